@@ -30,6 +30,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
         "ghdlsynth_top": {"type": "str", "desc": "VHDL unit to translate, [library.]unit (default: the toplevel)"},
         "ghdlsynth_std": {"type": "str", "desc": "VHDL standard (default: 08 if a file has it, else 93)"},
         "ghdlsynth_options": {"type": "str", "desc": "Additional options for ghdl --synth", "list": True},
+        "ghdlsynth_refuse_loops": {"type": "bool", "desc": "Report combinational loops as errors"},
     }
 
     def setup(self, edam: dict[str, Any]) -> None:
@@ -50,6 +51,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
             std=self.tool_options.get("ghdlsynth_std") or _standard(sources),
             options=self.tool_options.get("ghdlsynth_options", []),
             programs=_programs(edam),
+            refuses_loops=bool(self.tool_options.get("ghdlsynth_refuse_loops")),
         )
         output = self.translation.output
         self.commands = EdaCommands()

@@ -23,6 +23,7 @@ from typing import Any
 
 from fusesoc_firm.netlist import dump, lost_constants, verilog
 from fusesoc_firm.netlist.corrections import correct, doubts
+from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.netlist.model import LostMemoryError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.sources import LIBRARY, Copies, use_numbers
 from fusesoc_firm.tools.launcher import starts_everything
@@ -81,7 +82,7 @@ class Translation:
 
     `verilog` lists the sources that may define the modules for components without an entity; a later step links these
     sources. `programs` lists the known programs that read the netlist; if a program is missing, nothing is translated.
-    All paths are relative to the current folder.
+    If `refuses_loops` is set, a combinational loop is an error. All paths are relative to the current folder.
     """
 
     top: str
@@ -92,6 +93,7 @@ class Translation:
     std: str = "93"
     options: Sequence[str] = ()
     programs: Sequence[str] = ()
+    refuses_loops: bool = False
 
     def to_json(self) -> str:
         """Return the translation as a text that `from_json` reads."""
@@ -128,15 +130,7 @@ def translate(translation: Translation, folder: Path) -> str:
         raise NetlistError(explanation(absent))
     output = Path(translation.output)
     output.unlink(missing_ok=True)
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    ghdl = _Ghdl(translation, folder, Copies(folder / "copies"))
-    if is_copied := use_numbers(chain.from_iterable(translation.libraries.values())):
-        ghdl.run("-a", f"--work={LIBRARY}", str(ghdl.copies.write_package()))
-    for library, files in translation.libraries.items():
-        if files:
-            ghdl.run("-i", f"--work={library}", *(ghdl.copies.copy(files) if is_copied else files))
-    ghdl.run("-m", f"--work={translation.library}", translation.unit)
+    ghdl = _analysed(translation, folder)
     try:
         netlist, warnings = _netlist(ghdl)
     except LostMemoryError as error:
@@ -151,6 +145,28 @@ def translate(translation: Translation, folder: Path) -> str:
     return warnings
 
 
+def find_loops(translation: Translation, folder: Path) -> list[str]:
+    """Return a sentence for each combinational loop of a design, with GHDL's libraries in `folder`; write no netlist.
+
+    Raises `NetlistError`.
+    """
+    return loops(dump.read(_analysed(translation, folder).synthesise("dump")[0]))
+
+
+def _analysed(translation: Translation, folder: Path) -> _Ghdl:
+    """Return GHDL with all files in its libraries, which are in the emptied `folder`."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    ghdl = _Ghdl(translation, folder, Copies(folder / "copies"))
+    if is_copied := use_numbers(chain.from_iterable(translation.libraries.values())):
+        ghdl.run("-a", f"--work={LIBRARY}", str(ghdl.copies.write_package()))
+    for library, files in translation.libraries.items():
+        if files:
+            ghdl.run("-i", f"--work={library}", *(ghdl.copies.copy(files) if is_copied else files))
+    ghdl.run("-m", f"--work={translation.library}", translation.unit)
+    return ghdl
+
+
 def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     """Return the Verilog netlist and GHDL's relevant warnings."""
     text, warnings = ghdl.synthesise("dump")
@@ -158,6 +174,8 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     if lost:
         raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not match the VHDL"]))
     modules = dump.read(text)
+    if ghdl.translation.refuses_loops and (found := loops(modules)):
+        raise NetlistError("\n".join(found))
     components = _components(modules, ghdl.translation.verilog)
     # The second netlist supplies the generics, which the dump lacks.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}

@@ -1,6 +1,6 @@
 """`make bench`: measure, print the tables, write docs/figures and the areas of Manager and schedulers.
 
-    python -m tests.bench [PART ...] [--seed N] [--broken N]
+    python -m tests.bench [PART ...] [--seed N] [--broken N] [--row PATTERN] [--seeds N ...]
 
 Progress goes to the standard error, tables to the standard output. The exit code is 1 if a design cannot be measured,
 a converter fails or a bar is missed; messages that are not converted yet are none of these.
@@ -22,6 +22,7 @@ from tests.bench import (
     images,
     links,
     live,
+    loops,
     manager,
     replay,
     simulators,
@@ -31,7 +32,7 @@ from tests.bench import (
     use,
 )
 from tests.bench.areas import write_areas
-from tests.bench.nextpnr import Nextpnr
+from tests.bench.nextpnr import SEEDS, Nextpnr
 from tests.bench.tables import Table
 from tests.bench.yosys import Yosys
 
@@ -46,6 +47,15 @@ def main() -> int:
     parser.add_argument(
         "--broken", type=int, default=fuzz.BROKEN_FRAMES, help="broken frames for each converter (default: %(default)s)"
     )
+    parser.add_argument(
+        "--row",
+        default="",
+        metavar="PATTERN",
+        help="for timing and loops: only rows whose names match, such as 'Image.* 64 bits'",
+    )
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"
+    )
     arguments = parser.parse_args()
     if unknown := set(arguments.parts) - set(figures.parts()):
         parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(figures.parts())}")
@@ -54,7 +64,7 @@ def main() -> int:
     for part in figures.parts():
         if arguments.parts and part not in arguments.parts:
             continue
-        tables = _measure(part, arguments.seed, arguments.broken)
+        tables = _measure(part, arguments)
         is_good = is_good and all(table.is_good for table in tables)
         sections[part] = figures.section(part, tables)
         print(sections[part], flush=True)
@@ -64,11 +74,13 @@ def main() -> int:
     return 0 if is_good else 1
 
 
-def _measure(part: str, seed: int, broken: int) -> list[Table]:
+def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
+    seed, broken = arguments.seed, arguments.broken
     measures: dict[str, Callable[[], list[Table]]] = {
         "area": lambda: area.measure(Yosys(), _tell),
         "manager": lambda: manager.measure(Yosys(), _tell),
-        "timing": lambda: timing.measure(Nextpnr(Yosys()), _tell),
+        "timing": lambda: timing.measure(Nextpnr(Yosys()), _tell, figures.written(), arguments.row, arguments.seeds),
+        "loops": lambda: loops.measure(seed, _tell, figures.written(), arguments.row),
         "use": lambda: use.measure(seed, _tell),
         "cycles": lambda: cycles.measure(seed, _tell),
         "fuzz": lambda: fuzz.measure(seed, _tell, broken),

@@ -19,6 +19,7 @@ from tests.bench import (
     images,
     links,
     live,
+    loops,
     manager,
     nextpnr,
     replay,
@@ -46,7 +47,12 @@ class Page:
 
 
 PAGES = (
-    Page("converters", "Figures of converters", "area, cycles and broken frames", ("area", "cycles", "fuzz")),
+    Page(
+        "converters",
+        "Figures of converters",
+        "area, cycles, broken frames and loops",
+        ("area", "cycles", "fuzz", "loops"),
+    ),
     Page(
         "manager",
         "Figures of the Manager and the schedulers",
@@ -64,6 +70,7 @@ _HEADINGS = {
     "use": "Channel use",
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
+    "loops": "Combinational loops",
     "images": "Images",
     "links": "Links and crossings",
     "applications": "Applications",
@@ -81,13 +88,17 @@ _METHODS = {
         reported by Vivado for an UltraScale+.""",
     "manager": "LUT and FF are counted as in [Area](converters.md#area).",
     "timing": f"""The tables list the clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and
-        nextpnr (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. With another
-        seed, the figures differ by a few percent.""",
+        nextpnr (`{nextpnr.DEVICE}`), in a harness with registers at all ports. MHz is the median of the seeds of the
+        placement, {", ".join(map(str, nextpnr.SEEDS))} unless fewer are listed. LUT4 and FF do not include the harness;
+        a carry cell counts as the two LUT4 that it occupies.
+        `make bench BENCH='timing --row "Image.* 64 bits"'` measures only the rows whose names match. A design that is
+        unchanged since its last measurement is not placed again.""",
     "use": "The beats are counted in the cycle-exact models of the schedulers.",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
         not be delivered.""",
+    "loops": """GHDL's netlist is searched bit by bit, as [`lint`](../reference/netlist.md) does.""",
     "images": """The accelerators of specs/image_pipeline and specs/sobel are measured on their own: LUT/FF as in
         [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
     "links": "LUT and FF are counted as in [Area](converters.md#area).",
@@ -127,6 +138,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         use,
         cycles,
         fuzz,
+        loops,
         images,
         links,
         applications,
@@ -174,6 +186,8 @@ def _versions(part: str) -> str:
         return ", ".join([f"Python {platform.python_version()}", *map(_package, packages)])
     if part == "builds":
         return f"Python {platform.python_version()}, {_package('fusesoc')} and two processors"
+    if part == "loops":
+        return f"{_first_line('ghdl')}, {_package('rosbags')}"
     if part == "use":
         return f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}"
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]

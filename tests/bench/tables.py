@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from fusesoc_firm.scheduling.tables import grid
 
 NOT_CONVERTED = "not converted"
+NOT_MEASURED = "not measured"
 MET, MISSED, FAILED = "met", "MISSED", "FAILED"
 
 _LINE_LENGTH = 100
@@ -40,6 +42,16 @@ class Table:
         kept = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
         rows = (tuple(row[index] for index in kept) for row in self.rows)
         return Table(self.title, tuple(self.columns[index] for index in kept), tuple(rows), self.note)
+
+
+def known_rows(text: str, title: str, columns: Sequence[str]) -> dict[tuple[str, ...], tuple[str, ...]]:
+    """The rows of a table in a text, by their cells in the first two columns; columns without entries are restored."""
+    found = re.search(rf"^### {re.escape(title)}\n\n((?:\|.*\n)+)", text, re.MULTILINE)
+    if not found:
+        return {}
+    heading, _, *lines = ([cell.strip() for cell in line.strip("|").split("|")] for line in found[1].splitlines())
+    rows = (dict(zip(heading, line, strict=True)) for line in lines)
+    return {(cells[0], cells[1]): cells for cells in (tuple(row.get(name, "") for name in columns) for row in rows)}
 
 
 def filled(text: str) -> str:

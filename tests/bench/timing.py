@@ -1,10 +1,14 @@
-"""How fast the clock may be: of schedulers and of the Manager with one, placed and routed on an ECP5."""
+"""How fast the clock may be: of converters, whole systems, schedulers and the Manager, placed and routed on an ECP5.
+
+Each row can be measured alone. The others then keep the figures of docs/figures, or are marked as not measured.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,111 +16,237 @@ from pathlib import Path
 from fusesoc_firm.scheduling.policies import POLICIES
 from fusesoc_firm.text.render import render
 from tests.bench import schedulers
+from tests.bench.applications import NotBuiltError, netlist_of
 from tests.bench.area import Subject
-from tests.bench.nextpnr import Nextpnr
-from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
+from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, generate
+from tests.bench.nextpnr import SEEDS, Nextpnr, Placement
+from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.bench.yosys import SynthesisError
+from tests.converter.simulated.pass_through import PassThrough
 from tests.hdl.ghdl import GhdlError, Library, core_files
+from tests.hdl.verilog import netlist
+from tests.system.simulated.systems import RUNTIME, generate_system
 
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.
 BARS = {32: 100.0, 256: 80.0}
+LOOP_BARS = {32: (125.0, 150.0), 256: (100.0, 125.0)}
 MANAGER_WIDTH = 8
 
+_CONVERTERS_TITLE = "Converters of ROS 2 messages, MHz"
+_SYSTEMS_TITLE = "Clock of whole systems, MHz"
 _SCHEDULERS_TITLE = "Schedulers, MHz"
-_MANAGER_TITLE = f"Manager without scheduler, {MANAGER_WIDTH} bits, MHz"
+_MANAGER_TITLE = f"Manager without its scheduler, {MANAGER_WIDTH} bits, MHz"
 _LOOP_TITLE = f"Manager with its scheduler, {MANAGER_WIDTH} bits, MHz"
-_COLUMNS = ("design", *(f"N = {channels}" for channels in CHANNELS), "bar", "result")
-_BAR = ", ".join(f"{bar:.0f} at {channels}" for channels, bar in BARS.items())
+_COLUMNS = ("design", "bits", "MHz", "of each seed", "LUT4", "FF", "bar", "result", "stretch")
+_NOTES = {
+    _SYSTEMS_TITLE: """In the systems of a subscriber and a publisher for each message, messages are passed through. The
+        others are the demo systems.""",
+    _LOOP_TITLE: "The path from a grant through the Manager and back to the scheduler is included.",
+}
 
-# The simplest one has no more than the loop itself.
-_POLICIES_IN_LOOP = ("fixed_priority",)
+JOINT_STATE, IMAGE, POSE = "sensor_msgs/JointState", "sensor_msgs/Image", "geometry_msgs/Pose"
+_VARIABLE = (IMAGE, "nav_msgs/Odometry", "sensor_msgs/PointCloud2", "diagnostic_msgs/DiagnosticArray")
+# Bar and stretch in MHz, by message and width: of the subscriber, then of the publisher.
+_CONVERTERS: Mapping[tuple[str, int], tuple[tuple[float, float | None], tuple[float, float | None]]] = {
+    (JOINT_STATE, 64): ((120, 160), (130, 160)),
+    (JOINT_STATE, 128): ((110, 140), (110, 140)),
+    (IMAGE, 128): ((115, 150), (125, 150)),
+    **{(message, width): ((120, 160), (120, 160)) for message in _VARIABLE for width in (8, 64)},
+    # The publisher is not to become slower than it was before others were pipelined.
+    (POSE, 64): ((180, None), (281, None)),
+}
+# The messages that are passed through, width, bar and stretch.
+_PASSED = (
+    ((IMAGE, POSE), 64, 110.0, 150.0),
+    ((IMAGE, POSE), 8, 130.0, 150.0),
+    ((JOINT_STATE, IMAGE, POSE), 64, 105.0, 140.0),
+)
+_DEMOS = {
+    "quat2euler": (125.0, 150.0),
+    **dict.fromkeys(("mobile_robot", "sobel", "image_pipeline", "robotic_arm"), (100.0, 125.0)),
+}
 _LOOP_ENTITY = "manager_loop"
 
-Make = Callable[[Path, int], Subject]
+
+@dataclass(frozen=True)
+class Design:
+    """A netlist in Verilog, and its top level."""
+
+    verilog: str
+    top: str
 
 
 @dataclass(frozen=True)
 class Row:
-    """A placed subject; `make` analyses it in an empty folder, for a number of channels."""
+    """A placed design; `make` makes it in an empty folder. `width` is in bits, `bar` and `stretch` are in MHz."""
 
     label: str
-    make: Make
+    width: int | None
+    make: Callable[[Path], Design]
+    bar: float | None = None
+    stretch: float | None = None
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The cells that tell it from other rows of its table."""
+        return (self.label, str(self.width or ""))
+
+    @property
+    def name(self) -> str:
+        """How a user names it."""
+        return ", ".join(filter(None, (self.label, f"{self.width} bits" if self.width else "")))
 
 
 def rows() -> dict[str, list[Row]]:
     """All rows by the title of their table."""
     return {
+        _CONVERTERS_TITLE: [*_converters()],
+        _SYSTEMS_TITLE: [*_systems()],
         _SCHEDULERS_TITLE: [*_schedulers()],
-        _MANAGER_TITLE: [Row("firm_manager", _manager)],
-        _LOOP_TITLE: [Row(policy, _loop(policy)) for policy in _POLICIES_IN_LOOP],
+        _MANAGER_TITLE: [*_managers()],
+        _LOOP_TITLE: [*_loops()],
     }
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
-    return {title: [(row.label,) for row in found] for title, found in rows().items()}
+    return {title: [row.key for row in found] for title, found in rows().items()}
 
 
-def measure(nextpnr: Nextpnr, tell: Tell) -> list[Table]:
-    """Place everything; `tell` hears of each design."""
+def measure(
+    nextpnr: Nextpnr, tell: Tell, written: str = "", pattern: str = "", seeds: Sequence[int] = SEEDS
+) -> list[Table]:
+    """Place the rows whose names match the regular expression `pattern`; `tell` hears of each.
+
+    The other rows are taken from the text `written` of docs/figures.
+    """
     table_rows = rows()
-    wanted = [(row, channels) for found in table_rows.values() for row in found for channels in CHANNELS]
+    wanted = [row for found in table_rows.values() for row in found if re.search(pattern, row.name)]
 
-    def outcome(one: tuple[Row, int]) -> float | str:
-        row, channels = one
-        found = _outcome(row, channels, nextpnr)
-        tell(f"{row.label}, N = {channels}: {found if isinstance(found, str) else f'{found:.1f} MHz'}")
-        return found
+    def measured(row: Row) -> tuple[str, ...]:
+        found = _placed(row, nextpnr, seeds)
+        tell(f"{row.name}: {found if isinstance(found, str) else _summary(found)}")
+        return _cells(row, found)
 
     nextpnr.prepare()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        outcomes = list(pool.map(outcome, wanted))
-    found = {(id(row), channels): fmax for (row, channels), fmax in zip(wanted, outcomes, strict=True)}
-    return [
-        Table(title, _COLUMNS, tuple(_cells(row, [found[id(row), each] for each in CHANNELS]) for row in of_table))
-        for title, of_table in table_rows.items()
-    ]
+        cells = dict(zip(map(id, wanted), pool.map(measured, wanted), strict=True))
+    tables = []
+    for title, of_table in table_rows.items():
+        known = known_rows(written, title, _COLUMNS)
+        lines = (cells.get(id(row)) or known.get(row.key) or _not_measured(row) for row in of_table)
+        tables.append(Table(title, _COLUMNS, tuple(lines), _NOTES.get(title, "")))
+    return tables
 
 
-def _outcome(row: Row, channels: int, nextpnr: Nextpnr) -> float | str:
-    """Return MHz, or the error."""
+def _placed(row: Row, nextpnr: Nextpnr, seeds: Sequence[int]) -> Placement | str:
+    """Return the placement, or the error."""
     with tempfile.TemporaryDirectory() as name:
         try:
-            subject = row.make(Path(name), channels)
-            netlist = subject.library.synthesise(subject.entity, subject.generics, "verilog")
-            return nextpnr.fmax(netlist, subject.entity)
-        except (GhdlError, SynthesisError) as error:
+            design = row.make(Path(name))
+            return nextpnr.place(design.verilog, design.top, seeds)
+        except (GhdlError, SynthesisError, NotBuiltError) as error:
             return f"{FAILED}: {error}"
 
 
-def _cells(row: Row, found: list[float | str]) -> tuple[str, ...]:
-    figures = [FAILED if isinstance(fmax, str) else f"{fmax:.0f}" for fmax in found]
-    if FAILED in figures:
-        return (row.label, *figures, _BAR, FAILED)
-    fmax_of = dict(zip(CHANNELS, found, strict=True))
-    is_met = all(float(fmax_of[channels]) >= bar for channels, bar in BARS.items())
-    return (row.label, *figures, _BAR, MET if is_met else MISSED)
+def _summary(found: Placement) -> str:
+    return f"{found.median:.1f} MHz ({_of_seeds(found)}), {found.cells}; slowest: {' > '.join(found.path)}"
+
+
+def _of_seeds(found: Placement) -> str:
+    return " ".join(f"{fmax:.0f}" for fmax in found.fmax.values())
+
+
+def _cells(row: Row, found: Placement | str) -> tuple[str, ...]:
+    bar, stretch = (f"{limit:.0f}" if limit else "" for limit in (row.bar, row.stretch))
+    if isinstance(found, str):
+        return (*row.key, "", "", "", "", bar, FAILED, stretch)
+    verdict = "" if row.bar is None else MET if found.median >= row.bar else MISSED
+    cells = (str(found.cells.lut), str(found.cells.ff))
+    return (*row.key, f"{found.median:.1f}", _of_seeds(found), *cells, bar, verdict, stretch)
+
+
+def _not_measured(row: Row) -> tuple[str, ...]:
+    *cells, _, stretch = _cells(row, FAILED)
+    return (*cells, NOT_MEASURED, stretch)
+
+
+def _converters() -> Iterator[Row]:
+    for (message, width), limits in _CONVERTERS.items():
+        for direction, (bar, stretch) in zip((SUBSCRIBER, PUBLISHER), limits, strict=True):
+            converter = Converter(2, message, direction, width)
+            yield Row(str(converter), width, _converter(converter), bar, stretch)
+
+
+def _converter(converter: Converter) -> Callable[[Path], Design]:
+    def make(folder: Path) -> Design:
+        (design,) = generate(folder, converter)
+        return _synthesised(Subject(design.library, design.entity))
+
+    return make
+
+
+def _systems() -> Iterator[Row]:
+    for messages, width, bar, stretch in _PASSED:
+        label = " + ".join(message.partition("/")[2] for message in messages)
+        yield Row(f"pass-through {label}", width, _passed(messages, width), bar, stretch)
+    for name, (bar, stretch) in _DEMOS.items():
+        yield Row(name, None, _demo(name), bar, stretch)
+
+
+def _passed(messages: Sequence[str], width: int) -> Callable[[Path], Design]:
+    def make(folder: Path) -> Design:
+        specification = PassThrough("humble", messages, count=0, seed=0, width=width).specification(folder)
+        work = generate_system(specification, folder / "system")
+        file = netlist(work[-1].stem, folder, work, core_files(*RUNTIME))
+        return Design(file.read_text(encoding="utf-8"), work[-1].stem)
+
+    return make
+
+
+def _demo(name: str) -> Callable[[Path], Design]:
+    def make(_: Path) -> Design:
+        found = netlist_of(name)
+        return Design(found.verilog, found.top)
+
+    return make
 
 
 def _schedulers() -> Iterator[Row]:
     for policy in POLICIES:
-        yield Row(policy, _scheduler(policy))
+        for channels in CHANNELS:
+            yield Row(_label(policy, channels), None, _scheduler(policy, channels), BARS.get(channels))
 
 
-def _scheduler(policy: str) -> Make:
-    return lambda folder, channels: Subject(*schedulers.analysed(folder, policy, channels))
+def _scheduler(policy: str, channels: int) -> Callable[[Path], Design]:
+    return lambda folder: _synthesised(Subject(*schedulers.analysed(folder, policy, channels)))
 
 
-def _manager(folder: Path, channels: int) -> Subject:
-    library = Library("firm", folder)
-    library.analyse(core_files("axis/package", "axis/axis", "manager/manager"))
-    generics = {"WIDTH": MANAGER_WIDTH, "SUBSCRIBERS": channels, "PUBLISHERS": channels}
-    return Subject(library, "firm_manager", generics)
+def _managers() -> Iterator[Row]:
+    for channels in CHANNELS:
+        yield Row(_label("firm_manager", channels), None, _manager(channels), BARS.get(channels))
 
 
-def _loop(policy: str) -> Make:
-    def make(folder: Path, channels: int) -> Subject:
+def _manager(channels: int) -> Callable[[Path], Design]:
+    def make(folder: Path) -> Design:
+        library = Library("firm", folder)
+        library.analyse(core_files("axis/package", "axis/axis", "manager/manager"))
+        generics = {"WIDTH": MANAGER_WIDTH, "SUBSCRIBERS": channels, "PUBLISHERS": channels}
+        return _synthesised(Subject(library, "firm_manager", generics))
+
+    return make
+
+
+def _loops() -> Iterator[Row]:
+    for policy in POLICIES:
+        for channels in CHANNELS:
+            bar, stretch = LOOP_BARS.get(channels, (None, None))
+            yield Row(_label(f"Manager, {policy}", channels), None, _loop(policy, channels), bar, stretch)
+
+
+def _loop(policy: str, channels: int) -> Callable[[Path], Design]:
+    def make(folder: Path) -> Design:
         library, scheduler = schedulers.analysed(folder, policy, channels)
         Library("firm", folder).analyse(core_files("manager/manager"))
         file = folder / f"{_LOOP_ENTITY}.vhd"
@@ -127,6 +257,14 @@ def _loop(policy: str) -> Make:
         }
         file.write_text(render(file.name, configuration, Path(__file__).parent), encoding="ascii")
         library.analyse([file])
-        return Subject(library, _LOOP_ENTITY, {"WIDTH": MANAGER_WIDTH, "CHANNELS": channels})
+        return _synthesised(Subject(library, _LOOP_ENTITY, {"WIDTH": MANAGER_WIDTH, "CHANNELS": channels}))
 
     return make
+
+
+def _label(design: str, channels: int) -> str:
+    return f"{design}, N = {channels}"
+
+
+def _synthesised(subject: Subject) -> Design:
+    return Design(subject.library.synthesise(subject.entity, subject.generics, "verilog"), subject.entity)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.netlist.translation import Translation, translate
+from fusesoc_firm.netlist.translation import Translation, find_loops, translate
 from fusesoc_firm.request.request import Request
 from fusesoc_firm.simulation import simulation_core
 from fusesoc_firm.system import system_core
@@ -77,6 +77,12 @@ def netlist(
     )
     translate(translation, folder / f"{top}.ghdl")
     return output
+
+
+def loops(top: str, folder: Path, work: Sequence[Path], firm: Sequence[Path] = ()) -> list[str]:
+    """The combinational loops of the entity `top`, a sentence for each. Raises `NetlistError`."""
+    libraries = {"firm": list(map(str, firm)), "work": list(map(str, work))}
+    return find_loops(Translation(top, "", libraries, {}), folder / f"{top}.ghdl")
 
 
 def build(request: Request, folder: Path, *cores: str) -> Icarus:

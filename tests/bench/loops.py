@@ -1,0 +1,138 @@
+"""Combinational loops: of every message that is passed through, and of random systems. None is allowed."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.netlist.model import NetlistError
+from fusesoc_firm.system.scaffold.skeleton import missing_sources
+from fusesoc_firm.system.system_core import load_system
+from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
+from tests.converter.simulated.pass_through import PassThrough, systems_of_all
+from tests.hdl.ghdl import core_files
+from tests.hdl.verilog import loops
+from tests.random_systems import random_system
+from tests.system.simulated.systems import RUNTIME, generate_system
+
+TITLE = "Combinational loops"
+DISTRIBUTIONS, WIDTHS = ("noetic", "humble"), (8, 64)
+RANDOM_SYSTEMS = 500
+BAR = 0
+
+_COLUMNS = ("design", "bits", "number", "loops", "bar", "result")
+_NOTE = """
+    Each message of a distribution has a subscriber that is connected to a publisher. Random systems have widths of
+    their own, and first versions of accelerators, in which an input's ready depends on the outputs'.
+    """
+# A random system has so many blocks at least and at most.
+_FEWEST, _MOST = 3, 12
+
+
+@dataclass(frozen=True)
+class Row:
+    """Designs that are searched: each part returns a sentence for each of its loops, and works in an empty folder."""
+
+    label: str
+    width: str
+    number: int
+    parts: Sequence[Callable[[Path], list[str]]]
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The cells that tell it from other rows."""
+        return (self.label, self.width)
+
+    @property
+    def name(self) -> str:
+        """How a user names it."""
+        return ", ".join(filter(None, (self.label, self.width and f"{self.width} bits")))
+
+
+def rows(seed: int, random_systems: int = RANDOM_SYSTEMS) -> Iterator[Row]:
+    """All rows; random systems are drawn by `seed`."""
+    for distribution in DISTRIBUTIONS:
+        systems = systems_of_all(distribution, 0, seed)
+        for width in WIDTHS:
+            parts = [_passed(distribution, system.names, width) for system in systems]
+            number = sum(len(system.names) for system in systems)
+            yield Row(f"messages of {distribution}", str(width), number, parts)
+    yield Row("random systems", "", random_systems, [_random(seed + number) for number in range(random_systems)])
+
+
+def keys() -> dict[str, list[tuple[str, ...]]]:
+    """The first cells of every row, by table."""
+    messages = [(f"messages of {distribution}", str(width)) for distribution in DISTRIBUTIONS for width in WIDTHS]
+    return {TITLE: [*messages, ("random systems", "")]}
+
+
+def measure(seed: int, tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
+    """Search the designs of rows whose names match the regular expression `pattern`; `tell` hears of each loop.
+
+    The other rows are taken from the text `written` of docs/figures.
+    """
+    known = known_rows(written, TITLE, _COLUMNS)
+    lines = []
+    for row in rows(seed):
+        if re.search(pattern, row.name):
+            lines.append(_cells(row, tell))
+        else:
+            lines.append(known.get(row.key) or (*row.key, str(row.number), "", str(BAR), NOT_MEASURED))
+    return [Table(TITLE, _COLUMNS, tuple(lines), _NOTE)]
+
+
+def _cells(row: Row, tell: Tell) -> tuple[str, ...]:
+    try:
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            found = [sentence for part in pool.map(_searched, row.parts) for sentence in part]
+    except NetlistError as error:
+        tell(f"{row.name}: {error}")
+        return (row.label, row.width, str(row.number), "", str(BAR), FAILED)
+    for sentence in found:
+        tell(f"{row.name}: {sentence}")
+    tell(f"{row.name}: {len(found)} loops")
+    return (row.label, row.width, str(row.number), str(len(found)), str(BAR), MET if len(found) <= BAR else MISSED)
+
+
+def _searched(part: Callable[[Path], list[str]]) -> list[str]:
+    with tempfile.TemporaryDirectory() as name:
+        return part(Path(name))
+
+
+def _passed(distribution: str, names: Sequence[str], width: int) -> Callable[[Path], list[str]]:
+    return lambda folder: loops_of_messages(PassThrough(distribution, names, 0, 0, width), folder)
+
+
+def _random(seed: int) -> Callable[[Path], list[str]]:
+    return lambda folder: loops_of_random_system(seed, folder)
+
+
+def loops_of_messages(system: PassThrough, folder: Path) -> list[str]:
+    """The loops of messages that are passed through."""
+    return _loops(generate_system(system.specification(folder), folder / "system"), folder)
+
+
+def loops_of_random_system(seed: int, folder: Path) -> list[str]:
+    """The loops of a random system, whose accelerators are first versions."""
+    chance = random.Random(seed)
+    blocks = chance.randint(_FEWEST, _MOST)
+    specification = folder / "spec.yaml"
+    specification.write_text(random_system(chance, blocks, max(2, blocks // 2)).text, encoding="utf-8")
+    libraries = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
+    system = load_system(specification, libraries, needs_sources=False).system
+    for path, text in missing_sources(system, folder).items():
+        path.write_text(text, encoding="utf-8")
+    return [f"seed {seed}: {sentence}" for sentence in _loops(generate_system(specification, folder / "core"), folder)]
+
+
+def _loops(work: Sequence[Path], folder: Path) -> list[str]:
+    found = loops(work[-1].stem, folder, work, core_files(*RUNTIME))
+    return [sentence.replace(f"{folder}/", "") for sentence in found]

@@ -1,0 +1,40 @@
+"""A system whose accelerator closes a combinational loop: `lint` names the accelerator's ports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.hdl.ghdl import core_files
+from tests.hdl.verilog import loops
+from tests.system.simulated.systems import DATA, RUNTIME, generate_system
+from tests.system.simulated.test_variable_system import IMAGE, converter, image_accelerator
+
+FORWARDED = "out_data_axis_tvalid            <= in_data_axis_tvalid;"
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_a_valid_that_waits_for_its_ready_is_named(tmp_path: Path, waits: bool) -> None:
+    source = (DATA / "invert.vhd").read_text(encoding="ascii")
+    assert FORWARDED in source
+    waiting = FORWARDED.replace(";", " and out_data_axis_tready;")
+    (tmp_path / "invert.vhd").write_text(source.replace(FORWARDED, waiting) if waits else source, encoding="ascii")
+    blocks = [
+        converter("sub", "subscriber", IMAGE, "acc"),
+        {"name": "acc", "type": "invert", "outgoing": [{"name": "pub"}]},
+        converter("pub", "publisher", IMAGE),
+    ]
+    content = {
+        "project": {"name": "loopy"},
+        "accelerators": [image_accelerator(length="given")],
+        "blocks": blocks,
+    }
+    (tmp_path / "system.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    work = generate_system(tmp_path / "system.yaml", tmp_path / "work")
+    said = loops(work[-1].stem, tmp_path, work, core_files(*RUNTIME))
+    assert len(said) == waits, said
+    if said:
+        assert "'out_data_axis_tvalid' of 'u_acc' depends on its 'out_data_axis_tready', which depends on it" in said[0]
+        assert "'u_pub' (from 'data_axis_tvalid' to 'data_axis_tready')" in said[0]
