@@ -44,7 +44,7 @@ SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw)
 # The path of the waves is printed after a failed run, too.
 SAY_WAVES = $(if $(WAVES),trap 'ls -t build/*/sim/waves.ghw | sed -n "1s/^/waves: /p"' EXIT;)
 # A host in Verilog takes its seed from FuseSoC.
-RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 is for GHDL, TARGET=sim))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
+RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 requires GHDL (TARGET=sim)))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
 
 # ROS 1 for a node and its peers, from Debian: programs, libraries, and modules of Debian's own Python.
 DEBIAN_MODULES := /usr/lib/python3/dist-packages
@@ -57,7 +57,7 @@ FUZZ_OPTIONS ?=
 
 # Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip would hide error messages.
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
-  { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
+  { cat $(1)/pip.log >&2; echo "pip could not install $(2); see the message above." >&2; exit 1; }
 
 .PHONY: help sim test check docs ros bitstream bench matrix proofs policies corpus fuzz-netlist lint licences setup tools clean distclean
 
@@ -77,24 +77,24 @@ test check: TOOLS = $(TEST_TOOLS)
 test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
-check: setup ros lint ## Run what takes longer: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'
+check: setup ros lint ## Run the longer tests: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest -m "check and not thorough" $(PYTEST_OPTIONS)
 
 docs: TOOLS = dot:graphviz
-docs: tools $(VENV)/.extra-docs ## Run the commands of the pages, build their site in build/docs; DOCS=--update writes their output into the pages
+docs: tools $(VENV)/.extra-docs ## Run the commands in the documentation, build the site in build/docs; DOCS=--update updates their output in the pages
 	@$(BIN)/python -m tests.pages $(DOCS)
 	@$(BIN)/zensical build --clean --strict
 	@echo "The site: build/docs/index.html"
 
 # Some tests need both, and are skipped without them.
 ros: $(VENV)/.ros2
-	@./.ci/install-tools $(ROS1) >/dev/null || echo "No ROS 1: the tests with it are skipped" >&2
+	@./.ci/install-tools $(ROS1) >/dev/null || echo "ROS 1 is missing: tests that need it are skipped" >&2
 
 HAS_CORPUS := $(and $(wildcard $(CORPUS)/ros1),$(wildcard $(CORPUS)/ros2))
 
 corpus: $(if $(HAS_CORPUS),setup) ## Verify the converters of all messages below CORPUS; VERIFY_OPTIONS='--width 64 ...'
 ifeq ($(HAS_CORPUS),)
-	@echo "No corpus: '$(CORPUS)' has no folders ros1 and ros2 of message definitions; CORPUS=DIR names another place"
+	@echo "No corpus: '$(CORPUS)' does not contain the folders ros1 and ros2 with message definitions; set CORPUS=DIR"
 else
 	@status=0; mkdir -p build; \
 	for ros in 1 2; do \
@@ -116,7 +116,7 @@ bitstream: $(VENV)/.installed ## Build SYSTEM for BOARD (icebreaker, tangnano9k,
 	@$(BIN)/fusesoc run --setup --build --target=$(BOARD) $(FUSESOC_OPTIONS) $(SYSTEM)
 
 matrix: TOOLS = verilator
-matrix: tools $(VENV)/.extra-matrix ## Try each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' names more
+matrix: tools $(VENV)/.extra-matrix ## Test each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' adds more
 	@$(BIN)/python -m tests.matrix $(PYTHONS)
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/figures/proofs.md
@@ -129,7 +129,7 @@ fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
 	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
-lint: setup $(VENV)/.extra-lint ## Check style and types: Python, and VHDL, also a sample of what is generated
+lint: setup $(VENV)/.extra-lint ## Check style and types of Python and VHDL, including a sample of generated VHDL
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 	@$(BIN)/python .ci/lint_vhdl.py
@@ -137,10 +137,10 @@ lint: setup $(VENV)/.extra-lint ## Check style and types: Python, and VHDL, also
 # All extras, since all of them are listed.
 licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
 licences: TOOLS = $(TEST_TOOLS)
-licences: tools ros ## List what the project depends on and under which licences, in docs/reference/licences.md
+licences: tools ros ## List the project's dependencies and their licences in docs/reference/licences.md
 	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 
-setup: tools $(VENV)/.extra-test ## Install what the other targets need: programs by apt, Python packages into .venv
+setup: tools $(VENV)/.extra-test ## Install the programs (with apt) and Python packages (into .venv) that other targets need
 
 tools:
 	@./.ci/install-tools $(TOOLS) >/dev/null
@@ -168,9 +168,9 @@ $(VENV)/.ros2: tests/ros/ros2.txt $(VENV)/.installed
 	  ./.ci/install-tools $$("$$python" -c 'from sys import version_info as v; from ctypes.util import find_library as f; \
 	    name = f"python{v[0]}.{v[1]}"; print("" if f(name) else f"lib{name}")') >/dev/null && \
 	  $(VENV)/ros2/bin/pip install --quiet --disable-pip-version-check --requirement $< && touch $@ || \
-	  echo "No ROS 2: the tests with it are skipped" >&2
+	  echo "ROS 2 is missing: tests that need it are skipped" >&2
 
-clean: ## Remove what was built; .venv stays
+clean: ## Remove everything that was built, except .venv
 	@find build -mindepth 1 -maxdepth 1 ! -name FUSESOC_IGNORE -exec rm -rf {} +
 	@rm -rf dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 

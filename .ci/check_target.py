@@ -24,7 +24,7 @@ def check(core: str, target: str, flows: Collection[str]) -> str:
         fitting = ", ".join(name for name, flow in flow_of.items() if flow in flows)
         fail(
             f"target '{target}' of {found.name} has the flow '{flow_of[target]}', not {' or '.join(flows)}",
-            hint=f"with such a flow it has: {fitting or 'none'}",
+            hint=f"its targets with such a flow: {fitting or 'none'}",
         )
     return flow_of[target]
 

@@ -184,7 +184,8 @@ def main(arguments: Sequence[str]) -> int:
         made = samples()
         found = violations(hand_written(), HAND_WRITTEN) + violations(made, GENERATED)
         found += [
-            f"{path.relative_to(ROOT)}:1: no sample uses it: add one in {__file__}" for path in unused_templates(made)
+            f"{path.relative_to(ROOT)}:1: no sample uses this file; add a sample in {__file__}"
+            for path in unused_templates(made)
         ]
     print(*found, sep="\n", end="\n" if found else "")
     return 1 if found else 0

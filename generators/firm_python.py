@@ -71,8 +71,8 @@ def _warn_of_another_version(command: str) -> None:
     version = name.strip().rpartition(":")[2]
     if version != __version__:
         print(
-            f"{command}: warning: the library in {folder} is of version {version}, fusesoc-firm in {sys.prefix} of "
-            f"{__version__}\n      = 'firm path' prints the folder of the installed package's library",
+            f"{command}: warning: the library in {folder} has version {version}, but fusesoc-firm in {sys.prefix} has "
+            f"version {__version__}\n      = 'firm path' prints the folder of the installed package's library",
             file=sys.stderr,
             flush=True,
         )
@@ -103,7 +103,8 @@ def _start_next(command: str, tried: list[str], left: list[str]) -> NoReturn:
     lines = "\n".join(f"  {python}" for python in tried)
     sys.exit(
         f"{command}: error: no Python with the packages {', '.join(_NEEDED)} was found. These were tried:\n{lines}\n"
-        f"Install fusesoc-firm beside FuseSoC, activate the environment that has it, or set {_CHOSEN} to its python3."
+        f"Install fusesoc-firm beside FuseSoC, activate an environment that contains fusesoc-firm, "
+        f"or set {_CHOSEN} to the python3 of such an environment."
     )
 
 

@@ -1,7 +1,8 @@
 """For all tests: their own store, this Python first on PATH, busy machines, ignored interrupts, a limit on waiting.
 
 How long something takes says nothing on a busy machine, so no test is ended for the time it takes. But it fails when it
-and all processes below it have waited for a minute (`waiting_limit`) without doing anything.
+and all processes below it have waited for a minute (`waiting_limit`) without doing anything. Waiting for a processor,
+which others have, counts as doing something.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ def _limited(item: pytest.Item) -> Iterator[None]:
 
     def look(*_: object) -> None:
         nonlocal looking
-        begun, now, done = time.process_time(), time.monotonic(), _processor_seconds() - looking
+        begun, now, done = time.process_time(), time.monotonic(), _busy_seconds() - looking
         looking += time.process_time() - begun
         if seen and now - seen[-1][0] > limit / 2:
             # The machine slept, or the test held the looks back.
@@ -139,10 +140,20 @@ def _limited(item: pytest.Item) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
 
-def _processor_seconds() -> float:
-    """What this process and all below it have taken."""
-    total = sum(os.times()[:4])
-    for process in psutil.Process().children(recursive=True):
+def _busy_seconds() -> float:
+    """Return how long this process and all below it have had a processor or have waited for one."""
+    this = psutil.Process()
+    total = sum(os.times()[:4]) + _seconds_in_queues(this.pid)
+    for process in this.children(recursive=True):
         with suppress(psutil.Error):
-            total += sum(process.cpu_times()[:4])
+            total += sum(process.cpu_times()[:4]) + _seconds_in_queues(process.pid)
     return total
+
+
+def _seconds_in_queues(pid: int) -> float:
+    """Return how long the threads of a process have waited for a processor: the second number of Linux's schedstat."""
+    nanoseconds = 0
+    for file in Path(f"/proc/{pid}/task").glob("*/schedstat"):
+        with suppress(OSError):  # the thread has ended
+            nanoseconds += int(file.read_text().split()[1])
+    return nanoseconds / 1e9

@@ -29,7 +29,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
     TOOL_OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
         "ghdlsynth_top": {"type": "str", "desc": "VHDL unit to translate, [library.]unit (default: the toplevel)"},
         "ghdlsynth_std": {"type": "str", "desc": "VHDL standard (default: 08 if a file has it, else 93)"},
-        "ghdlsynth_options": {"type": "str", "desc": "Additional options of ghdl --synth", "list": True},
+        "ghdlsynth_options": {"type": "str", "desc": "Additional options for ghdl --synth", "list": True},
         "ghdlsynth_refuse_loops": {"type": "bool", "desc": "Report combinational loops as errors"},
     }
 

@@ -1,4 +1,4 @@
-"""Routes the messages of a bag: each topic to the subscribers of a system."""
+"""Route the messages of a bag: each topic to the subscribers of a system."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ Message = tuple[Middleware, MessageName]
 
 @dataclass(frozen=True)
 class Route:
-    """The subscribers of a stream, and the reason if they cannot take its messages."""
+    """A stream's subscribers and, if they cannot accept the stream's messages, the reason."""
 
     subscribers: tuple[Topic, ...]
     misfit: str = ""
 
 
 def renamed(topics: Iterable[AnyTopic], names: Mapping[str, str]) -> list[AnyTopic]:
-    """Return the topics, with the topics of some blocks renamed to `names`."""
+    """Return the topics, with the topics of the blocks in `names` renamed."""
     return [replace(item, given_name=names.get(item.block, item.given_name)) for item in topics]
 
 
 def routes_of(
     bag: Bag, subscribers: Sequence[Topic], signatures: Mapping[Message, str] | None = None
 ) -> dict[Stream, Route]:
-    """The route of each stream that has one; either all streams of a topic have a route, or none.
+    """Return the routes by stream; either all streams of a topic have a route, or none of them.
 
-    A topic goes to all subscribers with the same topic name. A subscriber whose name is not in the bag takes the only
-    topic of its type, if it is the only such subscriber. `signatures` holds the known signatures of the system's
-    messages. Raises `InputError` with every topic that does not fit.
+    A topic is routed to all subscribers with the same topic name. A subscriber whose topic is not in the bag receives
+    the only topic of its type, if no other subscriber without a topic has this type. `signatures` contains the known
+    signatures of the system's messages. Raise `InputError` with every topic that does not fit.
     """
     return _Routing(bag, subscribers, signatures or {}).routes()
 
 
 @dataclass
 class _Routing:
-    """Computes routes."""
+    """The computation of routes from a bag's streams and a system's subscribers."""
 
     bag: Bag
     subscribers: Sequence[Topic]
@@ -73,7 +73,10 @@ class _Routing:
         return tuple(item for item in self.subscribers if item.name == absolute_name(topic))
 
     def _only_topic(self, subscriber: Topic, takers: Mapping[str, Sequence[Topic]]) -> str:
-        """The only topic that fits a subscriber whose name is not in the bag; empty if there is not exactly one."""
+        """Return the only topic that fits a subscriber whose name is not in the bag.
+
+        Return an empty string if there is not exactly one such topic.
+        """
         streams = self.bag.streams
         topics = [item.topic for item in streams if not takers[item.topic] and self._fits(item, subscriber)]
         rivals = [item for item in self.subscribers if _meant(item) == _meant(subscriber)]
@@ -81,47 +84,47 @@ class _Routing:
         if len(found) == len(rivals) == 1:
             return found[0]
         names = ", ".join(item.block for item in rivals)
-        hint = "name the topic like one of them, or give one the key 'topic'"
+        hint = "give the topic the name of one of these blocks, or add the key 'topic' to one of them"
         if len(rivals) > 1:
             for topic in found:
-                self.faults.error(f"topic {topic} of {self.bag.path} could go to {names}", hint=hint)
+                self.faults.error(f"topic {topic} in {self.bag.path} could go to several blocks: {names}", hint=hint)
         elif found:
-            self.faults.error(f"topics {', '.join(found)} of {self.bag.path} could go to {names}", hint=hint)
+            self.faults.error(f"several topics in {self.bag.path} could go to {names}: {', '.join(found)}", hint=hint)
         return ""
 
     def _fits(self, stream: Stream, subscriber: Topic) -> bool:
         return self._is_of(stream, subscriber) and self.bag.form.ros == subscriber.frame.ros
 
     def _is_of(self, stream: Stream, subscriber: Topic) -> bool:
-        """Whether a stream's message has the name of the subscriber's, in either version of ROS."""
+        """Return whether the messages of a stream and a subscriber have the same name, in either ROS version."""
         name = _message(stream)
         return name is not None and _present(name, self.bag.form.ros) == _meant(subscriber)
 
     def _check_versions(self, takers: Mapping[str, Sequence[Topic]]) -> None:
-        """Add a fault for each topic whose message the system takes only in the other ROS version."""
+        """Add a fault for each topic whose message the system accepts only from the other ROS version."""
         ros = self.bag.form.ros
         for stream in self.bag.streams:
             fitting = [item for item in self.subscribers if self._is_of(stream, item)]
             wrong = [item for item in takers[stream.topic] or fitting if item.frame.ros != ros]
             if wrong and not any(item.frame.ros == ros for item in fitting):
-                versions = f"is of {ros.title}, but '{wrong[0].block}' speaks {wrong[0].frame.ros.title}"
-                self.faults.error(f"topic {stream.topic} of {self.bag.path} {versions}")
+                versions = f"uses {ros.title}, but '{wrong[0].block}' uses {wrong[0].frame.ros.title}"
+                self.faults.error(f"topic {stream.topic} in {self.bag.path} {versions}")
 
     def _misfit(self, stream: Stream, subscribers: Sequence[Topic]) -> str:
-        """Why subscribers cannot take a stream that matches them by name; empty if they can."""
+        """Return the reason why subscribers cannot accept a stream with their topic's name, or an empty string."""
         for item in subscribers:
             wanted = item.frame.message
             if not self._is_of(stream, item):
-                return f"it is a {_spelled(stream)}, but '{item.block}' takes {wanted}"
+                return f"its type is {_spelled(stream)}, but '{item.block}' takes {wanted}"
             if item.frame.ros != self.bag.form.ros:
-                return f"it is of {self.bag.form.ros.title}, but '{item.block}' speaks {item.frame.ros.title}"
+                return f"it uses {self.bag.form.ros.title}, but '{item.block}' uses {item.frame.ros.title}"
             ours, theirs = self.signatures.get((item.frame.ros, wanted)), self._signatures(stream, wanted)
             if ours and theirs and ours not in theirs:
-                return f"its {wanted} differs from that of '{item.block}': {theirs[0]}, not {ours}"
+                return f"its definition of {wanted} differs from the one of '{item.block}': {theirs[0]}, not {ours}"
         return ""
 
     def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
-        """The bag's signatures for a message: the recorded one and, since some writers err, the definition's."""
+        """Return a message's signatures in the bag: the recorded one and, since it may be wrong, the definition's."""
         said = [stream.signature] if _is_signature(stream.signature) else []
         if stream.definition and (defined := signature_of_text(message, stream.definition, self.bag.form.ros)):
             said.append(defined)
@@ -129,7 +132,7 @@ class _Routing:
 
 
 def _message(stream: Stream) -> MessageName | None:
-    """The message of a stream; None if a specification cannot name it."""
+    """Return the name of a stream's message, or None if a specification cannot contain this name."""
     try:
         return parse_name(stream.type)
     except InputError:
@@ -141,7 +144,7 @@ def _meant(topic: Topic) -> MessageName:
 
 
 def _present(name: MessageName, ros: Middleware) -> MessageName:
-    """The current name of a message that may have been renamed."""
+    """Return the current name of a message that may have been renamed."""
     return ros.aliases.get(name, name)
 
 
@@ -150,19 +153,25 @@ def _spelled(stream: Stream) -> str:
 
 
 def _is_signature(text: str) -> bool:
-    """Whether the text is a signature; ROS 1 has `*` for any message, and old bags of ROS 2 have none."""
+    """Return whether a text is a signature.
+
+    ROS 1 uses `*` for any message, and old ROS 2 bags contain no signatures.
+    """
     return text.startswith("RIHS01_") or re.fullmatch(r"[0-9a-f]{32}", text) is not None
 
 
 def read_bag(
     path: Path, subscribers: Sequence[Topic], hint: str = BAGS
 ) -> Iterator[tuple[Topic, bytes, dict[str, Any]]]:
-    """Yield subscriber, payload and decoded message of all routed messages, in order of time. Raises `InputError`."""
+    """Yield the subscriber, payload and decoded value of each routed message, in the order of time.
+
+    May raise `InputError`.
+    """
     with open_bag(path, hint) as bag:
         routes = routes_of(bag, subscribers)
         for stream, route in routes.items():
             if route.misfit:
-                fail(f"topic {stream.topic} of {path}: {route.misfit}")
+                fail(f"topic {stream.topic} in {path}: {route.misfit}")
         for recorded in bag.messages({stream.topic for stream in routes}):
             for subscriber in routes[recorded.stream].subscribers:
                 try:

@@ -1,4 +1,4 @@
-"""Writes bags: each bag appears when it is complete, and the same messages give the same bytes."""
+"""Write bags: each bag appears only when it is complete, and equal messages result in equal bytes."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from fusesoc_firm.text.outputs import check_parent
 
 _FILES = {".bag": Form.ROS1, ".mcap": Form.MCAP, ".db3": Form.SQLITE3}
 _PLUGINS = {Form.SQLITE3: StoragePlugin.SQLITE3, Form.MCAP: StoragePlugin.MCAP}
-# A folder with only these files counts as a bag and may be replaced.
+# A folder that contains only these files counts as a bag and may be replaced.
 _IN_A_BAG = ("metadata.yaml", "*.db3", "*.mcap", "*.db3.zstd", "*.mcap.zstd")
 
 
 @dataclass(frozen=True)
 class RecordedTopic:
-    """A topic with its type, such as geometry_msgs/msg/Point, and the definition and signature of the type."""
+    """A topic with its type, such as geometry_msgs/msg/Point, and the type's definition and signature."""
 
     name: str
     type: str
@@ -39,7 +39,7 @@ class RecordedTopic:
 
     @classmethod
     def of(cls, name: str, definitions: Definitions) -> RecordedTopic:
-        """The topic of the last message in `definitions`, which contains all nested messages."""
+        """Return the topic of the last message in `definitions`, which contains all nested messages."""
         message = list(definitions)[-1]
         kind = definitions[message].kind
         type_ = f"{message.package}/{kind}/{message.name}"
@@ -48,17 +48,17 @@ class RecordedTopic:
 
 @dataclass
 class BagWriter:
-    """A bag being written; it contains every topic, even those without messages."""
+    """A bag that is being written; it contains all topics, even topics without messages."""
 
     _writer: Rosbag1Writer | Rosbag2Writer
     _connections: dict[RecordedTopic, Connection] = field(default_factory=dict)
 
     def add(self, topic: RecordedTopic) -> None:
-        """Add a topic; adding it again has no effect."""
+        """Add a topic; adding the same topic again has no effect."""
         if topic in self._connections:
             return
         if isinstance(self._writer, Rosbag1Writer):
-            # ROS 1 has no kinds of interface, and rosbags' writer expects this one.
+            # ROS 1 has no kinds of interfaces, and the writer in rosbags expects this kind.
             type_ = "/msg/".join(topic.type.split("/")[::2])
             made = self._writer.add_connection(topic.name, type_, msgdef=topic.definition, md5sum=topic.signature)
         else:
@@ -66,22 +66,22 @@ class BagWriter:
         self._connections[topic] = made
 
     def write(self, topic: RecordedTopic, stamp: int, payload: bytes) -> None:
-        """Add a message of one of the topics, recorded at `stamp` (ns)."""
+        """Add a message on one of the topics, recorded at `stamp` (in ns)."""
         self._writer.write(self._connections[topic], stamp, payload)
 
 
 def form_of(path: Path) -> Form | None:
-    """The format that a bag's ending implies, or None."""
+    """Return the format that the ending of a bag's name implies, or None."""
     return _FILES.get(path.suffix)
 
 
 def check_writable(path: Path, *, force: bool) -> None:
-    """Raise `InputError` if `path` holds something that must not, or without `force` should not, be replaced."""
+    """Raise `InputError` if `path` is not a bag and must not be replaced, or if it is a bag and `force` is not set."""
     check_parent(path)
     if path.is_dir() and (other := next((file for file in path.iterdir() if not _is_of_bag(file)), None)):
-        fail(f"{path} is a folder, but not a bag: it holds {other.name}")
+        fail(f"the folder {path} is not a bag: it contains {other.name}")
     if path.exists() and not force:
-        fail(f"{path} already exists", hint="--force replaces it")
+        fail(f"{path} already exists", hint="use --force to replace it")
 
 
 def _is_of_bag(file: Path) -> bool:
@@ -90,9 +90,9 @@ def _is_of_bag(file: Path) -> bool:
 
 @contextmanager
 def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterator[BagWriter]:
-    """Write a bag with some topics; if the context ends without an error, the bag replaces what is at `path`.
+    """Write a bag with these topics; if the context ends without an error, move the bag to `path`.
 
-    Raises `InputError` if it cannot be written.
+    An existing bag is replaced. Raise `InputError` if the bag cannot be written.
     """
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
@@ -110,9 +110,9 @@ def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterat
 
 
 def _put(made: Path, path: Path) -> None:
-    """Move a bag to its destination."""
+    """Move a finished bag to its destination."""
     if path.suffix in _FILES and made.is_dir():
-        # A ROS 2 bag as a single file: the file also contains the metadata of the folder.
+        # In a ROS 2 bag that is a single file, this file also contains the folder's metadata.
         made = made / f"{path.name}{path.suffix}"
     if path.is_dir():
         shutil.rmtree(path)

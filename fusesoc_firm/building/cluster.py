@@ -1,4 +1,4 @@
-"""Runs builds on the machines of a Dask cluster that share the folder: each build is a `firm build` on one machine."""
+"""Run builds on the machines of a Dask cluster that share the folder; each build is a `firm build` on one machine."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.pool import SHOWN_LINES, Outcome
 from fusesoc_firm.tools.workers import Workers
 
-# The environment variables that workers need; each worker knows the paths of the programs on its machine.
+# The environment variables that workers need, without paths of programs, which differ between machines.
 _PREFIXES = ("FUSESOC", "EDALIZE", "ROS_", "AMENT_")
 _POLL_SECONDS = 0.2
 
 
 @dataclass(frozen=True)
 class _Task:
-    """A build: the arguments of `firm build`, and a file that exists as long as the build is wanted."""
+    """A build: the arguments of `firm build`, and a file that exists while the build is wanted."""
 
     build: Build
     arguments: tuple[str, ...]
@@ -39,7 +39,7 @@ class _Result:
 
 
 def build_on(workers: Workers, plan: Plan, arguments: Sequence[str]) -> Iterator[Outcome]:
-    """Run `firm build` with these arguments for each build; yield each outcome when ready. All builds end on exit."""
+    """Run `firm build` for each build; yield each outcome when it is ready, and end all builds on exit."""
     wanted = plan.build_root / f".firm_build.{token_hex(8)}"
     plan.build_root.mkdir(parents=True, exist_ok=True)
     wanted.touch()
@@ -55,7 +55,7 @@ def build_on(workers: Workers, plan: Plan, arguments: Sequence[str]) -> Iterator
 
 
 def _build(task: _Task) -> _Result:
-    """Run a build on this machine until it finishes or is no longer wanted."""
+    """Run a build on this machine until the build finishes or is no longer wanted."""
     command = [sys.executable, "-m", "fusesoc_firm.cli", "build", task.build.core, "--target", task.build.target]
     started = time.monotonic()
     with subprocess.Popen(

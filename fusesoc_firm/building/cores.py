@@ -1,6 +1,6 @@
 """The cores in FuseSoC's libraries: the parts of each core, and the cores that an edit affects.
 
-A core is read for all targets and flags together, so that everything that any build uses is included.
+A core is read for all targets and flags together, so that the result includes everything that any build uses.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ GRAPH_TEMPLATE = "dot/cores.dot"
 
 @dataclass(frozen=True)
 class ProjectCore:
-    """A core: its name, its files with the `.core` file first, its dependencies, and its generator calls.
+    """A core: the name, the files with the `.core` file first, the dependencies, and the generator calls.
 
-    `names` are the names by which other cores can depend on this core, and `depends` the names of its dependencies.
+    `names` are the names by which other cores can depend on this core, and `depends` are the names of its dependencies.
     Each name consists of vendor, library and name.
     """
 
@@ -36,7 +36,7 @@ class ProjectCore:
 
 
 def project_cores() -> list[ProjectCore]:
-    """Every core in FuseSoC's libraries, as `fusesoc` finds them in the current folder, sorted by name."""
+    """Return all cores that `fusesoc` finds from the current folder, sorted by name."""
     from fusesoc.fusesoc import Fusesoc
 
     found = Fusesoc(configuration()).get_cores()
@@ -44,9 +44,9 @@ def project_cores() -> list[ProjectCore]:
 
 
 def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
-    """A core and all cores that any of its targets depends on, sorted by name.
+    """Return a core and all cores that any of its targets depends on, sorted by name.
 
-    Raises `InputError` if the core or one of its dependencies is missing.
+    Raise `InputError` if the core or one of its dependencies is missing.
     """
     fusesoc, top = _found(core)
     needed: dict[str, Path] = {}
@@ -57,9 +57,9 @@ def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
 
 
 def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
-    """The cores that are touched or depend on a touched core, each with the reason, in the order of `cores`.
+    """Return the names of the cores that are touched or depend on a touched core, each with the reason.
 
-    `touches` returns the part of a core that is touched, or None.
+    The result is in the order of `cores`. `touches` returns the touched part of a core, or None.
     """
     cores = list(cores)
     reasons = {core.vlnv: reason for core in cores if (reason := touches(core))}
@@ -75,12 +75,13 @@ def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str 
 
 
 def changed_files(revision: str, folder: Path) -> list[Path]:
-    """The absolute paths of the repository's files that differ from a revision, including new and removed ones.
+    """Return the absolute paths of the files that differ from a revision, including new and removed files.
 
-    The repository is the one that contains `folder`. Raises `InputError` if the repository or the revision is missing.
+    The files are those in the repository that contains `folder`. Raise `InputError` if the repository or the revision
+    is missing.
     """
     root = Path(_git(folder, "rev-parse", "--show-toplevel").rstrip("\n"))
-    # Resolved to a commit, so that a leading dash cannot be read as an option.
+    # The revision is resolved to a commit, so that a leading dash is not read as an option.
     commit = _git(folder, "rev-parse", "--verify", "--end-of-options", f"{revision}^{{commit}}").strip()
     listed = _git(root, "diff", "--name-only", "--no-renames", "-z", commit)
     listed += _git(root, "ls-files", "--others", "--exclude-standard", "-z")
@@ -91,16 +92,16 @@ def _git(folder: Path, *arguments: str) -> str:
     try:
         done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=False)
     except FileNotFoundError:
-        fail("this needs the program 'git'", hint="Debian and Ubuntu: apt install git")
+        fail("the program 'git' is not installed", hint="on Debian and Ubuntu: apt install git")
     if done.returncode:
         fail(f"git {arguments[0]}: {done.stderr.strip()}")
     return done.stdout
 
 
 def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list[str]]) -> str:
-    """The dependencies of a core's target in Graphviz's language: cores, generated cores, and their inputs.
+    """Return the dependencies of a core's target in Graphviz's language: cores, generated cores and inputs.
 
-    Raises `InputError` if the core, the target or a dependency is missing.
+    Raise `InputError` if the core, the target or a dependency is missing.
     """
     fusesoc, top = _found(core)
     cores = solved(fusesoc, top, target)
@@ -129,16 +130,16 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
 
 
 def configuration() -> Any:
-    """FuseSoC's configuration in the current folder, as the command `fusesoc` reads it."""
+    """Return FuseSoC's configuration for the current folder, as the command `fusesoc` reads it."""
     from fusesoc.config import Config
 
     return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
 
 
 def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, Any]]]:
-    """All cores of a target with their flags, dependencies first and the core itself last.
+    """Return all cores of a target with their flags, each after its dependencies, so that the core itself is last.
 
-    Raises `InputError` if the target or a dependency is missing.
+    Raise `InputError` if the target or a dependency is missing.
     """
     from fusesoc.coremanager import DependencyError
 
@@ -153,7 +154,7 @@ def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, 
 
 
 def _found(core: str) -> tuple[Any, Any]:
-    """FuseSoC, and the core of this name."""
+    """Return a FuseSoC instance, and the core with this name. May raise `InputError`."""
     from fusesoc.coremanager import DependencyError
     from fusesoc.fusesoc import Fusesoc
 
@@ -161,7 +162,7 @@ def _found(core: str) -> tuple[Any, Any]:
     try:
         return fusesoc, fusesoc.get_core(core)
     except (DependencyError, SyntaxError):
-        fail(f"unknown core '{core}'", hint="fusesoc core list")
+        fail(f"unknown core '{core}'", hint="'fusesoc core list' lists all cores")
 
 
 def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
@@ -186,7 +187,7 @@ def _core(vlnv: str, path: Path) -> ProjectCore:
 
 
 def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
-    """Yield the call of each instance, and another call for each target that changes the instance's parameters."""
+    """Yield the call of each generator instance, and another call for each target that changes its parameters."""
     known = core.section("generate")
     changes: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
     for target in core.section("targets").values():
@@ -205,22 +206,22 @@ def _call(vlnv: str, instance: str, generator: str, folder: Path | str, paramete
 
 
 def _names(core: CoreFile) -> list[str]:
-    """The core's own name and the virtual names that it provides."""
+    """Return the core's own name and the virtual names that it provides."""
     return [_short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
 
 
 def _listed(section: Mapping[str, Any], key: str) -> list[Any]:
-    """A list in a section, including additions to an inherited list."""
+    """Return the list under a key of a section, including additions to an inherited list."""
     return [item for name in (key, f"{key}_append") for item in section.get(name) or ()]
 
 
 def _file(item: object) -> str:
-    """The name of a file, with or without attributes."""
+    """Return the name in a file's entry, which may have attributes."""
     return str(next(iter(item)) if isinstance(item, dict) else item)
 
 
 def _words(item: object) -> list[str]:
-    """The words of a text under all flags: `target_sim ? (x)` gives x. Text that FuseSoC rejects is unchanged."""
+    """Return the words of a text under all flags, such as x for `target_sim ? (x)`; rejected text is unchanged."""
     from fusesoc.capi2.exprs import parse
 
     def words(tree: Iterable[Any]) -> Iterator[str]:
@@ -234,7 +235,7 @@ def _words(item: object) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """Vendor, library and name of a core, without version. A name that FuseSoC rejects is unchanged."""
+    """Return a core's vendor, library and name, without the version; a name that FuseSoC rejects is unchanged."""
     from fusesoc.vlnv import Vlnv
 
     try:

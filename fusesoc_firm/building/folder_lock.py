@@ -1,14 +1,14 @@
-"""A lock that admits one build at a time to a folder of the build root, on all machines that share the folder.
+"""A lock that admits only one build at a time to a folder, on all machines that share the folder.
 
-FuseSoC and the tools that it starts assume exclusive use of a work root. The lock is a file next to the work root, put
-in place by a hard link. Linking is atomic even on network folders, where system locks (`text/file_lock.py`) may cover
+FuseSoC and the tools that it starts assume exclusive use of a work root. The lock is a file next to the work root that
+is created as a hard link. Linking is atomic even in network folders, where system locks (`text/file_lock.py`) may cover
 only one machine. The file names the owner. An owner on this machine is gone when its process has ended; an owner on
-another machine is gone when it has not touched the file for a while. Only changes to the file's time count, so clocks
-are not compared.
+another machine is gone when it has not touched the file for some time. Only changes to the file's time matter, so
+clocks are not compared.
 
 If a lock's owner is gone, the lock is removed under a system lock, so that only one waiting process removes it. If the
-system lock does not work between machines, two machines might remove the file at the same instant; one owner then loses
-its lock, and `beat` reports this.
+system lock does not work between machines, two machines might remove the file simultaneously; one owner then loses its
+lock, which `beat` reports.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from pathlib import Path
 from fusesoc_firm.text.file_lock import locked
 
 BEAT_SECONDS = 2.0
-"""The longest time in seconds between an owner's calls of `beat`."""
+"""The maximum time in seconds between an owner's calls of `beat`."""
 _SILENT_SECONDS = 30.0
-# The processes that an owner started end with it, but not at the same instant.
+# The processes that an owner started end with the owner, but not in the same instant.
 _GRACE_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
 class Owner:
-    """The owner of a lock: a process, its start time, and the machine by its system id and its name."""
+    """The owner of a lock: a process, its start time, and the machine's system id and name."""
 
     token: str
     machine: str
@@ -47,15 +47,15 @@ class Owner:
 
 @dataclass
 class FolderLock:
-    """The lock in the file `path`, whose folder is created. Not thread-safe."""
+    """The lock in the file `path`, whose folder is created if necessary; the class is not thread-safe."""
 
     path: Path
     _mine: Owner | None = field(default=None, init=False)
-    # The owner being waited for, the time of the lock file, and the time since which both are unchanged.
+    # The current owner, the time of the lock file, and the time since which both have been unchanged.
     _watched: tuple[Owner, int, float] | None = field(default=None, init=False)
 
     def acquire(self) -> Owner | None:
-        """Take the lock and return None, or return the current owner at once. Raises `OSError`."""
+        """Take the lock and return None or, without waiting, return the current owner. May raise `OSError`."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         mine = Owner(secrets.token_hex(8), _machine(), os.getpid(), _started(os.getpid()), socket.gethostname())
         new = self.path.with_name(f"{self.path.name}.{mine.token}")
@@ -75,7 +75,7 @@ class FolderLock:
             new.unlink(missing_ok=True)
 
     def beat(self) -> bool:
-        """Show that the owner is alive; False if it has lost the lock."""
+        """Show that this owner is alive; return False if this owner has lost the lock."""
         if self._mine is None or _owner(self.path) != self._mine:
             return False
         with suppress(FileNotFoundError):
@@ -109,18 +109,18 @@ class FolderLock:
 
 
 def _owner(path: Path) -> Owner | None:
-    """The owner of the lock; None if it is free."""
+    """Return the owner of a lock, or None if the lock is free."""
     try:
         return Owner(**json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         return None
     except (ValueError, TypeError, RecursionError):
-        # A damaged file is removed when it has not been touched for a while.
+        # A damaged file is removed when it has not been touched for some time.
         return Owner("", "", 0, "", "an unknown machine")
 
 
 def _machine() -> str:
-    """An id of the machine, or of a container, in which process numbers differ."""
+    """Return an id of the machine, or of the container if it has separate process numbers."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
         return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
@@ -129,7 +129,7 @@ def _machine() -> str:
 
 
 def _started(process: int) -> str:
-    """The start time of a process, as the system counts it; "" if the process does not exist."""
+    """Return the start time of a process in the system's units, or an empty string if the process does not exist."""
     try:
         # The fields follow the name in parentheses, which may contain blanks.
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]

@@ -1,4 +1,4 @@
-"""The plan of what to build: cores and targets in FuseSoC, their build folders, and their generated cores."""
+"""The plan of builds: cores and targets in FuseSoC, with their build folders and generated cores."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 @dataclass(frozen=True)
 class Build:
-    """A target of a core (by its full name), and its build folder."""
+    """The full name of a core, a target of the core, and the build folder."""
 
     core: str
     target: str
@@ -24,12 +24,12 @@ class Build:
 
     @property
     def log(self) -> Path:
-        """The file for its output."""
+        """The file for the build's output."""
         return self.work_root.with_name(f"{self.work_root.name}.log")
 
     @property
     def lock(self) -> Path:
-        """The lock file of its folder."""
+        """The lock file of the build folder."""
         return self.work_root.with_name(f"{self.work_root.name}.lock")
 
     def __str__(self) -> str:
@@ -45,7 +45,7 @@ class Plan:
     builds: tuple[Build, ...]
 
     def generator_calls(self) -> list[GeneratorCall]:
-        """All generator calls, each once. Raises `InputError` if a dependency is missing."""
+        """Return the generator calls of all builds, each once. Raise `InputError` if a dependency is missing."""
         found: dict[tuple[str, str, str], GeneratorCall] = {}
         for build in self.builds:
             for core, flags in self._cores(build):
@@ -60,7 +60,10 @@ class Plan:
                 if core.provider and core.cache_status() != "downloaded":
                     lock = FolderLock(Path(f"{core.files_root}.lock"))
                     if owner := lock.acquire():
-                        fail(f"{core.name} is being downloaded by {owner}", hint="start again after the download")
+                        fail(
+                            f"{core.name} is being downloaded by {owner}",
+                            hint="run the command again after the download",
+                        )
                     try:
                         core.setup()
                     finally:
@@ -71,14 +74,14 @@ class Plan:
 
 
 def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | None = None) -> Plan:
-    """A plan of all targets of all cores, each once, with FuseSoC's configuration in the current folder.
+    """Return a plan of the builds of all targets of all cores, with FuseSoC's configuration for the current folder.
 
-    Raises `InputError` with all unknown cores and targets.
+    Raise `InputError` with all unknown cores and targets.
     """
     from fusesoc.fusesoc import Fusesoc
 
     config = configuration()
-    # A single work root would be shared by all builds.
+    # All builds would share a single work root.
     config.args_work_root = None
     config.args_build_root = str(Path(build_root or config.build_root).absolute())
     fusesoc = Fusesoc(config)
@@ -94,35 +97,37 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
 
 
 def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnostics) -> str | None:
-    """The full name of a core; a name without a colon is the bare name, as for `fusesoc run`.
+    """Return the full name of a core, or None if it is unknown; as in `fusesoc run`, vendor and library are optional.
 
-    For an unknown core, the cores with all the targets are listed.
+    For an unknown core, add a fault that lists the cores with all these targets.
     """
     from fusesoc.coremanager import DependencyError
 
     known = [name for name in fusesoc.get_cores() if name.split(":")[2].lower() == core.lower()]
     families = sorted({name.rpartition(":")[0] for name in known})
     if len(families) > 1:
-        faults.error(f"'{core}' can be {' or '.join(families)}")
+        faults.error(f"'{core}' is ambiguous: {' or '.join(families)}")
         return None
     try:
         return str(fusesoc.get_core(families[0] if families else core).name)
     except (DependencyError, SyntaxError):
         fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
         listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if fitting else ""
-        faults.error(f"unknown core '{core}'", hint=listed or "fusesoc core list")
+        faults.error(f"unknown core '{core}'", hint=listed or "'fusesoc core list' lists all cores")
         return None
 
 
 def _flags(fusesoc: Any, name: str, target: str, faults: Diagnostics) -> dict[str, Any] | None:
-    """The flags of a target; None, with a fault added, if it cannot be built."""
+    """Return the flags of a target; if the target cannot be built, add a fault and return None."""
     core = fusesoc.get_core(name)
     known = core.get_data({}).targets
     if target not in known:
-        faults.error(f"{name} has no target '{target}'", hint=f"it has: {', '.join(known) or 'none'}")
+        faults.error(f"{name} has no target '{target}'", hint=f"its targets: {', '.join(known) or 'none'}")
         return None
     flags = {**core.get_flags(target), "target": target}
     if not core.get_flow(flags) and "tool" not in flags:
-        faults.error(f"target '{target}' of {name} cannot be built", hint="it has neither 'flow' nor 'default_tool'")
+        faults.error(
+            f"target '{target}' of {name} cannot be built", hint="the target has neither 'flow' nor 'default_tool'"
+        )
         return None
     return flags

@@ -1,4 +1,4 @@
-"""Runs several builds on this machine at once, but only one at a time in each build folder."""
+"""Run several builds on this machine in parallel, but only one at a time in each build folder."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.process import build_in_this_process, last_lines
 
 _POLL_SECONDS = 0.2
-# The time between the request to end and the kill.
+# The time in seconds between the request to end and the kill.
 _PATIENCE_SECONDS = 5.0
 _END_POLL_SECONDS = 0.02
 SHOWN_LINES = 20
-"""The number of lines shown of a failed build's log."""
+"""The number of lines shown from a failed build's log."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a build: success, the duration in seconds and, after a failure, the last lines of its log."""
+    """The result of a build: success, the duration in seconds and, after a failure, the last lines of the log."""
 
     build: Build
     is_good: bool
@@ -44,14 +44,14 @@ class _Running:
 
 @dataclass(frozen=True)
 class Pool:
-    """Runs builds with the options of `fusesoc run`, at most `jobs` at once; calls `tell` for builds that must wait."""
+    """A runner of at most `jobs` parallel builds with the options of `fusesoc run`; `tell` reports waiting builds."""
 
     options: tuple[str, ...]
     jobs: int
     tell: Callable[[str], None]
 
     def run(self, plan: Plan) -> Iterator[Outcome]:
-        """Yield each build's outcome as it finishes. On exit, all processes that it started are ended."""
+        """Yield the outcome of each build as it finishes. On exit, end all started processes."""
         waiting = {build: FolderLock(build.lock) for build in plan.builds}
         running: list[_Running] = []
         told: set[Build] = set()
@@ -88,7 +88,7 @@ class Pool:
 
 
 def _holds(item: _Running) -> bool:
-    """Whether a build still holds its folder's lock; renews the lock from time to time."""
+    """Return whether a build still holds its folder's lock, and renew the lock at intervals."""
     if time.monotonic() - item.beaten < BEAT_SECONDS:
         return True
     item.beaten = time.monotonic()
@@ -103,7 +103,9 @@ def _finish(item: _Running) -> Outcome:
         return Outcome(item.build, True, seconds)
     lines = last_lines(item.build.log, SHOWN_LINES)
     if status is None:
-        lines = [f"another machine took over {item.build.work_root} because it had not seen this build for a while"]
+        lines = [
+            f"another machine took over {item.build.work_root} because this build had shown no activity for a while"
+        ]
     elif status < 0:
         lines.append(f"ended by {signal.Signals(-status).name}")
     return Outcome(item.build, False, seconds, tuple(lines))
@@ -124,12 +126,12 @@ def _end(items: list[_Running]) -> None:
 
 
 def _signal(process: BaseProcess, number: signal.Signals) -> bool:
-    """Signal a build and all its processes; return False if no process is left."""
+    """Send a signal to a build and all its processes; return False if no process is left."""
     assert process.pid
     try:
         os.killpg(process.pid, number)
     except ProcessLookupError:
-        # The process does not lead its group yet, or has ended.
+        # The process is not yet a group leader, or has ended.
         if process.is_alive():
             os.kill(process.pid, number)
         return process.is_alive()

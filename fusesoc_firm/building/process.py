@@ -1,7 +1,7 @@
-"""Runs one build in a separate process: FuseSoC's `run`, with all output in a log.
+"""Run one build in a separate process: FuseSoC's `run`, with all output in a log.
 
-The process is a copy of one in which FuseSoC has already read its libraries. The process leads a process group that
-contains all programs it starts, so that they can be ended together; they also end when the parent process ends.
+The process is a copy of a process in which FuseSoC has already read its libraries. It leads a process group with all
+programs that it starts, so that all can be ended together. All also end when the parent process ends.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 from fusesoc_firm.building.plan import Build
 
 Answer = Callable[[list[str]], bool]
-"""Answers the generator call with this command line in the current folder; returns False to leave it to FuseSoC."""
+"""A function that answers the generator call with this command line, or returns False to leave it to FuseSoC."""
 
 
 def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], alive: tuple[int, int]) -> None:
@@ -40,10 +40,10 @@ def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], 
 
 
 def save_time(answer: Answer) -> None:
-    """Save FuseSoC two costs for each generated core: a generator process, and recompiling a schema.
+    """Avoid two costs of FuseSoC for each generated core: a generator process, and recompiling a schema.
 
-    This applies to the process and its copies. It affects only the time: if FuseSoC lacks the names that are replaced
-    here, builds take longer.
+    The change applies to this process and its copies, and only shortens builds: if FuseSoC lacks the replaced names,
+    builds take longer.
     """
     from fusesoc import edalizer
 
@@ -51,12 +51,12 @@ def save_time(answer: Answer) -> None:
         edalizer.Launcher = _answering(edalizer.Launcher, answer)
     if hasattr(edalizer, "Core2Parser"):
         edalizer.Core2Parser = cache(edalizer.Core2Parser)
-        # This repeats FuseSoC's call, so that copies of the process inherit the result.
+        # Make FuseSoC's call once here, so that copies of the process inherit the result.
         edalizer.Core2Parser(False, allow_additional_properties=False)
 
 
 def _answering(launcher: Any, answer: Answer) -> type:
-    """A subclass of FuseSoC's launcher of generators, which calls `answer` first."""
+    """Return a subclass of FuseSoC's launcher for generators that first calls `answer`."""
 
     class Launcher(launcher):  # type: ignore[misc]
         def run(self) -> None:
@@ -78,13 +78,13 @@ def _run(fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
 
 
 def _end_with(alive: int) -> None:
-    """Wait until the parent has ended, then kill this process and all that it started."""
+    """Wait until the parent has ended, then kill this process and all processes that it started."""
     os.read(alive, 1)
     os.killpg(0, signal.SIGKILL)
 
 
 def last_lines(path: Path, count: int) -> list[str]:
-    """The last lines of a log; empty if there is no log."""
+    """Return the last lines of a log, or an empty list if there is no log."""
     try:
         return path.read_text(encoding="utf-8", errors="replace").splitlines()[-count:]
     except FileNotFoundError:

@@ -28,7 +28,7 @@ from fusesoc_firm.tools.library_path import demos_root, docs_root, library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `firm`; the exit status is 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
+    """Run `firm`; return the exit status: 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
     accept_interrupts()
     arguments = _parsed(argv)
     try:
@@ -41,14 +41,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # The reader of the output (`| head`) has closed the pipe. Nothing may be flushed into it at exit.
+        # The reader of the output (`| head`) has closed the pipe, so nothing may be flushed into the pipe at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     return 0
 
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
-    """Parse the command line; remappings for a ROS node may be anywhere in it."""
+    """Parse the command line, in which remappings for a ROS node may be at any position."""
     parser = _parser()
     arguments, rest = parser.parse_known_args(argv)
     if rest and not hasattr(arguments, "remappings"):
@@ -70,10 +70,12 @@ def _parser() -> argparse.ArgumentParser:
         _print_path,
     )
     kind = path.add_mutually_exclusive_group()
-    kind.add_argument("--demos", action="store_true", help="the library of demo systems instead")
-    kind.add_argument("--docs", action="store_true", help="the folder of the documentation instead")
+    kind.add_argument("--demos", action="store_true", help="print the folder of the demo systems instead")
+    kind.add_argument("--docs", action="store_true", help="print the folder of the documentation instead")
     path.add_argument(
-        "--relative", action="store_true", help="relative to the current folder, for a fusesoc.conf in version control"
+        "--relative",
+        action="store_true",
+        help="print a path relative to the current folder, for a fusesoc.conf in version control",
     )
     add_message(commands)
     add_system(commands)

@@ -1,4 +1,4 @@
-"""`firm build`: runs FuseSoC for many cores and targets at once."""
+"""`firm build`: run FuseSoC for many cores and targets in parallel."""
 
 from __future__ import annotations
 
@@ -35,20 +35,24 @@ def add_build(commands: Any) -> None:
         nargs="+",
         action="extend",
         required=True,
-        help="targets; every core must have all of them",
+        help="the targets to build; every core must have all of them",
     )
     stages = build.add_mutually_exclusive_group()
-    stages.add_argument("--setup", action="store_true", help="only generate the cores and set up the tools' inputs")
-    stages.add_argument("--build-only", action="store_true", help="build, but run nothing: no simulation, no board")
+    stages.add_argument("--setup", action="store_true", help="only generate the cores and prepare the tools' inputs")
+    stages.add_argument(
+        "--build-only", action="store_true", help="only build: do not run simulations or program boards"
+    )
     build.add_argument(
         "--jobs", type=positive, metavar="N", help="number of parallel builds (default: one per processor core)"
     )
     build.add_argument(
-        "--cluster", metavar="ADDRESS", help="use the Dask cluster of this scheduler instead of this machine"
+        "--cluster", metavar="ADDRESS", help="run on the Dask cluster of the scheduler at ADDRESS, not on this machine"
     )
-    build.add_argument("--build-root", type=Path, metavar="DIR", help="folder for the builds (default: FuseSoC's)")
-    build.add_argument("--clean", action="store_true", help="empty each build's folder first")
-    build.add_argument("--locked", action="store_true", help="report differences from a core's lock file as errors")
+    build.add_argument(
+        "--build-root", type=Path, metavar="DIR", help="folder for the builds (default: FuseSoC's build folder)"
+    )
+    build.add_argument("--clean", action="store_true", help="empty each build folder first")
+    build.add_argument("--locked", action="store_true", help="report differences from each core's lock file as errors")
 
 
 def _build(arguments: argparse.Namespace) -> None:
@@ -57,7 +61,7 @@ def _build(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.building.plan import make_plan
     from fusesoc_firm.plugin.build import How, build
 
-    # Build processes are forked, which is safe only without other threads; tqdm's monitor would be one.
+    # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
     tqdm.monitor_interval = 0
     plan = make_plan(arguments.cores, arguments.targets, arguments.build_root)
     how = How(
@@ -81,7 +85,7 @@ def _build(arguments: argparse.Namespace) -> None:
 
 
 def _report(outcomes: Sequence[Outcome], seconds: float) -> None:
-    """Print the results of the builds. Raises `InputError` if one failed."""
+    """Print the results of the builds. Raise `InputError` if a build failed."""
     from fusesoc_firm.text.outputs import shown
 
     failed = [outcome for outcome in outcomes if not outcome.is_good]

@@ -31,12 +31,12 @@ def add_cache(commands: Any) -> None:
         "--to",
         type=_size,
         metavar="SIZE",
-        help="remove the least recently used entries until the store has this size, such as 200M",
+        help="remove the least recently used entries until the store is at most SIZE, such as 200M",
     )
     command(
         actions,
         "verify",
-        "check every entry against its digest, and remove damaged entries",
+        "compare every entry with its digest, and remove damaged entries",
         "firm cache verify",
         _verify_cache,
     )
@@ -60,7 +60,7 @@ def _show_cache(arguments: argparse.Namespace) -> None:
     print(f"entries  {len(entries)}")
     print(f"size     {_shown(store.size())} of {_shown(store.limit)}")
     if not store.is_writable():
-        print("rights   read only: what you generate is not cached")
+        print("rights   read-only: new results are not cached")
     for file in entries if arguments.entries else ():
         used = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.used))
         entry = read_entry(str(store.root), file.name)
@@ -86,7 +86,7 @@ def _verify_cache(_: argparse.Namespace) -> None:
     try:
         damaged = store.remove_damaged()
     except OSError as error:
-        fail(f"cannot remove a damaged entry of {store.root}: {error.strerror}")
+        fail(f"cannot remove a damaged entry from {store.root}: {error.strerror}")
     if damaged:
         files = "\n".join(map(str, damaged))
         entries = "1 entry was" if len(damaged) == 1 else f"{len(damaged)} entries were"
@@ -95,7 +95,7 @@ def _verify_cache(_: argparse.Namespace) -> None:
 
 
 def _shown(size: float) -> str:
-    """Return a number of bytes in readable form."""
+    """Return a number of bytes as a readable text with a unit."""
     if size < _UNIT:
         return f"{size} bytes"
     for unit in ("KiB", "MiB", "GiB"):

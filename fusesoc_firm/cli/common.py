@@ -1,4 +1,4 @@
-"""Shared parts of the `firm` commands: declarations, and the loading and writing that most commands need."""
+"""The shared parts of the `firm` commands: declarations, and loading and writing for most commands."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def command(
 
 
 def positive(text: str) -> int:
-    """Parse an argument that is a positive integer."""
+    """Return an argument's value, which must be a positive integer."""
     return _at_least(1, text)
 
 
 def natural(text: str) -> int:
-    """Parse an argument that is a non-negative integer."""
+    """Return an argument's value, which must be a non-negative integer."""
     return _at_least(0, text)
 
 
@@ -66,13 +66,13 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PLACE",
-        help="a folder or bag with message definitions; may be given more than once",
+        help="a folder or bag with message definitions; may be repeated",
     )
     parser.add_argument("--distro", metavar="NAME", help="the ROS distribution that provides the standard messages")
 
 
 def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
-    """Return the messages that the arguments select."""
+    """Return the library with the messages that the arguments select."""
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.message.middleware import middleware_of
 
@@ -82,7 +82,7 @@ def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
     """Load the system of the specification in the arguments, and print its warnings.
 
-    Unless `needs_sources`, the sources of the system's accelerators may be missing.
+    Unless `needs_sources` is set, the sources of the system's accelerators may be missing. May raise `InputError`.
     """
     from fusesoc_firm.system.message_sources import load_beside
 
@@ -95,8 +95,8 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
 
 
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
-    """Return the folders of message cores that FuseSoC knows here. Raises `InputError`."""
-    # Import FuseSoC only when it is needed.
+    """Return the folders of message cores that FuseSoC finds from the current folder. May raise `InputError`."""
+    # FuseSoC is imported only when it is needed.
     from fusesoc_firm.plugin.project import message_folders
 
     return message_folders(names) if names else ()
@@ -109,6 +109,6 @@ def add_picture(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         metavar="F.svg",
-        help="the file to write, also F.png, F.pdf or F.dot (default: print the picture)",
+        help="the file to write; .png, .pdf and .dot are legal, too (default: print the picture)",
     )
     parser.add_argument("--format", choices=("svg", "dot"), help="format of the printed picture (default: svg)")

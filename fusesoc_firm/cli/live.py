@@ -1,4 +1,4 @@
-"""`firm live`: a simulated system as a node of a running ROS. `firm trace`: a picture of its messages' stages."""
+"""`firm live`: run a simulated system as a ROS node. `firm trace`: draw the stages of the node's messages."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ def add_live(commands: Any) -> None:
     live = command(
         commands,
         "live",
-        "run a ROS node that connects topics to a system, simulated or on a board",
+        "run a ROS node that connects topics to a system in simulation or on a board",
         "firm live robot.yaml --ros 1 --trace ways.csv sub:=/imu/orientation",
         _live,
     )
     live.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
-    live.add_argument("--ros", type=int, choices=(1, 2), help="only topics of this version (default: all)")
+    live.add_argument(
+        "--ros", type=int, choices=(1, 2), help="connect only topics of this ROS version (default: all topics)"
+    )
     live.add_argument(
         "--transport", metavar="ADDRESS", help="the transport to the hardware (default: build and start a simulator)"
     )
@@ -33,20 +35,20 @@ def add_live(commands: Any) -> None:
     trace = command(
         commands,
         "trace",
-        "draw the trace of messages that a node wrote with --trace",
+        "draw the message trace that a node wrote with --trace",
         "firm trace ways.csv -o ways.svg",
         _draw_trace,
     )
     trace.add_argument("table", metavar="F.csv", type=Path, help="the trace that the node wrote")
     trace.add_argument(
-        "--system", type=Path, metavar="SPEC", help="the system's specification, for the table of a node in C++"
+        "--system", type=Path, metavar="SPEC", help="the system's specification; required for the trace of a C++ node"
     )
     trace.add_argument(
         "-o",
         "--output",
         type=Path,
         metavar="F.svg",
-        help="the picture to write, also .png or .pdf (default: beside the trace)",
+        help="the picture to write; .png and .pdf are legal, too (default: beside the trace)",
     )
     add_sources(trace)
 
@@ -89,8 +91,8 @@ def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
 
     if not arguments.system:
         fail(
-            f"{steps} is the table of a node in C++, which has no names",
-            hint="give the specification with --system SPEC",
+            f"{steps} is a C++ node's trace, which contains no names",
+            hint="add the system's specification with --system SPEC",
         )
     arguments.spec = arguments.system
     table = steps.with_name(f"{steps.stem}-ways.csv")

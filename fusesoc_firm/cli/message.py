@@ -24,21 +24,23 @@ def add_message(commands: Any) -> None:
         "firm message list 'sensor_msgs/*'",
         _list_messages,
     )
-    listing.add_argument("pattern", nargs="?", default="*", help="only names that match this pattern of * and ?")
+    listing.add_argument(
+        "pattern", nargs="?", default="*", help="list only names that match this pattern; * and ? are wildcards"
+    )
     show = command(
         actions,
         "show",
-        "print a message, or those of a service or action, in any stage from definition to hardware",
+        "print a message, or the messages of a service or action, at any stage from definition to hardware",
         "firm message show geometry_msgs/Quaternion --ros 1 --stage vhdl",
         _show_message,
     )
     show.add_argument("type", metavar="TYPE", help="the message's type, such as geometry_msgs/Quaternion")
-    show.add_argument("--stage", choices=STAGES, default="tree", help="what to print (default: tree)")
+    show.add_argument("--stage", choices=STAGES, default="tree", help="the stage to print (default: tree)")
     show.add_argument("--width", type=int, default=8, metavar="BITS", help="the stream's width in bits (default: 8)")
     verify = command(
         actions,
         "verify",
-        "compare converters in simulation with independent serialisers",
+        "compare simulated converters with independent serialisers",
         "firm message verify 'geometry_msgs/*' --ros 1 --report geometry.json",
         _verify_messages,
     )
@@ -49,10 +51,13 @@ def add_message(commands: Any) -> None:
 
 def _add_verification(verify: argparse.ArgumentParser) -> None:
     verify.add_argument(
-        "types", metavar="TYPE", nargs="*", help="a type, or a pattern of * and ? (default: all known types)"
+        "types",
+        metavar="TYPE",
+        nargs="*",
+        help="a type, or a pattern with the wildcards * and ? (default: all known types)",
     )
     verify.add_argument(
-        "--stimuli", type=positive, default=3, metavar="N", help="number of values for each message (default: 3)"
+        "--stimuli", type=positive, default=3, metavar="N", help="number of stimuli for each message (default: 3)"
     )
     verify.add_argument("--width", type=int, default=8, metavar="BITS", help="the stream's width in bits (default: 8)")
     verify.add_argument("--seed", type=int, default=1, metavar="N", help="seed of all random values (default: 1)")
@@ -60,13 +65,13 @@ def _add_verification(verify: argparse.ArgumentParser) -> None:
         "--jobs",
         type=positive,
         metavar="N",
-        help="number of messages verified in parallel (default: one per processor core)",
+        help="number of messages to verify in parallel (default: one per processor core)",
     )
     verify.add_argument(
-        "--cluster", metavar="ADDRESS", help="use the Dask cluster of this scheduler instead of this machine"
+        "--cluster", metavar="ADDRESS", help="run on the Dask cluster of the scheduler at ADDRESS, not on this machine"
     )
-    verify.add_argument("--report", type=Path, metavar="F.json", help="write a report, and the same as F.html")
-    verify.add_argument("--keep", type=Path, metavar="DIR", help="keep the work folder of each message that fails")
+    verify.add_argument("--report", type=Path, metavar="F.json", help="write the report to F.json and F.html")
+    verify.add_argument("--keep", type=Path, metavar="DIR", help="keep the work folder of each failed message in DIR")
 
 
 def _list_messages(arguments: argparse.Namespace) -> None:

@@ -13,7 +13,7 @@ def add_project(commands: Any) -> None:
     graph = command(
         commands,
         "graph",
-        "draw a core's dependencies: cores, generated cores and the files that they are generated from",
+        "draw a core's dependencies: cores, generated cores and the files that determine the generated cores",
         "firm graph robot:sys:quat2euler --target sim -o quat2euler.svg",
         _draw_cores,
     )
@@ -31,7 +31,7 @@ def add_project(commands: Any) -> None:
     lock = command(
         commands,
         "lock",
-        "record the message definitions, cores and tools that a core uses in a lock file beside it",
+        "write a core's lock file, which lists the message definitions, cores and tools that the core uses",
         "firm lock robot:sys:quat2euler",
         _lock,
     )

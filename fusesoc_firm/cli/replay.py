@@ -1,4 +1,4 @@
-"""`firm replay`: sends a recorded bag through a simulated system."""
+"""`firm replay`: send a recorded bag through a simulated system."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def add_replay(commands: Any) -> None:
         metavar="BAG",
         type=Path,
         required=True,
-        help="the bag to replay, of ROS 1 or ROS 2 (sqlite3, MCAP)",
+        help="the ROS 1 or ROS 2 (sqlite3, MCAP) bag to replay",
     )
     replay.add_argument(
         "--out",
@@ -37,38 +37,38 @@ def add_replay(commands: Any) -> None:
         metavar="BAG",
         type=Path,
         required=True,
-        help="the bag to write: a folder, or F.bag, F.mcap, F.db3",
+        help="the bag to write: a folder, F.bag, F.mcap or F.db3",
     )
     replay.add_argument(
         "--format",
         choices=("ros1", "sqlite3", "mcap"),
-        help="format of --out (default: by its ending, else that of --in)",
+        help="format of the written bag (default: from its ending, otherwise the format of --in)",
     )
-    replay.add_argument("--force", action="store_true", help="replace an existing bag at --out")
+    replay.add_argument("--force", action="store_true", help="replace the bag at --out if it exists")
     replay.add_argument(
         "--map",
         type=_mapping,
         action="append",
         default=[],
         metavar="TOPIC=BLOCK",
-        help="the topic of a subscriber or publisher, instead of the specification's; may be repeated",
+        help="use TOPIC for a subscriber or publisher, not the topic in the specification; may be repeated",
     )
     replay.add_argument("--limit", type=positive, metavar="N", help="replay at most N messages")
     replay.add_argument(
-        "--start", type=_seconds, default=0, metavar="S", help="begin S seconds after the start of the bag"
+        "--start", type=_seconds, default=0, metavar="S", help="start S seconds after the beginning of the bag"
     )
-    replay.add_argument("--duration", type=_seconds, metavar="S", help="replay only the messages of S seconds")
+    replay.add_argument("--duration", type=_seconds, metavar="S", help="replay at most S seconds of the bag")
     replay.add_argument(
         "--latency",
         action="store_true",
-        help="add the hardware's latency, by the system's clock, to the recorded time stamps",
+        help="add the hardware's latency to the recorded time stamps; requires the system's clock frequency",
     )
     replay.add_argument(
         "--quiet",
         type=positive,
         default=_QUIET,
         metavar="CYCLES",
-        help="cycles without a beat after which the system is idle (default: %(default)s)",
+        help="number of cycles without a beat after which the system is considered idle (default: %(default)s)",
     )
     add_simulator_options(replay)
 
@@ -76,7 +76,7 @@ def add_replay(commands: Any) -> None:
 def _mapping(text: str) -> tuple[str, str]:
     topic, equals, block = text.rpartition("=")
     if not equals or not topic or not block:
-        raise argparse.ArgumentTypeError(f"'{text}' is not TOPIC=BLOCK, such as /arm/left=arm_in")
+        raise argparse.ArgumentTypeError(f"'{text}' does not have the form TOPIC=BLOCK, such as /arm/left=arm_in")
     return block, topic
 
 

@@ -1,4 +1,4 @@
-"""`firm scheduler`: the evaluation of the schedulers, and the best one for a system."""
+"""`firm scheduler`: the evaluation of the schedulers, and the best scheduler for a system."""
 
 from __future__ import annotations
 
@@ -22,14 +22,19 @@ def add_scheduler(commands: Any) -> None:
         _bench_schedulers,
     )
     lists = "names separated by commas (default: %(default)s)"
-    bench.add_argument("--dataset", default="large", metavar="NAMES", help=f"large, cc1 to cc4, or all; {lists}")
+    bench.add_argument(
+        "--dataset", default="large", metavar="NAMES", help=f"data sets: large, cc1 to cc4, or all; {lists}"
+    )
     bench.add_argument("--policies", default="all", metavar="NAMES", help=f"schedulers; {lists}")
     bench.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
     bench.add_argument(
-        "--sets", type=positive, metavar="N", help="number of sets in each data set (default: the data set's own)"
+        "--sets", type=positive, metavar="N", help="number of sets in each data set (default: set by the data set)"
     )
     bench.add_argument(
-        "--cycles", type=positive, metavar="N", help="cycles of each simulation (default: the data set's own)"
+        "--cycles",
+        type=positive,
+        metavar="N",
+        help="number of cycles in each simulation (default: set by the data set)",
     )
     bench.add_argument("--seed", type=natural, default=1, metavar="N", help="seed of all random values (default: 1)")
     bench.add_argument(
@@ -43,20 +48,20 @@ def add_scheduler(commands: Any) -> None:
         type=positive,
         default=1,
         metavar="BEATS",
-        help="beats of a run before preemptive schedulers may interrupt it (default: 1)",
+        help="number of beats in a run before a preemptive scheduler may interrupt the run (default: 1)",
     )
     bench.add_argument(
         "--resume-beats",
         type=natural,
         default=0,
         metavar="BEATS",
-        help="additional beats of a resumed run; 1 with the Manager's bursts (default: 0, as in section 4.3)",
+        help="number of additional beats in a resumed run; 1 for the Manager's bursts (default: 0, as in section 4.3)",
     )
     bench.add_argument(
         "--jobs", type=positive, metavar="N", help="number of parallel simulations (default: one per processor core)"
     )
     bench.add_argument(
-        "--cluster", metavar="ADDRESS", help="use the Dask cluster of this scheduler instead of this machine"
+        "--cluster", metavar="ADDRESS", help="run on the Dask cluster of the scheduler at ADDRESS, not on this machine"
     )
     bench.add_argument(
         "--output", type=Path, metavar="DIR", help="write a report with all tables and figures into this folder"
@@ -65,7 +70,7 @@ def add_scheduler(commands: Any) -> None:
     choose = command(
         actions,
         "choose",
-        "find the best scheduler for a specification, and the buffers it needs",
+        "choose the best scheduler for a specification, and compute the required buffers",
         "firm scheduler choose robot.yaml --criterion lateness",
         _choose_scheduler,
     )
@@ -74,8 +79,8 @@ def add_scheduler(commands: Any) -> None:
         "--criterion",
         choices=("luts", "lateness", "finish"),
         default="luts",
-        help="fewest LUTs with all deadlines met, smallest worst lateness, or fewest LUTs without starvation "
-        "(default: luts)",
+        help="luts: fewest LUTs with all deadlines met; lateness: smallest worst lateness; "
+        "finish: fewest LUTs without starvation (default: luts)",
     )
     choose.add_argument("--format", choices=("text", "yaml", "json"), default="text", help="default: text")
     add_sources(choose)

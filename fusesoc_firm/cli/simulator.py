@@ -1,4 +1,4 @@
-"""`firm simulator`: builds the simulator of a system for another program to start."""
+"""`firm simulator`: build a system's simulator, which another program starts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_simulator(commands: Any) -> None:
     simulator = command(
         commands,
         "simulator",
-        "build the simulator of a system, and print the command that starts it (docs/reference/transports.md)",
+        "build a system's simulator, and print the command that starts it (docs/reference/transports.md)",
         'robot_node --transport "pipe:$(firm simulator robot.yaml)"',
         _build_simulator,
     )
@@ -25,11 +25,11 @@ def add_simulator(commands: Any) -> None:
 
 
 def add_simulator_options(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of commands that simulate a system live; `built_simulator` reads these arguments and `spec`."""
+    """Add the arguments of commands that simulate a system live; `built_simulator` reads them, and `spec`."""
     tools, default = [*fitting(is_live=True)], default_simulator(is_live=True)
     parser.add_argument("--tool", choices=tools, default=default, help="default: %(default)s")
     parser.add_argument(
-        "--build-root", type=Path, metavar="DIR", help="folder for the build (default: in the user's cache)"
+        "--build-root", type=Path, metavar="DIR", help="folder for the build (default: a folder in the user's cache)"
     )
     parser.add_argument(
         "--seed", type=_seed, default=1, metavar="N", help="seed of all random values (default: %(default)s)"
@@ -42,9 +42,13 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
         help="percentage of cycles in which the host stalls a stream, 0 to 99 (default: %(default)s)",
     )
     add_sources(parser)
-    core = parser.add_argument_group("if no core beside the specification names them")
+    core = parser.add_argument_group("required only if no core beside the specification lists them")
     core.add_argument(
-        "--depend", metavar="VLNV", action="append", default=[], help="a core that accelerators need; may be repeated"
+        "--depend",
+        metavar="VLNV",
+        action="append",
+        default=[],
+        help="a core that the accelerators need; may be repeated",
     )
     core.add_argument(
         "--environment",
@@ -52,7 +56,7 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        help="VHDL of the environment at the pins; may be repeated",
+        help="a VHDL file of the environment at the pins; may be repeated",
     )
 
 

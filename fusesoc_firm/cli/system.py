@@ -1,4 +1,4 @@
-"""`firm system`: specifications and what is derived from them."""
+"""`firm system`: specifications, and the files and data derived from them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def add_system(commands: Any) -> None:
     system = command(
         commands,
         "system",
-        "write and check system specifications, and what belongs to them",
+        "write and check system specifications, and generate cores, nodes and diagrams from them",
         "firm system check robot.yaml",
     )
     actions = system.add_subparsers(title="actions", metavar="ACTION", required=True)
     new = command(
         actions,
         "new",
-        "write a specification from answers to questions, or extend an existing one",
+        "write or extend a specification by answering questions",
         "firm system new robot.yaml",
         _new_system,
     )
@@ -67,7 +67,7 @@ def add_system(commands: Any) -> None:
     node = command(
         actions,
         "node",
-        "write the software node of a system: a ROS package that connects its topics to its hardware",
+        "write a system's software node: a ROS package that connects topics to the hardware",
         "firm system node robot.yaml -o src/robot_node",
         _write_node,
     )
@@ -88,13 +88,17 @@ def _add_core_options(core: argparse.ArgumentParser) -> None:
     core.add_argument(
         "-o", "--output", type=Path, metavar="F.core", help="the core file to write (default: beside the specification)"
     )
-    new = core.add_argument_group("for a new core; paths are relative to it")
+    new = core.add_argument_group("for a new core; all paths are relative to the core")
     new.add_argument(
         "--name", metavar="VLNV", default="", help="the core's name (default: robot:sys:<the system's name>:0.1.0)"
     )
     new.add_argument("--description", metavar="TEXT", default="", help="a description of the system")
     new.add_argument(
-        "--depend", metavar="VLNV", action="append", default=[], help="a core that accelerators need; may be repeated"
+        "--depend",
+        metavar="VLNV",
+        action="append",
+        default=[],
+        help="a core that the accelerators need; may be repeated",
     )
     new.add_argument(
         "--stimuli", metavar="F", default="stimuli.yaml", help="stimuli: the messages to send (default: %(default)s)"
@@ -110,7 +114,7 @@ def _add_core_options(core: argparse.ArgumentParser) -> None:
         metavar="F",
         action="append",
         default=[],
-        help="VHDL of the environment at the pins; may be repeated",
+        help="a VHDL file of the environment at the pins; may be repeated",
     )
 
 

@@ -1,4 +1,4 @@
-"""`firm tool`: starts a program of a build for Edalize."""
+"""`firm tool`: start a program of a build for Edalize."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ def add_tool(commands: Any) -> None:
     tool = command(
         commands,
         "tool",
-        "start a program for Edalize and record it in manifest.json, or name the package that provides it",
+        "start a program for Edalize and record it in manifest.json, or name the package that provides the program",
         "firm tool nextpnr-ecp5 --version",
         _run_tool,
     )
     tool.add_argument("program", metavar="PROGRAM", help="the program, such as nextpnr-ecp5")
-    tool.add_argument("arguments", metavar="ARGUMENT", nargs=argparse.REMAINDER, help="arguments of the program")
+    tool.add_argument("arguments", metavar="ARGUMENT", nargs=argparse.REMAINDER, help="arguments for the program")
 
 
 def _run_tool(arguments: argparse.Namespace) -> None:

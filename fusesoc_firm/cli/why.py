@@ -1,4 +1,4 @@
-"""`firm why`: the source lines of a generated line."""
+"""`firm why`: show the source lines of a generated line."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ def add_why(commands: Any) -> None:
     why = command(
         commands,
         "why",
-        "show the lines of template, specification and message definition that produced a generated line",
+        "show the lines in the template, specification and message definition that produced a generated line",
         "firm why build/robot_sys_quat2euler_0.2.0/sim/src/robot_sys_quat2euler-system_0.2.0/quat2euler_system.vhd:80",
         _tell_why,
     )
-    why.add_argument("place", metavar="FILE[:LINE]", help="a generated file of a build; without LINE, all its lines")
+    why.add_argument(
+        "place", metavar="FILE[:LINE]", help="a generated file in a build; without LINE, all its lines are explained"
+    )
 
 
 def _tell_why(arguments: argparse.Namespace) -> None:
@@ -31,7 +33,7 @@ def _tell_why(arguments: argparse.Namespace) -> None:
 
     path, number = _split(arguments.place)
     if not path.is_file():
-        fail(f"there is no file {path}", hint="write FILE or FILE:LINE")
+        fail(f"there is no file {path}", hint="the form is FILE or FILE:LINE")
     found = why(path)
     if number is None:
         for count, reason in enumerate(found, start=1):

@@ -26,17 +26,17 @@ class Platform(Section):
 
 @dataclass(frozen=True)
 class Project(Section):
-    """The settings of all messages."""
+    """The settings that apply to all messages."""
 
     name: Text = key("the project's name", is_required=True)
     platform: Platform | None = key("the target hardware", form="section", section=Platform)
-    width: int = key("bits of the streams", form="integer", choices=WIDTHS, default=8)
-    prefix: Text | None = key("prefix of the names of all generated units except the interfaces, such as left")
+    width: int = key("width in bits of the streams", form="integer", choices=WIDTHS, default=8)
+    prefix: Text | None = key("prefix for the names of all generated units except the interfaces, such as left")
 
 
 @dataclass(frozen=True)
 class MessageInterfaces(Section):
-    """A message and the converters requested for it."""
+    """A message and its requested converters."""
 
     type: Text = key("the middleware that defines the message", is_required=True, choices=tuple(MIDDLEWARES))
     name: Text = key("the message's type, such as sensor_msgs/Image", is_required=True)
@@ -46,7 +46,7 @@ class MessageInterfaces(Section):
 
 @dataclass(frozen=True)
 class ConfigFile(Section):
-    """The whole file."""
+    """The contents of a configuration file."""
 
     project: Project = key("settings of all messages", form="section", section=Project, is_required=True)
     messages: tuple[MessageInterfaces, ...] = key(
@@ -55,9 +55,9 @@ class ConfigFile(Section):
 
 
 def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
-    """Read the configuration in a file and note all faults in it.
+    """Read a configuration file and note all faults in the file.
 
-    Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
+    Raise `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
     text = read_yaml(path, str(path), faults)
     if text.root is None or is_null(text.root):
@@ -69,7 +69,7 @@ def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
 
 
 def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
-    """Check that each message has an interface, and each interface a unique name that is legal for an entity."""
+    """Check that each message has an interface, and that each interface has a unique, legal entity name."""
     prefix = config.project.prefix
     if prefix is not None and not is_prefix(prefix):
         faults.error(f"'{prefix}_axis_to_...' is not a legal entity name", prefix.source, PREFIX_RULE)
@@ -77,11 +77,11 @@ def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
     for message in config.messages:
         names = (*message.subscribers, *message.publishers)
         if not names and message.is_sound:
-            hint = "it needs 'subscribers' or 'publishers', or both"
+            hint = "add 'subscribers', 'publishers' or both"
             faults.error(f"'{message.name}' has no interface", message.name.source, hint)
         for name in names:
             if identifier(name) != name:
-                hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+                hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
                 faults.error(f"'{name}' is not a legal entity name", name.source, hint)
             first = seen.setdefault(name.lower(), name)
             if first is not name:

@@ -23,27 +23,27 @@ from fusesoc_firm.text.render import Context
 
 SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
-# VHDL counts the bits of a publisher's frame, with up to three bytes before it, up to 2**31-1.
+# VHDL counts the bits of a publisher's frame, including up to three bytes before the frame, up to 2**31-1.
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
-# The position encodes 2**3 states that are not beats; while a message waits, the next beat is the first one.
+# The position encodes 2**3 states that are not beats; while a message waits, the next beat is the first beat.
 _STATE_BITS = 3
-# The number of bytes of a literal on each line.
+# The number of a literal's bytes on each line.
 _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
 
 
 def subscriber_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
-    """`<prefix>_axis_to_<pkg>_<type>`; a suffix identifies the selection of fields, a prefix the core."""
+    """Return `<prefix>_axis_to_<pkg>_<type>`; a suffix identifies the selection of fields, and a prefix the core."""
     return prefixed(prefix, f"axis_to_{entity_name(frame.message.package, frame.message.name)}{suffix}")
 
 
 def publisher_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
-    """`<prefix>_<pkg>_<type>_to_axis`; a suffix identifies the selection of fields, a prefix the core."""
+    """Return `<prefix>_<pkg>_<type>_to_axis`; a suffix identifies the selection of fields, and a prefix the core."""
     return prefixed(prefix, f"{entity_name(frame.message.package, frame.message.name)}_to_axis{suffix}")
 
 
 def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Context:
-    """The configuration of `entity` (default: `subscriber_entity`) for a stream of `width` bits."""
+    """Return the configuration of `entity` (default: `subscriber_entity`) for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -66,9 +66,9 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
 
 
 def _states(last_position: int) -> Context:
-    """The position values that do not represent beats; they share the shortest prefix of ones that no beat has.
+    """Return the position values that do not represent beats; all begin with more ones than any beat's position.
 
-    Below this prefix, bit 2 tells whether the frame has ended; bits 1 and 0 hold a code.
+    In the three lowest bits, bit 2 tells whether the frame has ended, and bits 1 and 0 hold a code.
     """
     bits = max(_STATE_BITS + 1, (last_position + 2**_STATE_BITS).bit_length())
     ones = next(count for count in range(1, bits) if last_position < 2**bits - 2 ** (bits - count))
@@ -84,7 +84,7 @@ def _states(last_position: int) -> Context:
 
 
 def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Context:
-    """The configuration of `entity` (default: `publisher_entity`) for a stream of `width` bits."""
+    """Return the configuration of `entity` (default: `publisher_entity`) for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -95,7 +95,7 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
     return {
         **_common(frame, stream, entity or publisher_entity(frame), "in"),
         "first_position": start,
-        # The bytes before the frame.
+        # The number of bytes before the frame.
         "start_bits": start * width,
         "start_zeros": hexadecimal(bytes(start)) if start else "",
         "last_position": start + beats - 1,
@@ -108,10 +108,10 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
 
 
 def _first_position(stream: Stream) -> int:
-    """A publisher's first position; on an 8-bit stream, it aligns the payload's first byte to a multiple of four.
+    """Return a publisher's first position; on 8-bit streams, it aligns the payload's start to a multiple of four.
 
-    Four payload bytes then share a LUT of the multiplexer, and the constant bytes before them need no LUT. This saves
-    a third of the LUTs.
+    Four payload bytes then share a LUT of the multiplexer, and the constant bytes before the payload need no LUT. The
+    alignment saves a third of the LUTs.
     """
     return -(ID_BYTES + LENGTH_BYTES) % 4 if stream.lanes == 1 else 0
 
@@ -119,14 +119,15 @@ def _first_position(stream: Stream) -> int:
 def check_width(width: int) -> None:
     """Raise `InputError` if converters do not support a stream of this width."""
     if width not in WIDTHS:
-        fail(f"a converter cannot have a stream of {width} bits", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
+        fail(f"converters do not support {width}-bit streams", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
 
 
 def _check_size(frame: Frame) -> None:
     if frame.frame_bytes > _LARGEST_FRAME:
         fail(
-            f"{frame.message} takes {frame.payload_bytes} bytes, too many for a converter",
-            hint=f"at most {_LARGEST_FRAME - ID_BYTES - LENGTH_BYTES}, since VHDL counts bits up to 2**31-1",
+            f"{frame.message} has {frame.payload_bytes} bytes, which is too many for a converter",
+            hint=f"legal here: at most {_LARGEST_FRAME - ID_BYTES - LENGTH_BYTES}, since VHDL"
+            " cannot count more than 2**31-1 bits",
         )
 
 
@@ -146,10 +147,10 @@ def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Contex
 
 
 def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
-    """The beats that carry the length, with the bytes of each legal length in them.
+    """Return the beats that carry the length, with the bytes of each legal length in each beat.
 
-    The legal lengths are the payload's length and, where writers append bytes, a few larger values. Bit k of `match` is
-    high while the received length can still be the payload's length plus k.
+    The legal lengths are the payload's length and, if writers append bytes, a few larger values. Bit k of `match` is
+    high while the received length may still be the payload's length plus k.
     """
     places = range(stream.length_start, stream.length_start + LENGTH_BYTES)
     beats = sorted({stream.beat(byte) for byte in places})
@@ -167,7 +168,7 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
 
 
 def _length_checks(length: int, beat: int, stream: Stream) -> list[Context]:
-    """The checks of a length's bytes on a beat; a present byte that differs rules the length out."""
+    """Return the checks of a length's bytes on a beat; a byte that is present and differs excludes this length."""
     return [
         _byte_check(stream, stream.length_start + index, byte)
         for index, byte in enumerate(length.to_bytes(LENGTH_BYTES, "little"))
@@ -180,7 +181,10 @@ def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
 
 
 def _byte_check(stream: Stream, byte: int, value: int) -> Context:
-    """The check that a byte of the stream has a value; the byte is present if its lane's `tkeep` is set."""
+    """Return the check that a byte of the stream has a certain value.
+
+    A byte is present if its lane's `tkeep` is set.
+    """
     lane = stream.lane(byte)
     return {
         "beat": is_beat(stream.beat(byte), stream.beat(byte)),
@@ -192,7 +196,10 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Context:
 
 
 def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
-    """The end of a frame whose length sets bit `number` of `match`; None if there is only one legal length."""
+    """Return the end of a frame whose length sets bit `number` of `match`.
+
+    With only one legal length, `number` is None.
+    """
     lane = stream.lane(last_byte)
     return {
         "number": number,
@@ -203,14 +210,14 @@ def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
 
 
 def _field_slices(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Context]:
-    """The pieces of a port that are contiguous in a store."""
+    """Return the pieces of all ports; each piece is contiguous in a store."""
     places, registers = StoreMap(stream, stores), [f"fields{suffix}_r" for suffix in store_names(stores)]
     slices = (piece for port in field_ports(frame) for piece in slices_of(port))
     return [stored for piece in slices for stored in stored_slices(piece, places, registers)]
 
 
 def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Context]:
-    """The parts of a frame after its id, with their values; bits count from `start` bytes before the frame.
+    """Return the parts of a frame after the id, with their values; bit 0 is `start` bytes before the frame.
 
     The parts are header, constant bytes, fields, and zeros up to `size` bytes.
     """
@@ -232,15 +239,15 @@ def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Context]:
 
 
 def _literal(data: bytes) -> str:
-    """Bytes as a VHDL literal, the first byte lowest; long runs of zeros are abbreviated."""
+    """Return bytes as a VHDL literal with the first byte lowest; long runs of zeros are abbreviated."""
     return hexadecimal(data) if any(data) or len(data) <= _ROW else "(others => '0')"
 
 
 def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:
-    """The parts of the payload that no port drives, with the bytes that a publisher sends there.
+    """Yield the offset and the bytes of each part of the payload that no port drives.
 
-    These bytes are the prefix, the defaults of unused fields, and zeros elsewhere. The bytes are split into rows; a
-    long run of zeros is a single part.
+    The bytes are the prefix, the defaults of unused fields, and zeros elsewhere. They are split into rows; a long run
+    of zeros is a single part.
     """
     payload = default_payload(frame)
     cursor = 0

@@ -1,7 +1,7 @@
-"""Message -> configuration of its VHDL package: the signature, and the constants in the types of converters' ports.
+"""Message -> configuration of its VHDL package: the signature and the constants, in the types of converters' ports.
 
-ROS messages have constants instead of enumerations. The package also has the constants of nested messages, prefixed
-with the nested message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
+ROS messages have constants instead of enumerations. The package also contains the constants of nested messages,
+prefixed with the nested message's name: `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
 """
 
 from __future__ import annotations
@@ -44,20 +44,20 @@ class _Placed:
 
     @property
     def comment(self) -> str:
-        """The constant's type and ROS name, with the value if it is a number: `uint8 sensor_msgs/PointField.INT8=1`."""
+        """The constant's type and ROS name, with the value of a number: `uint8 sensor_msgs/PointField.INT8=1`."""
         owner = "" if self.message is None else f"{self.message}."
         named = f"{self.constant.type} {owner}{self.constant.name}"
         return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
 
 
 def constants_package(name: MessageName, ros: Middleware | None = None, prefix: str = "") -> str:
-    """`<prefix>_<pkg>_<type>_pkg`, or `..._ros<N>_pkg` where packages of both ROS versions coexist."""
+    """Return `<prefix>_<pkg>_<type>_pkg` or, where packages of both ROS versions coexist, `..._ros<N>_pkg`."""
     version = [] if ros is None else [f"ros{ros.number}"]
     return prefixed(prefix, "_".join([entity_name(name.package, name.name), *version, "pkg"]))
 
 
 def constants_configuration(name: MessageName, definitions: Definitions, package: str) -> dict[str, Any]:
-    """The configuration of a message's package; `definitions` hold the message and all nested messages."""
+    """Return the configuration of a message's package; `definitions` contains the message and all nested messages."""
     placed = list(_placed(name, definitions))
     texts = [item for item in placed if isinstance(item.constant.type, StringType)]
     numbers = [item for item in placed if not isinstance(item.constant.type, StringType)]
@@ -81,7 +81,7 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
 
 
 def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
-    """The constants of a message, then those of each nested message once, in the order of the fields."""
+    """Yield the constants of a message, then those of each nested message once, in the order of the fields."""
     messages: list[MessageName] = []
     _collect(name, definitions, messages)
     for message in messages:
@@ -90,7 +90,7 @@ def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
 
 
 def _collect(name: MessageName, definitions: Definitions, found: list[MessageName]) -> None:
-    """Add a message and all messages nested in it, unless they were found before."""
+    """Add a message and all messages nested in it to `found`, unless they are already there."""
     if name in found:
         return
     found.append(name)
@@ -100,7 +100,7 @@ def _collect(name: MessageName, definitions: Definitions, found: list[MessageNam
 
 
 def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
-    """A number or a bool as the bits at a port."""
+    """Return the configuration of a number or bool, with its value as the bits at a port."""
     wire = ros.rules.scalars[str(item.constant.type)]
     digits = struct.pack(f">{wire.code}", item.constant.value).hex()
     is_bit = wire.bits == 1
@@ -113,14 +113,17 @@ def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
 
 
 def _numbers(values: list[dict[str, Any]]) -> dict[str, Any]:
-    """The constants in columns; if a line would be too long, every comment goes above its constant."""
+    """Return the configuration of constants in columns.
+
+    If a line would be too long, comments are above the constants.
+    """
     columns = {key: max((len(item[key]) for item in values), default=0) for key in ("name", "type", "value", "comment")}
     aligned = [{**item, **{key: item[key].ljust(columns[key]) for key in ("name", "type")}} for item in values]
     return {"values": aligned, "is_above": sum(columns.values()) + len("  constant  :  := ; -- ") > _LONGEST_LINE}
 
 
 def _text(item: _Placed, names: Sequence[str]) -> list[dict[str, Any]]:
-    """The three constants of a text: the string, its length, and its bytes as a converter's stream carries them."""
+    """Return a text's three constants: the string, the length, and the bytes as in a converter's stream."""
     characters = str(item.constant.value).encode()
     data = _wire_bytes(item)
     count = len(data) // (WIDE_CHARACTER.size if _is_wide(item) else CHARACTER.size)
@@ -139,7 +142,7 @@ def _is_wide(item: _Placed) -> bool:
 
 
 def _wire_bytes(item: _Placed) -> bytes:
-    """The bytes of the text on the wire, without the length before it and the terminator after it."""
+    """Return the bytes of the text on the wire, without length and terminator."""
     text = str(item.constant.value)
     if not _is_wide(item):
         return text.encode()
@@ -148,7 +151,7 @@ def _wire_bytes(item: _Placed) -> bytes:
 
 
 def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
-    """A constant whose value is `pieces` joined with `&`, on one line or several."""
+    """Return a constant whose value is `pieces` joined with `&`, on one line or several."""
     lines = wrapped(pieces, "&", _LONGEST_EXPRESSION)
     length = len("  constant  :  := ;") + len(name) + len(type_) + len(lines[0])
     return {
@@ -160,10 +163,10 @@ def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
 
 
 def _characters(text: str) -> list[str]:
-    """Pieces that form a string of Latin-1: `"printable"`, and `character'val(10)` for any other character."""
+    """Return the pieces of a Latin-1 string: `"printable"`, and `character'val(10)` for any other character."""
     runs = groupby(text, key=lambda character: character.isascii() and character.isprintable())
     pieces = [piece for is_printable, run in runs for piece in (_quoted("".join(run)) if is_printable else _codes(run))]
-    # Characters joined with `&` form a string only if an operand is a string, so an empty string comes first.
+    # Characters joined with `&` form a string only if an operand is a string, so the first operand is an empty string.
     return pieces if pieces and pieces[0].startswith(_QUOTE) else ['""', *pieces]
 
 
@@ -177,11 +180,11 @@ def _codes(characters: Iterable[str]) -> Iterator[str]:
 
 
 def _bytes(data: bytes) -> list[str]:
-    """Pieces that form a vector, the first byte lowest."""
+    """Return the pieces of a vector, with the first byte lowest."""
     digits, size = data[::-1].hex(), 2 * _BYTES_A_PIECE
     return [f'x"{digits[first : first + size]}"' for first in range(0, len(digits), size)]
 
 
 def _decimal(value: bool | float) -> str:
-    """A number as ROS writes it."""
+    """Return a number as ROS writes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

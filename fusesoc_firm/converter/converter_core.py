@@ -28,7 +28,7 @@ VHDL = "vhdlSource-93"
 
 
 def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], str | None]:
-    """The sources of a request's messages, as arguments of `MessageLibrary`: folders, environment, distribution."""
+    """Return the sources of a request's messages as arguments of `MessageLibrary`."""
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
@@ -37,7 +37,7 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
 
 
 def load(request: Request) -> LoadedRequest:
-    """The order of a request; raises `InputError`."""
+    """Load the order of a request; may raise `InputError`."""
     order = order_of_request(request)
     return LoadedRequest(
         request,
@@ -48,7 +48,7 @@ def load(request: Request) -> LoadedRequest:
 
 
 def converters_core(order: Order) -> GeneratedCore:
-    """The core of an order, with its files in compilation order; raises `InputError`."""
+    """Return the core of an order, with its files in compilation order; may raise `InputError`."""
     files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
     interfaces: dict[str, GeneratedFile] = {}
     for wanted in order.messages:
@@ -62,7 +62,7 @@ def converters_core(order: Order) -> GeneratedCore:
 
 
 def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix: str = "") -> dict[str, GeneratedFile]:
-    """The package of each message, without duplicates; the definitions include nested messages."""
+    """Return the package files of the messages, each once, by name; the definitions include nested messages."""
     return {
         path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
         for path, configuration in constants_configurations(messages, prefix)
@@ -72,7 +72,7 @@ def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix:
 def constants_configurations(
     messages: Sequence[tuple[MessageName, Definitions]], prefix: str = ""
 ) -> Iterator[tuple[str, Context]]:
-    """The file name of each message's package, with the configuration to render it."""
+    """Yield the file name of each message's package, with the configuration to render it."""
     counts = Counter(name for name, _ in messages)
     for name, definitions in messages:
         package = constants_package(name, definitions[name].ros if counts[name] > 1 else None, prefix)
@@ -80,13 +80,13 @@ def constants_configurations(
 
 
 def subscriber_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
-    """`<prefix>_axis_to_<pkg>_<type>.vhd` of each frame."""
+    """Return `<prefix>_axis_to_<pkg>_<type>.vhd` for each frame."""
     entities = {subscriber_entity(frame, prefix=prefix): frame for frame in frames}
     return {f"{entity}.vhd": _file(subscriber_source(frame, width, entity)) for entity, frame in entities.items()}
 
 
 def publisher_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
-    """`<prefix>_<pkg>_<type>_to_axis.vhd` of each frame."""
+    """Return `<prefix>_<pkg>_<type>_to_axis.vhd` for each frame."""
     entities = {publisher_entity(frame, prefix=prefix): frame for frame in frames}
     return {f"{entity}.vhd": _file(publisher_source(frame, width, entity)) for entity, frame in entities.items()}
 
@@ -96,7 +96,7 @@ def _file(source: ConverterSource) -> GeneratedFile:
 
 
 def order_of_request(request: Request) -> Order:
-    """The order of a request, which names either a message or a configuration file."""
+    """Return the order of a request, which names either a message or a configuration file."""
     config, ros, width = (request.parameters.get(name) for name in ("config", "ros", "width"))
     if config is not None:
         return order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
@@ -109,7 +109,7 @@ def order_of_request(request: Request) -> Order:
 
 
 def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:
-    """`<name>.vhd` for each further name of a converter; `vhdl` is the converter's text."""
+    """Return `<name>.vhd` for each additional name of a converter; `vhdl` is the converter's text."""
     message = f"{frame.message} ({frame.ros.title})"
     return {
         f"{name}.vhd": GeneratedFile(

@@ -1,6 +1,7 @@
-"""An interface: an entity that only instantiates a converter, under the name that a configuration file gives it.
+"""An interface: an entity that only instantiates a converter, with a name from the configuration file.
 
-Its ports are read from the converter's text, so the two cannot differ. A converter can have any number of names.
+The wrapper's ports are read from the converter's text, so the two cannot differ. A converter can have any number of
+names.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ _NAME = re.compile(r"^    (\w+) +: ", re.MULTILINE)
 
 
 def interface_configuration(name: str, converter: str, vhdl: str, message: str) -> dict[str, Any]:
-    """The configuration of the entity `name`, which wraps the entity `converter`; `vhdl` is the converter's text."""
+    """Return the configuration of the entity `name`, a wrapper of the entity `converter` with the text `vhdl`."""
     generics, ports = _declarations(vhdl, "generic"), _declarations(vhdl, "port")
     port_names = _NAME.findall(ports)
     (label,) = distinct_identifiers([("u_converter",)], reserved=port_names)
@@ -35,7 +36,7 @@ def interface_configuration(name: str, converter: str, vhdl: str, message: str) 
 
 
 def _declarations(vhdl: str, kind: str) -> str:
-    """The lines of an entity's list of generics or ports; "" if the entity has no such list."""
+    """Return the lines of an entity's list of generics or ports, or an empty string without such a list."""
     entity = vhdl.partition("\nentity ")[2].partition("\nend entity;")[0] + "\n"
     found = re.search(_LIST.format(kind), entity, re.MULTILINE | re.DOTALL)
     return found[1] if found else ""

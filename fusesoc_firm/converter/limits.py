@@ -1,4 +1,4 @@
-"""The limits of converters of fixed size."""
+"""The limits of converters for messages of fixed size."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 def check_fixed_size(frame: Frame) -> None:
-    """Raise `InputError` with all fields of variable size, if there are any."""
+    """Raise `InputError` with all fields of variable size if the message has any."""
     faults = Diagnostics()
     for part in _variable_parts(frame.nodes):
         faults.error(
             f"field '{'.'.join(part.names)}' of type '{part.ros_type}' has no fixed size",
             part.source if part.source and part.source.line else None,
-            "converters take messages of fixed size: numbers, time, duration, fixed arrays and messages of these",
+            "legal here: numbers, time, duration, and fixed arrays and messages of these types",
         )
     faults.raise_if_any()
 
 
 def _variable_parts(nodes: Sequence[Node]) -> Iterator[Data | Loop]:
-    """The parts of variable length; for a fixed array, the variable parts in its elements."""
+    """Yield the parts of variable length, including those in the elements of fixed arrays."""
     for node in nodes:
         if isinstance(node, Loop) and node.count is not None:
             yield from _variable_parts(node.body)

@@ -1,4 +1,4 @@
-"""The order to the generator `firm`: messages, the converters requested for each message, and the converters' names.
+"""The order to the generator `firm`: messages, the requested converters for each message, and the converters' names.
 
 An order comes from the parameters of a core, for a message, a service or an action, or from a configuration file.
 """
@@ -32,7 +32,7 @@ class Wanted:
     """A message's frame, with the definitions of the message and all nested messages.
 
     `interfaces` has a key for each direction in which a converter is requested; the value lists additional names for
-    that converter.
+    this converter.
     """
 
     frame: Frame
@@ -52,10 +52,10 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Order:
-    """All requested messages, each once, for streams of `width` bits, with the `files` from which they were read.
+    """All requested messages, each once, for streams of `width` bits; `files` are the files that were read.
 
-    `libraries` are the libraries of the messages. `prefix` precedes the names of all design units except the units that
-    the user named.
+    `libraries` are the libraries of the messages. `prefix` precedes the names of all design units that the user did not
+    name.
     """
 
     title: str
@@ -66,7 +66,7 @@ class Order:
     prefix: str = ""
 
     def entity(self, frame: Frame, direction: str) -> str:
-        """The entity of a frame's converter."""
+        """Return the entity name of a frame's converter in this direction."""
         return ENTITIES[direction](frame, prefix=self.prefix)
 
 
@@ -81,9 +81,9 @@ class Selection:
 def order_of_message(
     text: str, direction: str, width: int, library: MessageLibrary, selection: Selection | None = None
 ) -> Order:
-    """The converters of one message, or of the messages that the two ends of a service or an action exchange.
+    """Return an order for one message, or for the messages that the ends of a service or an action exchange.
 
-    `direction` is a key of `ENTITIES`, or "both". `selection` selects fields and requires a single message. Raises
+    `direction` is a key of `ENTITIES`, or "both". `selection` selects fields and requires a single message. May raise
     `InputError`.
     """
     selection = selection or Selection()
@@ -110,12 +110,12 @@ def _check_no_selection(selection: Selection, text: str) -> None:
         fail(
             f"'{text}' consists of several messages, so its fields cannot be selected",
             source,
-            "name one of them instead",
+            "name one of these messages instead",
         )
 
 
 def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) -> Order:
-    """The converters listed in a configuration file; raises `InputError` with all faults of the file."""
+    """Return the order in a configuration file; raise `InputError` with all faults in the file."""
     faults = Diagnostics()
     config = read_config(path, faults)
     found = [(entry, wanted) for entry in config.messages if (wanted := _wanted(entry, libraries, faults))]
@@ -131,7 +131,7 @@ def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) 
 def _wanted(
     entry: MessageInterfaces, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Wanted | None:
-    """The message of an item of the file; None if a fault was noted."""
+    """Return the requested message in an item of the file; after a fault, note it and return None."""
     if not entry.type or not entry.name:
         return None
     library = libraries[MIDDLEWARES[entry.type]]
@@ -148,7 +148,7 @@ def _wanted(
 
 
 def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
-    """Each message once, with all interfaces of the message."""
+    """Return each message once, with all interfaces that are requested for it."""
     joined: dict[tuple[Middleware, MessageName], Wanted] = {}
     for wanted in messages:
         first = joined.get((wanted.ros, wanted.message))
@@ -160,13 +160,13 @@ def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
 
 
 def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, faults: Diagnostics) -> None:
-    """Check that no name is needed twice, since a tool keeps one entity or package of each name."""
+    """Check that no name is needed twice, since a tool keeps only one entity or package of each name."""
     owners: dict[str, tuple[str, Frame]] = {}
     for entry, wanted in found:
         package = constants_package(wanted.message, prefix=prefix)
         _, twin = owners.setdefault(package, ("package", wanted.frame))
         if twin.message != wanted.message:
-            message = f"'{wanted.message}' and '{twin.message}' need the package '{package}'"
+            message = f"'{wanted.message}' and '{twin.message}' both need the package '{package}'"
             faults.error(message, entry.name.source)
         for direction in wanted.interfaces:
             entity = ENTITIES[direction](wanted.frame, prefix=prefix)
@@ -174,11 +174,11 @@ def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, 
             if twin.message == wanted.message and twin.ros is not wanted.ros:
                 message = f"'{wanted.message}' already needs the entity '{entity}' for {twin.ros.title}"
                 faults.error(
-                    message, entry.name.source, "a project can have a message in only one ROS version per direction"
+                    message, entry.name.source, "a project can use a message in only one ROS version per direction"
                 )
     for entry, wanted in found:
         own = {"subscriber": entry.subscribers, "publisher": entry.publishers}
         for name, direction in ((name, direction) for direction, names in own.items() for name in names):
             what, frame = owners.get(name.lower(), ("", wanted.frame))
             if what and (what, frame) != (direction, wanted.frame):
-                faults.error(f"'{name}' is already the name of the {what} of {frame.message}", name.source)
+                faults.error(f"the name '{name}' is already used for the {what} of {frame.message}", name.source)

@@ -64,7 +64,7 @@ def length_ports(frame: Frame) -> tuple[str, ...]:
 def payload_length_configuration(frame: Frame, suffix: str = "") -> Context:
     """The configuration of `<pkg>_<type>_length`, for a frame with a computed length."""
     length = sent_length_of(frame)
-    assert length.is_computed, f"the lengths at the ports of {frame.message} do not determine its payload's"
+    assert length.is_computed, f"the lengths at the ports of {frame.message} do not determine the payload's length"
     parts = _counted_parts(length.terms)
     names = dict(zip((part.path for part in parts), length_ports(frame), strict=True))
     # Positions count from the end of the prefix.

@@ -9,7 +9,7 @@ from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Frame, FrameField, Path
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
-# Names that the templates declare or use; a field with one of these names gets a different port name.
+# Names that the templates declare or use; the port of a field with one of these names has a different name.
 _TAKEN = """
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
@@ -26,7 +26,7 @@ _NUMBERED = re.compile(r"(store|fields|turns?|used)_\d+(_\w+)?", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class FieldPort:
-    """A port and its leaf; `width` is None for a `std_logic`."""
+    """A port and its leaf; `width` is in bits, or None for a `std_logic`."""
 
     name: str
     width: int | None
@@ -39,12 +39,12 @@ class FieldPort:
 
     @property
     def comment(self) -> str:
-        """The ROS name and type of the leaf, which show the port's origin: `pose.position.x: float64`."""
+        """The leaf's ROS name and type, which identify the port's origin: `pose.position.x: float64`."""
         return f"{ros_path(self.field.path)}: {self.field.type.name}"
 
 
 def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
-    """A port for each used leaf that holds a value, in wire order; names do not depend on the selection of fields."""
+    """Return the ports of the used leaves in wire order; names do not depend on the selection of fields."""
     fields = [field for field in frame.fields if field.count]
     numbered = (name for field in fields if _NUMBERED.fullmatch(name := identifier(*field.names)))
     names = distinct_identifiers((field.names for field in fields), reserved=[*_TAKEN, *numbered])
@@ -54,11 +54,11 @@ def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
 
 
 def port_width(field: FrameField) -> int | None:
-    """The width of a leaf's port in bits; None for a single bool."""
+    """Return the width of a leaf's port in bits, or None for a single bool."""
     is_bit = field.type.bits == 1 and not field.is_array
     return None if is_bit else field.count * field.type.bits
 
 
 def ros_path(path: Path) -> str:
-    """A path as written in a definition, with the sizes of fixed arrays: `pose.covariance[36]`."""
+    """Return a path as written in a definition, with the sizes of fixed arrays: `pose.covariance[36]`."""
     return ".".join(step.name if step.count is None else f"{step.name}[{step.count}]" for step in path)

@@ -24,7 +24,7 @@ _DECLARED = re.compile(
 
 @cache
 def reserved_names(*templates: str) -> frozenset[str]:
-    """The names in the VHDL templates, in lower case, except names that contain tags, which are numbered."""
+    """Return the names in the VHDL templates in lower case, except names with tags, which expand to numbered names."""
     found = set(_USED)
     for template in templates:
         text = _TAG.sub("\N{REPLACEMENT CHARACTER}", _COMMENT.sub("", template_text(template)))

@@ -12,7 +12,7 @@ from fusesoc_firm.frame.model import FrameField
 
 @dataclass(frozen=True)
 class Slice:
-    """`width` bits of a port from bit `low` on, and the payload bytes that hold them: `bytes` bytes from `offset` on.
+    """`width` bits of a port from bit `low`, and the payload bytes that contain them: `bytes` bytes from `offset`.
 
     A bool is one bit of the port and one byte of the payload. All other types have 8 bits in each byte.
     """
@@ -42,11 +42,11 @@ class Slice:
 
 
 def slices_of(port: FieldPort) -> Iterator[Slice]:
-    """The slices of a port that are contiguous in the payload, lowest bits first."""
+    """Yield the slices of a port that are contiguous in the payload, lowest bits first."""
     type_ = port.field.type
     low = 0
     for run in port.field.runs:
-        # Neighbouring bools of a port are a byte apart on the wire.
+        # Adjacent bools of a port are one byte apart on the wire.
         pieces, elements = (run.count, 1) if type_.bits == 1 else (1, run.count)
         for piece in range(pieces):
             yield Slice(port, low, elements * type_.bits, run.offset + piece * type_.size, elements * type_.size)
@@ -54,7 +54,7 @@ def slices_of(port: FieldPort) -> Iterator[Slice]:
 
 
 def windows_of(fields: Iterable[FrameField]) -> list[tuple[int, int]]:
-    """The positions of used fields in the payload, as sorted (first, end) offsets; adjacent ranges are merged."""
+    """Return the sorted (first, end) ranges of fields in the payload, in bytes; adjacent ranges are merged."""
     windows: list[tuple[int, int]] = []
     for first, end in sorted(
         (run.offset, run.offset + run.count * field.type.size)

@@ -22,14 +22,14 @@ from fusesoc_firm.text.render import Context
 
 
 class ConverterSource(NamedTuple):
-    """The template of a converter's text, with its configuration."""
+    """A template and its configuration, which together define a converter's text."""
 
     template: str
     configuration: Context
 
 
 def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
-    """The subscriber `entity` (default: `subscriber_entity`) on `width` bits; raises `InputError` if unsupported."""
+    """Return the source of a subscriber; `entity` is by default `subscriber_entity`. May raise `InputError`."""
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, entity))
@@ -43,7 +43,7 @@ def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSo
 
 
 def publisher_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
-    """The publisher `entity` (default: `publisher_entity`) on `width` bits; raises `InputError` if unsupported."""
+    """Return the source of a publisher; `entity` is by default `publisher_entity`. May raise `InputError`."""
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, entity))

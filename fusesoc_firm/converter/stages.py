@@ -1,6 +1,6 @@
-"""The text of a message at each stage on the route from definition to hardware.
+"""The text of a message at each stage from the definition to the hardware.
 
-Each stage imports only the modules that it needs, since the user of `firm message show` waits for these imports.
+Each stage imports only the modules that it needs, so that `firm message show` starts quickly.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> str:
-    """A message, or the messages of a service or action, at one of `STAGES`, without the final newline.
+    """Return a message, or the messages of a service or action, at one of `STAGES`, without a final newline.
 
-    `width` is the width of the converters' stream in bits. Raises `InputError`.
+    `width` is the width of the converters' stream in bits. May raise `InputError`.
     """
     from fusesoc_firm.message.parser import parse_full_name
 
@@ -36,7 +36,7 @@ def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> 
 
 
 def _title(interface: Interface, definitions: Definitions) -> str:
-    """The heading of a message of a service or an action."""
+    """Return the heading of a message of a service or an action."""
     from fusesoc_firm.message.signature import signature
 
     title = f"# {interface} ({interface.ros.title})"
@@ -77,7 +77,7 @@ def _vhdl(name: MessageName, definitions: Definitions, width: int) -> str:
 
 
 def _sources(name: MessageName, definitions: Definitions, width: int) -> Iterator[ConverterSource]:
-    """The message's package of constants, and both converters."""
+    """Yield the message's package of constants, and both converters."""
     from fusesoc_firm.converter import constants
     from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
     from fusesoc_firm.frame.layout import frame_of
@@ -97,5 +97,5 @@ STAGES: Mapping[str, Callable[[MessageName, Definitions, int], str]] = {
     "config": _configuration,
     "vhdl": _vhdl,
 }
-"""The text of a message, with all definitions within it, for a stream of so many bits: by the stage's name."""
+"""For each stage's name, a function of a message, its definitions and the stream width that returns the text."""
 _YAML = ("frame", "config")

@@ -58,8 +58,8 @@ def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> C
     places = Places(publisher_program(frame), width // 8)
     if (places.end + 1) * width > _LARGEST_NATURAL:
         fail(
-            f"the fields of {frame.message} take {places.end * places.lanes} bytes, too many for a converter",
-            hint=f"at most {_LARGEST_NATURAL // 8}: VHDL counts the bits of all fields up to 2**31-1",
+            f"the fields of {frame.message} have {places.end * places.lanes} bytes, which is too many for a converter",
+            hint=f"legal here: at most {_LARGEST_NATURAL // 8}, since VHDL cannot count more than 2**31-1 bits",
         )
     return {"entity": entity, **_Publisher(places, message_side(frame), width).configuration()}
 

@@ -4,47 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-# The approximate length of the lines of a condition.
+# The approximate length of a line in a condition.
 LINE = 80
 
 
 def vhdl_type(width: int | None) -> str:
-    """`std_logic` for None, else a vector of `width` bits."""
+    """Return `std_logic` if `width` is None, otherwise a vector type with `width` bits."""
     return "std_logic" if width is None else f"std_logic_vector({width - 1} downto 0)"
 
 
 def bit(vector: str, number: int) -> str:
-    """A bit of a vector."""
+    """Return the expression for a bit of a vector."""
     return f"{vector}({number})"
 
 
 def bits(vector: str, high: int, low: int) -> str:
-    """A range of bits of a vector."""
+    """Return the expression for a range of bits in a vector."""
     return f"{vector}({high} downto {low})"
 
 
 def binary(value: int, width: int) -> str:
-    """A `width`-bit number as a literal."""
+    """Return a `width`-bit number as a literal."""
     return f'"{value:0{width}b}"'
 
 
 def hexadecimal(data: bytes) -> str:
-    """Bytes as a literal, the first byte lowest."""
+    """Return bytes as a literal, with the first byte lowest."""
     return f'x"{data[::-1].hex()}"'
 
 
 def bits_of_bool(port: str) -> str:
-    """The byte that is sent for a bool's bit."""
+    """Return the expression for the byte that is sent for a bool's bit."""
     return f'"0000000" & {port}'
 
 
 def within(number: str, first: int, last: int) -> str:
-    """The condition that a number is in the range `first` to `last`."""
+    """Return the condition that a number is in the range `first` to `last`."""
     return f"{number} = {first}" if first == last else f"({number} >= {first} and {number} <= {last})"
 
 
 def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
-    """Operands joined by an operator, in lines of about `length` characters; the operator is omitted at line ends."""
+    """Return lines of about `length` characters with operands joined by an operator, which is omitted at line ends."""
     lines: list[str] = []
     for operand in operands:
         if lines and len(lines[-1]) + len(operand) < length:
@@ -55,10 +55,10 @@ def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
 
 
 def all_of(conditions: Iterable[str]) -> str:
-    """The expression that is '1' while all conditions are '1'."""
+    """Return the expression that is '1' if all conditions are '1'."""
     return " and ".join(conditions)
 
 
 def any_of(conditions: Iterable[str]) -> str:
-    """The condition that at least one of the conditions holds; "" if there are no conditions."""
+    """Return the condition that at least one condition is true, or an empty string without conditions."""
     return " or\n        ".join(wrapped(conditions, "or", LINE))

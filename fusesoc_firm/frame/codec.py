@@ -1,7 +1,7 @@
-"""Encodes and decodes frames in Python: nested dictionaries and lists to payload bytes, and back.
+"""Encode and decode frames in Python: nested dictionaries and lists to payload bytes, and back.
 
-The codec uses the same Frame as the hardware generator. It serves stimuli and reports. It never verifies the
-converters: independent serialisers do this.
+The codec uses the same Frame as the hardware generator, and serves stimuli and reports. It is never used to verify the
+converters; independent serialisers verify them.
 """
 
 from fusesoc_firm.frame.decoder import decode, used_bytes
@@ -13,5 +13,5 @@ __all__ = ["CodecError", "MessageValue", "decode", "encode", "pack_frame", "used
 
 
 def pack_frame(identifier: int, payload: bytes) -> bytes:
-    """The whole frame: id, length, payload."""
+    """Return the whole frame: the id, the payload's length and the payload."""
     return identifier.to_bytes(ID_BYTES, "little") + len(payload).to_bytes(LENGTH_BYTES, "little") + payload

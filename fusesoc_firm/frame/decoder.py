@@ -1,4 +1,4 @@
-"""Decodes payload bytes to nested dictionaries and lists, and finds the bytes that carry values."""
+"""Decode payload bytes to nested dictionaries and lists, and find the bytes that carry values."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from fusesoc_firm.frame.values import CodecError, check_bound, dotted, put, put_
 
 
 def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
-    """Decode a payload. Numbers become Python numbers, arrays lists, and variable arrays of `uint8` `bytes`.
+    """Decode a payload. Numbers become Python numbers, arrays become lists, and `uint8` sequences become bytes.
 
     Raises:
-        CodecError: the payload is too short or too long, has another encoding, or holds invalid values.
+        CodecError: the payload is too short or too long, has another encoding, or contains invalid values.
     """
     return _read(frame, payload)[0]
 
 
 def used_bytes(frame: Frame, payload: bytes) -> bytes:
-    """One byte for each byte of the payload: 1 for a value, a count or the prefix, 0 for padding.
+    """Return one byte for each byte of the payload: 1 for values, counts and the prefix, 0 for padding.
 
-    Raises `CodecError` like `decode`.
+    Raise `CodecError` like `decode`.
     """
     used = bytearray(len(payload))
     for first, end in _read(frame, payload)[1]:
@@ -30,12 +30,12 @@ def used_bytes(frame: Frame, payload: bytes) -> bytes:
 
 
 def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int]]]:
-    """The message, and the ranges (first, end) of the payload that carry it."""
+    """Return the message, and the (first, end) ranges of the payload bytes that carry the message."""
     if frame.is_fixed_size and not 0 <= len(payload) - frame.payload_bytes <= frame.trailing_bytes:
-        raise CodecError(f"{frame.message} takes {frame.payload_bytes} bytes, not {len(payload)}")
+        raise CodecError(f"the payload of {frame.message} must have {frame.payload_bytes} bytes, not {len(payload)}")
     checked = payload[: frame.checked_prefix]
     if checked != frame.prefix[: frame.checked_prefix]:
-        raise CodecError(f"unknown encoding {checked.hex()} of {frame.message}")
+        raise CodecError(f"the payload of {frame.message} has the unknown encoding {checked.hex()}")
     reader = _Reader(frame, payload)
     message = reader.read(frame.nodes, 0)
     if len(payload) - reader.position > frame.trailing_bytes:
@@ -44,7 +44,7 @@ def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int,
 
 
 class _Reader:
-    """Reads a payload from `position` on; `used` lists the ranges (first, end) that carry values."""
+    """A reader that is at `position` in a payload; `used` lists the (first, end) ranges that carry values."""
 
     def __init__(self, frame: Frame, payload: bytes) -> None:
         self.position = 0
@@ -53,7 +53,10 @@ class _Reader:
         self._payload = payload
 
     def read(self, nodes: Sequence[Node], depth: int) -> Any:
-        """Read the message, or the loop's element, that `nodes` describe; `depth` is the number of names above it."""
+        """Read the message, or the loop's element, that `nodes` describe.
+
+        `depth` is the number of names above the nodes.
+        """
         message: dict[str, Any] = {}
         leaves: dict[Path, list[Any]] = {}
         for node in nodes:
@@ -63,7 +66,7 @@ class _Reader:
                 case Pad(alignment):
                     self._align(alignment)
                 case Data() | Loop():
-                    # Earlier leaves are stored first, so that a message has its fields in wire order.
+                    # Earlier leaves are stored first, so that a message contains its fields in wire order.
                     _put_leaves(message, leaves, depth)
                     value = self._data(node) if isinstance(node, Data) else self._loop(node)
                     if len(node.path) == depth:

@@ -1,4 +1,4 @@
-"""Computes the bytes of fields without a value: the default, or zeros."""
+"""Compute the bytes of fields without a value: the default, or zeros."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fusesoc_firm.message.model import Scalar
 
 
 def default_bytes(node: Fixed) -> bytes:
-    """The bytes of a `Fixed` with all fields at their defaults; fields without a default, padding and prefix are zero.
+    """Return the bytes of a `Fixed` with the defaults of all fields; all other bytes are zero.
 
     Every element of an array of messages has the defaults of its members.
     """
@@ -35,15 +35,15 @@ def default_elements(leaf: FrameField) -> Iterator[tuple[int, bytes]]:
 
 
 def default_payload(frame: Frame) -> bytes:
-    """The payload of a fixed-size message with all fields at their defaults."""
+    """Return the payload of a fixed-size message in which all fields have their defaults."""
     payload = b"".join(default_bytes(node) for node in frame.nodes if isinstance(node, Fixed))
     return frame.prefix + payload[len(frame.prefix) :]
 
 
 def encode_used(frame: Frame, message: MessageValue) -> bytes:
-    """The payload that a publisher of the used fields sends; unused fields, which may be missing, have their defaults.
+    """Return the payload that a publisher of the used fields sends.
 
-    Raises `CodecError` like `encode`.
+    Unused fields, which may be missing in `message`, have their defaults. Raise `CodecError` like `encode`.
     """
     if not frame.is_fixed_size:
         return encode(frame, _as_sent(frame.nodes, message, 0))
@@ -60,13 +60,13 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
 
 
 def completed(frame: Frame, message: MessageValue) -> MessageValue:
-    """Return the message with missing unused fields added: with their defaults, or as zero or empty."""
+    """Return the message with added values for missing unused fields: the default, zero or empty."""
     filled: MessageValue = _filled(_as_sent(frame.nodes, message, 0), message)
     return filled
 
 
 def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
-    """A message, or an element `depth` names below it, with unused parts set to their defaults or empty."""
+    """Return a message, or an element at the end of `depth` names, with unused parts at their defaults or empty."""
     sent: dict[str, Any] = deepcopy(dict(value)) if isinstance(value, Mapping) else {}
     for node in nodes:
         match node:
@@ -84,7 +84,7 @@ def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
 
 
 def _part_as_sent(node: Data | Loop) -> Any:
-    """The value sent for an unused part."""
+    """Return the value sent for an unused part."""
     if node.default is not None:
         return node.default
     if isinstance(node, Data):
@@ -98,14 +98,14 @@ def _holds_texts(loop: Loop) -> bool:
 
 
 def _defaults(leaf: FrameField) -> Iterator[Scalar]:
-    """Yield the elements of an unused leaf."""
+    """Yield the values of an unused leaf's elements."""
     given = leaf.default if isinstance(leaf.default, tuple) else (0 if leaf.default is None else leaf.default,)
     values = (given[number % len(given)] for number in range(leaf.count))
     return (bool(value) if leaf.type.code == "?" else value for value in values)
 
 
 def _filled(default: Any, value: Any) -> Any:
-    """`value`, with missing parts taken from `default`."""
+    """Return `value` with missing parts filled in from `default`."""
     if isinstance(default, Mapping) and isinstance(value, Mapping):
         filled = {name: _filled(inner, value[name]) for name, inner in default.items() if name in value}
         return {**default, **value, **filled}

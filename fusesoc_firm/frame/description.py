@@ -1,4 +1,4 @@
-"""Describes a Frame as plain data, for people and other programs."""
+"""Describe a Frame as plain data, for people and for other programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fusesoc_firm.frame.values import dotted
 
 
 def description(frame: Frame) -> dict[str, Any]:
-    """The frame and its nodes in wire order; keys without information are omitted."""
+    """Return the frame and its nodes in wire order as plain data; keys without information are omitted."""
     length = length_of(frame)
     return {
         "message": str(frame.message),

@@ -1,4 +1,4 @@
-"""Encodes a message, given as nested dictionaries and lists, as payload bytes."""
+"""Encode a message, given as nested dictionaries and lists, as payload bytes."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from fusesoc_firm.message.wire import WireType
 
 
 def encode(frame: Frame, message: MessageValue) -> bytes:
-    """The payload of `message`; padding bytes are zero.
+    """Return the payload of `message`; padding bytes are zero.
 
-    A missing field takes its default. Arrays are lists or tuples; `uint8` arrays may also be bytes.
+    A missing field is encoded with its default. Arrays are lists or tuples; `uint8` arrays may also be bytes.
 
     Raises:
         CodecError: a field has neither value nor default, a value does not fit, or a name is unknown.
@@ -39,14 +39,17 @@ def encode(frame: Frame, message: MessageValue) -> bytes:
 
 
 class _Writer:
-    """The payload so far; alignment counts from the end of its `prefix_bytes`."""
+    """The payload so far; alignment counts from the end of the prefix, which has `prefix_bytes` bytes."""
 
     def __init__(self, prefix_bytes: int) -> None:
         self.payload = bytearray()
         self._prefix_bytes = prefix_bytes
 
     def write(self, nodes: Sequence[Node], value: Any, depth: int) -> None:
-        """Append `nodes`; the first `depth` names of their paths lead to `value`."""
+        """Append the parts of `value` that `nodes` describe.
+
+        The first `depth` names of the nodes' paths lead to `value`.
+        """
         for node in nodes:
             match node:
                 case Fixed():
@@ -88,7 +91,7 @@ class _Writer:
     def _loop(self, node: Loop, value: Any) -> None:
         if not isinstance(value, list | tuple) or node.count not in (None, len(value)):
             length = "" if node.count is None else f" of {node.count}"
-            raise CodecError(f"'{dotted(node.names)}' takes a list{length}, not {shown(value)}")
+            raise CodecError(f"'{dotted(node.names)}' must be a list{length}, not {shown(value)}")
         check_bound(node, len(value))
         if node.count is None:
             self._count(len(value))
@@ -103,12 +106,12 @@ def _pack_array(node: Data, value: Any) -> BytesLike:
     if node.element.code == "B" and isinstance(value, BytesLike):
         return value
     if not isinstance(value, list | tuple):
-        raise CodecError(f"'{dotted(node.names)}' takes a list, not {shown(value)}")
+        raise CodecError(f"'{dotted(node.names)}' must be a list, not {shown(value)}")
     return _pack(node.element, value, node.names)
 
 
 def _pack(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> bytes:
-    """The values in sequence. Raises `CodecError` for the first that does not fit."""
+    """Return the bytes of the values in sequence. Raise `CodecError` for the first value that does not fit."""
     try:
         return _packed(type_, values)
     except (struct.error, OverflowError, TypeError, ValueError):
@@ -116,12 +119,12 @@ def _pack(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> byt
             try:
                 _packed(type_, [value])
             except (struct.error, OverflowError, TypeError, ValueError) as error:
-                raise CodecError(f"'{dotted(names)}' takes a {type_.name}, not {shown(value)}") from error
+                raise CodecError(f"'{dotted(names)}' must be of type {type_.name}, not {shown(value)}") from error
         raise
 
 
 def _packed(type_: WireType, values: Sequence[Any]) -> bytes:
-    # `struct` accepts any value for a bool: it would send the text "False" as true.
+    # `struct` accepts any value as a bool, and would encode the text "False" as true.
     if type_.code == "?" and any(value not in (False, True) for value in values):
         raise TypeError
     return packed(type_.code, values)

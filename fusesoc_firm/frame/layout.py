@@ -1,4 +1,4 @@
-"""Computes the Frame of a message: walks the definition in wire order and records the position of every element."""
+"""Compute the Frame of a message: walk the definition in wire order and record the position of every element."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER, WireRules, Wire
 
 
 def frame_of(name: MessageName, definitions: Definitions) -> Frame:
-    """The frame of message `name`; `definitions` contains it and all nested messages."""
+    """Return the frame of the message `name`; `definitions` contains this message and all nested messages."""
     definition = definitions[name]
     rules = definition.ros.rules
     walk = _Walk(_Types(rules, definitions), Position(rules.max_alignment, frozenset({0})), size=len(rules.prefix))
@@ -55,7 +55,7 @@ def frame_of(name: MessageName, definitions: Definitions) -> Frame:
 
 @dataclass
 class _Types:
-    """Properties of types. Each property is computed once, since types nest and may occur many times."""
+    """Properties of types; each property is computed once, since types are nested and may occur many times."""
 
     rules: WireRules
     definitions: Definitions
@@ -65,7 +65,7 @@ class _Types:
     def has_fixed_size(self, type_: FieldType) -> bool:
         match type_:
             case ArrayType(element, length):
-                # An array without elements takes no bytes.
+                # An array without elements has no bytes.
                 return length == 0 or self.has_fixed_size(element)
             case MessageType(name):
                 if name not in self._fixed:
@@ -75,7 +75,7 @@ class _Types:
         return isinstance(type_, PrimitiveType)
 
     def behind(self, element: ElementType, position: Position, member: Field) -> Position:
-        """The position after an element of `member` that begins at `position`."""
+        """Return the position after an element of `member` that begins at `position`."""
         key = element, position
         if key not in self._ends:
             walk = _Walk(self, position, has_nodes=False)
@@ -84,9 +84,10 @@ class _Types:
         return self._ends[key]
 
     def steady(self, element: ElementType, position: Position, member: Field) -> Position:
-        """The smallest set of positions that includes the start of every array element if the first is at `position`.
+        """Return the possible starts of any element in an array that begins at `position`.
 
-        An element starts at the start of the array, or at the end of the previous element.
+        An element starts at the start of the array or at the end of the previous element. The result is the smallest
+        set of positions that contains all starts.
         """
         while (known := position.joined(self.behind(element, position, member))) != position:
             position = known
@@ -103,7 +104,7 @@ class _Leaf:
     runs: list[Run] = field(default_factory=list)
 
     def add(self, run: Run) -> None:
-        """Add a run, merged with the last run if both are adjacent."""
+        """Add a run; if it is adjacent to the last run, merge both."""
         last = self.runs[-1] if self.runs else None
         if last and last.offset + last.count * self.type.size == run.offset:
             self.runs[-1] = Run(last.offset, last.count + run.count)
@@ -113,10 +114,10 @@ class _Leaf:
 
 @dataclass
 class _Walk:
-    """One walk through a message or a loop's element: the current position and the nodes so far.
+    """The state of a walk through a message or a loop's element: the current position and the nodes so far.
 
-    `size` and `leaves` belong to the `Fixed` that is still open; `passed` counts the elements of each leaf. Without
-    `has_nodes`, only the position is computed.
+    `size` and `leaves` belong to the `Fixed` that is still open; `passed` counts the elements of each leaf so far. If
+    `has_nodes` is false, only the position is computed.
     """
 
     types: _Types
@@ -134,7 +135,7 @@ class _Walk:
             self.member(member, path)
 
     def finish(self) -> tuple[Node, ...]:
-        """The nodes in wire order."""
+        """Return the nodes in wire order."""
         if self.size or self.leaves:
             fields = (
                 FrameField(path, leaf.type, tuple(leaf.runs), leaf.first, leaf.default)
@@ -161,7 +162,7 @@ class _Walk:
                 self.element(element, (*path, Step(member.name)), 1, member)
 
     def element(self, element: ElementType, path: Path, count: int, member: Field) -> None:
-        """Add `count` adjacent elements; a string is always alone."""
+        """Add `count` adjacent elements; `count` is always 1 for a string."""
         match element:
             case PrimitiveType(name) if name in self.types.rules.scalars:
                 self.values(self.types.rules.scalars[name], path, count, member.default)
@@ -186,7 +187,7 @@ class _Walk:
         self.position = self.position.advanced(size)
 
     def align(self, size: int) -> None:
-        """Move to the next legal start of a value of `size` bytes."""
+        """Advance to the next legal start of a value of `size` bytes."""
         alignment = self.types.rules.alignment(size)
         padding = self.position.padding(alignment)
         if padding is None:

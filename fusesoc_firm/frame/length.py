@@ -1,7 +1,7 @@
-"""Computes the length of a payload: an expression over the counts of its variable parts, suited to hardware.
+"""Compute the length of a payload as an expression over the counts of the variable parts, suitable for hardware.
 
-An expression is a list of terms, evaluated from the first byte on: add bytes, pad to an alignment, repeat. CDR's
-padding depends on all previous bytes, so this order makes a separate formula unnecessary.
+An expression is a list of terms, evaluated in order from the first byte: add bytes, pad to an alignment, repeat. CDR's
+padding depends on all previous bytes, which evaluation in this order takes into account.
 """
 
 from __future__ import annotations
@@ -13,30 +13,30 @@ from typing import Any
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad
 from fusesoc_firm.frame.values import MessageValue, part_of, units_of
 
-# Growth by a fixed body depends on the position modulo at most this number.
+# The growth by a body of fixed size depends on the position modulo at most this number.
 _PERIOD = 8
 
 
 @dataclass(frozen=True)
 class Bytes:
-    """Advance by `count` bytes."""
+    """The term that advances by `count` bytes."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Align:
-    """Pad to a multiple of `alignment`, counted from the end of the prefix."""
+    """The term that pads to a multiple of `alignment`, counted from the end of the prefix."""
 
     alignment: int
 
 
 @dataclass(frozen=True)
 class Repeat:
-    """Repeat `body` for each element of `part`.
+    """The term that repeats `body` for each element of `part`.
 
-    `stride` is the size of each element after the first, at any position: only the padding of the first element depends
-    on the position. `stride` is None if the elements differ in size because they contain counts.
+    `stride` is the size of each element after the first, which does not depend on the position: only the padding of the
+    first element does. If the elements contain counts and therefore differ in size, `stride` is None.
     """
 
     part: Data | Loop
@@ -45,20 +45,20 @@ class Repeat:
 
 
 Term = Bytes | Align | Repeat
-# The elements of a part within a value; None if their number is unlimited.
+# A function that returns the elements of a part within a value, or None if their number is unlimited.
 _Elements = Callable[[Data | Loop, Any], Sequence[Any] | None]
 
 
 @dataclass(frozen=True)
 class Length:
-    """The length of a payload without trailing bytes: `prefix` bytes and `terms`."""
+    """The length of a payload without trailing bytes, as `prefix` bytes followed by `terms`."""
 
     prefix: int
     terms: tuple[Term, ...]
 
     @property
     def is_computed(self) -> bool:
-        """Whether the counts of the message's top-level parts suffice, since no loop's element contains a count."""
+        """Whether the counts of top-level parts determine the length, since no loop's element contains a count."""
         return all(term.stride is not None for term in self.terms if isinstance(term, Repeat))
 
     @property
@@ -75,26 +75,29 @@ class Length:
         return None if longest is None else self.prefix + longest
 
     def of(self, message: MessageValue) -> int:
-        """The number of bytes in a message. Raises `CodecError` for a part without a value or default."""
+        """Return the number of bytes in a message's payload.
+
+        Raise `CodecError` for a part without a value or default.
+        """
         size = _Walk(_elements_of).behind(self.terms, 0, _Scope(message, 0))
         assert size is not None
         return self.prefix + size
 
 
 def length_of(frame: Frame) -> Length:
-    """The expression of a frame's payload."""
+    """Return the expression for the length of a frame's payload."""
     prefix = len(frame.prefix)
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes)]))
 
 
 def sent_length_of(frame: Frame) -> Length:
-    """The length of the payload that a publisher sends: unused parts have their defaults or are empty."""
+    """Return the length of the payload that a publisher sends: unused parts have their defaults or are empty."""
     prefix = len(frame.prefix)
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes, is_sent=True)]))
 
 
 def _terms(nodes: Sequence[Node], *, is_sent: bool = False) -> tuple[Term, ...]:
-    """The terms of nodes; with `is_sent`, unused parts are constants."""
+    """Return the terms for nodes; with `is_sent`, unused parts are constants."""
     terms: list[Term] = []
     for node in nodes:
         match node:
@@ -114,12 +117,12 @@ def _terms(nodes: Sequence[Node], *, is_sent: bool = False) -> tuple[Term, ...]:
 
 
 def _gap(node: Data) -> Term:
-    """The gap between the count and the elements, if there are any."""
+    """Return the term for the gap between the count and the elements, if there are elements."""
     return Align(node.alignment) if node.padding is None else Bytes(node.padding)
 
 
 def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
-    """The terms of a part with a constant value; None means an element without a value."""
+    """Yield the terms for a part with a constant value; a value of None means an element without a value."""
     if isinstance(node, Data):
         size = node.element.size
         count = len(value or ()) if node.kind is DataKind.ARRAY else len(units_of(node, value or "")) // size
@@ -139,7 +142,7 @@ def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
 
 
 def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """The terms with adjacent bytes added up."""
+    """Return the terms with adjacent `Bytes` terms merged."""
     joined: list[Term] = []
     for term in terms:
         last = joined[-1] if joined else None
@@ -151,10 +154,10 @@ def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:
 
 
 def _stride(body: tuple[Term, ...]) -> int | None:
-    """The size of every element after the first.
+    """Return the size in bytes of every element after the first, or None if the sizes differ.
 
-    After the widest padding, an element is aligned to its largest alignment. The element therefore ends at a position
-    from which all following elements are padded alike.
+    After its widest padding, an element is aligned to its largest alignment. The element therefore ends at a position
+    after which all following elements have the same padding.
     """
     if any(isinstance(term, Repeat) for term in body):
         return None
@@ -168,13 +171,13 @@ def _stride(body: tuple[Term, ...]) -> int | None:
 
 @dataclass
 class _Walk:
-    """Evaluates terms. `_grown` caches the growth of a part without a value, by its term and the residue."""
+    """An evaluation of terms; `_grown` caches the growth of a part without a value, by term and residue."""
 
     elements_of: _Elements
     _grown: dict[tuple[int, int], int | None] = field(default_factory=dict)
 
     def behind(self, terms: Sequence[Term], position: int, value: Any = None) -> int | None:
-        """The position after `terms`; None if the length is unlimited."""
+        """Return the position after `terms`, or None if the length is unlimited."""
         for term in terms:
             match term:
                 case Bytes(count):
@@ -198,7 +201,8 @@ class _Walk:
             first = self.behind(term.body, position)
             return None if first is None else first + (len(elements) - 1) * term.stride
         if isinstance(elements, range):
-            # Parts nest, so without this cache every walk of a parent part would walk each nested part many times.
+            # Parts are nested, so without this cache every walk of a parent part would walk each nested part many
+            # times.
             key = id(term), position % _PERIOD
             if key not in self._grown:
                 self._grown[key] = self._growth_alike(term, key[1], len(elements))
@@ -211,7 +215,10 @@ class _Walk:
         return position
 
     def _growth_alike(self, term: Repeat, start: int, count: int) -> int | None:
-        """Add `count` elements without a value: growth repeats when a residue does, so a few steps suffice."""
+        """Return the position after `count` elements without a value.
+
+        Growth repeats with the residue, so few steps suffice.
+        """
         passed: dict[int, tuple[int, int]] = {}
         position, done = start, 0
         while done < count:
@@ -232,7 +239,7 @@ class _Walk:
 
 @dataclass(frozen=True)
 class _Scope:
-    """A message or a loop's element, and the number of names above it."""
+    """A message or a loop's element, with the number of names above the value."""
 
     value: Any
     depth: int

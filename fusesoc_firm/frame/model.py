@@ -3,7 +3,7 @@
 A frame is `id` (1 byte) | `length` (uint32, little-endian) | payload. The payload is a tree of nodes in wire order;
 docs/explanation/frames.md shows an example:
 
-* `Fixed`: bytes with a known arrangement, including padding.
+* `Fixed`: bytes with a known layout, including padding.
 * `Pad`: padding that depends on the position, which is known only at run time.
 * `Data`: a string, or a variable array of numbers.
 * `Loop`: an array whose elements are messages or strings; its body consists of nodes, too.
@@ -31,7 +31,7 @@ COUNT_BYTES = 4
 class Step:
     """One name on the path from a message to a field; `count` is None except for a fixed-size array.
 
-    A `Loop` does not set `count`: a path within a loop describes one of its elements.
+    A `Loop` does not set `count`: a path within a loop describes one element of the loop.
     """
 
     name: str
@@ -53,9 +53,10 @@ class Run:
 class FrameField:
     """A leaf of the message; all elements of a leaf have the same wire type.
 
-    `path` leads from the message to the leaf. Each fixed array on the path multiplies the elements, which are numbered
-    in wire order. `runs` gives the positions of the elements. If a `Pad` separates the elements, each `Fixed` has a
-    field with this path for the elements in that `Fixed`, and `first` is the number of the first such element.
+    `path` leads from the message to the leaf. Each fixed array on the path multiplies the number of elements, which are
+    numbered in wire order. `runs` contains the positions of the elements. If a `Pad` separates the elements, each
+    `Fixed` has a field with this path for the elements in that `Fixed`, and `first` is the number of the first of these
+    elements.
     """
 
     path: Path
@@ -72,7 +73,7 @@ class FrameField:
 
     @property
     def is_array(self) -> bool:
-        """Whether the path includes a fixed array, even of one element."""
+        """Whether the path includes a fixed array, even an array of one element."""
         return any(step.count is not None for step in self.path)
 
     @property
@@ -82,7 +83,7 @@ class FrameField:
 
     @property
     def held(self) -> int:
-        """The number of elements in this node: all of them unless a `Pad` separates them."""
+        """The number of elements in this node: all elements of the leaf, unless a `Pad` separates them."""
         return sum(run.count for run in self.runs)
 
     @property
@@ -94,7 +95,7 @@ class FrameField:
 
 @dataclass(frozen=True)
 class Fixed:
-    """`size` bytes of `fields` with padding between them; the first of a payload begins with the prefix."""
+    """`size` bytes with `fields` and padding between them; the first `Fixed` of a payload begins with the prefix."""
 
     size: int
     fields: tuple[FrameField, ...]
@@ -108,7 +109,7 @@ class Pad:
 
 
 class DataKind(Enum):
-    """The kind of value that the elements of a `Data` form."""
+    """The kind of value that a `Data` contains."""
 
     ARRAY = "array"
     STRING = "string"
@@ -117,7 +118,7 @@ class DataKind(Enum):
 
 @dataclass(frozen=True)
 class Data:
-    """A count (uint32), then that many elements: numbers, or the bytes or UTF-16 units of a text.
+    """A count (uint32), followed by that number of elements: numbers, or the bytes or UTF-16 units of a text.
 
     The count includes the `terminator` zero bytes after the text; `bound` does not. If there are elements, `padding`
     bytes precede them; None means padding to `alignment` that depends on the position, as for a `Pad`. `ros_type` is
@@ -147,7 +148,7 @@ class Loop:
     """An array of messages or strings: `body`, repeated for each element.
 
     `count` is the size of a fixed array, which is not sent. If `count` is None, a count (uint32) of at most `bound`
-    precedes the elements. Paths in the body begin with the loop's own path.
+    precedes the elements. Paths in the body begin with the path of the loop.
     """
 
     path: Path
@@ -173,8 +174,8 @@ NameTree = dict[str, "NameTree"]
 class Frame:
     """The layout of a message.
 
-    `prefix` holds the constant bytes before the first field; a receiver compares only the first `checked_prefix` bytes.
-    A sender may append up to `trailing_bytes` bytes after the last field.
+    `prefix` is the constant bytes before the first field; a receiver checks only the first `checked_prefix` bytes. A
+    sender may append up to `trailing_bytes` bytes after the last field.
     """
 
     message: MessageName
@@ -206,7 +207,7 @@ class Frame:
 
     @cached_property
     def names(self) -> NameTree:
-        """The name of every field, with the names of nested fields; a field without values is omitted."""
+        """The tree of the names of all fields and nested fields; a field without values is omitted."""
         tree: NameTree = {}
         for node in all_nodes(self.nodes):
             for part in node.fields if isinstance(node, Fixed) else () if isinstance(node, Pad) else (node,):
@@ -223,12 +224,12 @@ class Frame:
 
 
 def names_of(path: Path) -> tuple[str, ...]:
-    """The names on a path."""
+    """Return the names on a path."""
     return tuple(step.name for step in path)
 
 
 def all_nodes(nodes: tuple[Node, ...]) -> Iterator[Node]:
-    """Yield every node in wire order, a loop before its body."""
+    """Yield every node in wire order; a loop precedes the nodes of its body."""
     for node in nodes:
         yield node
         if isinstance(node, Loop):

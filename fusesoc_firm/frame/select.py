@@ -1,4 +1,4 @@
-"""Selects the used fields of a message; unused fields stay on the wire, but need neither port nor register."""
+"""Select the used fields of a message; unused fields remain on the wire, but need neither ports nor registers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Names = tuple[str, ...]
 
 
 def select(frame: Frame, include: Paths | None = None, exclude: Paths | None = None) -> Frame:
-    """The frame with its fields marked as used or unused.
+    """Return the frame with its fields marked as used or unused.
 
     A path (`header.stamp`, `poses.position`) selects the field and all fields below it. Without `include`, all fields
-    are used; `exclude` then removes some. A loop is used if any part of it is. Raises `InputError`, with the nearest
-    valid path, for a path that leads to no value.
+    are used; `exclude` then removes fields. A loop is used if any of its parts is used. Raise `InputError`, with the
+    nearest valid path, for a path that does not lead to a value.
     """
     include, exclude = include or {}, exclude or {}
     known = {dotted(names) for names in _all_names(frame.names, ())}
@@ -34,23 +34,23 @@ def select(frame: Frame, include: Paths | None = None, exclude: Paths | None = N
 
 
 def names_in_use(frame: Frame) -> frozenset[Names]:
-    """The names of every used leaf."""
+    """Return the names of every used leaf."""
     return frozenset(names for node in all_nodes(frame.nodes) for names, is_used in _leaves(node) if is_used)
 
 
 def with_names_in_use(frame: Frame, names: Collection[Names]) -> Frame:
-    """The frame in which exactly the leaves with these names are used."""
+    """Return the frame with exactly the leaves with these names marked as used."""
     return replace(frame, nodes=_Marking(lambda leaf: leaf in names).marked(frame.nodes))
 
 
 def used_part(message: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
-    """The part of a message that consists of used fields."""
+    """Return the part of a message that consists of used fields."""
     found: dict[str, Any] = _part(message, names_in_use(frame))
     return found
 
 
 def _part(value: Any, leaves: Collection[Names]) -> Any:
-    """The part of a value on the paths to the leaves; all elements of an array are treated alike."""
+    """Return the part of a value that is on the paths to the leaves; all elements of an array are treated equally."""
     if () in leaves:
         return value
     if not isinstance(value, Mapping):
@@ -68,7 +68,7 @@ def _is_chosen(names: Names, include: Collection[str], exclude: Collection[str])
 
 @dataclass(frozen=True)
 class _Marking:
-    """Marks every leaf for which `has` holds, and the nodes around it."""
+    """A pass that marks each leaf for which `has` returns true, and the nodes around the leaf."""
 
     has: Callable[[Names], bool]
 
@@ -85,7 +85,7 @@ class _Marking:
             case Loop():
                 body = self.marked(node.body)
                 inner = [is_used for part in body for is_used in _uses(part)]
-                # An array of empty messages has no leaves: only its count can be used.
+                # An array of empty messages has no leaves, so only its count can be used.
                 return replace(node, body=body, is_used=any(inner) if inner else self.has(node.names))
         return replace(node, is_used=self.has(node.names))
 
@@ -98,7 +98,7 @@ def _uses(node: Node) -> Iterator[bool]:
 
 
 def _leaves(node: Node) -> Iterator[tuple[Names, bool]]:
-    """The names of the leaves in a node, without nested nodes; an array of empty messages is a leaf."""
+    """Yield the names of the leaves in a node, except those in nested nodes; an array of empty messages is a leaf."""
     if isinstance(node, Fixed):
         yield from ((leaf.names, leaf.is_used) for leaf in node.fields)
     elif not isinstance(node, Pad) and not (

@@ -1,4 +1,4 @@
-"""Shows a message as a tree: every field with its type, its width in bits and its position in the payload."""
+"""Show a message as a tree: every field with its type, its width in bits and its position in the payload."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fusesoc_firm.message.model import ArrayType, Definitions, MessageDefinition
 class Row:
     """A line of the tree; `bits` and `offset` (bytes from the payload's start) are None if they vary.
 
-    Below an array that is not a fixed part of the payload, `bits` counts one element.
+    Below an array that is not a fixed part of the payload, `bits` is the width of one element.
     """
 
     depth: int
@@ -24,7 +24,7 @@ class Row:
 
 
 def rows(name: MessageName, definitions: Definitions, frame: Frame) -> Iterator[Row]:
-    """Yield the rows of a message, outer ones first."""
+    """Yield the rows of a message; a field precedes its nested fields."""
     is_fixed = frame.is_fixed_size
     title = f"{frame.ros.title}"
     yield Row(0, str(name), title, 8 * frame.payload_bytes if is_fixed else None, 0 if is_fixed else None)
@@ -32,7 +32,7 @@ def rows(name: MessageName, definitions: Definitions, frame: Frame) -> Iterator[
 
 
 def text(found: Iterator[Row]) -> str:
-    """Format the rows in columns."""
+    """Return the rows as a text in columns."""
     table = [("field", "type", "bits", "offset")]
     for row in found:
         bits, offset = (("" if value is None else str(value)) for value in (row.bits, row.offset))
@@ -54,7 +54,7 @@ class _Leaf:
 
 
 def _leaves(frame: Frame) -> list[_Leaf]:
-    """The leaves; only those before the first variable part have an offset."""
+    """Return the leaves of a frame; only leaves before the first variable part have an offset."""
     leaves = []
     first = frame.nodes[0] if frame.nodes else None
     for node in all_nodes(frame.nodes):

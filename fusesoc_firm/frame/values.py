@@ -25,9 +25,9 @@ class CodecError(ValueError):
 
 
 class SignallingNan(float):
-    """A signalling NaN of a float32; conversion to a double, Python's float, would make it quiet.
+    """A signalling NaN of a float32, which conversion to a double, Python's float, would turn into a quiet NaN.
 
-    The value prints and calculates like any NaN; `bits` are the bits on the wire.
+    The value prints and calculates like any other NaN; `bits` are the bits on the wire.
     """
 
     bits: int
@@ -39,12 +39,12 @@ class SignallingNan(float):
         return made
 
     def __getnewargs__(self) -> tuple[int]:
-        """The arguments of `__new__` for a copy."""
+        """Return the arguments of `__new__` for a copy."""
         return (self.bits,)
 
 
 def packed(code: str, values: Sequence[Any]) -> bytes:
-    """Pack numbers into bytes, in sequence; `code` is a `struct` format code. Raises `struct`'s errors."""
+    """Pack numbers into bytes, in sequence; `code` is a `struct` format code. May raise the errors of `struct`."""
     data = struct.pack(f"<{len(values)}{code}", *values)
     if code != "f" or SignallingNan not in {*map(type, values)}:
         return data
@@ -54,7 +54,7 @@ def packed(code: str, values: Sequence[Any]) -> bytes:
 
 
 def unpacked(code: str, data: bytes) -> Sequence[Any]:
-    """Unpack the numbers in `data`, so that `packed` returns the same bytes."""
+    """Unpack the numbers in `data`; `packed` converts them back to the same bytes."""
     numbers = struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data)
     if code != "f" or struct.pack(f"<{len(numbers)}f", *numbers) == data:
         return numbers
@@ -63,22 +63,22 @@ def unpacked(code: str, data: bytes) -> Sequence[Any]:
 
 
 def _is_signalling(word: int) -> bool:
-    """Whether a float32's exponent bits are all ones, and its fraction is not zero but begins with a zero."""
+    """Return whether the bits of a float32 are those of a signalling NaN."""
     return word & 0x7FC00000 == 0x7F800000 and word & 0x003FFFFF != 0
 
 
 def shown(value: object) -> str:
-    """The value as shown in error messages; long values are shortened."""
+    """Return the text of a value in error messages; long values are shortened."""
     return _repr.repr(value)
 
 
 def dotted(names: tuple[str, ...]) -> str:
-    """The names as a dotted path."""
+    """Return the names as a dotted path."""
     return ".".join(names)
 
 
 def part_of(value: Any, part: Data | Loop, depth: int) -> Any:
-    """The value of `part` within `value`, or the part's default; `depth` is the number of names above `value`."""
+    """Return the value or default of `part` within `value`; `depth` is the number of names above `value`."""
     for step in part.path[depth:]:
         value = _member(value, step.name)
         if value is _MISSING:
@@ -87,7 +87,7 @@ def part_of(value: Any, part: Data | Loop, depth: int) -> Any:
 
 
 def leaf_of(value: Any, leaf: FrameField, depth: int) -> list[Any]:
-    """Every element of `leaf` in `value`, in wire order."""
+    """Return every element of `leaf` in `value`, in wire order."""
     return list(_elements(value, leaf.path[depth:], leaf))
 
 
@@ -111,27 +111,27 @@ def put_leaf(message: dict[str, Any], path: Path, elements: Iterator[Any]) -> No
 
 
 def reject_unknown(frame: Frame, message: MessageValue) -> None:
-    """Raise `CodecError` for an unknown name, unless it has no values below it."""
+    """Raise `CodecError` for an unknown name, unless there are no values below that name."""
     for names in _unknown(message, frame.names, ()):
         raise CodecError(f"{frame.message} has no field '{dotted(names)}'")
 
 
 def units_of(data: Data, text: object) -> BytesLike:
-    """The units of a text as sent, without count or terminator. Raises `CodecError` if the value is not a text."""
+    """Return the bytes of a text on the wire, without count and terminator. Raise `CodecError` for any other value."""
     if not isinstance(text, str):
-        raise CodecError(f"'{dotted(data.names)}' takes a {data.kind.value}, not {shown(text)}")
+        raise CodecError(f"'{dotted(data.names)}' must be of type {data.kind.value}, not {shown(text)}")
     try:
         if data.kind is DataKind.STRING:
             return text.encode("utf-8", "surrogateescape")
         units = text.encode("utf-16-le", "surrogatepass")
     except UnicodeEncodeError as error:
-        raise CodecError(f"'{dotted(data.names)}' cannot hold a lone surrogate: {shown(text)}") from error
+        raise CodecError(f"'{dotted(data.names)}' cannot contain a lone surrogate: {shown(text)}") from error
     count = len(units) // 2
     return struct.pack(f"<{count}I", *struct.unpack(f"<{count}H", units))
 
 
 def text_of(data: Data, units: bytes) -> str:
-    """The text that was sent as `units`."""
+    """Return the text that was sent as `units`."""
     if data.kind is DataKind.STRING:
         return units.decode("utf-8", "surrogateescape")
     count = len(units) // data.element.size
@@ -139,17 +139,17 @@ def text_of(data: Data, units: bytes) -> str:
     try:
         return struct.pack(f"<{count}H", *numbers).decode("utf-16-le", "surrogatepass")
     except struct.error:
-        raise CodecError(f"'{dotted(data.names)}' holds a unit that is not UTF-16: {max(numbers):#x}") from None
+        raise CodecError(f"'{dotted(data.names)}' contains a unit that is not UTF-16: {max(numbers):#x}") from None
 
 
 def check_bound(part: Data | Loop, count: int) -> None:
-    """Raise `CodecError` if `count` exceeds the bound of the definition."""
+    """Raise `CodecError` if `count` exceeds the bound in the definition."""
     if part.bound is not None and count > part.bound:
-        raise CodecError(f"'{dotted(part.names)}' holds at most {part.bound}, not {count}")
+        raise CodecError(f"the length of '{dotted(part.names)}' must be at most {part.bound}, not {count}")
 
 
 def _member(value: Any, name: str) -> Any:
-    """The member `name`. A missing message has no members, since it may consist of defaults."""
+    """Return the member `name`, or `_MISSING`; a missing message has no members, since it may consist of defaults."""
     if value is _MISSING or not isinstance(value, Mapping):
         return _MISSING
     return value.get(name, _MISSING)
@@ -181,7 +181,7 @@ def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
         return
     is_array = isinstance(inner, list | tuple) or (not rest and leaf.type.code == "B" and isinstance(inner, BytesLike))
     if not is_array or len(inner) != step.count:
-        raise CodecError(f"'{step.name}' takes a list of {step.count}, not {shown(inner)}")
+        raise CodecError(f"'{step.name}' must be a list of {step.count}, not {shown(inner)}")
     if not rest:
         yield from inner
         return
@@ -190,7 +190,7 @@ def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
 
 
 def _unknown(value: Any, known: NameTree, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """The names that are not in `known`; the values of leaves are not examined."""
+    """Yield the names that are not in `known`; the values of leaves are not examined."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
             here = (*names, str(name))
@@ -204,7 +204,7 @@ def _unknown(value: Any, known: NameTree, names: tuple[str, ...]) -> Iterator[tu
 
 
 def _leaves(value: Any, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """The names of all values; empty messages and arrays without elements have none."""
+    """Yield the names on the path to each value; empty messages and arrays without elements contain no values."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
             yield from _leaves(inner, (*names, str(name)))

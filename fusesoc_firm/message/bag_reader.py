@@ -1,11 +1,11 @@
-"""Reads recorded bags, message by message.
+"""Read recorded bags, message by message.
 
     with open_bag(path) as bag:
         for recorded in bag.messages(topics):
             ...
 
-The formats are ROS 1 bags, and ROS 2 bags as sqlite3 or MCAP, with or without compression. Only a bag's index is held
-in memory. Payloads are returned as recorded, without decoding. `definitions_in` returns the definitions that a bag
+The formats are ROS 1 bags, and ROS 2 bags in sqlite3 or MCAP, with or without compression. Only a bag's index is held
+in memory. Payloads are returned as recorded and are not decoded. `definitions_in` returns the definitions that a bag
 contains.
 """
 
@@ -36,21 +36,21 @@ from fusesoc_firm.text.diagnostics import InputError, fail
 
 Reader = Rosbag1Reader | Rosbag2Reader
 
-BAGS = "a bag is a .bag of ROS 1, or a folder, .mcap or .db3 of ROS 2"
+BAGS = "a bag is a ROS 1 .bag file, or a ROS 2 folder, .mcap file or .db3 file"
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _METADATA = "metadata.yaml"
 _ROS1_MAGIC = b"#ROSBAG"
 # The errors that rosbags reports for a damaged bag, and the remedy for each.
 _REMEDIES = {
-    "not indexed": "it was not closed: rosbag reindex {path}",
-    "index looks damaged": "it is cut off: rosbag reindex {path}",
-    "are in its journal": "it was not closed: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
-    "end magic is invalid": "it was not closed, or is cut off: mcap recover {path}",
+    "not indexed": "the bag was not closed; run: rosbag reindex {path}",
+    "index looks damaged": "the bag is cut off; run: rosbag reindex {path}",
+    "are still in the journal": "the bag was not closed; run: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
+    "end magic is invalid": "the bag was not closed or is cut off; run: mcap recover {path}",
 }
 
 
 class Form(Enum):
-    """The format of a bag, by its name in commands."""
+    """The format of a bag; the values are the formats' names in commands."""
 
     ROS1 = "ros1"
     SQLITE3 = "sqlite3"
@@ -58,12 +58,12 @@ class Form(Enum):
 
     @property
     def ros(self) -> Middleware:
-        """The middleware of the messages."""
+        """The middleware of the messages in this format."""
         return ROS1 if self is Form.ROS1 else ROS2
 
 
 class Stream(NamedTuple):
-    """The messages of one topic and one type, with the signature and definition that the bag gives for the type.
+    """The messages of one topic and one type, with the type's signature and definition from the bag.
 
     The signature and the definition are empty if the bag does not contain them. The definition is a joint text (see
     `message/joint.py`).
@@ -76,7 +76,7 @@ class Stream(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """A recorded message: `number` counts the messages of its topic from 0, `stamp` is in ns."""
+    """A recorded message; `number` counts the messages of a topic from 0, and `stamp` is in ns."""
 
     stream: Stream
     number: int
@@ -86,7 +86,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag: its format, the number of messages of each stream, and its start time (ns)."""
+    """An open bag: its format, the number of messages in each stream, and the start time in ns."""
 
     path: Path
     form: Form
@@ -95,9 +95,9 @@ class Bag:
     _readers: Sequence[Reader] = field(repr=False)
 
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
-        """Yield the messages of `topics` in order of time, up to but not including `stop` (ns).
+        """Yield the messages of `topics` in the order of their times, up to but not including `stop` (in ns).
 
-        Raises `InputError` if the bag is damaged.
+        Raise `InputError` if the bag is damaged.
         """
         numbers: dict[str, int] = {}
         for reader in self._readers:
@@ -117,28 +117,28 @@ class Bag:
 
 @dataclass(frozen=True)
 class BagDefinitions:
-    """The definitions in a bag: the middleware, and the distinct texts for each message."""
+    """The definitions in a bag: the middleware, and the distinct definition texts of each message."""
 
     ros: Middleware
     texts: Mapping[MessageName, tuple[str, ...]]
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a bag, judged by the file's name or the folder's contents."""
+    """Return whether a path is a bag, according to the file's name or the folder's contents."""
     if path.is_dir():
         return (path / _METADATA).is_file() or any(file.suffix in _SUFFIXES[1:] for file in path.iterdir())
     return path.suffix in _SUFFIXES and path.is_file()
 
 
 def bag_files(path: Path) -> list[Path]:
-    """The files of a bag: all files in its folder (ROS 2), or the file itself."""
+    """Return the files of a bag: all files in its folder (ROS 2), or the file itself."""
     return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
 def definitions_in(path: Path) -> BagDefinitions:
-    """Return the message definitions in a bag; reads only the bag's index. Raises `InputError`.
+    """Return the message definitions in a bag; only the bag's index is read. May raise `InputError`.
 
-    Types without a definition in ROS's `.msg` language are omitted.
+    Types without a definition in the `.msg` language are omitted.
     """
     files = bag_files(path)
     with in_part(files):
@@ -146,14 +146,14 @@ def definitions_in(path: Path) -> BagDefinitions:
 
 
 def _state(file: Path) -> tuple[str, int, int]:
-    """A tuple that changes when the file changes."""
+    """Return a tuple that changes when the file changes."""
     status = file.stat()
     return str(file.absolute()), status.st_size, status.st_mtime_ns
 
 
 @lru_cache(maxsize=4)
 def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> BagDefinitions:
-    """Cached `definitions_in`: every library of a process needs the definitions; `_states` invalidates the cache."""
+    """Cache `definitions_in`, since every library of a process needs the result; `_states` invalidates the cache."""
     texts: dict[MessageName, dict[str, None]] = {}
     with open_bag(path) as bag:
         for stream in bag.streams:
@@ -166,7 +166,7 @@ def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> Ba
 
 @contextmanager
 def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
-    """Open a bag for reading within the context. Raises `InputError`, with `hint` if the path is not a bag."""
+    """Open a bag for reading within the context. Raise `InputError`, with `hint` if the path is not a bag."""
     with ExitStack() as stack:
         with _readable(path, hint):
             _check_journals(path)
@@ -186,17 +186,17 @@ def _readers(path: Path) -> list[Reader]:
         # A recorder writes the metadata file last. Without it, the finished part of the bag is still readable.
         files = sorted((file for file in path.iterdir() if file.suffix in _SUFFIXES[1:]), key=_natural)
         if not files:
-            raise FileNotFoundError("it contains neither metadata.yaml nor a .db3 or .mcap file")
+            raise FileNotFoundError("the folder contains neither metadata.yaml nor a .db3 or .mcap file")
         return [Rosbag2Reader(file) for file in files]
     return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
 
 
 def _check_journals(path: Path) -> None:
-    """Raise `ValueError` if SQLite has not yet written all messages to the file: rosbags would miss the others."""
+    """Raise `ValueError` if SQLite has not yet written all messages to the file, since rosbags would miss the rest."""
     for file in path.glob("*.db3") if path.is_dir() else [path]:
         journal = file.with_name(f"{file.name}-wal")
         if journal.exists() and journal.stat().st_size:
-            raise ValueError(f"messages of {file.name} are in its journal {journal.name}")
+            raise ValueError(f"messages of {file.name} are still in the journal {journal.name}")
 
 
 def _is_ros1(path: Path) -> bool:
@@ -207,7 +207,7 @@ def _is_ros1(path: Path) -> bool:
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """A sort key that orders `bag_10` after `bag_9`."""
+    """Return a sort key that orders `bag_10` after `bag_9`."""
     return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
 
 

@@ -1,7 +1,7 @@
-"""Limits the size of messages, checked on the definitions before any further work.
+"""Limit the size of messages; the definitions are checked before any further work.
 
-Because of nesting, a few lines of text can define a huge message. Real messages stay far below the limits: among 5,900
-messages, the maxima are 17 levels, 1,982 fields and 6,049 bytes.
+Because of nesting, a few lines of text can define a huge message. Real messages are far below the limits: the maxima
+among 5,900 messages are 17 levels, 1,982 fields and 6,049 bytes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Extent:
 
     `levels` is 1 for a message without nested messages. `fields` includes the fields of nested messages; an array
     counts once. `nodes` also counts each element of a fixed array, unless the elements are numbers. `bytes` is the size
-    on the wire with empty strings and one element in each variable array, without padding.
+    of the payload with empty strings and one element in each variable array, without padding.
     """
 
     levels: int = 0
@@ -48,7 +48,7 @@ class Extent:
     bytes: int = 0
 
     def joined(self, other: Extent) -> Extent:
-        """The extent of both messages, one after the other."""
+        """Return the extent of both messages in sequence."""
         return Extent(
             max(self.levels, other.levels),
             self.fields + other.fields,
@@ -59,18 +59,18 @@ class Extent:
 
 # The limits, each with its name in error messages.
 _BOUNDS = {
-    "levels": (MOST_LEVELS, "levels of messages within messages"),
-    "fields": (MOST_FIELDS, "fields, with those of all messages within"),
-    "nodes": (MOST_NODES, "fields, with those of every element of its fixed arrays"),
+    "levels": (MOST_LEVELS, "levels of nested messages"),
+    "fields": (MOST_FIELDS, "fields, including those of nested messages"),
+    "nodes": (MOST_NODES, "fields, including those of each element in fixed arrays"),
     "bytes": (MOST_BYTES, "bytes of fixed size"),
 }
 
 
 def check_extents(definitions: Definitions, known: MutableMapping[MessageName, Extent]) -> None:
-    """Raise `InputError` for the first message that is too large, at the field that exceeds the limit.
+    """Raise `InputError` for the first message that is too large, with the place of the field that exceeds the limit.
 
     `definitions` lists each message after its nested messages. `known` holds the extents of previously checked
-    messages, and receives the new extents.
+    messages; the function adds the new extents to it.
     """
     for name, definition in definitions.items():
         if name not in known:
@@ -94,7 +94,7 @@ def _extent(definition: MessageDefinition, known: Mapping[MessageName, Extent]) 
 
 
 def _of_type(type_: FieldType, rules: WireRules, known: Mapping[MessageName, Extent]) -> Extent:
-    """The extent that a field of this type adds."""
+    """Return the extent that a field of this type adds."""
     match type_:
         case PrimitiveType(name) if name in rules.scalars:
             return Extent(0, 1, 1, rules.scalars[name].size)

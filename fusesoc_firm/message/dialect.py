@@ -1,7 +1,7 @@
-"""The rules for `.msg` files in ROS 1 and ROS 2: one table each, so that the parser needs no special cases.
+"""The rules for `.msg` files in ROS 1 and ROS 2, one table for each, so that the parser needs no special cases.
 
-ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few places where FIRM
-accepts more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
+ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few cases in which FIRM
+accepts more text (blanks, `pkg/msg/Type`) or less text (values that no generator could use).
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ LARGEST_SIZE = 2**32 - 1  # element and character counts are uint32 on the wire
 
 @dataclass(frozen=True)
 class NameRule:
-    """The legal spellings of one kind of name; `description` completes the hint "a field name has ..."."""
+    """The legal spellings of one kind of name; `description` completes the hint "a field name consists of ..."."""
 
     kind: str
     pattern: re.Pattern[str]
     description: str
 
     def accepts(self, name: str) -> bool:
-        """Whether all of `name` is legal."""
+        """Return whether the whole `name` is legal."""
         return len(name) <= LONGEST_TEXT and self.pattern.fullmatch(name) is not None
 
     def fault(self, name: str, title: str) -> str:
-        """The fault of a name that is not accepted."""
+        """Return the fault of a name that is not accepted."""
         if len(name) > LONGEST_TEXT:
             return f"a {self.kind} has at most {LONGEST_TEXT} characters, not {len(name)}"
         return f"'{name}' is not a legal {self.kind} in {title}" if name else f"the {self.kind} is missing"
@@ -37,12 +37,12 @@ class NameRule:
     @property
     def hint(self) -> str:
         """A description of the legal names."""
-        return f"a {self.kind} has {self.description}"
+        return f"a {self.kind} consists of {self.description}"
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """The rules of one ROS version. `integer_ranges` holds the smallest and largest legal values."""
+    """The rules of one ROS version; `integer_ranges` holds each type's smallest and largest legal value."""
 
     title: str
     package_name: NameRule
@@ -53,7 +53,7 @@ class Dialect:
     # Primitives that cannot be constants: ROS 1's `time` and `duration`.
     opaque_primitives: frozenset[str]
     strings: frozenset[str]
-    # Words that abbreviate a message type, and whether they may precede `[`.
+    # Words that abbreviate a message type, and whether each may precede `[`.
     shorthands: Mapping[str, MessageName]
     has_array_shorthands: bool
     booleans: Mapping[str, bool]
@@ -89,16 +89,16 @@ def _integer_ranges(byte: tuple[int, int]) -> dict[str, tuple[int, int]]:
 
 
 _ANY_CASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_ANY_CASE_TEXT = "letters, digits and '_' and starts with a letter"
+_ANY_CASE_TEXT = "letters, digits and '_', and starts with a letter"
 _LOWER_SNAKE = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
-_LOWER_SNAKE_TEXT = "lower-case letters, digits and single '_' between them and starts with a letter"
+_LOWER_SNAKE_TEXT = "lower-case letters, digits and single '_' between them, and starts with a letter"
 _UPPER_SNAKE = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
-_UPPER_SNAKE_TEXT = "upper-case letters, digits and single '_' between them and starts with a letter"
+_UPPER_SNAKE_TEXT = "upper-case letters, digits and single '_' between them, and starts with a letter"
 # The suffixes end the names of messages that ROS 2 derives from services and actions.
 _UPPER_CAMEL = re.compile(
     r"[A-Z][A-Za-z0-9]*(?:_(?:Request|Response|Event|Goal|Result|Feedback|FeedbackMessage|SendGoal|GetResult))*"
 )
-_UPPER_CAMEL_TEXT = "letters and digits and starts with a capital"
+_UPPER_CAMEL_TEXT = "letters and digits, and starts with a capital letter"
 
 ROS1 = Dialect(
     title="ROS 1",

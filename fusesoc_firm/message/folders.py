@@ -1,6 +1,6 @@
-"""Finds `.msg`, `.srv` and `.action` files.
+"""Find `.msg`, `.srv` and `.action` files.
 
-It searches packages, workspaces of packages, flat folders of packages, and installed ROS distributions.
+The search covers packages, workspaces of packages, flat folders of packages, and installed ROS distributions.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ InterfaceFiles = dict[InterfaceKind, dict[MessageName, list[Path]]]
 
 
 def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_SUFFIXES) -> InterfaceFiles:
-    """All interface files below a folder, by kind and name; a name maps to all files that define it.
+    """Return all interface files below a folder, by kind and name; each name maps to all files that define it.
 
     The suffix of a file determines its kind.
 
@@ -44,12 +44,12 @@ def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_S
 
 
 def ros1_folders(environment: Mapping[str, str]) -> list[Path]:
-    """The folders of a sourced ROS 1, in ROS's order of precedence; missing folders are skipped, as in ROS."""
+    """Return the message folders of a sourced ROS 1 in the order of precedence; like ROS, skip missing folders."""
     return [path for path in _entries(environment.get("ROS_PACKAGE_PATH", "")) if path.is_dir()]
 
 
 def ros2_folders(environment: Mapping[str, str]) -> list[Path]:
-    """The folders of a sourced ROS 2, in ROS's order of precedence; missing folders are skipped."""
+    """Return the message folders of a sourced ROS 2 in the order of precedence; skip missing folders."""
     prefixes = _entries(environment.get("AMENT_PREFIX_PATH", ""))
     return [share for prefix in prefixes if (share := prefix / "share").is_dir()]
 
@@ -59,7 +59,7 @@ def _entries(variable: str) -> list[Path]:
 
 
 def _walk(folder: Path, suffixes: Collection[str]) -> Iterator[Path]:
-    """Yield the files in a fixed order. Links are followed, since workspaces contain them, but cycles are not."""
+    """Yield the files in a fixed order. Links are followed, since workspaces contain links; cycles of links are not."""
     seen: set[str] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
         real = os.path.realpath(parent)
@@ -72,7 +72,10 @@ def _walk(folder: Path, suffixes: Collection[str]) -> Iterator[Path]:
 
 
 def _package_name(parent: Path, folder: Path) -> str:
-    """The package of the files in `parent`; the search for `package.xml` ends at the folder that the user named."""
+    """Return the package of the files in `parent`.
+
+    The search for `package.xml` ends at `folder`, which the user named.
+    """
     # If the user names the `msg` folder itself, the package is still the folder above.
     top = folder.resolve().parent if folder.resolve().name in _KINDS else folder.resolve()
     # Links are kept (a linked package is named after its link), but `..` is resolved, or the walk would miss `top`.
@@ -86,7 +89,7 @@ def _package_name(parent: Path, folder: Path) -> str:
 
 
 def _declared_name(manifest: Path) -> str:
-    """The `<name>` in a `package.xml`; empty if it is missing, as in rosbuild's `manifest.xml`."""
+    """Return the `<name>` in a `package.xml`, or an empty string if it is missing, as in rosbuild's `manifest.xml`."""
     try:
         return (ET.fromstring(read_regular(manifest, MOST_FILE_BYTES)).findtext("name") or "").strip()
     # ElementTree raises ValueError or LookupError for bad encodings.

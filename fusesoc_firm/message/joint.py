@@ -1,4 +1,4 @@
-"""Converts a message with its nested messages to one text, as in bags and ROS 1 connections, and back.
+"""Convert a message with its nested messages to one text, as in bags and ROS 1 connections, and back.
 
 Lines of 80 `=` separate the definitions. Each definition except the first begins with `MSG: ` and the message's name.
 """
@@ -22,21 +22,24 @@ _PARTING = re.compile(rf"^{_LINE}\s*\n\s*MSG:\s*(\S+)\s*?\n", re.MULTILINE)
 
 
 def joint_text(name: MessageName, definitions: Definitions) -> str:
-    """The joint text: the message first, then all others in `definitions`."""
+    """Return the joint text: the message first, then all other messages in `definitions`."""
     others = [definition for other, definition in definitions.items() if other != name]
     parts = [to_text(definitions[name]), *(f"MSG: {item.name}\n{to_text(item)}" for item in reversed(others))]
     return f"{_LINE}\n".join(parts)
 
 
 def separate_texts(name: MessageName, text: str) -> dict[MessageName, str]:
-    """The text of each message in a joint text of the message `name`. Raises `InputError` for a bad name."""
+    """Return the text of each message in the joint text of the message `name`.
+
+    Raise `InputError` for an illegal name.
+    """
     first, *others = _PARTING.split(text)
     pairs = zip(others[::2], others[1::2], strict=True)
     return {name: first} | {parse_name(word): part for word, part in pairs}
 
 
 def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | None:
-    """The signature of the message that a joint text defines; None if the text is faulty or incomplete."""
+    """Return the signature of the message that a joint text defines, or None if the text is faulty or incomplete."""
     faults = Diagnostics()
     parse = ros.parse
     try:
@@ -50,7 +53,10 @@ def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | No
 
 
 def _inner_first(definitions: Definitions) -> Iterable[MessageName]:
-    """The names, each after the names of that message's nested messages. Raises `CycleError`."""
+    """Return the names in an order in which nested messages precede the messages that contain them.
+
+    May raise `CycleError`.
+    """
     within = {
         name: [nested for field in definition.fields if (nested := nested_message(field.type))]
         for name, definition in definitions.items()

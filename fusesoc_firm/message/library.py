@@ -1,7 +1,7 @@
-"""Finds definitions: in the user's folders first, then in a sourced ROS, then in the distributions of rosbags.
+"""Find definitions: first in the user's folders, then in a sourced ROS, then in the distributions of rosbags.
 
-A library reads and parses each definition once, on request. The library itself reads no environment variables, so the
-same arguments and files give the same definitions.
+A library reads and parses each definition once, on request. The library itself reads no environment variables, so that
+equal arguments and files always result in equal definitions.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from fusesoc_firm.store.reads import Input, Part
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.text.files import read_regular
 
-# The means by which users name additional places.
-_FURTHER = "; further places: 'paths' of the specification or core, --path"
+# The means by which users name additional sources.
+_FURTHER = "; add places with 'paths' in the specification or core, or with --path"
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
 
 @dataclass(frozen=True)
 class _Source:
-    """The files that define a message (several must be equal), and their service or action, if any.
+    """The files that define a message, which must be equal, and the service or action that they define, if any.
 
-    If the source is a bag, `texts` holds its definitions; several must be equivalent.
+    If the source is a bag, `texts` holds the bag's definitions of the message, which must be equivalent.
     """
 
     paths: tuple[Path, ...]
@@ -47,10 +47,10 @@ class MessageLibrary:
     """All messages that one middleware knows, including the messages of services and actions.
 
     `paths` are folders and bags in order of precedence. `environment` is a mapping like `os.environ`; None ignores an
-    installed ROS. `store` names the distribution of last precedence (`noetic`, `jazzy`, ...). A message is taken from
-    the first place that contains it; within a place, a `.msg` file takes precedence over messages derived from a `.srv`
-    or `.action` file. Raises `InputError` for a folder that is missing or holds no file of any middleware, and for a
-    bag without definitions.
+    installed ROS. `store` names the distribution with the lowest precedence (`noetic`, `jazzy`, ...). A message's
+    definition is that of the first source that contains the message; within a source, a `.msg` file takes precedence
+    over messages derived from a `.srv` or `.action` file. Raises `InputError` for a folder that is missing or contains
+    no file of any middleware, and for a bag without definitions.
     """
 
     def __init__(
@@ -66,15 +66,15 @@ class MessageLibrary:
         self._sources: dict[MessageName, _Source] = {}
         self._interfaces: dict[Interface, Path] = {}
         self._messages: set[MessageName] = set()
-        # The definition or None, and the faults in the text: a faulty file is reported on every request.
+        # The definition or None, and the faults in the text, which are reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
         self._extents: dict[MessageName, Extent] = {}
         self._put_before(dict.fromkeys(paths), self.ros.folders(environment) if environment is not None else [])
 
     def before(self, paths: Mapping[Path, SourceRef | None]) -> MessageLibrary:
-        """A copy with additional folders and bags, each with its source reference, that precede all others.
+        """Return a copy in which additional folders and bags, each with its source reference, take precedence.
 
-        Raises `InputError` like the constructor.
+        Raise `InputError` like the constructor.
         """
         if not paths:
             return self
@@ -83,15 +83,18 @@ class MessageLibrary:
         return other
 
     def names(self) -> list[MessageName]:
-        """All known messages, sorted."""
+        """Return all known messages, sorted."""
         return sorted(self._store.names | self._sources.keys())
 
     def interfaces(self) -> dict[Interface, Path]:
-        """All known services and actions, sorted by full name, and their files."""
+        """Return the files of all known services and actions, sorted by full name."""
         return dict(sorted(self._interfaces.items(), key=lambda item: str(item[0])))
 
     def interface(self, name: MessageName, kind: InterfaceKind | None = None) -> Interface | None:
-        """The service or action of this name, or None; without `kind`, a message takes precedence over both."""
+        """Return the service or action with this name, or None.
+
+        Without `kind`, a message with this name takes precedence.
+        """
         if kind is None and self._is_message(name):
             return None
         kinds = (InterfaceKind.SERVICE, InterfaceKind.ACTION) if kind is None else (kind,)
@@ -99,7 +102,7 @@ class MessageLibrary:
         return next((interface for interface in named if interface in self._interfaces), None)
 
     def get(self, name: MessageName, source: SourceRef | None = None) -> MessageDefinition:
-        """The definition of a message requested at `source`; raises `InputError` with all faults in the file."""
+        """Return the definition of a message that `source` requests; raise `InputError` with all faults in its file."""
         diagnostics = Diagnostics()
         definition = self.find(name, diagnostics, source)
         diagnostics.raise_if_any()
@@ -109,7 +112,7 @@ class MessageLibrary:
     def find(
         self, name: MessageName, diagnostics: Diagnostics, source: SourceRef | None = None
     ) -> MessageDefinition | None:
-        """Like `get`, but adds faults to `diagnostics` and returns the valid part of a faulty definition, or None."""
+        """Return the definition like `get`, but add faults to `diagnostics` and return the valid part, or None."""
         if not self._is_message(name):
             diagnostics.error(f"unknown message '{name}'", source, self._hint(name))
             return None
@@ -121,9 +124,9 @@ class MessageLibrary:
         return definition
 
     def closure(self, name: MessageName, source: SourceRef | None = None) -> dict[MessageName, MessageDefinition]:
-        """The message and all nested messages, each after those that it contains.
+        """Return the definitions of a message and of all nested messages, each after the messages that it contains.
 
-        Raises `InputError` with every fault in every file, every unknown message and every cycle, and for a message
+        Raise `InputError` with every fault in every file, every unknown message and every cycle, and for a message
         that exceeds the limits in `bounds`.
         """
         return self.joint_closure((name,), source)
@@ -131,7 +134,7 @@ class MessageLibrary:
     def joint_closure(
         self, names: Iterable[MessageName], source: SourceRef | None = None
     ) -> dict[MessageName, MessageDefinition]:
-        """Like `closure`, for several messages, such as the messages of a service."""
+        """Return the definitions like `closure`, but for several messages, such as the messages of a service."""
         diagnostics = Diagnostics()
         closure: dict[MessageName, MessageDefinition] = {}
         for name in names:
@@ -141,19 +144,19 @@ class MessageLibrary:
         return closure
 
     def origin(self, name: MessageName) -> str:
-        """The file of a known message, or the distribution that contains it, for people to read."""
+        """Return a text for users that names the file or the distribution that defines a known message."""
         return str(self._sources[name].paths[0]) if name in self._sources else self._store.title
 
     def content(self, name: MessageName) -> bytes:
-        """The unchanged source of a known message: the file's bytes, or the text in a bag or distribution."""
+        """Return the unchanged source of a known message: the file's bytes, or the text in a bag or distribution."""
         if source := self._sources.get(name):
             return source.texts[0].encode() if source.texts else read_regular(source.paths[0], MOST_FILE_BYTES)
         return self._store.text(name).encode()
 
     def files(self, names: Iterable[MessageName]) -> list[Input]:
-        """The files of these messages, in the order of names; messages in a distribution have no files.
+        """Return the files of these messages, in the order of names; messages in a distribution have no files.
 
-        For a bag, only the part that defines the message counts.
+        For a bag, the result contains only the part that defines the message.
         """
         known = [(name, self._sources[name]) for name in sorted(set(names)) if name in self._sources]
         found = [_part(name, source) if source.texts else source.paths[0] for name, source in known]
@@ -161,14 +164,14 @@ class MessageLibrary:
 
     @cached_property
     def _has_events(self) -> bool:
-        # Only for services: loading the distribution takes time, which ROS 1 messages do not need to spend.
+        # Read only for services, since loading the distribution takes time, and ROS 1 messages do not need it.
         return self.ros is ROS2 and (EVENT_INFO in self._messages or EVENT_INFO in self._store.names)
 
     def _is_message(self, name: MessageName) -> bool:
         return name in self._sources or name in self._store.names
 
     def _put_before(self, paths: Mapping[Path, SourceRef | None], installed: Sequence[Path] = ()) -> None:
-        """Add folders and bags: the user's `paths` before `installed` ones, both before existing places."""
+        """Add folders and bags before the existing sources: the user's `paths` first, then the `installed` folders."""
         faults = Diagnostics()
         places = [*paths, *installed]
         found = {place: interface_files(place, self.ros.suffixes) for place in places}
@@ -184,7 +187,10 @@ class MessageLibrary:
         self._places = [*places, *self._places]
 
     def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> dict[MessageName, _Source]:
-        """The definitions in a bag; a `path` that is not a bag must serve another middleware's library."""
+        """Return the definitions in a bag.
+
+        If `path` is not a bag, check that another middleware's library can use it.
+        """
         # Imported only for bags: rosbags' readers are slow to import.
         from fusesoc_firm.message.bag_reader import definitions_in, is_bag
 
@@ -198,12 +204,14 @@ class MessageLibrary:
             return {}
         if not bag.texts:
             faults.error(
-                f"message path '{path}' is a bag without definitions", source, "name the folder of its messages"
+                f"message path '{path}' is a bag without message definitions",
+                source,
+                "give the folder with the message definitions",
             )
         return {name: _Source((path,), None, texts) for name, texts in bag.texts.items()} if bag.ros == self.ros else {}
 
     def _add(self, files: InterfaceFiles) -> None:
-        """Add the files of a folder before existing ones."""
+        """Add the files of a folder before the existing files."""
         for kind in (InterfaceKind.ACTION, InterfaceKind.SERVICE):
             for name, paths in files[kind].items():
                 interface = Interface(name, kind, self.ros, self._has_events)
@@ -238,7 +246,11 @@ class MessageLibrary:
         """Report a fault if a bag's definitions of a message are not equivalent."""
         parsed = (self.ros.parse(text, name, self.ros, file, Diagnostics()) for text in source.texts)
         if len({to_text(definition) for definition in parsed}) > 1:
-            faults.error(f"'{name}' is defined in several ways", SourceRef(file, 1, 1), "name the folder of one")
+            faults.error(
+                f"the bag has different definitions of '{name}'",
+                SourceRef(file, 1, 1),
+                "give the folder with the right definition",
+            )
 
     def _collect(
         self,
@@ -268,7 +280,7 @@ class MessageLibrary:
 
     def _hint(self, name: MessageName) -> str:
         if interface := self.interface(name):
-            return f"it is a {_WORDS[interface.kind]}; its messages are {', '.join(map(str, interface.messages))}"
+            return f"'{name}' is a {_WORDS[interface.kind]} with the messages {', '.join(map(str, interface.messages))}"
         places = ", ".join([*map(str, self._places), self._store.title])
         if feature := unsupported_word(name.name):
             return f"looked in: {places}; {feature.fault}: {feature.hint}"
@@ -276,7 +288,7 @@ class MessageLibrary:
         return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}{_FURTHER}"
 
     def _nearest(self, name: MessageName) -> str:
-        """The most likely meaning: the same type in another package, a misspelt primitive, or a similar name."""
+        """Return the most likely meaning: the same type in another package, a misspelt primitive, or a similar name."""
         same_type = [known for known in self.names() if known.name == name.name]
         if same_type:
             return str(same_type[0])
@@ -287,35 +299,36 @@ class MessageLibrary:
 
 
 class Libraries(Mapping[Middleware, MessageLibrary]):
-    """The library of each middleware, created on first access, which raises `InputError` like its constructor."""
+    """The library of each middleware, created on first access, which may raise `InputError` like the constructor."""
 
     def __init__(self, makers: Mapping[Middleware, Callable[[], MessageLibrary]]) -> None:
         self._makers = makers
         self._made: dict[Middleware, MessageLibrary] = {}
 
     def __getitem__(self, ros: Middleware) -> MessageLibrary:
-        """The library of a middleware."""
+        """Return the library of a middleware."""
         if ros not in self._made:
             self._made[ros] = self._makers[ros]()
         return self._made[ros]
 
     def __iter__(self) -> Iterator[Middleware]:
-        """Every middleware."""
+        """Return an iterator over all middlewares."""
         return iter(self._makers)
 
     def __len__(self) -> int:
-        """The number of middlewares."""
+        """Return the number of middlewares."""
         return len(self._makers)
 
 
 def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None) -> Libraries:
-    """The libraries of all middlewares.
+    """Return the libraries of all middlewares.
 
-    `store` is a distribution of one of them; the others keep their defaults. Raises `InputError` for an unknown one.
+    `store` is a distribution of one middleware; the other middlewares keep their defaults. Raise `InputError` for an
+    unknown distribution.
     """
     known = {ros: ros.distributions() for ros in middlewares()}
     if store is not None and not any(store in names for names in known.values()):
-        fail(f"'{store}' is not a distribution of ROS", hint=nearest(store, itertools.chain(*known.values())))
+        fail(f"unknown ROS distribution '{store}'", hint=nearest(store, itertools.chain(*known.values())))
     return Libraries(
         {
             ros: partial(MessageLibrary, ros, paths, environment, store if store in names else None)
@@ -325,14 +338,21 @@ def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, stor
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
-    """The text of the files; adds a fault if a file cannot be read, differs from the first, or is not UTF-8."""
+    """Return the text that all files share.
+
+    Add a fault if a file is unreadable, differs from the first, or is not UTF-8.
+    """
     contents = [_content(path, faults) for path in paths]
     if faults.found:
         return ""
     first, data = paths[0], contents[0]
     for other, content in zip(paths, contents, strict=True):
         if content != data:
-            faults.error(f"'{name}' differs from {other}", SourceRef(str(first), 1, 1), "name the folder of one")
+            faults.error(
+                f"the definition of '{name}' differs from the one in {other}",
+                SourceRef(str(first), 1, 1),
+                "give the folder with the right definition",
+            )
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as fault:
@@ -341,7 +361,7 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
 
 
 def _content(path: Path, faults: Diagnostics) -> bytes:
-    """The bytes of a file; if it cannot be read, adds a fault and returns no bytes."""
+    """Return the bytes of a file; if the file cannot be read, add a fault and return empty bytes."""
     try:
         return read_regular(path, MOST_FILE_BYTES)
     except OSError as error:
@@ -350,8 +370,8 @@ def _content(path: Path, faults: Diagnostics) -> bytes:
 
 
 def _note_depth(top: MessageName, name: MessageName, source: SourceRef | None, faults: Diagnostics) -> None:
-    hint = f"legal here: up to {MOST_LEVELS} levels of messages within messages"
-    faults.error(f"'{top}' holds '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
+    hint = f"legal here: up to {MOST_LEVELS} levels of nested messages"
+    faults.error(f"'{top}' contains '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
 
 
 def _part(name: MessageName, source: _Source) -> Part:
@@ -364,7 +384,7 @@ def _check_folder(path: Path, source: SourceRef | None, faults: Diagnostics) -> 
     if any(interface_files(path, suffixes).values()):
         return
     *others, last = (f".{suffix}" for suffix in suffixes)
-    reason = f"holds no {', '.join(others)} or {last} file" if path.is_dir() else "is neither a folder nor a bag"
+    reason = f"contains no {', '.join(others)} or {last} file" if path.is_dir() else "is neither a folder nor a bag"
     faults.error(
-        f"message path '{path}' {reason}", source, "give a package, a workspace, a folder of packages or a bag"
+        f"message path '{path}' {reason}", source, "legal here: a package, a workspace, a folder of packages or a bag"
     )

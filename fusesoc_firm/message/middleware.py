@@ -1,7 +1,7 @@
 """The interface of a middleware: the sources of its messages, and their serialisation rules.
 
-A middleware is a module with one `Middleware` value, and the line in `message/__init__.py` that registers it.
-docs/how-to/add-a-middleware.md explains how to add one.
+A middleware consists of a module with one `Middleware` value, and of the line in `message/__init__.py` that registers
+the value. docs/how-to/add-a-middleware.md explains how to add one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 class Store(Protocol):
-    """Definitions that need no user files; `title` names the store."""
+    """A collection of definitions that needs no user files; `title` names the store in messages."""
 
     title: str
 
@@ -27,14 +27,14 @@ class Store(Protocol):
         """The names of all messages in the store."""
 
     def text(self, name: MessageName) -> str:
-        """The definition of one of `names`."""
+        """Return the definition text of one of `names`."""
 
     def file(self, name: MessageName) -> str:
-        """A substitute for the file's name in errors."""
+        """Return the name for a message's definition in errors, in place of a file's name."""
 
 
 class Parse(Protocol):
-    """Parses a definition; faults are added to `diagnostics`, and valid parts are returned."""
+    """A function that parses a definition, adds faults to `diagnostics`, and returns the valid parts."""
 
     def __call__(
         self, text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics
@@ -43,7 +43,7 @@ class Parse(Protocol):
 
 
 class Signature(Protocol):
-    """Computes a word that is equal at both ends of a topic if both use the same message."""
+    """A function that computes a text that is equal at both ends of a topic if both ends use the same message."""
 
     def __call__(
         self,
@@ -56,13 +56,13 @@ class Signature(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Middleware:
-    """All properties of a middleware. Each middleware has one value, which is compared by identity.
+    """All properties of a middleware. Each middleware has one value, and values are compared by identity.
 
-    `title` is its name in comments and messages, `number` its number in options and reports, and `words` are its names
-    in users' files. `suffixes` are the suffixes of the files that define its messages, without the dot. `folders`
-    returns the places of these files in an environment. `store` returns the definitions of one of `distributions`, or
-    of the default for None; it raises `InputError` for any other name. `builtin_types` lists, for hints, the types that
-    are not messages. `aliases` maps former names of messages to current names; both mean the same message.
+    `title` is the name in comments and messages, `number` the number in options and reports, and `words` are the names
+    in users' files. `suffixes` are the suffixes, without the dot, of the files that define messages. `folders` returns
+    the folders of these files in an environment. `store` returns the definitions of one of `distributions`, or of the
+    default for None, and raises `InputError` for any other name. `builtin_types` lists, for hints, the types that are
+    not messages. `aliases` maps former names of messages to current names; both mean the same message.
     """
 
     number: int
@@ -78,17 +78,17 @@ class Middleware:
     store: Callable[[str | None], Store]
     aliases: Mapping[MessageName, MessageName] = field(default_factory=dict)
     dialect: Dialect | None = None
-    """The rules of its `.msg` files, which `message/parser.py` reads."""
+    """The rules of the middleware's `.msg` files, if `message/parser.py` parses them."""
 
     def __repr__(self) -> str:
         return self.title
 
     def __hash__(self) -> int:
-        """Return a hash that is the same in every process, so that the order of sets is the same, too."""
+        """Return a hash that is equal in every process, so that the order of sets is also equal."""
         return self.number
 
     def __reduce__(self) -> tuple[Callable[[int], Middleware], tuple[int]]:
-        """Unpickle to the receiving process's value."""
+        """Return the data from which unpickling restores the receiving process's value."""
         return middleware_of, (self.number,)
 
 
@@ -99,7 +99,7 @@ MIDDLEWARES: dict[str, Middleware] = {}
 
 
 def register(middleware: Middleware) -> None:
-    """Register a middleware. Raises ValueError if its number is taken."""
+    """Register a middleware. Raise `ValueError` if its number is already in use."""
     if middleware.number in _registered:
         raise ValueError(f"{middleware.number} is {_registered[middleware.number].title}")
     _registered[middleware.number] = middleware
@@ -107,15 +107,15 @@ def register(middleware: Middleware) -> None:
 
 
 def middleware_of(number: int) -> Middleware:
-    """The middleware with this number. Raises KeyError if it is not registered."""
+    """Return the middleware with this number. Raise `KeyError` if it is not registered."""
     return _registered[number]
 
 
 def middlewares() -> list[Middleware]:
-    """All registered middlewares, in the order of their numbers."""
+    """Return all registered middlewares, in the order of their numbers."""
     return [_registered[number] for number in sorted(_registered)]
 
 
 def known_suffixes() -> dict[str, InterfaceKind]:
-    """The suffixes of the files that define messages, for all middlewares."""
+    """Return the suffixes of the files that define messages, for all middlewares."""
     return {suffix: kind for middleware in _registered.values() for suffix, kind in middleware.suffixes.items()}

@@ -1,4 +1,4 @@
-"""The message model, the first stage: a definition as its author wrote it.
+"""The message model, the first stage: definitions as their authors wrote them.
 
 This module knows neither the wire layout (`frame`) nor the hardware (`converter`). All values are frozen, so a
 definition can be a dictionary key and can be shared.
@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 
 class InterfaceKind(StrEnum):
-    """The kind of interface: the file's suffix, its folder, and the middle part of ROS 2's full names."""
+    """The kind of an interface.
+
+    Its value is the file's suffix, the folder, and the middle part of full names in ROS 2.
+    """
 
     MESSAGE = "msg"
     SERVICE = "srv"
@@ -27,7 +30,7 @@ class InterfaceKind(StrEnum):
 
 @dataclass(frozen=True, order=True)
 class MessageName:
-    """A name such as `geometry_msgs/Quaternion`; ROS 2's spelling `geometry_msgs/msg/Quaternion` is the same name."""
+    """A name such as `geometry_msgs/Quaternion`; ROS 2 also spells this name `geometry_msgs/msg/Quaternion`."""
 
     package: str
     name: str
@@ -60,7 +63,7 @@ class StringType:
 
 @dataclass(frozen=True)
 class MessageType:
-    """A field whose type is another message."""
+    """The type of a field that contains another message."""
 
     name: MessageName
 
@@ -73,7 +76,7 @@ ElementType = PrimitiveType | StringType | MessageType
 
 @dataclass(frozen=True)
 class ArrayType:
-    """A fixed number of elements: `float64[9]`."""
+    """An array with a fixed number of elements, such as `float64[9]`."""
 
     element: ElementType
     length: int
@@ -84,7 +87,7 @@ class ArrayType:
 
 @dataclass(frozen=True)
 class SequenceType:
-    """A variable number of elements: `float64[]`, or `float64[<=9]` with a bound."""
+    """An array with a variable number of elements: `float64[]`, or `float64[<=9]` with a bound."""
 
     element: ElementType
     bound: int | None = None
@@ -97,7 +100,7 @@ FieldType = ElementType | ArrayType | SequenceType
 
 
 def nested_message(kind: FieldType) -> MessageName | None:
-    """The message that a field of this type contains, directly or as array elements."""
+    """Return the message that a field of this type contains, directly or as array elements."""
     element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
     return element.name if isinstance(element, MessageType) else None
 
@@ -108,7 +111,7 @@ DefaultValue = Scalar | tuple[Scalar, ...]
 
 @dataclass(frozen=True)
 class Field:
-    """A field; `default` is None if the definition has none (only ROS 2 has defaults)."""
+    """A field; `default` is None if the definition has no default (only ROS 2 has defaults)."""
 
     name: str
     type: FieldType
@@ -118,9 +121,9 @@ class Field:
 
 @dataclass(frozen=True)
 class Constant:
-    """A named value of the definition, which is never sent.
+    """A named value in a definition, which is never sent.
 
-    `text` is the value as its author wrote it, without surrounding blanks: ROS 1's MD5 sum distinguishes `1` from `+1`.
+    `text` is the value as written, without surrounding blanks, since ROS 1's MD5 sum distinguishes `1` from `+1`.
     """
 
     name: str
@@ -132,7 +135,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class MessageDefinition:
-    """A `.msg` file, or a message that ROS derives from a `.srv` or `.action` file, depending on `kind`."""
+    """The definition in a `.msg` file or, depending on `kind`, of a message derived from a `.srv` or `.action` file."""
 
     name: MessageName
     ros: Middleware
@@ -143,4 +146,4 @@ class MessageDefinition:
 
 
 Definitions = Mapping[MessageName, MessageDefinition]
-"""A message and all nested messages, by name."""
+"""The definitions of a message and of all nested messages, by name."""

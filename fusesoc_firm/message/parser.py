@@ -1,4 +1,4 @@
-r"""Parses `.msg` text. rosbags' parser loses defaults and gives no line and column for errors.
+r"""Parse `.msg` text; the parser in rosbags loses defaults and reports no line and column for errors.
 
     line        = [ declaration ] [ "#" comment ]
     declaration = type name [ default ]             a field; defaults: ROS 2
@@ -8,7 +8,7 @@ r"""Parses `.msg` text. rosbags' parser loses defaults and gives no line and col
     default     = scalar | "[" [ scalar { "," scalar } ] "]"
 
 `dialect` lists the differences between the versions. In both, a line with "=" after its first word is a constant. Each
-line is parsed on its own, so a faulty line does not hide faults in the next.
+line is parsed separately, so a faulty line does not hide faults in later lines.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ def parse_name(text: str) -> MessageName:
 
 
 def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
-    """Like `parse_name`, but also return the kind that the text names, if any."""
+    """Parse a name like `parse_name`, and also return the kind that the text names, or None."""
     match = _NAME.fullmatch(text.strip())
     if match is None:
-        fail(f"'{text}' is not a message name", hint="write 'package/Type', like 'geometry_msgs/Quaternion'")
+        fail(f"'{text}' is not a message name", hint="write 'package/Type', such as 'geometry_msgs/Quaternion'")
     package, kind, name = match.groups()
     return InterfaceKind(kind) if kind else None, MessageName(package, name)
 
 
 def dialect_of(ros: Middleware) -> Dialect:
-    """The rules of a middleware's `.msg` files."""
+    """Return the rules of a middleware's `.msg` files."""
     assert ros.dialect is not None, f"{ros.title} has no .msg files"
     return ros.dialect
 
@@ -66,7 +66,7 @@ def dialect_of(ros: Middleware) -> Dialect:
 def parse_message(
     text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics
 ) -> MessageDefinition:
-    """Parse the text of a `.msg` file; faults are added to `diagnostics`, and valid parts are returned."""
+    """Parse the text of a `.msg` file; add faults to `diagnostics`, and return the valid parts."""
     return _parse_lines(read_lines(text, file), name, ros, file, diagnostics)
 
 
@@ -81,10 +81,10 @@ def parse_sections(
         elif len(sections) < len(names):
             sections.append([])
         else:
-            diagnostics.error(f"more than the {len(names)} expected sections", line.source)
+            diagnostics.error(f"the file has more than the {len(names)} expected sections", line.source)
     if len(sections) < len(names):
         diagnostics.error(
-            f"{len(sections)} of {len(names)} sections found",
+            f"the file has {len(sections)} of the {len(names)} expected sections",
             SourceRef(file, 1, 1),
             f"'{_SEPARATOR}' separates sections",
         )
@@ -92,12 +92,12 @@ def parse_sections(
 
 
 def service_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of a service's request and response in this middleware."""
+    """Return the names of a service's request and response in this middleware."""
     return _derived_names(name, ros, ("Request", "Response"))
 
 
 def action_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of an action's goal, result and feedback in this middleware."""
+    """Return the names of an action's goal, result and feedback in this middleware."""
     return _derived_names(name, ros, ("Goal", "Result", "Feedback"))
 
 
@@ -119,7 +119,7 @@ def _parse_lines(
 
 
 class _Reader:
-    """Parses the lines of one message, reports every fault, and keeps the valid declarations."""
+    """A parser for the lines of one message, which reports every fault and keeps the valid declarations."""
 
     def __init__(self, name: MessageName, dialect: Dialect, diagnostics: Diagnostics) -> None:
         self.fields: list[Field] = []
@@ -140,7 +140,9 @@ class _Reader:
             return
         kind, rest = code.split_word()
         if not rest.text:
-            self._diagnostics.error(f"'{kind.text}' is not followed by a name", kind.source, "a field is 'type name'")
+            self._diagnostics.error(
+                f"'{kind.text}' is not followed by a name", kind.source, "a field has the form 'type name'"
+            )
         elif "=" in rest.text:
             self._read_constant(kind, rest, line)
         else:
@@ -150,7 +152,9 @@ class _Reader:
         name, default = rest.split_word()
         if name.text.startswith("["):
             joined = f"{kind.text}{name.text}"
-            self._diagnostics.error("a blank before '['", name.source, f"the type is one word: '{joined}'")
+            self._diagnostics.error(
+                "unexpected blank before '['", name.source, f"write the type as one word: '{joined}'"
+            )
             return
         field_type = self._type(kind)
         is_named = self._check_name(name, self._dialect.field_name)
@@ -164,7 +168,7 @@ class _Reader:
             self._diagnostics.error(
                 f"unexpected '{default.text}' after field '{name.text}'",
                 default.source,
-                f"{self._dialect.title} has no default values; a constant is 'type NAME=value'",
+                f"{self._dialect.title} has no default values; a constant has the form 'type NAME=value'",
             )
             return None
         return None if field_type is None else read_default(default, field_type, self._dialect, self._diagnostics)
@@ -187,19 +191,21 @@ class _Reader:
         if kind.text in self._dialect.primitives - self._dialect.opaque_primitives:
             return PrimitiveType(kind.text)
         self._diagnostics.error(
-            f"'{kind.text}' is not a type for constants", kind.source, "a constant is a number, a bool or a string"
+            f"a constant cannot have the type '{kind.text}'", kind.source, "legal here: numbers, bool and strings"
         )
         return None
 
     def _check_name(self, name: Piece, rule: NameRule) -> bool:
         if not rule.accepts(name.text):
-            # A default such as `s "a=b"` gets here: the reference parser, too, takes the line for a constant.
+            # This case includes a default such as `s "a=b"`: the reference parser also treats the line as a constant.
             is_default = len(name.text.split()) > 1
-            hint = "a line with '=' is a constant, even if the '=' is in quotes" if is_default else rule.hint
+            hint = "a line with '=' declares a constant, even if the '=' is in quotes" if is_default else rule.hint
             self._diagnostics.error(rule.fault(name.text, self._dialect.title), name.source, hint)
             return False
         if first := self._first_line.get(name.text):
-            self._diagnostics.error(f"'{name.text}' is declared twice", name.source, f"first in line {first}")
+            self._diagnostics.error(
+                f"'{name.text}' is declared twice", name.source, f"the first declaration is in line {first}"
+            )
             return False
         self._first_line[name.text] = name.line
         return True
@@ -208,7 +214,7 @@ class _Reader:
         match = _TYPE.fullmatch(kind.text)
         if match is None:
             forms = "'T', 'T[]', 'T[3]' or 'T[<=3]'" if self._dialect.has_bounds else "'T', 'T[]' or 'T[3]'"
-            self._diagnostics.error(f"'{kind.text}' is not a type", kind.source, f"a type is {forms}")
+            self._diagnostics.error(f"'{kind.text}' is not a type", kind.source, f"a type has the form {forms}")
             return None
         is_array = match[2] is not None
         element = self._element(kind.part(*match.span(1)), is_array)
@@ -227,9 +233,11 @@ class _Reader:
         return ArrayType(element, length) if element and length is not None else None
 
     def _bound(self, piece: Piece) -> int | None:
-        """The number after the `<=` at the start of `piece`."""
+        """Return the number after the `<=` at the start of `piece`, or None if a fault was reported."""
         if not self._dialect.has_bounds:
-            self._diagnostics.error(f"{self._dialect.title} has no bounds like '{piece.text}'", piece.source)
+            self._diagnostics.error(
+                f"{self._dialect.title} does not support bounds such as '{piece.text}'", piece.source
+            )
             return None
         return self._size(piece.part(2), smallest=1)
 
@@ -239,8 +247,8 @@ class _Reader:
         is_short = piece.text.isascii() and piece.text.isdigit() and len(digits) <= len(str(LARGEST_SIZE))
         if is_short and smallest <= int(digits) <= LARGEST_SIZE:
             return int(digits)
-        hint = f"a size is a whole number from {smallest} to {LARGEST_SIZE}"
-        self._diagnostics.error(f"'{piece.text}' is not a size", piece.source, hint)
+        hint = f"legal here: whole numbers from {smallest} to {LARGEST_SIZE}"
+        self._diagnostics.error(f"'{piece.text}' is not a legal size", piece.source, hint)
         return None
 
     def _element(self, piece: Piece, is_array: bool) -> ElementType | None:
@@ -274,4 +282,4 @@ class _Reader:
 
     def _message_hint(self, is_package: bool) -> str:
         rule = self._dialect.message_name if is_package else self._dialect.package_name
-        return f"a message's type is 'package/Type'; {rule.hint}"
+        return f"a message type has the form 'package/Type'; {rule.hint}"

@@ -1,4 +1,4 @@
-"""Text with a position, so that an error can point to any part of a line."""
+"""Text with a position, so that an error can refer to any part of a line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fusesoc_firm.text.diagnostics import SourceRef
 
 _BYTE_ORDER_MARK = "\ufeff"
-# Not str.splitlines(): editors do not end a line at a form feed or U+2028.
+# Not `str.splitlines`, which also ends lines at form feeds and U+2028, unlike editors.
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _BLANKS = re.compile(r"\s+")
 
@@ -35,22 +35,22 @@ class Piece:
         return SourceRef(self.file, self.line, self.start + 1, self.line_text, max(1, self.end - self.start))
 
     def part(self, start: int, end: int | None = None) -> Piece:
-        """The characters `start` to `end` of this piece, counted from its start."""
+        """Return the characters `start` to `end` of this piece, counted from its start."""
         stop = self.end if end is None else self.start + end
         return Piece(self.file, self.line, self.line_text, self.start + start, stop)
 
     def strip(self) -> Piece:
-        """The piece without leading or trailing blanks."""
+        """Return the piece without leading or trailing blanks."""
         start = len(self.text) - len(self.text.lstrip())
         return self.part(start, max(start, len(self.text.rstrip())))
 
     def partition(self, separator: str) -> tuple[Piece, Piece]:
-        """The parts before and after the first `separator`, stripped; without a separator, the second part is empty."""
+        """Return the stripped parts before and after the first `separator`; without it, the second part is empty."""
         before, found, _ = self.text.partition(separator)
         return self.part(0, len(before)).strip(), self.part(len(before) + len(found)).strip()
 
     def split_word(self) -> tuple[Piece, Piece]:
-        """Return the first word and the rest, stripped."""
+        """Return the first word and the stripped rest."""
         blanks = _BLANKS.search(self.text)
         return self.partition(blanks.group()) if blanks else (self, self.part(len(self.text)))
 

@@ -1,4 +1,4 @@
-"""Prints a message as `.msg` text in one canonical, aligned form, which the parser reads back as the same message."""
+"""Print a message as `.msg` text in a canonical, aligned form, which the parser reads back as the same message."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _SEPARATOR = "=" * 80
 
 
 def to_text(definition: MessageDefinition, signature: str = "") -> str:
-    """The definition as `.msg` text: constants, then fields in wire order.
+    """Return the definition as `.msg` text: constants, then fields in wire order.
 
-    A comment gives the message's name, its version and, if given, its signature.
+    A comment contains the message's name, its ROS version and, if given, the signature.
 
     The parser reads every printed value back unchanged (ROS 2 cannot express a `#`).
     """
@@ -28,7 +28,7 @@ def to_text(definition: MessageDefinition, signature: str = "") -> str:
 
 
 def closure_text(name: MessageName, definitions: Definitions) -> str:
-    """The texts of a message and all others in `definitions`, joined as in ROS's bags and connection headers."""
+    """Return the texts of a message and of all others in `definitions`, joined as in bags and connection headers."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{to_text(definitions[other])}" for other in definitions if other != name]
     return "".join([to_text(definitions[name]), *others])
 

@@ -1,7 +1,7 @@
-"""The messages of services and actions: the sections of their files, and the messages that ROS derives from these.
+"""The messages of services and actions: the sections of the files, and the messages that ROS derives from them.
 
-The derived messages follow actionlib_msgs' genaction.py for ROS 1, and rosidl_parser's `Service` and `Action` for ROS
-2.
+The derived messages follow genaction.py in actionlib_msgs for ROS 1, and `Service` and `Action` in rosidl_parser for
+ROS 2.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, Message
 from fusesoc_firm.message.parser import action_names, parse_message, parse_sections, service_names
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# ROS 2 has service events and hashes since Iron, the distribution that introduced this message.
+# ROS 2 has had service events and hashes since Iron, the distribution that introduced this message.
 EVENT_INFO = MessageName("service_msgs", "ServiceEventInfo")
 
 # The suffix of a derived message and its text; `{0}` is the name of the service or action.
@@ -49,7 +49,7 @@ _ROS2_ACTION_EVENTS: _Wrappers = {
 
 @dataclass(frozen=True)
 class Interface:
-    """A service or an action. `has_events` adds ROS 2's service events, which contain `EVENT_INFO`."""
+    """A service or an action; `has_events` adds the service events of ROS 2, which contain `EVENT_INFO`."""
 
     name: MessageName
     kind: InterfaceKind
@@ -57,27 +57,27 @@ class Interface:
     has_events: bool
 
     def __str__(self) -> str:
-        """The full name, such as `std_srvs/srv/SetBool`."""
+        """Return the full name, such as `std_srvs/srv/SetBool`."""
         return f"{self.name.package}/{self.kind}/{self.name.name}"
 
     @property
     def messages(self) -> tuple[MessageName, ...]:
-        """The names of the messages; the messages that the file defines come first."""
+        """The names of all messages; the messages that the file itself defines are first."""
         return self._sections + tuple(self._suffixed(suffix) for suffix in self._wrappers)
 
     @property
     def exchanged(self) -> tuple[MessageName, ...]:
-        """The messages that the two ends exchange: all except the events, which ROS 2 itself publishes."""
+        """The names of the messages that the two ends exchange: all except the events, which ROS 2 itself publishes."""
         events = {self._suffixed(suffix) for suffix in (*_ROS2_SERVICE_EVENT, *_ROS2_ACTION_EVENTS)}
         return tuple(name for name in self.messages if self.ros is ROS1 or name not in events)
 
     @property
     def has_signature(self) -> bool:
-        """Whether the ROS version defines a signature: ROS 2 distributions without service events have no hashes."""
+        """Whether ROS defines a signature; ROS 2 distributions without service events have no hashes."""
         return self.ros is ROS1 or self.has_events
 
     def parse(self, text: str, file: str, diagnostics: Diagnostics) -> dict[MessageName, MessageDefinition]:
-        """Parse the file's text into messages; faults are added to `diagnostics`, and valid parts are returned."""
+        """Parse the file's text into messages; add faults to `diagnostics`, and return the valid parts."""
         sections = parse_sections(text, self._sections, self.ros, file, diagnostics)
         wrappers = [self._wrapper(suffix, wrapper, file) for suffix, wrapper in self._wrappers.items()]
         return {message.name: replace(message, kind=self.kind) for message in (*sections, *wrappers)}
@@ -99,8 +99,8 @@ class Interface:
         return MessageName(self.name.package, self.name.name + suffix)
 
     def _wrapper(self, suffix: str, text: str, file: str) -> MessageDefinition:
-        """A derived message; its fields are not in the file, so all refer to the start of the file."""
-        # The only possible fault is in the name, and the sections report it.
+        """Return a derived message; since its fields are not in the file, their place is the start of the file."""
+        # The only possible fault is in the name, which the sections report.
         ignored = Diagnostics()
         definition = parse_message(text.format(self.name.name), self._suffixed(suffix), self.ros, file, ignored)
         fields = tuple(replace(field, source=definition.source) for field in definition.fields)

@@ -1,9 +1,9 @@
-"""Computes signatures, which two ends of a topic compare: ROS 1's MD5 sum and ROS 2's RIHS01 hash.
+"""Compute signatures, which the two ends of a topic compare: the MD5 sum in ROS 1, the RIHS01 hash in ROS 2.
 
-The MD5 sum follows genmsg 0.6.0 (`compute_md5_text`). It covers the constants, with their values as written, then the
-fields; the sum of a nested message replaces the message. The hash follows REP-2011 and REP-2016 (`RIHS01`): SHA-256 of
-the JSON of a type description, which lists the fields of the type and of all nested types, without constants and
-default values.
+The MD5 sum follows genmsg 0.6.0 (`compute_md5_text`). The sum covers the constants, with their values as written, then
+the fields; each nested message is represented by its own sum. The hash follows REP-2011 and REP-2016 (`RIHS01`):
+SHA-256 of the JSON of a type description, which lists the fields of the type and of all nested types, without constants
+and default values.
 """
 
 from __future__ import annotations
@@ -52,16 +52,16 @@ _ONLY_MEMBER = ("structure_needs_at_least_one_member", PrimitiveType("uint8"))
 
 
 def signature(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The signature in the definitions' middleware; for ROS, see `md5` and `rihs01`."""
+    """Return the signature that the definitions' middleware defines; for ROS, see `md5` and `rihs01`."""
     return next(iter(definitions.values())).ros.signature(name, definitions, kind)
 
 
 def md5(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The MD5 sum of a ROS 1 message, service or action: 32 hexadecimal digits.
+    """Return the MD5 sum of a ROS 1 message, service or action: 32 hexadecimal digits.
 
-    `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
-    KeyError). ROS 1 defines no sum for an action; the sum of the `...Action` message, which contains the other six
-    messages, replaces it.
+    `definitions` must contain the message, or the messages of the service or action, and all nested messages. Raise
+    `KeyError` if one is missing. ROS 1 defines no sum for an action; the result is then the sum of the `...Action`
+    message, which contains the other six messages.
     """
 
     @cache
@@ -90,10 +90,10 @@ def _md5_of(text: str) -> str:
 
 
 def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The hash of a ROS 2 message, service or action: `RIHS01_` and 64 hexadecimal digits.
+    """Return the hash of a ROS 2 message, service or action: `RIHS01_` and 64 hexadecimal digits.
 
-    `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
-    KeyError).
+    `definitions` must contain the message, or the messages of the service or action, and all nested messages. Raise
+    `KeyError` if one is missing.
     """
     describer = _Describer(definitions)
     match kind:
@@ -108,12 +108,12 @@ def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = In
         "type_description": described[top],
         "referenced_type_descriptions": [described[other] for other in sorted(described) if other != top],
     }
-    # The standard fixes the order of keys and the blanks after ',' and ':'; json's defaults match.
+    # The standard prescribes the order of keys and the blanks after ',' and ':', which are json's defaults.
     return f"RIHS01_{hashlib.sha256(json.dumps(description).encode()).hexdigest()}"
 
 
 class _Describer:
-    """Describes a type and its nested types; each method returns the full name of the described type."""
+    """A description of a type and its nested types; each method adds a type and returns its full name."""
 
     def __init__(self, definitions: Definitions) -> None:
         self.descriptions: dict[str, dict[str, Any]] = {}
@@ -177,7 +177,7 @@ def _described_field(
 
 
 def _array_of(kind: FieldType) -> tuple[PrimitiveType | StringType | MessageType, int, int]:
-    """The element of a type, the offset that an array adds to the element's type id, and the array's size or bound."""
+    """Return a type's element, the array's offset to the element's type id, and the array's size or bound."""
     if isinstance(kind, ArrayType):
         return kind.element, _ARRAY, kind.length
     if isinstance(kind, SequenceType):

@@ -14,7 +14,7 @@ from fusesoc_firm.text.diagnostics import fail, nearest
 # The newest distributions with long-term support that the round-trip tests use.
 _DEFAULTS = {1: "noetic", 2: "jazzy"}
 _TRANSFORMS = "geometry_msgs/TransformStamped[] transforms\n"
-# Messages of tf2 and tf, which most bags contain but rosbags' tables do not.
+# Messages of tf2 and tf, which most bags contain but the tables of rosbags do not.
 _ADDED = {
     1: {
         MessageName("tf2_msgs", "TFMessage"): _TRANSFORMS,
@@ -26,7 +26,7 @@ _NEXT_DEFINITION = "=" * 80
 
 
 def distributions(version: int) -> list[str]:
-    """The names of the distributions of a version, such as `jazzy`."""
+    """Return the names of all distributions of a ROS version, such as `jazzy`."""
     prefix = _prefix(version)
     return sorted(store.value.removeprefix(prefix) for store in Stores if store.value.startswith(prefix))
 
@@ -38,15 +38,15 @@ def _prefix(version: int) -> str:
 class DistributionStore:
     """The definitions of one distribution.
 
-    The texts come from rosbags' tables. Names, types, bounds and constants match the distribution, but comments and
-    default values are lost, and ROS 1's `Header` is expanded. `_ADDED` supplies messages missing from the tables.
+    The texts are from the tables of rosbags. Names, types, bounds and constants match the distribution, but comments
+    and default values are lost, and `Header` of ROS 1 is expanded. `_ADDED` supplies messages missing from the tables.
     """
 
     def __init__(self, version: int, distribution: str | None = None) -> None:
-        """`distribution` is one of `distributions`; None selects the default. Raises `InputError` for any other."""
+        """Select one of `distributions`, or the default for None. Raise `InputError` for any other name."""
         chosen = _DEFAULTS[version] if distribution is None else distribution
         if chosen not in distributions(version):
-            fail(f"'{chosen}' is not a distribution of ROS {version}", hint=nearest(chosen, distributions(version)))
+            fail(f"unknown ROS {version} distribution '{chosen}'", hint=nearest(chosen, distributions(version)))
         self._version = version
         self.title = f"rosbags {_prefix(version)}{chosen}"
         self._name = f"{_prefix(version)}{chosen}"
@@ -59,7 +59,7 @@ class DistributionStore:
     def names(self) -> frozenset[MessageName]:
         """The names of all messages in the distribution."""
         names = {parse_name(name) for name in self._typestore.fielddefs} | self._added.keys()
-        # rosbags keeps ROS 1's primitives `time` and `duration` as messages of ROS 2.
+        # rosbags represents the primitives `time` and `duration` of ROS 1 as messages of ROS 2.
         return frozenset(name for name in names if self._version == 2 or name.package != "builtin_interfaces")
 
     @property
@@ -67,12 +67,12 @@ class DistributionStore:
         return _ADDED.get(self._version, {})
 
     def text(self, name: MessageName) -> str:
-        """The definition of one of `names` as `.msg` text."""
+        """Return the definition of one of `names` as `.msg` text."""
         if name in self._added:
             return self._added[name]
         text, _ = self._typestore.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=self._version)
         return text.partition(_NEXT_DEFINITION)[0]
 
     def file(self, name: MessageName) -> str:
-        """A substitute for the file's name in errors."""
+        """Return the name for a message's definition in errors, in place of a file's name."""
         return f"<{self.title}>/{name}"

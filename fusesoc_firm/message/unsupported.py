@@ -1,7 +1,7 @@
 """Features of other definition languages that `.msg` lacks, each with a name and the equivalent in `.msg`.
 
-docs/explanation/frames.md describes how a Frame could represent each feature. No feature is legal in ROS 1 or ROS 2:
-both reference parsers reject every form, and a word is looked up only if no message has, or can have, that name.
+docs/explanation/frames.md describes how a Frame could represent each feature. None of the features is legal in ROS 1 or
+ROS 2: both reference parsers reject every form, and a word is looked up only if no message has, or can have, that name.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ class Feature:
     @property
     def fault(self) -> str:
         """The message for the user."""
-        return f"{self.name} are not supported by .msg"
+        return f"{self.name} are not supported in .msg files"
 
 
 def _feature(name: str, words: str, forms: tuple[str, ...], hint: str) -> Feature:
     return Feature(name, re.compile("|".join(f"(?:{form})" for form in forms)), frozenset(words.split()), hint)
 
 
-# A keyword followed by two words or a block; followed by one word, it is a field's type.
+# A keyword followed by two words or a block; a keyword followed by one word is a field's type.
 _DECLARATION = r"{}(?=\s+\S+\s+\S|\s*\{{|\s+\w+\s*\{{)"
 
 FEATURES = (
@@ -39,55 +39,55 @@ FEATURES = (
         "multi-dimensional arrays",
         "",
         (r"[^\s\[\]=]+\[[^\[\]]*\]\s*\[[^\[\]]*\]", r"[^\s\[\]=]+\[\s*[1-9]\d*\s*[,x*]\s*\d+[^\]]*\]"),
-        "write one dimension, such as 'float64[9] x' for 3 by 3; its element (i, j) is x[3*i + j]",
+        "use one dimension, such as 'float64[9] x' for 3 by 3 elements; element (i, j) is x[3*i + j]",
     ),
     _feature(
         "maps",
         "map dict",
         (r"(?:std::)?(?:unordered_map|map|dict)\s*<[^>]*>?",),
-        "write an array of a message that has the fields 'key' and 'value'",
+        "use an array of a message with the fields 'key' and 'value'",
     ),
     _feature(
         "optional fields",
         "optional",
         (r"@optional\b", r"(?:std::)?optional\s*<[^>]*>?", _DECLARATION.format("optional"), r"\w+(?:/\w+)*\?(?=\s)"),
-        "write an array of at most one element, or add a bool beside the field",
+        "use an array of at most one element, or add a bool field",
     ),
     _feature(
         "unions",
         "union variant oneof",
         (r"(?:std::)?variant\s*<[^>]*>?", _DECLARATION.format("(?:union|oneof)")),
-        "write a number for the kind, and a field for each kind",
+        "use a number for the variant, and a field for each variant",
     ),
     _feature(
         "typedefs",
         "typedef",
         (_DECLARATION.format("typedef"), r"using\s+\w+\s*=.*"),
-        "write the type itself, or a message that has it as its field",
+        "use the type itself, or a message with a field of this type",
     ),
     _feature(
-        "any types",
+        "'any' types",
         "any",
         (r"(?:std::)?any\s*<[^>]*>?",),
-        "write 'string type' and 'uint8[] data'",
+        "use the fields 'string type' and 'uint8[] data'",
     ),
     _feature(
         "inherited fields",
         "extends inherits",
         (r"(?:extends|inherits)(?=\s+\w+/\w)",),
-        "put the base into a field, such as 'Base base'",
+        "use a field for the base message, such as 'Base base'",
     ),
     _feature(
         "enum types",
         "enum",
         (_DECLARATION.format("enum"),),
-        "write a number and constants, such as 'uint8 mode' and 'uint8 MODE_IDLE=0'",
+        "use a number and constants, such as 'uint8 mode' and 'uint8 MODE_IDLE=0'",
     ),
 )
 
 
 def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
-    """The feature that a line (without its comment) uses, and the part of the line that uses it."""
+    """Return the feature that a line (without its comment) uses, and the part of the line that uses it."""
     for feature in FEATURES:
         if match := feature.form.match(code.text):
             return feature, code.part(0, match.end())
@@ -95,5 +95,5 @@ def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
 
 
 def unsupported_word(type_name: str) -> Feature | None:
-    """The unsupported feature that this type name suggests, or None."""
+    """Return the unsupported feature that this type name suggests, or None."""
     return next((feature for feature in FEATURES if type_name.lower() in feature.words), None)

@@ -1,4 +1,4 @@
-"""Parses the values of constants and defaults, and checks them against the ranges of their types."""
+"""Parse the values of constants and defaults, and check them against the ranges of their types."""
 
 from __future__ import annotations
 
@@ -20,15 +20,18 @@ from fusesoc_firm.message.piece import Piece
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 _QUOTES = ('"', "'")
-# An array element is either quoted, with `\"` for a quote, or extends to the comma. The match is possessive, since
-# otherwise the quote of `\"` could also close the string.
+# An array element is either quoted, with `\"` for a quote, or extends to the comma. The match is possessive; otherwise,
+# the quote of `\"` could also close the string.
 _ELEMENT = re.compile(r"""\s*("(?:\\"|[^"])*+"|'(?:\\'|[^'])*+'|[^\s,"'](?:[^,]*[^\s,])?)\s*(?:,|$)""")
 
 
 def read_value(
     piece: Piece, kind: PrimitiveType | StringType, dialect: Dialect, diagnostics: Diagnostics
 ) -> Scalar | None:
-    """The value of a constant, a default or an element of a default; None if a fault was reported."""
+    """Return the value of a constant, a default or an element of a default.
+
+    After a fault, report it and return None.
+    """
     try:
         return _scalar(piece.text, kind, dialect)
     except ValueError as fault:
@@ -38,10 +41,14 @@ def read_value(
 
 
 def read_default(piece: Piece, kind: FieldType, dialect: Dialect, diagnostics: Diagnostics) -> DefaultValue | None:
-    """The default value of a field; None if a fault was reported."""
+    """Return the default value of a field; after a fault, report it and return None."""
     element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
     if isinstance(element, MessageType):
-        diagnostics.error(f"a field of type {kind} has no default value", piece.source, "only primitive types have one")
+        diagnostics.error(
+            f"a field of type {kind} cannot have a default value",
+            piece.source,
+            "only fields of primitive types can have default values",
+        )
         return None
     if isinstance(kind, ArrayType | SequenceType):
         return _array(piece, kind, element, dialect, diagnostics)
@@ -56,29 +63,31 @@ def _array(
     diagnostics: Diagnostics,
 ) -> tuple[Scalar, ...] | None:
     if len(piece.text) < 2 or piece.text[0] != "[" or piece.text[-1] != "]":
-        diagnostics.error(f"'{piece.text}' is not a value of {kind}", piece.source, "an array is written '[a, b, c]'")
+        diagnostics.error(f"'{piece.text}' is not a value of {kind}", piece.source, "write an array as '[a, b, c]'")
         return None
     elements = _elements(piece.part(1, len(piece.text) - 1), diagnostics)
     if elements is None:
         return None
     values = [read_value(part, element, dialect, diagnostics) for part in elements]
     if hint := _count_fault(kind, len(values)):
-        diagnostics.error(f"a default of {len(values)} elements does not fit {kind}", piece.source, hint)
+        diagnostics.error(f"a default value with {len(values)} elements does not fit {kind}", piece.source, hint)
         return None
     known = tuple(value for value in values if value is not None)
     return known if len(known) == len(values) else None
 
 
 def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
-    """The elements between the brackets; None if a fault was reported."""
+    """Return the elements between the brackets; after a fault, report it and return None."""
     elements: list[Piece] = []
     position = 0
     while inner.text.strip():
         match = _ELEMENT.match(inner.text, position)
         if match is None:
             rest = inner.part(position).strip()
-            hint = "elements are separated by ','; a string that starts with a quote ends with it"
-            diagnostics.error(f"element {len(elements) + 1} of the array is empty or not closed", rest.source, hint)
+            hint = "separate elements by ','; a string must end with the quote that starts it"
+            diagnostics.error(
+                f"element {len(elements) + 1} of the array is empty or has no closing quote", rest.source, hint
+            )
             return None
         elements.append(inner.part(*match.span(1)))
         position = match.end()
@@ -89,12 +98,12 @@ def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
 
 def _count_fault(kind: ArrayType | SequenceType, count: int) -> str:
     if isinstance(kind, ArrayType):
-        return "" if count == kind.length else f"it takes exactly {kind.length}"
-    return "" if kind.bound is None or count <= kind.bound else f"it takes at most {kind.bound}"
+        return "" if count == kind.length else f"legal here: exactly {kind.length} elements"
+    return "" if kind.bound is None or count <= kind.bound else f"legal here: at most {kind.bound} elements"
 
 
 def _scalar(text: str, kind: PrimitiveType | StringType, dialect: Dialect) -> Scalar:
-    """The value of `text`. Raises ValueError, which names the legal values."""
+    """Return the value of `text`. Raise `ValueError`, with the legal values, if it is illegal."""
     if isinstance(kind, StringType):
         return _string(text, kind, dialect)
     if kind.name == "bool":
@@ -107,7 +116,7 @@ def _scalar(text: str, kind: PrimitiveType | StringType, dialect: Dialect) -> Sc
 def _boolean(text: str, dialect: Dialect) -> bool:
     key = text.lower() if "true" in dialect.booleans else text
     if key not in dialect.booleans:
-        raise ValueError(f"bool takes {', '.join(dialect.booleans)}")
+        raise ValueError(f"legal here: {', '.join(dialect.booleans)}")
     return dialect.booleans[key]
 
 
@@ -117,9 +126,9 @@ def _integer(text: str, kind: PrimitiveType, dialect: Dialect) -> int:
         value = _whole_number(text, dialect)
     except ValueError:
         radix = "decimal, 0x, 0o or 0b" if dialect.has_integer_prefixes else "decimal"
-        raise ValueError(f"{kind} takes a whole number ({radix}) from {smallest} to {largest}") from None
+        raise ValueError(f"legal here: whole numbers ({radix}) from {smallest} to {largest}") from None
     if not smallest <= value <= largest:
-        raise ValueError(f"{kind} takes {smallest} to {largest}")
+        raise ValueError(f"legal here: {smallest} to {largest}")
     return value
 
 
@@ -136,7 +145,7 @@ def _float(text: str, kind: PrimitiveType) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise ValueError(f"{kind} takes a number with '.' as the separator, inf or nan") from None
+        raise ValueError("legal here: inf, nan, and numbers with '.' as the decimal separator") from None
     try:
         struct.pack("<f" if kind.name == "float32" else "<d", value)
     except OverflowError:
@@ -147,16 +156,16 @@ def _float(text: str, kind: PrimitiveType) -> float:
 def _string(text: str, kind: StringType, dialect: Dialect) -> str:
     value = _unquoted(text) if dialect.has_quoted_strings else text
     if kind.bound is not None and len(value) > kind.bound:
-        raise ValueError(f"{kind} takes at most {kind.bound} characters, not {len(value)}")
+        raise ValueError(f"legal here: at most {kind.bound} characters, not {len(value)}")
     return value
 
 
 def _unquoted(text: str) -> str:
-    """Remove the surrounding quotes; a text that is not quoted at both ends is returned unchanged."""
+    """Return a text without surrounding quotes; a text that is not quoted at both ends is unchanged."""
     for quote in _QUOTES:
         if text.startswith(quote) and text.endswith(quote):
             inner = text[1:-1]
             if re.search(rf"(?<!\\){quote}", inner):
-                raise ValueError(f"a {quote} within the quotes is written \\{quote}")
+                raise ValueError(f"write a {quote} within the quotes as \\{quote}")
             return inner.replace(f"\\{quote}", quote)
     return text

@@ -1,6 +1,6 @@
 """The serialisation rules of a middleware: types, alignment and the bytes around a message.
 
-One `WireRules` value contains them all; the layout and the codec need nothing else.
+A single `WireRules` value contains all rules that the layout and the codec need.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ class WireType:
 
     @property
     def bits(self) -> int:
-        """The width of an element at a converter's port: a bool has one bit at the port, but one byte on the wire."""
+        """The width in bits of an element at a converter's port.
+
+        A bool has one bit at a port, but one byte on the wire.
+        """
         return 1 if self.name == "bool" else 8 * self.size
 
 
@@ -49,12 +52,12 @@ WIDE_CHARACTER = WireType("wide character", 4, "I")
 
 @dataclass(frozen=True)
 class WireRules:
-    """The layout rules of one serialisation.
+    """The layout rules of a serialisation.
 
     `scalars` maps each primitive with one value to its wire type; `compounds` lists the named parts of a primitive that
-    is sent as several values (ROS 1's `time`). `max_alignment` is 1 if nothing is aligned; alignment offsets count from
-    the end of `prefix`. `empty_bytes` is the serialised form of a message without fields. `string_terminator` is the
-    number of zeros that end a string and are included in the count (a wstring has none).
+    is sent as several values (ROS 1's `time`). `max_alignment` is 1 if values are not aligned; positions for alignment
+    count from the end of `prefix`. `empty_bytes` is the serialised form of a message without fields.
+    `string_terminator` is the number of zeros that end a string and are included in the count (a wstring has none).
     """
 
     scalars: MappingProxyType[str, WireType]
@@ -67,5 +70,5 @@ class WireRules:
     trailing_bytes: int
 
     def alignment(self, size: int) -> int:
-        """The alignment in bytes of a value of `size` bytes."""
+        """Return the alignment in bytes of a value of `size` bytes."""
         return min(size, self.max_alignment)

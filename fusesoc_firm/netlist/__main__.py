@@ -1,4 +1,4 @@
-"""`python -m fusesoc_firm.netlist FILE`: run the translation described in a file that `Translation.to_json` wrote."""
+"""`python -m fusesoc_firm.netlist FILE`: run the translation in a file that `Translation.to_json` wrote."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fusesoc_firm.tools.manifest import note
 
 
 def main(path: Path) -> int:
-    """Translate, and return the exit status: 1 if there is no netlist; the reason is then printed."""
+    """Run the translation and return the exit status; without a netlist, print the reason and return 1."""
     translation = Translation.from_json(path.read_text(encoding="utf-8"))
     try:
         warnings = translate(translation, path.with_suffix(".ghdl"))

@@ -1,6 +1,6 @@
-"""Corrects errors in GHDL 2.0's synthesis for which the netlist and its sources show the intended logic.
+"""Correct those errors in GHDL 2.0's synthesis for which the netlist and the sources show the intended logic.
 
-* A rotation by the vector's width or more yields zeros, because GHDL builds it from two shifts.
+* A rotation by at least the vector's width results in zeros, because GHDL builds rotations from two shifts.
 * If our functions (`sources.py`) extend a vector to compare it with a constant, the comparison is narrowed to the
   vector's width.
 """
@@ -15,7 +15,7 @@ from fusesoc_firm.netlist.model import Instance, Modules, Net
 from fusesoc_firm.netlist.verilog import constant
 
 _SIGNED, _UNSIGNED = {"$sextend"}, {"$uextend"}
-# The operator of each comparison, and the gates that may extend the vector before it.
+# The operator of each comparison, and the gates that may extend the vector before the comparison.
 _COMPARISONS: Mapping[str, tuple[Callable[[int, int], bool], set[str]]] = {
     "$eq": (eq, _SIGNED | _UNSIGNED),
     "$ne": (ne, _SIGNED | _UNSIGNED),
@@ -45,11 +45,11 @@ def correct(modules: Modules) -> None:
 
 
 def doubts(modules: Modules) -> list[str]:
-    """Return warnings about constants whose bits GHDL may have reordered.
+    """Return warnings about constants whose bits GHDL may have read in the wrong order.
 
-    If one branch assigns a constant to a whole signal and another branch assigns parts of the signal, GHDL 2.0 takes
-    the parts of the constant from the wrong end. The resulting gates look the same as those for a constant assigned in
-    parts.
+    If one branch assigns a constant to a whole signal and another branch assigns parts of the signal, GHDL 2.0 counts
+    the constant's parts from the wrong end. The resulting gates cannot be distinguished from the gates for a constant
+    that is assigned in parts.
     """
     found: dict[str, None] = {}
     for module in modules.values():
@@ -58,14 +58,14 @@ def doubts(modules: Modules) -> list[str]:
             if gate.kind.startswith("$concat"):
                 found |= dict.fromkeys(_mixed(gate, drivers))
     return [
-        f"{place}: warning: if one branch assigns a constant to all of a signal, and another assigns parts of it, GHDL "
-        "mixes up the constant's bits; assign it in the same parts"
+        f"{place}: warning: if one branch assigns a constant to a whole signal and another assigns parts of the "
+        "signal, GHDL mixes up the constant's bits; assign the constant in the same parts"
         for place in found
     ]
 
 
 def _mixed(parts: Instance, drivers: Mapping[int, Instance]) -> Iterator[str]:
-    """Return the places of selections that have different constants for several of these parts on one side."""
+    """Yield the places of selections in which several of these parts have different constants at the same input."""
     constants: dict[tuple[str, int, int], list[str]] = defaultdict(list)
     for index in range(len(parts.inputs)):
         selection = _driver(parts, index, drivers)
@@ -95,7 +95,7 @@ def _correct_rotation(gate: Instance, drivers: Mapping[int, Instance]) -> None:
 
 
 def _correct_comparison(gate: Instance, drivers: dict[int, Instance]) -> Instance | None:
-    """Compare the vector before its extension with a new constant, which is returned; or replace a constant result."""
+    """Compare the vector before its extension with a new constant, which is returned, or make the result constant."""
     for index in (0, 1):
         number, lengthened = _driver(gate, index, drivers), _driver(gate, 1 - index, drivers)
         bits = constant(number) if number else None
@@ -113,7 +113,7 @@ def _correct_comparison(gate: Instance, drivers: dict[int, Instance]) -> Instanc
                 drivers[net.number] = Instance(name, "$const_UB32", gate.location, [parameter], outputs=[net])
                 gate.inputs = [net, vector] if index == 0 else [vector, net]
                 return drivers[net.number]
-            # All values of the vector are on the same side of this number.
+            # The number is greater than, or less than, all values of the vector.
             compared = (value, 0) if index == 0 else (0, value)
             gate.parameters = [str(int(_COMPARISONS[gate.kind][0](*compared)))]
             gate.kind, gate.inputs = "$const_UB32", []

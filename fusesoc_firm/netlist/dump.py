@@ -1,7 +1,7 @@
-"""Reads a netlist as `ghdl --synth --out=dump` prints it: every gate with its kind, its parameters and its nets.
+"""Read a netlist in the form of `ghdl --synth --out=dump`: every gate with its kind, its parameters and its nets.
 
-GHDL translates this form to its VHDL and Verilog netlists. GHDL's Verilog netlist loses much information; the dump
-lacks only the generics of components without an entity.
+GHDL derives its VHDL and Verilog netlists from this form. The Verilog netlist lacks much information; the dump lacks
+only the generics of components without an entity.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _NET = re.compile(r"(\S.*?)\{n(\d+)w(\d+)\}")
 _DRIVER = re.compile(r".* <- (?:.*\{n(\d+)w(\d+)\})?")
 _PORT = re.compile(r"(input|output) (.*?)(?:\[(?:(\d+):0|(\?))\])?;")
 _INSTANCE = re.compile(r"instance (.*?)\{i\d+\}: (.*)")
-# The inputs of the instances already name the readers of each net.
+# The instances' inputs already determine the readers of each net.
 _NOT_NEEDED = ("connect ", "attribute ")
 _MODULE = re.compile(r"module \{m\d+\} (.*)")
 _LOCATION = re.compile(r"# (.*:\d+:\d+)")
@@ -36,7 +36,7 @@ def read(text: str) -> Modules:
 
 
 class _Reader:
-    """Collects the modules from the lines read so far; a line belongs to the nearest less indented line above."""
+    """The modules in the lines read so far; a line belongs to the nearest line above with less indentation."""
 
     def __init__(self) -> None:
         self.modules: dict[str, Module] = {}
@@ -92,7 +92,7 @@ class _Reader:
         self._instance = instance
         self._module = None
         if instance.kind == module.name:
-            # From inside a module, the module's outputs are inputs.
+            # Inside a module, the module's outputs are inputs.
             module.is_defined = True
             self._module = module
         else:
@@ -118,7 +118,7 @@ def _matched(pattern: re.Pattern[str], text: str) -> re.Match[str]:
 
 
 def _name(text: str) -> str:
-    r"""Spell a name as GHDL's netlists do: `\sum.%3` is `sum_n3`; an extended identifier loses its backslashes."""
+    r"""Return a name as in GHDL's netlists: `\sum.%3` becomes `sum_n3`; extended identifiers lose their backslashes."""
     parts = [_plain(user) if user else own or f"n{number}" for user, own, number in _PART.findall(text)]
     if not parts:
         raise ValueError(text)

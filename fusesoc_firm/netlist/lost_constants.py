@@ -1,9 +1,9 @@
-"""Finds constants that GHDL 2.0 turns into zero: 64, 96, ... bits wide, with bits set only in the highest 32.
+"""Find constants that GHDL 2.0 turns into zero: 64, 96, ... bits wide, with bits set only in the highest 32.
 
-In the netlist, a lost constant looks like any other zero. So if the netlist contains a zero of such a width, GHDL
-reports the value of each constant expression in the VHDL: a copy of the sources contains functions that examine the
-expressions (probes). Synthesis evaluates the probes, because all their arguments are constant. Levels other than 0 and
-1 are treated in the same manner.
+In the netlist, a lost constant looks like any other zero. If the netlist contains a zero of one of these widths, a copy
+of the sources with probes is therefore synthesised; a probe is a function that reports the value of a constant
+expression. GHDL evaluates the probes during synthesis, because all arguments are constant. The same applies to levels
+other than 0 and 1.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ _PORT = re.compile(rf"{_NAMES}\s*(?:out|inout|buffer)\s+(\w+(?:\s*\((?:[^()]|\([
 _DYNAMIC = re.compile(rf"\b(?:signal|variable)\s+{_NAMES}", re.IGNORECASE)
 _INTERFACE = re.compile(r"\b(generic|port|function|procedure)\b[^()]*\(", re.IGNORECASE)
 _COMMA = r"\s*,\s*"
-# The text after a constant of which the whole, or an element, is used.
+# The text after a constant that is used as a whole, or of which an element is used.
 _NO_SLICE = r"(?P<index>)(?!\s*(?:'|\(\s*\d+(?:\s+(?:downto|to)\s+\d+)?\s*\)))"
 _OF_ELEMENT = r"\s*\((?P<index>[^();]*)\)"
 _SCALAR = re.compile(
@@ -153,7 +153,7 @@ _REPORT = re.compile(r"firm lost (\d+) (\d+)")
 
 @dataclass(frozen=True)
 class _Probe:
-    """A text that replaces a part of a file; `constant` is the span of the expression that it examines, if any."""
+    """A text that replaces a part of a file; `constant` is the span of the examined expression, if any."""
 
     start: int
     end: int
@@ -162,12 +162,12 @@ class _Probe:
 
 
 class Source:
-    """A file and the probes of its constants."""
+    """A source file with the probes for its constants."""
 
     def __init__(self, name: str) -> None:
         self.name = name
         self.text = Path(name).read_bytes().decode("latin-1")
-        # Comments and the contents of literals are blank, so that all positions stay the same.
+        # Comments and the contents of literals are replaced by blanks, so that all positions remain valid.
         self.code = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), self.text)
         self.units = [
             (found.start(), found.end(), (found[1] or found[2] or found[4] or found[3]).lower())
@@ -195,7 +195,7 @@ class Source:
         return f"{self.name}:{before.count(chr(10)) + 1}:{position - before.rfind(chr(10))}"
 
     def unit(self, position: int) -> str:
-        """Return the kind of the unit around a position; empty within parentheses, which enclose interfaces."""
+        """Return the kind of the unit around a position, or an empty string within the parentheses of an interface."""
         index = bisect_right(self._begins, position)
         is_inside = self._depths[bisect_right(self._parentheses, position)]
         return self.units[index - 1][2] if index and not is_inside else ""
@@ -204,11 +204,11 @@ class Source:
         return bisect_right(self._begins, position)
 
     def constant(self, position: int) -> re.Match[str] | None:
-        """Return the constant declaration around a position."""
+        """Return the constant declaration around a position, or None."""
         return next((found for found in self.constants if found.start() <= position < found.end()), None)
 
     def types(self, *, of_packages: bool) -> Iterator[tuple[str, int, str]]:
-        """Yield the array and record types in packages, or all others: name, end, and a function that returns bits."""
+        """Yield the array and record types in packages, or all others: name, end, and the function for the bits."""
         for found in _TYPE.finditer(self.code):
             kind = self.unit(found.start())
             if kind and (kind == "package") == of_packages:
@@ -247,7 +247,10 @@ class Source:
         yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in assigned)]))
 
     def _first_value(self, found: re.Match[str]) -> _Probe | None:
-        """Return the probe of a declaration, unless the value depends on parameters: GHDL runs such functions."""
+        """Return the probe of a declaration, or None if the value depends on a function's parameters.
+
+        GHDL runs such functions itself.
+        """
         is_vector = found[3].strip().lower().startswith(_VECTORS)
         if not found[4] or not self._is_constant(*found.span(4)):
             return None
@@ -258,7 +261,7 @@ class Source:
     def _assigned(
         self, declared: Mapping[tuple[int, str], re.Match[str]], spans: Sequence[tuple[int, int]]
     ) -> Iterator[_Probe]:
-        """Yield probes of assigned values: next to the target's declaration or, for a port, in the assignment."""
+        """Yield the probes of assigned values: next to the target's declaration or, for a port, in the assignment."""
         for found in _ASSIGNMENT.finditer(self.code):
             if not self.unit(found.start(1)) or _is_within(found.start(1), spans):
                 continue
@@ -268,11 +271,11 @@ class Source:
                     yield from filter(None, [self._value(target, start, end) if target else self._joined(start, end)])
 
     def _joined(self, start: int, end: int) -> _Probe | None:
-        """Return a probe of concatenated vectors; function calls have their own probes."""
+        """Return a probe of concatenated vectors; function calls have separate probes."""
         return self._seen(start, end) if "&" in self.code[start:end] else None
 
     def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
-        """Yield probes of the results of functions applied to constants within expressions."""
+        """Yield the probes for the results of functions that expressions apply to constants."""
         last = 0
         for found in _CALL.finditer(self.code):
             start, end = found.start(), _closed(self.code, found.end())
@@ -321,7 +324,7 @@ def _values(text: str, start: int) -> Iterator[tuple[int, int]]:
 
 
 def _closed(code: str, start: int) -> int:
-    """Return the position after the closing parenthesis that matches the opening one just before `start`."""
+    """Return the position after the parenthesis that closes the one just before `start`."""
     depth = 1
     for position in range(start, len(code)):
         depth += {"(": 1, ")": -1}.get(code[position], 0)
@@ -342,7 +345,7 @@ def widths(modules: Modules) -> set[int]:
 
 
 class Copies:
-    """Copies of the sources with probes."""
+    """Copies of the source files with probes."""
 
     def __init__(self, files: Iterable[str], folder: Path) -> None:
         self.sources = {name: Source(name) for name in files}
@@ -360,7 +363,7 @@ class Copies:
         return any(probe.constant for probes in self.probes.values() for probe in probes)
 
     def write(self) -> dict[str, str]:
-        """Write the copies; return the name of each copy by the name of its file."""
+        """Write the copies; return a mapping from each source file's name to the name of its copy."""
         self._seen = []
         return {name: self._write(source, index) for index, (name, source) in enumerate(self.sources.items())}
 
@@ -382,7 +385,7 @@ class Copies:
         return copy
 
     def drop(self, messages: str) -> bool:
-        """Drop the probes that GHDL rejects; return False if there are none."""
+        """Drop the probes that GHDL rejects; return False if GHDL rejects none."""
         dropped = False
         for number, (name, probes) in enumerate(self.probes.items()):
             copy = str(self.folder / f"{number}.vhd")
@@ -397,7 +400,7 @@ class Copies:
         return dropped
 
     def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:
-        """Yield the place and width of each lost constant that GHDL reports, if the width is in `among`."""
+        """Yield the place and the width of each lost constant that GHDL reports with a width in `among`."""
         reported = ((*self._seen[int(number)], int(width)) for number, width in _REPORT.findall(messages))
         literals = ((name, *found) for name in self.sources for found in self._literals(name))
         for name, position, width in chain(reported, literals):
@@ -406,7 +409,7 @@ class Copies:
                 yield self.sources[name].place(position), width
 
     def _literals(self, name: str) -> Iterator[tuple[int, int]]:
-        """Yield the literals that GHDL loses; an examined literal counts only if elements of its constant are used."""
+        """Yield the literals that GHDL loses; an examined literal counts only if elements of the constant are used."""
         source = self.sources[name]
         seen = sorted(probe.constant for probe in self.probes[name] if probe.constant)
         for position, width in source.literals():
@@ -415,7 +418,7 @@ class Copies:
                 yield position, width
 
     def _is_used(self, declaration: re.Match[str], how: str) -> bool:
-        """Whether a constant is used outside its declaration in a form that matches `how`."""
+        """Return whether a constant is used outside its declaration in a form that matches `how`."""
         uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
         found = (
             not source.dynamic & set(_NAME.findall((use["index"] or "").lower()))
@@ -426,12 +429,12 @@ class Copies:
 
 
 def refuse(lost: Sequence[tuple[str, int]]) -> None:
-    """Raise `NetlistError` if constants are lost."""
+    """Raise `NetlistError` with all lost constants, if there are any."""
     if lost:
         raise NetlistError(
             "\n".join(
-                f"{place}: error: GHDL turns a constant of {width} bits into zero if only its highest {_WORD} bits are "
-                "not zero; assign it in two slices, or an array by its elements"
+                f"{place}: error: GHDL turns a {width}-bit constant into zero if only its highest {_WORD} bits are "
+                "not zero; assign the constant in two slices, or an array element by element"
                 for place, width in dict.fromkeys(lost)
             )
         )
@@ -440,6 +443,6 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
 def doubt(widths: Iterable[int], message: str) -> str:
     """Return a warning that constants of some widths were not examined, with GHDL's reason."""
     return (
-        f"warning: GHDL turns constants of {', '.join(map(str, sorted(widths)))} bits into zero if only their "
-        f"highest {_WORD} bits are not zero, and cannot tell whether there are any: {message.splitlines()[0]}"
+        f"warning: GHDL turns constants with {', '.join(map(str, sorted(widths)))} bits into zero if only their "
+        f"highest {_WORD} bits are not zero; the search for such constants failed: {message.splitlines()[0]}"
     )

@@ -1,4 +1,4 @@
-"""A netlist as plain data: modules, their instances of gates and of other modules, and the nets between them."""
+"""A netlist as plain data: modules, the instances of gates and modules in each module, and nets."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 
 class NetlistError(Exception):
-    """The netlist does not match the VHDL; the text is the message for the user."""
+    """An error because the netlist would not match the VHDL; the text is the message to the user."""
 
 
 class LostMemoryError(NetlistError):
-    """GHDL produced a wrong netlist, or crashed, while it inferred memories."""
+    """An error because GHDL produced a wrong netlist, or crashed, while inferring memories."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Port:
 class Instance:
     """A gate (`kind` begins with `$`) or an instance of a module.
 
-    An input is None if nothing drives it. `location` is `file:line:column` of the VHDL, or empty.
+    An undriven input is None. `location` is the place in the VHDL as `file:line:column`, or empty.
     """
 
     name: str
@@ -46,16 +46,16 @@ class Instance:
     outputs: Sequence[Net] = ()
 
     def error(self, message: str) -> NetlistError:
-        """Return an error at this instance's place in the VHDL."""
+        """Return an error with this instance's place in the VHDL."""
         return NetlistError(f"{self.location or self.name}: error: {message}")
 
     @property
     def numbers(self) -> list[int]:
-        """The parameters of a gate, without their names."""
+        """The values of a gate's parameters."""
         return [int(text.rpartition("=")[2]) for text in self.parameters]
 
     def input(self, index: int) -> Net:
-        """Return the net at an input. Raises `NetlistError` if nothing drives it."""
+        """Return the net at an input. Raise `NetlistError` if nothing drives it."""
         net = self.inputs[index]
         if net is None:
             raise self.error(f"nothing drives an input of '{self.name}'")
@@ -64,9 +64,9 @@ class Instance:
 
 @dataclass
 class Module:
-    """A module; without `is_defined`, it is a component that is defined elsewhere.
+    """A module; if `is_defined` is false, the module is a component that is defined outside the netlist.
 
-    `results` are the nets of the module's outputs, `arguments` the nets of its inputs.
+    `results` are the nets at the module's outputs, and `arguments` are the nets at its inputs.
     """
 
     name: str

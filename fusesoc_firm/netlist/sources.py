@@ -1,12 +1,12 @@
-"""Copies VHDL with correct functions in place of those whose wrong synthesis by GHDL 2.0 no netlist reveals.
+"""Copy VHDL with corrected functions, for errors in GHDL 2.0's synthesis that are not visible in the netlist.
 
 * `integer - signed` becomes `signed - integer`.
 * `resize` of a signed number to fewer bits drops the sign; numeric_std keeps it.
 * A product with an integer uses the whole integer; numeric_std truncates the integer to the vector's length.
-* A quotient, remainder or comparison with an integer truncates the integer; numeric_std uses all of it.
+* A quotient, remainder or comparison with an integer truncates the integer; numeric_std uses the whole integer.
 
-Our functions are aliases in each architecture and package body, because a declaration there hides names that a use
-clause makes visible.
+Our functions are declared as aliases in each architecture and package body, because these declarations hide the names
+that a use clause makes visible.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ _COMPARISON = """
     return ieee.numeric_std."{0}"(l, r);
   end function "{0}";
 """
-# In numeric_std, a quotient by an integer that does not fit is zero. A gate computes it, since GHDL folds few
+# In numeric_std, a quotient by an integer that does not fit is zero. A gate computes this zero, since GHDL folds few
 # constants.
 _BY_LARGE = {"/": "l and to_{1}(0, l'length)", "mod": _WIDE, "rem": _WIDE}
 _OPERATORS = {_PRODUCT: ["*"], _QUOTIENT: ["/", "mod", "rem"], _COMPARISON: ["=", "/=", "<", "<=", ">", ">="]}
@@ -143,7 +143,7 @@ def _full(type_: str) -> str:
 
 
 def _padded(text: str) -> str:
-    """Pad a text to a multiple of the tab width, so that tabs after the text keep their widths."""
+    """Return a text padded to a multiple of the tab width, so that tabs after the text keep their widths."""
     return text + " " * (-len(text) % _TAB)
 
 
@@ -155,21 +155,21 @@ _ADDED = re.compile(rf"^(.*{re.escape(_ALIASES)}.*)\n( *\^)$", re.MULTILINE)
 
 @dataclass
 class Copies:
-    """Copies of files in a folder, and the positions at which text was added."""
+    """Copies of files in a folder, and the positions of added text."""
 
     folder: Path
     files: list[str] = field(default_factory=list)
     _added: list[Mapping[int, Sequence[tuple[int, int]]]] = field(default_factory=list)
 
     def write_package(self) -> Path:
-        """Write the package with our functions, for `LIBRARY`; return its path."""
+        """Write the package with our functions, for the library `LIBRARY`; return the file's path."""
         self.folder.mkdir()
         package = self.folder / "numeric.vhd"
         package.write_text(_PACKAGE, encoding="latin-1")
         return package
 
     def copy(self, files: Iterable[str]) -> list[str]:
-        """Copy files; return the path of each copy, or of the file itself if nothing changes."""
+        """Copy files; return the path of each copy, or the file's own path if no change is needed."""
         return [self._copy(file) for file in files]
 
     def _copy(self, file: str) -> str:
@@ -184,7 +184,7 @@ class Copies:
         return str(copy)
 
     def original(self, text: str) -> str:
-        """Replace the names and columns of copies in GHDL's output with those of the original files."""
+        """Return GHDL's output with the names and columns in copies replaced by those in the original files."""
         place = re.compile(rf"{re.escape(str(self.folder))}/(\d+)\.vhd(?::(\d+):(\d+))?")
         text = _ADDED.sub(lambda line: _without_added(*line.groups()), place.sub(self._place, text))
         return text.replace(f"{self.folder}/", "")
@@ -194,7 +194,7 @@ class Copies:
         if not found[2]:
             return file
         line, column = int(found[2]), int(found[3])
-        # A place within an addition is reported as the start of the addition.
+        # A place within added text is reported as the start of that text.
         before = [(start, length) for start, length in self._added[int(found[1])].get(line, ()) if start < column]
         for start, length in reversed(before):
             column = max(start, column - length)
@@ -202,18 +202,18 @@ class Copies:
 
 
 def _without_added(line: str, mark: str) -> str:
-    """Remove our additions from a line that GHDL shows, and shift the caret in the line below."""
+    """Return a line that GHDL shows without our additions, and with the caret in the line below shifted."""
     shorter = line.replace(_CONTEXT, "").replace(_ALIASES, "")
     return f"{shorter}\n{mark[len(line) - len(shorter) :]}"
 
 
 def use_numbers(files: Iterable[str]) -> bool:
-    """Whether any of these files names a type with wrong functions."""
+    """Return whether any of these files names a type with wrong functions."""
     return any(_TYPES.search(Path(file).read_bytes().decode("latin-1")) for file in files)
 
 
 def _changed(text: str) -> tuple[str, Mapping[int, Sequence[tuple[int, int]]]]:
-    """Return a text with our functions, and the column and length of each addition by line."""
+    """Return a text that uses our functions, and the column and length of each addition by line."""
     code = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
     added: dict[int, list[tuple[int, int]]] = defaultdict(list)
     parts: list[str] = []

@@ -1,7 +1,7 @@
-"""Translates all VHDL files of a build to one Verilog netlist with GHDL's synthesis.
+"""Translate all VHDL files of a build to one Verilog netlist with GHDL's synthesis.
 
-Each run removes the results of earlier runs and writes the netlist only if every step succeeds. A GHDL warning that
-means lost logic ends the translation with an error.
+Each run removes the results of earlier runs and writes the netlist only if every step succeeds. A GHDL warning about
+lost logic ends the translation with an error.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _DEFINITION = re.compile(r"^module (\S+)(.*?)^endmodule", re.MULTILINE | re.DOTA
 _GENERIC_MAP = re.compile(r"^  \S+ #\(\n(.*?)\)\n +(\S+) \($", re.MULTILINE | re.DOTALL)
 _GENERIC = re.compile(r"^ +\.(\w+)\((.*?)\),?$", re.MULTILINE)
 # GHDL compares numbers with bounds that they cannot exceed, and packs signals that form no loop into one vector; a
-# module may have ports that its message has in only one ROS version. Linters should check only hand-written code.
+# module may have ports that exist only for one ROS version of its message. Linters should check only hand-written code.
 _WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT", "PINMISSING")
 _HEADER = "\n".join(
     [
@@ -44,18 +44,18 @@ _HEADER = "\n".join(
     ]
 )
 _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
-# GHDL's messages about logic that is then missing, worded as in GHDL's sources.
+# GHDL's messages that mean missing logic, worded as in GHDL's sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
 
 _CRASH = "GHDL Bug occurred"
-# The places in GHDL 2.0 that crash, and the input that causes each crash.
+# The places in GHDL 2.0 where it crashes, with the input that causes each crash.
 _CRASHES = {
-    "netlists-builders.adb:929": "\nIs there an integer whose range has one number, such as `range 0 to N - 1` with "
-    "N = 1? It has no bits, which GHDL does not expect.",
+    "netlists-builders.adb:929": "\nA possible cause is an integer whose range contains only one number, such as "
+    "`range 0 to N - 1` with N = 1: GHDL does not support integers without bits.",
     **dict.fromkeys(
         ("netlists.adb:774", "STORAGE_ERROR"),
-        "\nGHDL 2.0 does so where a table of it grows while some bits of a signal are assigned. That depends on how "
-        "many assignments there are before it: one more or less, or another order of processes, avoids it.",
+        "\nGHDL 2.0 crashes if one of its tables grows while some bits of a signal are assigned. To avoid the crash, "
+        "add or remove an assignment before this place, or reorder the processes.",
     ),
 }
 _OF_MEMORIES = "netlists-memories.adb"
@@ -67,22 +67,22 @@ _MEMORY = {"MALLOC_PERTURB_": "165"}
 _GULP = 1 << 20
 _PAUSE = 0.005
 
-# GHDL's option that turns off memory inference, which loses some registers.
+# GHDL's option that disables memory inference, which loses some registers.
 _NO_MEMORIES = "-dm"
 _WITHOUT_MEMORIES = (
-    "; GHDL loses a register that is written by a dynamic index and read by a constant one, and crashes at some "
-    "memories. So all memories of this netlist are registers; read such a register by dynamic indices alone, or write "
-    "it by constant ones, to get memories."
+    "; GHDL loses a register that is written with a dynamic index and read with a constant index, and crashes at some "
+    "memories. Therefore, all memories in this netlist are registers. To get memories, read such a register only with "
+    "dynamic indices, or write the register with constant indices."
 )
 
 
 @dataclass(frozen=True)
 class Translation:
-    """A translation: VHDL files by library, in any order; the top unit, `[library.]unit`; and the top unit's generics.
+    """A translation: VHDL files by library, in any order, the top unit, `[library.]unit`, and the top unit's generics.
 
-    `verilog` lists the sources that may define the modules for components without an entity; a later step links them.
-    `programs` lists the known programs that read the netlist; if they are missing, nothing is translated. If
-    `refuses_loops` is set, a combinational loop is an error. All paths are relative to the current folder.
+    `verilog` lists the sources that may define the modules for components without an entity; a later step links these
+    sources. `programs` lists the known programs that read the netlist; if a program is missing, nothing is translated.
+    If `refuses_loops` is set, a combinational loop is an error. All paths are relative to the current folder.
     """
 
     top: str
@@ -96,12 +96,12 @@ class Translation:
     refuses_loops: bool = False
 
     def to_json(self) -> str:
-        """Return a text that `from_json` reads."""
+        """Return the translation as a text that `from_json` reads."""
         return json.dumps({item.name: getattr(self, item.name) for item in fields(self)}, indent=2) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> Translation:
-        """Return the translation described by a text from `to_json`."""
+        """Return the translation in a text from `to_json`."""
         content: dict[str, Any] = json.loads(text)
         return cls(**content)
 
@@ -117,14 +117,14 @@ class Translation:
 
 
 def translator() -> list[Path]:
-    """Return the files, other than the sources, whose changes may affect a netlist."""
+    """Return the paths of the files, other than the sources, whose changes may affect a netlist."""
     return sorted(Path(__file__).parent.glob("*.py"))
 
 
 def translate(translation: Translation, folder: Path) -> str:
-    """Write the netlist, with GHDL's libraries in `folder`; return GHDL's warnings.
+    """Write the netlist and return GHDL's warnings; GHDL's libraries are in `folder`.
 
-    Raises `NetlistError`; then there is no netlist.
+    If there is no correct netlist, raise `NetlistError` and write none.
     """
     if absent := missing(["ghdl", *(translation.programs if starts_everything() else ())]):
         raise NetlistError(explanation(absent))
@@ -172,14 +172,12 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     text, warnings = ghdl.synthesise("dump")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
-        raise NetlistError(
-            "\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"])
-        )
+        raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not match the VHDL"]))
     modules = dump.read(text)
     if ghdl.translation.refuses_loops and (found := loops(modules)):
         raise NetlistError("\n".join(found))
     components = _components(modules, ghdl.translation.verilog)
-    # The dump lacks only the generics.
+    # The second netlist supplies the generics, which the dump lacks.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
     doubt = ghdl.check_constants(lost_constants.widths(modules))
     correct(modules)
@@ -190,14 +188,14 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class _Ghdl:
-    """GHDL with the options common to all its commands."""
+    """GHDL with the options that all commands share."""
 
     translation: Translation
     folder: Path
     copies: Copies
 
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
-        """Run a GHDL command; return its output on both streams."""
+        """Run a GHDL command; return the text on standard output and on standard error."""
         options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
         with (
             tempfile.TemporaryFile() as errors,
@@ -221,7 +219,7 @@ class _Ghdl:
     def check_constants(self, widths: set[int]) -> str:
         """Check the constants; return a warning if GHDL cannot evaluate them.
 
-        Raises `NetlistError` if GHDL turns a constant with one of these widths (in bits) into zero.
+        Raise `NetlistError` if GHDL turns a constant with one of these widths (in bits) into zero.
         """
         if not widths:
             return ""
@@ -242,7 +240,7 @@ class _Ghdl:
         return doubt
 
     def probed(self, copies: lost_constants.Copies) -> str:
-        """Return GHDL's output for the copies, after dropping the probes that GHDL rejects. Raises `NetlistError`."""
+        """Return GHDL's output for the copies without the probes that GHDL rejects. May raise `NetlistError`."""
         while True:
             written = copies.write()
             try:
@@ -258,7 +256,7 @@ class _Ghdl:
                     raise
 
     def synthesise(self, language: str) -> tuple[str, str]:
-        """Return the netlist and GHDL's messages about it."""
+        """Return the netlist in GHDL's format `language`, and GHDL's messages."""
         generics = [f"-g{name}={value}" for name, value in self.translation.generics.items()]
         library = f"--work={self.translation.library}"
         return self.run(
@@ -267,7 +265,7 @@ class _Ghdl:
 
 
 def _gulps(pipe: int) -> bytes:
-    """Read a pipe to its end. GHDL writes word by word, and waking up for each would take longer than GHDL's work."""
+    """Return all data in a pipe, read in large pieces: GHDL writes single words, and a read for each would be slow."""
     with suppress(OSError):
         fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _GULP)
     parts = []
@@ -278,7 +276,7 @@ def _gulps(pipe: int) -> bytes:
 
 
 def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
-    """Return the components without an entity; each must match a Verilog module and takes that module's name."""
+    """Return the components without an entity; each must match a Verilog module, whose name it receives."""
     found: dict[str, Module] = {}
     for instance in (instance for module in modules.values() for instance in module.instances):
         module = modules.get(instance.kind)
@@ -286,8 +284,8 @@ def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
             continue
         if not (name := _module(module.name, sources)):
             raise instance.error(
-                f"instance '{instance.name}' is of '{module.name}', which is neither an entity of this build's VHDL "
-                f"nor a module of its Verilog ({', '.join(sources) or 'it has none'})"
+                f"instance '{instance.name}' uses '{module.name}', which is neither an entity in this build's VHDL "
+                f"nor a module in the build's Verilog ({', '.join(sources) or 'no modules'})"
             )
         module.name = name
         found[instance.kind] = module
@@ -295,7 +293,7 @@ def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
 
 
 def _generics(netlist: str) -> dict[tuple[str, str], dict[str, str]]:
-    """Return the generics of instances in GHDL's own Verilog, by enclosing module and instance."""
+    """Return the generics in GHDL's own Verilog netlist, by enclosing module and instance."""
     found: dict[tuple[str, str], dict[str, str]] = {}
     for name, text in _DEFINITION.findall(netlist):
         for values, instance in _GENERIC_MAP.findall(text):
@@ -304,7 +302,7 @@ def _generics(netlist: str) -> dict[tuple[str, str], dict[str, str]]:
 
 
 def _module(name: str, verilog: Sequence[str]) -> str | None:
-    """Return a module's name as spelt in its source; VHDL does not keep the case."""
+    """Return a module's name as spelt in its source, since VHDL does not preserve the case, or None."""
     pattern = re.compile(_MODULE.format(name=re.escape(name)), re.MULTILINE | re.IGNORECASE)
     for file in verilog:
         if found := pattern.search(Path(file).read_text(encoding="utf-8", errors="replace")):
@@ -313,11 +311,11 @@ def _module(name: str, verilog: Sequence[str]) -> str | None:
 
 
 def _errors(text: str) -> str:
-    """Return GHDL's error messages after a failure; if there are none, all messages."""
+    """Return GHDL's error messages after a failure or, without error messages, all messages."""
     if _CRASH in text:
         what = re.search(r"^raised (.*)", text, re.MULTILINE)
         return (
-            f"error: GHDL crashed and does not say at which line of the VHDL: {what[1] if what else 'nothing is known'}"
+            f"error: GHDL crashed without reporting a line of the VHDL: {what[1] if what else 'no details are known'}"
             f"{next((hint for place, hint in _CRASHES.items() if place in text), '')}"
         )
     found = "\n".join(line for item in _messages(text) if not re.search(r":(note|warning):", item[0]) for line in item)
@@ -335,7 +333,7 @@ def _other_warnings(text: str) -> str:
 
 
 def _messages(text: str) -> list[list[str]]:
-    """Yield GHDL's messages: each is a line, possibly followed by the source with a caret or by details of a crash."""
+    """Return GHDL's messages, each as a line that a source line with a caret or details of a crash may follow."""
     messages: list[list[str]] = []
     for line in text.splitlines():
         if not messages or not line.startswith("  "):

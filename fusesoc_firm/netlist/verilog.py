@@ -1,8 +1,8 @@
-"""Writes a netlist as Verilog 2001: a wire for each net, and a statement for each gate that means exactly that gate.
+"""Write a netlist as Verilog 2001: a wire for each net, and a statement with the exact function of each gate.
 
 The result does not depend on Verilog's rules for the width and sign of expressions: operands are as wide as results,
-and signs are explicit. Combinational logic uses continuous assignments, not `always @*`, which some simulators do not
-run until an input changes.
+and signs are explicit. Combinational logic uses continuous assignments instead of `always @*`, which some simulators do
+not run until an input changes.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _EDGES = {"$posedge": "posedge", "$negedge": "negedge"}
 _MEMORIES = frozenset({"$memory", "$memory_init"})
 _MEMORY_PORTS = frozenset({"$mem_rd", "$mem_rd_sync", "$mem_wr_sync"})
 _REGISTERS = frozenset({"$dff", "$idff", "$adff", "$iadff"})
-# These gates are for formal verification and are not hardware.
+# These gates serve formal verification and are not hardware.
 _IGNORED = frozenset({"$assume", "$cover"})
 
 # The generics of a component, in Verilog, indexed by the enclosing module and the instance's name.
@@ -72,7 +72,7 @@ Generics = Mapping[tuple[str, str], Mapping[str, str]]
 
 
 def write(modules: Modules, generics: Generics) -> str:
-    """Return the Verilog of all defined modules; raises `NetlistError` for gates without an equivalent in hardware."""
+    """Return the Verilog of all defined modules; raise `NetlistError` for gates without a hardware equivalent."""
     defined = [module for module in modules.values() if module.is_defined]
     return "\n".join(_Writer(module, modules, generics).text() for module in reversed(defined))
 
@@ -85,19 +85,19 @@ def identifier(name: str) -> str:
 
 
 def literal(bits: str) -> str:
-    """Return a constant with the levels 0, 1, x and z, given with the highest bit first."""
+    """Return a Verilog literal for the levels 0, 1, x and z in `bits`, the highest bit first."""
     if len(bits) > 1 and set(bits) <= {"0", "1"}:
         return f"{len(bits)}'h{int(bits, 2):x}"
     return f"{len(bits)}'b{bits}"
 
 
 def declaration(width: int) -> str:
-    """Return the range in a declaration, followed by a blank; empty for one bit."""
+    """Return the range in a declaration, followed by a blank, or an empty string for one bit."""
     return f"[{width - 1}:0] " if width > 1 else ""
 
 
 def constant(gate: Instance) -> str | None:
-    """Return the levels of a constant, highest bit first; None if the gate is not a constant."""
+    """Return the levels of a constant, the highest bit first, or None if the gate is not a constant."""
     width = gate.outputs[0].width if gate.outputs else 0
     match gate.kind:
         case "$const_UB32" | "$const_0":
@@ -157,7 +157,7 @@ def _insertion(function: str, place: str, width: int) -> Iterator[str]:
 
 
 def _choice(function: str, width: int, count: int) -> Iterator[str]:
-    """Yield a choice among `count` values: the one whose bit in the `width`-bit `selector` is set, or `value0`."""
+    """Yield statements that choose the value whose bit in the `selector` is set, or `value0` if no bit is set."""
     yield "case (selector)"
     for bit in range(count - 1):
         yield f"  {literal(_digits(1 << bit, width))}: {function} = value{bit + 1};"
@@ -166,7 +166,7 @@ def _choice(function: str, width: int, count: int) -> Iterator[str]:
 
 
 class _Writer:
-    """Writes one module."""
+    """A writer for one module."""
 
     def __init__(self, module: Module, modules: Modules, generics: Generics) -> None:
         self.module: Final = module
@@ -190,7 +190,7 @@ class _Writer:
         self._name_all()
 
     def _name_all(self) -> None:
-        """Use GHDL's names for all nets and instances, with a number appended to names already taken."""
+        """Name all nets and instances as GHDL does; append a number to a name that is already in use."""
         for gate in self.module.instances:
             if gate.kind in _MEMORIES or not gate.kind.startswith("$"):
                 self.labels[id(gate)] = self._distinct(gate.name)
@@ -322,7 +322,7 @@ class _Writer:
         return _EXPRESSIONS[gate.kind].format(*map(self.value, nets), width=gate.outputs[0].width)
 
     def _driven(self, gate: Instance) -> str:
-        """Yield the assignment to a signal; a signal without a driver keeps its initial value."""
+        """Return the assignment to a signal; a signal without a driver keeps its initial value."""
         has_first = gate.kind in {"$isignal", "$ioutput"}
         return self.value(gate.input(1 if has_first and gate.inputs[0] is None else 0))
 
@@ -332,7 +332,7 @@ class _Writer:
         yield from self._assign(gate, _either(self.part(net, net.width - 1, 1), f"-{value}", value))
 
     def _modulus(self, gate: Instance) -> Iterator[str]:
-        """The remainder with the sign of the divisor."""
+        """Yield the statements for the remainder with the sign of the divisor."""
         left, right = gate.input(0), gate.input(1)
         a, b = (f"$signed({self.value(net)})" for net in (left, right))
         signs = " != ".join(self.part(net, net.width - 1, 1) for net in (left, right))
@@ -403,14 +403,14 @@ class _Writer:
         yield from self._assign(gate, changed)
 
     def _place(self, gate: Instance, index: Net, name: str = "") -> str:
-        """Return an index plus the gate's offset, wide enough for the sum."""
+        """Return the sum of an index and the gate's offset, which is wide enough not to overflow."""
         offset = gate.numbers[0]
         width = max(index.width, offset.bit_length()) + 1
         value = f"{{{literal('0' * (width - index.width))}, {name or self.value(index)}}}"
         return f"{value} + {width}'d{offset}" if offset else name or self.value(index)
 
     def _selection(self, gate: Instance) -> Iterator[str]:
-        """Yield a multiplexer with a selector bit for each value except the first."""
+        """Yield the statements for a multiplexer with a selector bit for each value except the first."""
         width, selector = gate.outputs[0].width, gate.input(0)
         nets = [gate.input(index) for index in range(1, len(gate.inputs))]
         name = self._distinct(f"{gate.name}_select")
@@ -464,7 +464,7 @@ class _Writer:
         net = gate.input(index)
         clock = self.driver.get(net.number)
         if clock is None or clock.kind not in _EDGES:
-            raise gate.error("a register without a clock")
+            raise gate.error("a register has no clock")
         return f"{_EDGES[clock.kind]} {self.value(clock.input(0))}"
 
     def _register(self, gate: Instance) -> Iterator[str]:
@@ -488,7 +488,7 @@ class _Writer:
         yield f"      {assignment}"
 
     def _first_value(self, gate: Instance, net: Net) -> str:
-        """Return the levels of an initial value, which may be a signal's initial value."""
+        """Return the levels of a net's initial value, which may come from a signal."""
         if net.number in self.constants:
             return self.constants[net.number]
         source = self.driver.get(net.number)
@@ -498,10 +498,10 @@ class _Writer:
             bits = self._first_value(gate, source.input(0))
             end = len(bits) - source.numbers[0]
             return bits[end - net.width : end]
-        raise gate.error("the first value is not constant")
+        raise gate.error("the initial value is not constant")
 
     def _memory_ports(self, memory: Instance) -> list[Instance]:
-        """Return a memory's ports in the order in which they act."""
+        """Return a memory's ports in the order in which they operate."""
         found: list[Instance] = []
         port = memory
         while (port := self._next_port(port)) is not memory:
@@ -513,7 +513,7 @@ class _Writer:
         for reader in self.readers[net]:
             if reader.inputs[0] and reader.inputs[0].number == net:
                 return reader
-        raise port.error("a memory whose ports GHDL did not connect")
+        raise port.error("GHDL did not connect the ports of a memory")
 
     def _memory_size(self, memory: Instance) -> tuple[int, int]:
         """Return the number of bits per word and the number of words."""
@@ -540,7 +540,7 @@ class _Writer:
             yield from self._clocked(name, edge, group)
 
     def _clocked(self, name: str, edge: str, ports: Sequence[Instance]) -> Iterator[str]:
-        """Yield the `always` block for a memory's ports that act at the same edge."""
+        """Yield the `always` block for the ports of a memory that operate at the same edge."""
         yield f"  always @({edge}) begin"
         for number, port in enumerate(ports):
             is_always = self.constants.get(port.input(3).number) == "1"
@@ -588,7 +588,7 @@ class _Writer:
         yield "  );"
 
     def _connections(self, gate: Instance, module: Module) -> Iterator[tuple[str, str]]:
-        """Yield each port of an instance and the net connected to the port."""
+        """Yield each port of an instance, with the connected net."""
         for index, port in enumerate(module.inputs):
             yield port.name, self.value(gate.input(index))
         for port, net in zip(module.outputs, gate.outputs, strict=True):

@@ -1,8 +1,8 @@
 """The ROS process of a Python node, which carries serialised messages between ROS topics and a socket.
 
-The bridge runs under the Python for which ROS is installed, which seldom is the Python that runs this package. The
-bridge is therefore a separate program that needs only ROS and the standard library of Python 3.8. `node/carrier.py`
-starts the bridge.
+The bridge runs under the Python for which ROS is installed. That is rarely the Python that runs this package, so the
+bridge is a separate program, which needs only ROS and the standard library of Python 3.8. `node/carrier.py` starts the
+bridge.
 
     python3 bridge.py SOCKET [ARGUMENT OF ROS ...]         # SOCKET is a file descriptor, a stream of parcels
 """
@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 # CONFIGURE, to the bridge: its configuration. READY, from the bridge: the names of the topics after remapping.
 CONFIGURE, READY = b"C", b"R"
-# MESSAGE, in both directions: a message from a topic, or a message to publish. PUBLISHED, from the bridge: the message
-# is published (sent on request).
+# MESSAGE, in both directions: a message from a topic, or a message to publish. PUBLISHED, from the bridge, on request:
+# the message is published.
 MESSAGE, PUBLISHED = b"M", b"P"
 # STOP, to the bridge: accept no more messages. From the bridge: ROS asks the node to end.
 STOP = b"S"
@@ -33,7 +33,7 @@ DONE, FAULT = b"D", b"E"
 
 # The kind, the number of the topic, a time of the system's monotonic clock in ns, and the number of bytes that follow.
 _HEADER = struct.Struct("<cHqI")
-# The longest wait for published messages to leave, in s.
+# The maximum time in s to wait until published messages have been sent.
 _FLUSH_SECONDS = 2.0
 
 
@@ -55,7 +55,7 @@ class Channel:
         self._lock = threading.Lock()
 
     def send(self, kind: bytes, topic: int = 0, data: bytes = b"", time_ns: int = 0) -> None:
-        """Send a parcel; block while the other end does not read. Raises OSError if the other end has gone."""
+        """Send a parcel; block while the other end does not read. Raise OSError if the other end is closed."""
         header = _HEADER.pack(kind, topic, time_ns, len(data))
         with self._lock:
             if len(data) < 1 << 16:
@@ -65,7 +65,7 @@ class Channel:
                 self._socket.sendall(data)
 
     def receive(self) -> Parcel | None:
-        """Return the next parcel, or None if the other end has closed, even in the middle of a parcel."""
+        """Return the next parcel, or None if the other end is closed, even in the middle of a parcel."""
         try:
             header = self._file.read(_HEADER.size)
             if len(header) < _HEADER.size:
@@ -91,7 +91,7 @@ class Channel:
             return True
 
     def close(self) -> None:
-        """Close this end and wake all threads that wait for data from it."""
+        """Close this end and wake all threads that wait for data from the socket."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         # The socket stays open until its file is closed.
@@ -104,7 +104,7 @@ class BridgeError(Exception):
 
 
 class Ros(ABC):
-    """The part that both versions of ROS have in common."""
+    """The parts of a ROS node that both versions of ROS share."""
 
     def __init__(self, config: dict[str, Any], channel: Channel) -> None:
         self._config = config
@@ -143,11 +143,11 @@ class Ros(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Wait until published messages have left, then shut the ROS node down."""
+        """Wait until published messages have been sent, then shut the ROS node down."""
 
 
 class Ros1(Ros):
-    """A ROS 1 node through rospy; no message package need be installed."""
+    """A ROS 1 node through rospy, which does not require installed message packages."""
 
     def __init__(self, config: dict[str, Any], arguments: list[str], channel: Channel) -> None:
         super().__init__(config, channel)
@@ -176,7 +176,10 @@ class Ros1(Ros):
         self.take(topic, message._buff)  # noqa: SLF001 - rospy has no public name for it
 
     def _stopped_by_ros(self) -> None:
-        """Report a stop by ROS, such as `rosnode kill`. ROS calls this at any shutdown; at others, nobody listens."""
+        """Report a stop by ROS, such as `rosnode kill`.
+
+        ROS calls this method at every shutdown; later reports are ignored.
+        """
         with contextlib.suppress(OSError):
             self._channel.send(STOP)
 
@@ -195,7 +198,7 @@ class Ros1(Ros):
             self._publishers[topic].publish(message)
 
     def stop(self) -> None:
-        """Accept no more messages: every callback has handed its message over, or never will."""
+        """Accept no more messages; after the call, no callback hands over a message."""
         for subscriber in self._subscribers.values():
             subscriber.unregister()
         self._is_taking = False
@@ -206,7 +209,7 @@ class Ros1(Ros):
         self._ended.wait()
 
     def close(self) -> None:
-        """Wait until published messages have left, then end the node."""
+        """Wait until published messages have been sent, then end the node."""
         latest = time.monotonic() + _FLUSH_SECONDS
         for publisher in self._publishers.values():
             for connection in list(publisher.impl.connections):
@@ -215,7 +218,7 @@ class Ros1(Ros):
 
 
 def _raw_class(rospy: Any, topic: dict[str, Any]) -> Any:
-    """Return a class whose messages are raw bytes; peers see the topic's type."""
+    """Return a message class that carries raw bytes but announces the topic's type to peers."""
     names = {"_type": topic["type"], "_md5sum": topic["signature"], "_full_text": topic["definition"], "__slots__": ()}
     return type("RawMessage", (rospy.AnyMsg,), names)
 
@@ -236,7 +239,7 @@ def _flush(connection: Any, latest: float) -> None:
 
 
 class Ros2(Ros):
-    """A ROS 2 node through rclpy; the message packages must be installed, because rmw gets a type from their code."""
+    """A ROS 2 node through rclpy. Message packages must be installed, because rmw reads types from their libraries."""
 
     def __init__(self, config: dict[str, Any], arguments: list[str], channel: Channel) -> None:
         super().__init__(config, channel)
@@ -275,7 +278,7 @@ class Ros2(Ros):
         return taken
 
     def _check_hashes(self) -> None:
-        """Raise BridgeError if an installed type differs from the hardware's. Older ROS 2 has no hash to compare."""
+        """Raise BridgeError if an installed type differs from the hardware's; older ROS 2 releases provide no hash."""
         info = {
             "subscribers": self._node.get_subscriptions_info_by_topic,
             "publishers": self._node.get_publishers_info_by_topic,
@@ -288,7 +291,7 @@ class Ros2(Ros):
                     known = str(getattr(end, "topic_type_hash", topic["signature"]))
                     if (end.node_name, end.node_namespace) == mine and known != topic["signature"]:
                         raise BridgeError(
-                            "the installed '{}' ({}) differs from the system's ({})".format(
+                            "the installed definition of '{}' ({}) differs from the system's definition ({})".format(
                                 topic["type"], known, topic["signature"]
                             )
                         )
@@ -327,7 +330,7 @@ class Ros2(Ros):
         self._executor.wake()
 
     def close(self) -> None:
-        """Wait until published messages have left, then end the node."""
+        """Wait until published messages have been sent, then end the node."""
         from rclpy.duration import Duration
 
         if self._config["is_reliable"]:
@@ -349,12 +352,12 @@ def _message_class(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), message)
     except (ImportError, AttributeError):
         raise BridgeError(
-            f"the message '{name}' is not installed for {sys.executable}; ROS 2 needs its package built and sourced"
+            f"the message '{name}' is not installed for {sys.executable}; build and source the message's ROS 2 package"
         ) from None
 
 
 def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
-    """Carry out the engine's requests until it closes its end."""
+    """Carry out the engine's requests until the engine closes its end."""
     while True:
         parcel = channel.receive()
         if parcel is None:

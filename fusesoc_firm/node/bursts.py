@@ -1,4 +1,4 @@
-"""Joins the bursts from a preemptive Manager into frames (docs/reference/manager.md, 'Bursts').
+"""Join the bursts from a preemptive Manager into frames (docs/reference/manager.md, 'Bursts').
 
     joiner = BurstJoiner(publishers=4, width=64)
     for burst in bursts:                    # the bytes between two `tlast` that `tkeep` marks as valid
@@ -6,8 +6,8 @@
             deliver(frame.id, frame.payload)
     joiner.close()
 
-An uninterrupted frame is one burst, so the class also supports a Manager without preemption. `cpp/firm/bursts.hpp` is
-the C++ version.
+Without preemption, each frame is one burst, so the class also supports a Manager without preemption.
+`cpp/firm/bursts.hpp` is the C++ version.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
 
 class BurstError(ValueError):
-    """A burst that no Manager sends. The received part of the burst's frame is dropped."""
+    """A burst that a Manager never sends; the received part of the burst's frame is dropped."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class JoinedFrame:
 
 
 class BurstJoiner:
-    """Joins bursts by id until a frame has the length that its header announces; each stream needs its own joiner."""
+    """A joiner of bursts by id, until a frame has the length in its header; each stream needs a separate joiner."""
 
     def __init__(self, publishers: int, width: int, longest: int | None = None) -> None:
         """Create a joiner for a Manager with `publishers` (1 to 256) and a stream of `width` bits.
 
         A frame that announces a payload of more than `longest` bytes is rejected as soon as its header is complete,
-        before it takes memory.
+        before the joiner allocates memory for the payload.
         """
         if not 1 <= publishers <= MOST_PUBLISHERS:
             raise ValueError(f"publishers is {publishers}; legal: 1 to {MOST_PUBLISHERS}")
@@ -59,7 +59,7 @@ class BurstJoiner:
     def push(self, burst: bytes, tid: int | None = None) -> JoinedFrame | None:
         """Take a burst and return the frame that it completes, if any.
 
-        `tid` is the stream's `tid`, if the transport has one; it must equal the id. Raises `BurstError`.
+        `tid` is the stream's `tid`, if the transport has one; it must equal the id. May raise `BurstError`.
         """
         identifier = self._id(burst, tid)
         begun = self._begun.pop(identifier, None)
@@ -67,8 +67,9 @@ class BurstJoiner:
             frame = bytearray(burst)
         else:
             if len(burst) <= self._beat_bytes:
-                raise BurstError(f"the burst that resumes the frame of id {identifier} holds nothing but the id")
-            # Only these bytes were inserted. They fill a beat, so that the following bytes stay in their lanes.
+                raise BurstError(f"the burst that resumes the frame with id {identifier} contains nothing but the id")
+            # The first beat of the burst is inserted and not part of the frame; the following bytes stay in their
+            # lanes.
             frame = begun
             frame += memoryview(burst)[self._beat_bytes :]
         whole = self._frame_bytes(identifier, frame)
@@ -76,17 +77,19 @@ class BurstJoiner:
             return JoinedFrame(identifier, bytes(memoryview(frame)[_HEADER_BYTES:]))
         if len(burst) % self._beat_bytes:
             raise BurstError(
-                f"a burst of id {identifier} ends within a beat: {len(burst)} bytes at {self._beat_bytes} per beat,"
+                f"a burst with id {identifier} ends within a beat: {len(burst)} bytes at {self._beat_bytes} per beat,"
                 f" and the frame is incomplete"
             )
         self._begun[identifier] = frame
         return None
 
     def close(self) -> None:
-        """End the stream. Raises `BurstError` if a frame is incomplete."""
+        """End the stream. Raise `BurstError` if a frame is incomplete."""
         if not self._begun:
             return
-        parts = ", ".join(f"{len(self._begun[identifier])} bytes of id {identifier}" for identifier in self.unfinished)
+        parts = ", ".join(
+            f"{len(self._begun[identifier])} bytes with id {identifier}" for identifier in self.unfinished
+        )
         self._begun.clear()
         raise BurstError(f"the stream ends within frames: {parts}")
 
@@ -101,25 +104,26 @@ class BurstJoiner:
         return identifier
 
     def _frame_bytes(self, identifier: int, frame: bytearray) -> int | None:
-        """Return the number of bytes of the whole frame; None while its header is incomplete."""
+        """Return the number of bytes in the whole frame, or None while its header is incomplete."""
         if len(frame) < _HEADER_BYTES:
             return None
         length = int.from_bytes(frame[ID_BYTES:_HEADER_BYTES], "little")
         if self._longest is not None and length > self._longest:
             raise BurstError(
-                f"the frame of id {identifier} announces {length} bytes of payload; the longest has {self._longest}"
+                f"the frame with id {identifier} announces {length} bytes of payload;"
+                f" the longest payload has {self._longest} bytes"
             )
         beyond = len(frame) - _HEADER_BYTES - length
         if beyond > 0:
-            raise BurstError(f"the frame of id {identifier} is {beyond} bytes longer than it announces")
+            raise BurstError(f"the frame with id {identifier} is {beyond} bytes longer than its header announces")
         return _HEADER_BYTES + length
 
 
 def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
-    """Split a frame into bursts, as the Manager does: `runs` has the beats of each burst except the last one.
+    """Split a frame into bursts, as the Manager does; `runs` lists the beats in each burst except the last.
 
-    This serves tests and models of the Manager. The meaningless bits of an extra beat are zero.
-    Raises `ValueError` if a run has no beats, or if the runs have more beats than the frame.
+    The function serves tests and models of the Manager. The unused bits of an extra beat are zero.
+    Raise `ValueError` if a run has no beats, or if the runs have more beats than the frame.
     """
     _check_width(width)
     beat_bytes = width // 8
@@ -128,7 +132,7 @@ def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
     for beats in runs:
         last = first + beats * beat_bytes
         if beats < 1 or last >= len(frame):
-            raise ValueError(f"run {len(bursts)} has {beats} beats; legal: 1 and more, fewer than remain")
+            raise ValueError(f"run {len(bursts)} has {beats} beats; legal: 1 or more, but fewer than remain")
         bursts.append(_burst(frame, first, last, beat_bytes))
         first = last
     return [*bursts, _burst(frame, first, len(frame), beat_bytes)]

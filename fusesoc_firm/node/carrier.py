@@ -1,4 +1,4 @@
-"""The middleware as a node sees it, and its implementation by ROS: a process under the Python that has ROS."""
+"""A node's interface to the middleware, and the implementation for ROS: a process under ROS's Python."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fusesoc_firm.node import bridge
 from fusesoc_firm.node.description import NodeDescription, NodeTopic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 
-# The module that the Python of each version of ROS can import.
+# For each version of ROS, a module that only the Python with that version can import.
 _MODULES = {1: "rospy", 2: "rclpy"}
 _END_SECONDS = 5.0
 
@@ -29,7 +29,7 @@ class CarrierError(Exception):
 
 @dataclass(frozen=True)
 class Taken:
-    """A message from the topic with this number, and the arrival time in ns of the system's monotonic clock."""
+    """A message from the topic with this number; its arrival time is in ns of the system's monotonic clock."""
 
     topic: int
     payload: bytes
@@ -38,17 +38,17 @@ class Taken:
 
 @dataclass(frozen=True)
 class Published:
-    """A message on the topic with this number was published at this time; events follow the order of `publish`."""
+    """The time at which a message on the topic with this number was published; events follow the order of `publish`."""
 
     topic: int
     time_ns: int
 
 
 class Carrier(Protocol):
-    """Topics of a middleware. Subscribers and publishers are numbered separately, as in the description."""
+    """The topics of one middleware. Subscribers and publishers are numbered separately, as in the description."""
 
     def receive(self) -> Iterator[Taken | Published]:
-        """Yield events until the carrier is closed or the middleware ends. Raises `CarrierError`."""
+        """Yield events until the carrier is closed or the middleware ends. May raise `CarrierError`."""
 
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message; any thread may call this method. After the middleware has ended, messages are dropped."""
@@ -57,15 +57,18 @@ class Carrier(Protocol):
         """Accept no more messages."""
 
     def wait_until_stopped(self, timeout: float) -> bool:
-        """Wait until `receive` has yielded all messages accepted before `stop`; return whether it has done so."""
+        """Wait until `receive` has yielded all messages accepted before `stop`.
+
+        Return False after `timeout` seconds.
+        """
 
     def close(self) -> None:
-        """End the carrier after all published messages have left."""
+        """End the carrier after all published messages have been sent."""
 
 
 @dataclass(frozen=True)
 class RosOptions:
-    """How a node appears in ROS.
+    """The options of a node's ROS process.
 
     `arguments` are arguments to ROS, such as remappings. `depth` is the depth of ROS's queues, in messages. `python` is
     the interpreter for which ROS is installed; if it is None, the carrier searches for an interpreter.
@@ -83,13 +86,15 @@ class RosCarrier:
     """A process that is a node of a running ROS; see `Carrier`."""
 
     def __init__(self, ros: int, description: NodeDescription, options: RosOptions) -> None:
-        """Start the process and wait until the ROS node is ready. Raises `CarrierError`. ROS 1 waits for its master."""
+        """Start the process and wait until the ROS node is ready; with ROS 1, wait for the master.
+
+        May raise `CarrierError`.
+        """
         self.title = f"ROS {ros}"
         self._python = options.python or _python_of(ros)
         mine, its = socket.socketpair()
         arguments = [*ros_arguments(ros, options.arguments)]
-        # A session of its own, so that Ctrl-C reaches only this process: the bridge must still publish the last
-        # responses.
+        # In a separate session, the bridge does not receive Ctrl-C: it must still publish the last responses.
         try:
             self._process = subprocess.Popen(
                 [self._python, bridge.__file__, str(its.fileno()), *arguments],
@@ -100,7 +105,7 @@ class RosCarrier:
         except OSError as error:
             mine.close()
             raise CarrierError(
-                f"the Python of {self.title}, {self._python}, cannot be started: {error.strerror}"
+                f"{self._python}, the Python for {self.title}, cannot be started: {error.strerror}"
             ) from None
         finally:
             its.close()
@@ -124,7 +129,7 @@ class RosCarrier:
             raise
 
     def _wait_until_ready(self) -> tuple[dict[int, str], dict[int, str]]:
-        """Wait for the bridge and return the names of the topics after remapping."""
+        """Wait for the bridge; return the names of the subscribed and the published topics after remapping."""
         parcel = self._channel.receive()
         if parcel is None or parcel.kind == bridge.FAULT:
             raise self._fault(parcel)
@@ -135,7 +140,7 @@ class RosCarrier:
         return subscribers, publishers
 
     def receive(self) -> Iterator[Taken | Published]:
-        """Yield events until the carrier is closed or ROS asks the node to end. Raises `CarrierError`."""
+        """Yield events until the carrier is closed or ROS asks the node to end. May raise `CarrierError`."""
         try:
             while parcel := self._channel.receive():
                 if parcel.kind == bridge.MESSAGE:
@@ -163,11 +168,11 @@ class RosCarrier:
         self._send(bridge.STOP)
 
     def wait_until_stopped(self, timeout: float) -> bool:
-        """Wait until all accepted messages are handed over; return whether they were."""
+        """Wait until all accepted messages are handed over; return False after `timeout` seconds."""
         return self._stopped.wait(timeout)
 
     def close(self) -> None:
-        """End the process after all published messages have left."""
+        """End the process after all published messages have been sent."""
         self._end(_END_SECONDS)
 
     def _send(self, kind: bytes, topic: int = 0, data: bytes = b"") -> None:
@@ -189,7 +194,7 @@ class RosCarrier:
 
     def _fault(self, parcel: bridge.Parcel | None) -> CarrierError:
         if parcel is None:
-            return CarrierError(f"the process of {self.title} ({self._python}) has ended")
+            return CarrierError(f"the process for {self.title} ({self._python}) has ended")
         return CarrierError(f"{self.title}: {parcel.data.decode(errors='replace')}")
 
 
@@ -211,15 +216,15 @@ def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
 
 @cache
 def _python_of(ros: int) -> str:
-    """Return the first Python that can import the modules of ROS. Raises `CarrierError`."""
+    """Return the path of the first Python that can import the modules of ROS. May raise `CarrierError`."""
     module = _MODULES[ros]
     found = [shutil.which("python3"), "/usr/bin/python3", sys.executable]
     candidates = [path for path in dict.fromkeys(found) if path and Path(path).exists()]
     for path in candidates:
-        # Finding an interpreter is not enough: a sourced ROS may be for another Python.
+        # An installed interpreter is not sufficient, since the sourced ROS may be for another Python.
         if not subprocess.run([path, "-c", f"import {module}"], capture_output=True, check=False).returncode:
             return path
     raise CarrierError(
-        f"no Python here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
-        f" source ROS's setup file, or name its Python by --ros-python"
+        f"no Python found here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
+        f" source the setup file of ROS, or select a Python with --ros-python"
     )

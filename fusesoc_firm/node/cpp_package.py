@@ -23,7 +23,7 @@ from fusesoc_firm.text.quoting import lines_of
 from fusesoc_firm.text.render import render
 
 HEADERS = Path(__file__).resolve().parent / "cpp"
-# Messages in the queue of each subscriber, and in ROS's own queues.
+# The capacity, in messages, of each subscriber's queue and of ROS's queues.
 _QUEUE_DEPTH = 10
 _SOURCE_TEMPLATE = "node/node.cpp"
 _PACKAGE_TEMPLATE = "node/package.xml"
@@ -33,8 +33,8 @@ _PACKAGE_TEMPLATE = "node/package.xml"
 class _Dialect:
     """The parts of a package that depend on the version of ROS.
 
-    `header` and `middleware` are the carrier of bytes in C++; `build_tool`, `library` and `cmake` build it. Only ROS 2
-    looks up a message's type in an installed package.
+    `header` and `middleware` name the C++ class that carries bytes; `build_tool`, `library` and `cmake` describe the
+    package's build. Only ROS 2 looks up a message's type in an installed package.
     """
 
     header: str
@@ -53,15 +53,15 @@ _DIALECTS = {
 
 
 def headers() -> list[Path]:
-    """Return the paths of the nodes' C++ headers."""
+    """Return the paths of the C++ headers that all nodes use."""
     return sorted(HEADERS.rglob("*.hpp"))
 
 
 def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str, str]:
-    """Return the files of the node in C++ by path within the package.
+    """Return the files of the C++ node by path within the package.
 
-    Raises `InputError` if the system's topics do not share one version of ROS, or do not belong to `ros` if it is
-    given.
+    Raise `InputError` if the system's topics do not share one version of ROS, or if `ros` is given and the topics do
+    not belong to it.
     """
     description = describe(loaded)
     version = _only_version(description, ros)
@@ -85,7 +85,10 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
 
 
 def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
-    """Return the node as a part of the generated system; empty if no single C++ node can serve the system."""
+    """Return the node's files as part of the generated system.
+
+    The result is empty if no single C++ node can serve the system.
+    """
     system = loaded.system
     topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
     spoken = {item.frame.ros.number for item in topics}
@@ -95,15 +98,15 @@ def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
 
 
 def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
-    """Return the version of ROS that all topics share. Raises `InputError`."""
+    """Return the version of ROS that all topics share. May raise `InputError`."""
     found = description.versions
     if len(found) > 1:
         titles = " and ".join(middleware_of(version).title for version in found)
-        fail(f"the topics of '{description.name}' are of {titles}, but a node in C++ speaks one of them")
+        fail(f"the topics of '{description.name}' use {titles}, but a C++ node supports only one ROS version")
     if ros is not None and ros.number != found[0]:
         title = middleware_of(found[0]).title
-        hint = "the hardware handles one version: set it with 'middleware' of blocks and interfaces"
-        fail(f"the topics of '{description.name}' are of {title}, not of {ros.title}", hint=hint)
+        hint = "the hardware supports one ROS version; select the version with 'middleware' in blocks and interfaces"
+        fail(f"the topics of '{description.name}' use {title}, not {ros.title}", hint=hint)
     return found[0]
 
 
@@ -118,7 +121,7 @@ def _headers(dialect: _Dialect) -> dict[str, str]:
 
 
 def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialect) -> dict[str, Any]:
-    """Return the configuration of the table's template."""
+    """Return the template configuration of the table."""
     return {
         "name": description.name,
         "ros": middleware_of(description.versions[0]).title,
@@ -137,7 +140,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
 
 
 def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, Any] | None:
-    """Return the ends of the messages of blocks in software; None if no such blocks run on this host."""
+    """Return the ends of messages to and from blocks in software, or None if no such block runs on this host."""
     ports = software_ports(loaded.system)
     if not ports.inputs:
         return None
@@ -157,7 +160,7 @@ def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) 
 
 
 def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
-    """Yield the text of each message's definition once; ROS 2 needs none."""
+    """Yield the definition text of each message once; ROS 2 needs no definitions."""
     texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
     for name, text in texts.items():
         if text:
@@ -173,7 +176,7 @@ def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
 
 
 def _constant(message: str) -> str:
-    """Return the constant's name for a definition's text: `kGeometryMsgsQuaternion`."""
+    """Return the name of the constant with a definition's text, such as `kGeometryMsgsQuaternion`."""
     words = re.split("_+", identifier(message))
     return "k" + "".join(f"{word[0].upper()}{word[1:]}" for word in words)
 

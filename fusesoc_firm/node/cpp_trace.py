@@ -1,4 +1,4 @@
-"""Converts the steps that a C++ node writes (`firm/trace.hpp`), one per line, to the table that `Trace` writes.
+"""Convert the steps that a C++ node writes (`firm/trace.hpp`), one per line, to a table like that of `Trace`.
 
     write_ways(Path("steps.csv"), Path("ways.csv"), describe(loaded))
 
@@ -31,7 +31,7 @@ class _Step:
 
 
 def are_steps(table: Path) -> bool:
-    """Return whether a table has lines for steps. Raises `InputError` if it cannot be read."""
+    """Return whether a table lists steps instead of routes. Raise `InputError` if it cannot be read."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             return tuple(next(csv.reader(file), ())) == COLUMNS
@@ -42,19 +42,19 @@ def are_steps(table: Path) -> bool:
 
 
 def write_ways(steps: Path, table: Path, description: NodeDescription) -> None:
-    """Write the table of the routes that these steps form. Raises `InputError`."""
+    """Write the table of the routes that these steps form. May raise `InputError`."""
     _Fold(description, [*_read(steps, description)]).write(table)
 
 
 class _Fold:
-    """Replays the steps into a `Trace`, with the original times."""
+    """A replay of the steps into a `Trace`, with the original times."""
 
     def __init__(self, description: NodeDescription, steps: list[_Step]) -> None:
         self._description = description
         self._steps = steps
         self._now = steps[0].time_ns if steps else 0
-        # By subscriber and number. Messages being sent stay, since simulated hardware may take them before or after
-        # that step.
+        # By subscriber and number. Messages being sent stay here, since simulated hardware may take them before or
+        # after the step `sent`.
         self._entries: dict[tuple[int, int], Entry] = {}
         # For the current frame of each publisher: the time of its last burst, and its cycles.
         self._bursts: dict[int, tuple[int, tuple[int, int] | None]] = {}
@@ -80,7 +80,7 @@ class _Fold:
             self._entries[step.converter, step.message] = Entry(
                 step.converter, step.size, step.time_ns, queued_ns=step.time_ns
             )
-        # A message received before the trace began is unknown.
+        # A message that was received before the trace began is unknown.
         elif entry := self._entries.get((step.converter, step.message)):
             self._go_on(trace, step, entry)
 
@@ -110,7 +110,8 @@ def _read(steps: Path, description: NodeDescription) -> Iterator[_Step]:
             step = _step(row, f"{steps}:{number}")
             known = outputs if step.event in ("burst", "published") else inputs
             if step.converter not in known:
-                fail(f"{steps}:{number}: '{description.name}' has no topic of converter {step.converter}, {step.event}")
+                end = f"converter {step.converter} and step '{step.event}'"
+                fail(f"{steps}:{number}: '{description.name}' has no topic for {end}")
             yield step
 
 
@@ -120,7 +121,7 @@ def _step(row: dict[str, str], place: str) -> _Step:
         first, last = row["first_cycle"], row["last_cycle"]
         cycles = (int(first), int(last)) if first and last else None
     except (TypeError, ValueError):
-        fail(f"{place} is not a step of a node")
+        fail(f"{place} is not a step in a node's trace")
     if row["event"] not in _EVENTS:
         fail(f"{place}: unknown step '{row['event']}'", hint=f"legal: {', '.join(_EVENTS)}")
     return _Step(time_ns, row["event"], converter, message, size, cycles)

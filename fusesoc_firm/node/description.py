@@ -1,6 +1,6 @@
-"""The system as its node sees it: the topics, and which of them have a converter in the hardware.
+"""The system from the node's view: its topics, and the topics' converters in the hardware.
 
-A payload is the message as its middleware serialised it, so the node needs only a table of names and ids.
+A payload is a message as serialised by the middleware, so the node needs only a table of names and ids.
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ from fusesoc_firm.text.diagnostics import fail
 
 @dataclass(frozen=True)
 class NodeTopic:
-    """A topic of a node; `block` is the specification's block, `id` the converter's id, or None without a converter.
+    """A topic of a node.
 
-    A relative `name` moves with the node's namespace. `signature` is the definition's signature: ROS 1's MD5 sum or
-    ROS 2's hash. `definition` is the definition's text with the texts of all nested messages; only ROS 1 announces it.
+    `block` is the block in the specification, and `id` is the converter's id, if there is a converter.
+
+    A relative `name` is resolved in the node's namespace. `signature` is the definition's signature: the MD5 sum for
+    ROS 1, the RIHS01 hash for ROS 2. `definition` is the definition's text with the texts of all nested messages; only
+    ROS 1 announces it.
     """
 
     block: str
@@ -36,7 +39,7 @@ class NodeTopic:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A converter between hardware and software on this host: it has an id, but no topic."""
+    """A converter between hardware and software on this host, with an id but without a topic."""
 
     block: str
     id: int
@@ -44,12 +47,12 @@ class Crossing:
 
 @dataclass(frozen=True)
 class NodeDescription:
-    """A system as its node sees it.
+    """A system from its node's view.
 
     The node takes messages from the topics of `subscribers` and publishes messages on the topics of `publishers`.
     Software on this host sends to the hardware through `entering` and receives from the hardware through `leaving`. For
-    each of the hardware's publishers, `sources` has the ids of the subscribers from which the publisher's messages
-    derive. `longest_payload` is the size of the longest payload from a publisher, in bytes, or None without a bound.
+    each publisher in hardware, `sources` lists the ids of the subscribers whose messages cause the publisher's
+    messages. `longest_payload` is the size in bytes of the longest payload from any publisher, or None without a bound.
     `clock_hz` is None if the specification has no clock.
     """
 
@@ -70,7 +73,7 @@ class NodeDescription:
 
     @property
     def outputs(self) -> tuple[NodeTopic | Crossing, ...]:
-        """All outputs of the hardware or of software."""
+        """All outputs of the hardware or of software: topics first, in the order of their numbers."""
         return (*self.publishers, *self.leaving)
 
     @property
@@ -80,7 +83,7 @@ class NodeDescription:
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:
-    """Describe the node of a system. Raises `InputError` for a middleware other than ROS."""
+    """Describe the node of a system. Raise `InputError` for a middleware other than ROS."""
     system, software = loaded.system, loaded.system.software
     here = {block.block for block in software.blocks if block.type.accelerator.sources}
     subscribers, entering = _parted(system.subscribers, here)
@@ -118,7 +121,7 @@ def _parted(converters: Iterable[Converter], here: Collection[str]) -> tuple[lis
 
 
 def _once(topics: Iterable[Topic]) -> list[Topic]:
-    """Return one topic per block, with the block's converter if there is one."""
+    """Return one topic for each block, with the block's converter if there is one."""
     found: dict[str, Topic] = {}
     for topic in topics:
         found.setdefault(topic.block, topic)
@@ -129,7 +132,8 @@ def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
     frame = topic.frame
     if frame.ros not in (ROS1, ROS2):
         fail(
-            f"'{topic.block}' uses {frame.ros.title}, which nodes do not support", hint="nodes support ROS 1 and ROS 2"
+            f"'{topic.block}' uses {frame.ros.title}, which nodes do not support",
+            hint="nodes support only ROS 1 and ROS 2",
         )
     definitions = loaded.libraries[frame.ros].closure(frame.message)
     is_first = frame.ros is ROS1

@@ -1,4 +1,4 @@
-"""The languages in which a system's node can be written, each with its writer.
+"""The languages in which a system's node can be generated, each with its writer.
 
 A writer imports its modules only when called, since the command line lists the languages in every help text.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Place:
-    """The folder of the node, the specification, and the folders in which the node must find messages again."""
+    """The folder of the node, the specification, and the folders in which the node searches for messages."""
 
     folder: Path
     specification: Path
@@ -46,4 +46,4 @@ LANGUAGES: Mapping[str, Callable[[LoadedSystem, Middleware | None, Place], Mappi
     "cpp": _cpp,
     "python": _python,
 }
-"""By the language's name, a function that returns the files of a node by path, for one version of ROS or for any."""
+"""For each language's name, a function that returns a node's files by path, for one version of ROS or for any."""

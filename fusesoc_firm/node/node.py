@@ -1,13 +1,13 @@
 """The node, which carries messages from topics to the hardware as frames, and back, without parsing them.
 
     node = Node(description, open_transport, settings)
-    node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails for good
+    node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails permanently
 
 A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next) and
 is sent as a frame. The response returns as bursts, which are joined. If software is part of the system, the thread that
 delivers a message calls the software's functions. While a function runs, the node takes no burst from the hardware; the
-hardware stalls as with any accelerator that is not ready. A function's output never waits for room, since it could wait
-for itself: if the output's queue to the hardware is full, a message is dropped and counted.
+hardware stalls as with any accelerator that is not ready. A function's output never waits for space in a queue, since
+this could cause a deadlock: if the output's queue to the hardware is full, a message is dropped and counted.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from fusesoc_firm.node.transport.transport import Burst, Transport, TransportErr
 
 # The interval at which waiting threads check whether to end.
 _POLL_SECONDS = 0.1
-# The number of successive transports that may fail without having delivered a burst.
+# The number of successive transports that may fail before they deliver a burst.
 _MOST_RESTARTS = 5
-# The number of hardware faults that are reported; later ones are only counted.
+# The number of hardware faults that are reported; later faults are only counted.
 _MOST_REPORTS = 20
 
 
 class HardwareListener(Protocol):
-    """Receives a transport's events other than bursts; any thread may call it."""
+    """The receiver of a transport's events other than bursts; any thread may call its methods."""
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
-        """Simulated hardware took the next sent frame in these cycles of clk."""
+        """Handle the event that simulated hardware took the next sent frame in these cycles of clk."""
 
     def refused(self, converter: int | None) -> None:
-        """The hardware reports a fault: from a converter, numbered as in `frame_error`, or in a frame's id (None)."""
+        """Handle a fault from the hardware: of a converter, numbered as in `frame_error`, or in a frame's id (None)."""
 
 
 OpenTransport = Callable[[HardwareListener], Transport]
@@ -52,10 +52,10 @@ OpenTransport = Callable[[HardwareListener], Transport]
 
 @dataclass(frozen=True)
 class NodeSettings:
-    """Each queue holds `depth` messages; `overflow` is its action when full.
+    """The settings of a node: each queue holds `depth` messages, and `overflow` is the action of a full queue.
 
-    At the end, received messages are processed until the hardware has been silent for `settle` seconds and does not
-    report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
+    After a stop request, the node processes received messages until the hardware has been silent for `settle` seconds
+    and does not report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
     `report` receives messages to the user.
     """
 
@@ -76,7 +76,7 @@ class _Message:
 
 
 class _Hardware:
-    """A transport from its opening to its failure or end."""
+    """The state of a transport from its opening to its failure or end."""
 
     def __init__(self, transport: Transport, description: NodeDescription) -> None:
         self.transport = transport
@@ -87,7 +87,7 @@ class _Hardware:
 
 
 class Node:
-    """One run of a system's node; see above."""
+    """One run of a system's node, as described for the module."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class Node:
         software: NodeSoftware | None = None,
         trace: Trace | None = None,
     ) -> None:
-        """Open the transport. Raises `TransportError`."""
+        """Open the transport. May raise `TransportError`."""
         self.statistics = Statistics.of(description)
         self._description = description
         self._open_transport = open_transport
@@ -126,10 +126,10 @@ class Node:
     # --- the run ---------------------------------------------------------------------------------------------------
 
     def run(self, carriers: Mapping[int, Carrier]) -> bool:
-        """Work until `stop` or the end of a carrier; return whether all received messages have been processed.
+        """Carry messages until `stop` or the end of a carrier; return whether all received messages were processed.
 
-        `carriers` maps versions of ROS to the carriers of their topics; they stay open. Raises `TransportError` or
-        `CarrierError` if one of them fails for good.
+        `carriers` maps each version of ROS to the carrier of its topics; the carriers stay open. Raise `TransportError`
+        or `CarrierError` if the transport or a carrier fails permanently.
         """
         self._carriers = carriers
         takers = [self._start(partial(self._take, carrier)) for carrier in carriers.values()]
@@ -145,7 +145,7 @@ class Node:
         self._queues.close()
         self.close()
         for thread in (sender, receiver, *takers):
-            # A thread that takes messages ends with its carrier, which the caller closes.
+            # A thread that receives messages ends with its carrier, which the caller closes.
             thread.join(_POLL_SECONDS)
         self._count_rest()
         if self._fault:
@@ -167,7 +167,7 @@ class Node:
         return thread
 
     def _fail(self, error: TransportError | CarrierError) -> None:
-        """End because of an error; errors of a transport or carrier that is being closed do not count."""
+        """End the run with an error; ignore the errors of a transport or carrier that is being closed."""
         with self._lock:
             if not self._is_over.is_set():
                 self._fault = self._fault or error
@@ -191,7 +191,7 @@ class Node:
         except CarrierError as error:
             self._fail(error)
         except ClosedError:
-            # The time for ending the node is over.
+            # The time limit for ending the node has passed.
             return
         self.stop()
 
@@ -215,7 +215,7 @@ class Node:
                 self._declined += 1
 
     def _waiting(self) -> int:
-        """Return the number of messages in queues or being sent."""
+        """Return the number of messages that are in queues or being sent."""
         dropped = sum(self._queues.dropped(number) for number in range(len(self._inputs)))
         with self._lock:
             return self._offered - self._declined - self._handled - dropped
@@ -232,7 +232,7 @@ class Node:
                 self._handled += 1
 
     def _send_frame(self, subscriber: int, message: _Message) -> bool:
-        """Send a frame to the hardware; return False if the hardware has failed for good."""
+        """Send a frame to the hardware; return False if the hardware has failed permanently."""
         hardware = self._hardware
         if self._trace and message.entry:
             self._trace.sending(message.entry)
@@ -343,12 +343,12 @@ class Node:
             )
 
     def _begin_anew(self, hardware: _Hardware, error: TransportError) -> bool:
-        """Reopen the transport if the settings allow it; return False if they do not, or if it fails."""
+        """Reopen the transport if the settings allow it; return False if they do not, or if reopening fails."""
         with self._restarting:
             if self._is_over.is_set():
                 return False
             if hardware is not self._hardware:
-                # The other thread has reopened the transport.
+                # The other thread has already reopened the transport.
                 return True
             hardware.transport.close()
             self._failed_restarts = 0 if hardware.has_answered else self._failed_restarts + 1
@@ -363,8 +363,8 @@ class Node:
             return True
 
     def _forget(self, transport: Transport, why: str) -> None:
-        """Continue with hardware that starts from reset, and forget all messages in the hardware."""
-        self._report(f"{why}; it is restarted, and the messages in it are lost")
+        """Continue with hardware that was reset, and forget all messages that the hardware held."""
+        self._report(f"{why}; the hardware is restarted, and the messages in it are lost")
         self.statistics.restarts += 1
         if self._trace:
             self._trace.forget()
@@ -372,7 +372,7 @@ class Node:
 
 
 class _Reporter:
-    """Passes reports to the user, with a limit: a broken link can repeat the same fault for hours."""
+    """A reporter to the user with a limit, since a broken link can repeat the same fault for hours."""
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
@@ -382,10 +382,10 @@ class _Reporter:
         if self._left > 0:
             self._report(text)
         elif self._left == 0:
-            self._report("further reports of this kind are only counted")
+            self._report("further reports of this kind are counted, but not printed")
         self._left -= 1
 
 
 def _left(latest: float) -> float:
-    """Return the seconds until a time, or 0 if it is past."""
+    """Return the seconds until a time, or 0 if the time has passed."""
     return max(0.0, latest - time.monotonic())

@@ -14,26 +14,26 @@ _REMAPPING = re.compile(r"[~/\w]+:=.*", re.DOTALL)
 
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a node to a parser; the rest of the command line is for `remappings`."""
-    parser.add_argument("--name", metavar="NAME", help="the node's name (default: the system's)")
+    """Add the options of a node to a parser; `remappings` handles the arguments that the parser leaves."""
+    parser.add_argument("--name", metavar="NAME", help="the node's name (default: the system's name)")
     parser.add_argument(
         "--qos",
         choices=("reliable", "best_effort"),
         default="reliable",
-        help="reliability of all topics in ROS 2 (default: reliable)",
+        help="reliability of all ROS 2 topics (default: reliable)",
     )
     parser.add_argument(
         "--queue",
         type=_positive,
         default=10,
         metavar="N",
-        help="capacity of each queue, including those of ROS, in messages (default: %(default)s)",
+        help="capacity of each queue, including ROS queues, in messages (default: %(default)s)",
     )
     parser.add_argument(
         "--overflow",
         choices=[rule.value for rule in Overflow],
         default=Overflow.DROP_OLDEST.value,
-        help="treatment of a message for a full queue; block stops all topics (default: drop_oldest)",
+        help="action if a queue is full; block stops all topics (default: drop_oldest)",
     )
     parser.add_argument(
         "--drain",
@@ -42,24 +42,28 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help="time limit for pending messages when the node ends (default: %(default)g)",
     )
-    parser.add_argument("--restart", action="store_true", help="restart hardware that is lost, instead of ending")
     parser.add_argument(
-        "--trace", type=Path, metavar="F.csv", help="write each message's trace to this table; see `firm trace`"
+        "--restart",
+        action="store_true",
+        help="restart hardware after its connection is lost; without this option, the node ends",
     )
     parser.add_argument(
-        "--ros-python", metavar="PATH", help="the Python that can import ROS (default: the first one found)"
+        "--trace", type=Path, metavar="F.csv", help="write the trace of each message to this table; see `firm trace`"
+    )
+    parser.add_argument(
+        "--ros-python", metavar="PATH", help="a Python that can import ROS (default: the first one found)"
     )
     parser.add_argument(
         ROS_ARGUMENTS,
         nargs=argparse.REMAINDER,
         default=[],
         metavar="...",
-        help="ROS 2's own arguments, up to the end; NAME:=VALUE is legal anywhere, in both versions of ROS",
+        help="arguments for ROS 2, up to the end of the line; NAME:=VALUE is legal anywhere, for both ROS versions",
     )
 
 
 def remappings(rest: Sequence[str], error: Callable[[str], object]) -> tuple[str, ...]:
-    """Return the arguments that the parser left, if all belong to ROS; otherwise call `error`."""
+    """Return the arguments that the parser left, all of which must be for ROS; call `error` for any other argument."""
     if wrong := [argument for argument in rest if not _REMAPPING.fullmatch(argument)]:
         error(f"unrecognized arguments: {' '.join(wrong)}")
     return tuple(rest)
@@ -67,7 +71,7 @@ def remappings(rest: Sequence[str], error: Callable[[str], object]) -> tuple[str
 
 def _positive(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of messages; legal: 1 and more")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of messages; legal: 1 or more")
     return int(text)
 
 

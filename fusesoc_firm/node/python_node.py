@@ -1,4 +1,4 @@
-"""Writes the node of a system as a Python file: a table, and a call of the code that does the work."""
+"""Write the node of a system as a Python file: a table, and a call of the package's node."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _TEMPLATE = "node/node.py"
 def python_node(
     loaded: LoadedSystem, ros: Middleware | None, specification: Path, folder: Path, paths: Sequence[Path] = ()
 ) -> dict[str, str]:
-    """Return the file by its name in `folder`.
+    """Return the text of the node's file by the file's name in `folder`.
 
-    If the system has software, the node finds its functions through the specification and its messages in `paths`; both
-    paths are relative to the folder. Raises `InputError` if the system has no topic of `ros`.
+    If the system has software, the node finds the functions through the specification, and the messages in `paths`. All
+    paths are relative to the folder. Raise `InputError` if the system has no topic of `ros`.
     """
     description = describe(loaded)
     if ros is not None and ros.number not in description.versions:
-        fail(f"system '{description.name}' has no topic of {ros.title}")
+        fail(f"system '{description.name}' has no {ros.title} topics")
     has_software = any(block.type.accelerator.sources for block in loaded.system.software.blocks)
     name = f"{description.name}_node.py"
     call = "main(NODE)"
@@ -73,5 +73,5 @@ def _topic(topic: NodeTopic) -> dict[str, Any]:
 
 
 def _constant(message: str) -> str:
-    """Return the constant's name for a definition's text: `GEOMETRY_MSGS_QUATERNION`."""
+    """Return the name of the constant with a definition's text, such as `GEOMETRY_MSGS_QUATERNION`."""
     return identifier(*message.split("/")).upper()

@@ -5,9 +5,9 @@
     for subscriber, frame in queues:                               # the thread that owns the DMA, until `close`
         send(frame)
 
-Section 6.3.3, figure 6.4b. With a single queue, which is a middleware's default, each subscriber would wait for all
-earlier frames. The policies are the same as for the hardware's schedulers, but non-preemptive, because the host sends
-whole frames in a single stream. `cpp/firm/queues.hpp` is the C++ version.
+The source is section 6.3.3, figure 6.4b. With a single queue, the default of a middleware, each subscriber would wait
+for all earlier frames. The policies are the same as for the hardware's schedulers, but non-preemptive, because the host
+sends whole frames in a single stream. `cpp/firm/queues.hpp` is the C++ version.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ Item = TypeVar("Item")
 
 
 class Policy(ABC):
-    """Chooses the next subscriber: the first frame with the smallest key wins; among equal keys, the lowest index."""
+    """The rule that chooses the next subscriber: the smallest key wins; among equal keys, the lowest index wins."""
 
     @abstractmethod
     def key(self, subscriber: int, arrival: int) -> int:
-        """Return the key of a subscriber whose first frame arrived at `arrival` (ns)."""
+        """Return the key of a subscriber whose first queued frame arrived at `arrival` (in ns)."""
 
     def served(self, subscriber: int) -> None:  # noqa: B027  (most policies ignore it)
-        """Note that a subscriber's frame was taken."""
+        """Record that a frame of this subscriber was read from its queue."""
 
 
 class FixedPriority(Policy):
-    """The lowest index first."""
+    """A policy that serves the lowest index first."""
 
     def key(self, subscriber: int, arrival: int) -> int:
         """Return the index."""
@@ -43,14 +43,14 @@ class FixedPriority(Policy):
 
 
 class RoundRobin(Policy):
-    """The next index after the one served last, cyclic; index 0 at first."""
+    """A policy that serves the indices in turn, beginning with index 0."""
 
     def __init__(self, subscribers: int) -> None:
         self._subscribers = subscribers
         self._first = 0
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """Return the distance from the next index in turn to this index."""
+        """Return the distance from the index whose turn it is to this index."""
         return (subscriber - self._first) % self._subscribers
 
     def served(self, subscriber: int) -> None:
@@ -59,7 +59,7 @@ class RoundRobin(Policy):
 
 
 class LeastRecentlyUsed(Policy):
-    """The subscriber served least recently (section 4.2.1); at first, the lowest index.
+    """A policy that serves the subscriber served least recently (section 4.2.1); at first, the lowest index.
 
     A subscriber waits for at most `subscribers` - 1 others.
     """
@@ -69,7 +69,7 @@ class LeastRecentlyUsed(Policy):
         self._now = 0
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """Return the time at which the subscriber was last served, counted in frames."""
+        """Return the time when the subscriber was last served, counted in frames."""
         return self._served_at[subscriber]
 
     def served(self, subscriber: int) -> None:
@@ -79,10 +79,10 @@ class LeastRecentlyUsed(Policy):
 
 
 class EarliestDeadlineFirst(Policy):
-    """The subscriber whose first frame has the earliest deadline: arrival time plus the subscriber's time limit."""
+    """A policy that serves the frame with the earliest deadline: its arrival time plus a relative deadline."""
 
     def __init__(self, deadlines: Sequence[int]) -> None:
-        """Set the relative deadlines, in ns."""
+        """Set each subscriber's relative deadline, in ns."""
         self._deadlines = tuple(deadlines)
 
     def key(self, subscriber: int, arrival: int) -> int:
@@ -91,28 +91,28 @@ class EarliestDeadlineFirst(Policy):
 
 
 class LeastSlackTime(Policy):
-    """The subscriber whose first frame has the least slack: time until the deadline minus transfer time."""
+    """A policy that serves the frame with the least slack: the time until the deadline minus the transfer time."""
 
     def __init__(self, deadlines: Sequence[int], transfer_times: Sequence[int]) -> None:
-        """Set the relative deadlines and the transfer times, in ns, one of each per subscriber."""
+        """Set each subscriber's relative deadline and transfer time, in ns."""
         pairs = zip(deadlines, transfer_times, strict=True)
         self._latest_starts = tuple(deadline - transfer for deadline, transfer in pairs)
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """Return the latest start time; it differs from the slack by the current time, which is the same for all."""
+        """Return the latest start time, which orders subscribers like their slack, since all share the current time."""
         return arrival + self._latest_starts[subscriber]
 
 
 class Overflow(Enum):
-    """The action of `put` if a queue is full."""
+    """The action of `put` when a queue is full."""
 
-    DROP_OLDEST = "drop_oldest"  # the queue keeps the latest, as ROS's KEEP_LAST does
+    DROP_OLDEST = "drop_oldest"  # the queue keeps the latest items, like KEEP_LAST in ROS
     DROP_NEWEST = "drop_newest"  # the queue is unchanged
     BLOCK = "block"  # `put` waits for room
 
 
 class ClosedError(Exception):
-    """The queues are closed and, for a reader, empty."""
+    """The queues are closed; to a reader, they are also empty."""
 
 
 class EmptyError(Exception):
@@ -120,7 +120,10 @@ class EmptyError(Exception):
 
 
 class SubscriberQueues(Generic[Item]):
-    """Bounded queues, one per subscriber, which are read as one queue. Any number of threads may write and read."""
+    """Bounded queues, one for each subscriber, that are read like one queue.
+
+    Any number of threads may read and write.
+    """
 
     def __init__(
         self,
@@ -132,7 +135,7 @@ class SubscriberQueues(Generic[Item]):
     ) -> None:
         """Create queues of `capacity` frames each; the default `policy` is least recently used; `clock` returns ns."""
         if subscribers < 1 or capacity < 1:
-            raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 and more")
+            raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 or more")
         self._policy = policy or LeastRecentlyUsed(subscribers)
         self._capacity = capacity
         self._overflow = overflow
@@ -146,8 +149,8 @@ class SubscriberQueues(Generic[Item]):
         """Add an item; return whether it is queued.
 
         The item is not queued if a full queue drops the newest item, or stays full for `timeout` seconds (None: no
-        limit).
-        Raises `ClosedError`, even during the wait, and `IndexError` for an unknown subscriber.
+        limit). Raise `ClosedError` if the queues are closed, even during the wait, and `IndexError` for an unknown
+        subscriber.
         """
         if not 0 <= subscriber < len(self._queues):
             raise IndexError(f"subscriber is {subscriber}; legal: 0 to {len(self._queues) - 1}")
@@ -169,7 +172,7 @@ class SubscriberQueues(Generic[Item]):
     def get(self, timeout: float | None = None) -> tuple[int, Item]:
         """Return the next subscriber and its first item; wait at most `timeout` seconds (None: no limit).
 
-        Raises `EmptyError` on timeout, and `ClosedError` when the queues are closed and empty.
+        Raise `EmptyError` on timeout, and `ClosedError` when the queues are closed and empty.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._closed or any(self._queues), timeout)
@@ -177,7 +180,7 @@ class SubscriberQueues(Generic[Item]):
             if not waiting:
                 if self._closed:
                     raise ClosedError("the queues are closed and empty")
-                raise EmptyError(f"no frame came in {timeout} s")
+                raise EmptyError(f"no frame arrived in {timeout} s")
             subscriber = min(waiting, key=lambda index: self._policy.key(index, self._queues[index][0][0]))
             _, item = self._queues[subscriber].popleft()
             self._policy.served(subscriber)
@@ -194,12 +197,12 @@ class SubscriberQueues(Generic[Item]):
             yield found
 
     def close(self) -> None:
-        """Accept no more items; queued items can still be read. Wakes all waiting threads."""
+        """Accept no more items, and wake all waiting threads; queued items can still be read."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     def dropped(self, subscriber: int) -> int:
-        """Return the number of dropped items of a subscriber."""
+        """Return the number of items that a subscriber's queue has dropped."""
         with self._changed:
             return self._dropped[subscriber]

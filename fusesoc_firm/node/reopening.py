@@ -9,9 +9,9 @@ from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
 from fusesoc_firm.simulation.simulator import BuiltSimulator
 
-# After this many cycles without a beat, the simulation runs only at intervals, to save processor time. It still serves
-# accelerators that send spontaneously or compute for longer. A simulation that never slept would not get processor time
-# when a message arrives.
+# After this many cycles without a beat, the simulation runs only at intervals. These suffice for accelerators that send
+# spontaneously or compute for longer. A simulation that never sleeps would use the processor time that an arriving
+# message needs.
 _PACE = Pace(rest_cycles=2_000, idle_seconds=0.05)
 
 
@@ -25,7 +25,7 @@ def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -
 
 
 def at_address(address: str) -> OpenTransport:
-    """Return a function that opens an address, such as `uart:DEVICE:BAUD` (docs/reference/transports.md)."""
+    """Return a function that opens a transport; docs/reference/transports.md describes addresses."""
     return lambda listener: open_transport(address, _PACE, partial(_tell, listener))
 
 

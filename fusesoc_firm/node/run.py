@@ -1,4 +1,4 @@
-"""Runs a node from its options to its exit status, for `firm live` and the generated node."""
+"""Run a node from its options to its exit status, for `firm live` and for generated nodes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fusesoc_firm.text.diagnostics import fail
 
 @dataclass(frozen=True)
 class RunOptions:
-    """The options of a node at its start. `versions` are the versions of ROS to which the node's topics belong."""
+    """The options with which a node starts; `versions` are the versions of ROS to which the node's topics belong."""
 
     versions: tuple[int, ...]
     ros: RosOptions
@@ -36,14 +36,20 @@ class RunOptions:
 def run_options(
     arguments: argparse.Namespace, rest: Sequence[str], description: NodeDescription, ros: int | None = None
 ) -> RunOptions:
-    """Return the options from a command line; `ros` selects a version, if given. Raises `InputError`."""
+    """Return the options from a command line, restricted to the version `ros` if it is given.
+
+    May raise `InputError`.
+    """
     if ros is not None and ros not in description.versions:
         known = " and ".join(map(str, description.versions))
-        hint = "the hardware handles one version: set it with 'middleware' of blocks and interfaces"
-        fail(f"system '{description.name}' has no topic of ROS {ros}, but of ROS {known}", hint=hint)
+        hint = "the hardware supports one ROS version; select the version with 'middleware' in blocks and interfaces"
+        fail(f"system '{description.name}' has no ROS {ros} topics, only topics of ROS {known}", hint=hint)
     versions = description.versions if ros is None else (ros,)
     if arguments.ros_args and 2 not in versions:
-        fail(f"'{ROS_ARGUMENTS}' is for ROS 2, and the topics are of ROS 1", hint="ROS 1 takes NAME:=VALUE without it")
+        fail(
+            f"'{ROS_ARGUMENTS}' is for ROS 2, but the topics use ROS 1",
+            hint="for ROS 1, write NAME:=VALUE without '{ROS_ARGUMENTS}'",
+        )
     passed = [*rest, *([ROS_ARGUMENTS, *arguments.ros_args] if arguments.ros_args else ())]
     return RunOptions(
         versions,
@@ -63,9 +69,9 @@ def run_options(
 def run_node(
     description: NodeDescription, open_transport: OpenTransport, options: RunOptions, loaded: LoadedSystem | None = None
 ) -> None:
-    """Run the node until Ctrl-C, SIGTERM or ROS ends it; a second Ctrl-C ends it at once.
+    """Run the node until Ctrl-C, SIGTERM or ROS stops it; a second Ctrl-C ends it immediately.
 
-    `loaded` is the system, if it has software. Raises `InputError` if ROS or the hardware fails, or if received
+    `loaded` is the system, if it has software. Raise `InputError` if ROS or the hardware fails, or if received
     messages could not be processed in time.
     """
     settings = replace(options.settings, report=_say)
@@ -74,7 +80,7 @@ def run_node(
             software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
             trace = stack.enter_context(closing(Trace(options.trace, description))) if options.trace else None
             node = Node(description, open_transport, settings, software, trace)
-            # Published messages leave before the node prints its statistics.
+            # Published messages are sent before the node prints its statistics.
             stack.callback(lambda: _say(node.statistics.text()))
             stack.callback(node.close)
             carriers = {}
@@ -90,7 +96,7 @@ def run_node(
 
 
 def _topics(carrier: RosCarrier, description: NodeDescription) -> str:
-    """Describe the topics of a running node."""
+    """Return a text for the user that lists a running node's topics."""
     taken = [f"  {name} -> {description.subscribers[number].block}" for number, name in carrier.subscribers.items()]
     given = [f"  {description.publishers[number].block} -> {name}" for number, name in carrier.publishers.items()]
     return "\n".join([f"{description.name} is a node of {carrier.title}", *taken, *given])
@@ -98,7 +104,7 @@ def _topics(carrier: RosCarrier, description: NodeDescription) -> str:
 
 @contextmanager
 def _stopped_by_signals(node: Node) -> Iterator[None]:
-    """Within this context, the first Ctrl-C or SIGTERM stops the node."""
+    """Stop the node at the first Ctrl-C or SIGTERM within this context."""
     known = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
     def stop(_: int, __: FrameType | None) -> None:

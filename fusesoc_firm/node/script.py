@@ -17,13 +17,15 @@ from fusesoc_firm.tools.interrupts import accept_interrupts
 
 
 def main(description: NodeDescription, script: str = "", specification: str = "", paths: Sequence[str] = ()) -> None:
-    """Run the node as the command line says, and exit: 0 after a stop request, 1 for faults, 2 for a bad command line.
+    """Run the node as the command line requests.
 
-    For a system with software, `specification` is its file and `paths` are the folders of its messages, both relative
-    to the `script`.
+    Exit with 0 after a stop request, 1 for faults, 2 for a bad command line.
+
+    For a system with software, `specification` is the specification's path, and `paths` are the folders with the
+    messages, all relative to `script`.
     """
     accept_interrupts()
-    parser = argparse.ArgumentParser(description=f"The node of the system {description.name}.")
+    parser = argparse.ArgumentParser(description=f"Run the node of the system {description.name}.")
     parser.add_argument("--transport", required=True, metavar="ADDRESS", help="the transport to the hardware")
     add_node_options(parser)
     arguments, rest = parser.parse_known_args()

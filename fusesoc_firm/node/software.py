@@ -1,4 +1,4 @@
-"""Runs a system's software in a node: takes payloads, calls the functions, and returns payloads."""
+"""Run a system's software in a node: decode payloads, call the functions, and encode the results."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fusesoc_firm.text.diagnostics import InputError, fail
 
 @dataclass
 class NodeSoftware:
-    """The blocks of type ROS-SW that have sources.
+    """A system's blocks of type ROS-SW that have sources.
 
-    A message enters from a block (a topic or a converter), and the functions' outputs leave to other blocks. `report`
-    receives each fault. A failed call and its messages are lost; all other calls continue.
+    Messages come from blocks (topics or converters), and the functions' outputs go to other blocks. `report` receives
+    each fault. The messages of a failed call are lost; all other calls continue.
     """
 
     functions: Functions
@@ -33,7 +33,7 @@ class NodeSoftware:
     _lock: Lock = field(default_factory=Lock)
 
     def take(self, block: str, payload: bytes) -> list[tuple[str, bytes]]:
-        """Take a message; return the resulting messages, each with its destination block."""
+        """Process a message from a block; return the resulting payloads, each with its destination block."""
         end, frame = self.sources[block]
         with self._lock:
             return list(self._run(block, end, frame, payload))
@@ -55,9 +55,9 @@ class NodeSoftware:
 
 @contextmanager
 def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) -> Iterator[NodeSoftware | None]:
-    """Load a system's software, None if it has none. The sources can be imported within this context.
+    """Load a system's software, or None without software; within this context, sources can import each other.
 
-    Raises `InputError`, also for a fault within a file.
+    May raise `InputError`, also for a fault within a source file.
     """
     system, software = loaded.system, loaded.system.software
     if not any(block.type.accelerator.sources for block in software.blocks):
@@ -69,7 +69,7 @@ def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) ->
         topics = (*system.subscribers, *system.publishers, *software.subscribers)
         ends = {topic.block: (End(topic.block), topic.frame) for topic in topics}
         ends |= {topic.block: (end, topic.frame) for topic, end in sent_elsewhere(system).items()}
-        # An output from hardware to software elsewhere is a topic, which no function here takes.
+        # An output from hardware to software in another program is a topic, not an input of a function here.
         outside = {topic.block for topic in taken}
         yield NodeSoftware(
             functions,
@@ -83,4 +83,4 @@ def _decoded(block: str, frame: Frame, payload: bytes) -> Message:
     try:
         return decode(frame, payload)
     except CodecError as error:
-        fail(f"a message from '{block}' is not a valid {frame.message}: {error}")
+        fail(f"a message from '{block}' is not a valid {frame.message} message: {error}")

@@ -1,9 +1,9 @@
-"""Runs a system's functions in a separate process, which reads frames from its standard input and writes frames back.
+"""Run a system's functions in a separate process, with frames on its standard input and output.
 
     python3 -m fusesoc_firm.node.software_process robot.yaml
 
-A node in C++ runs blocks of type ROS-SW in this way: it sees a transport, as for the hardware (`software:COMMAND`,
-docs/reference/node-library.md). The ids are the software's own, in the order of `software_ports`. At the end of the
+A C++ node uses this process for blocks of type ROS-SW, through a transport like the hardware's (`software:COMMAND`,
+docs/reference/node-library.md). The software has its own ids, in the order of `software_ports`. At the end of the
 input, the process finishes all messages and exits with status 0. Output that the functions print goes to standard
 error.
 """
@@ -31,10 +31,10 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
 @dataclass(frozen=True)
 class SoftwarePorts:
-    """The inputs and outputs of a system's functions; the index in each is the id in frames.
+    """The inputs and outputs of a system's functions; the index of each is its id in frames.
 
-    Inputs: the topics that the functions take, then the hardware's publishers that feed functions. Outputs: the
-    hardware's subscribers that the functions feed, then the topics that the functions publish.
+    The inputs are the topics that the functions receive, then the publishers in hardware that feed functions. The
+    outputs are the subscribers in hardware that functions feed, then the topics that the functions publish.
     """
 
     inputs: tuple[Topic, ...]
@@ -42,7 +42,7 @@ class SoftwarePorts:
 
 
 def software_ports(system: DerivedSystem) -> SoftwarePorts:
-    """Return the ports of the blocks with sources; blocks without sources are software elsewhere."""
+    """Return the ports of the blocks with sources; blocks without sources are software in other programs."""
     software = system.software
     here = {block.block for block in software.blocks if block.type.accelerator.sources}
     taken, given = set(), set()
@@ -61,9 +61,10 @@ def software_ports(system: DerivedSystem) -> SoftwarePorts:
 
 
 def serve(system: DerivedSystem, folder: Path, taken: BinaryIO, given: BinaryIO) -> None:
-    """Process frames until the input ends. Raises `InputError` for a fault in a function or in the stream of frames.
+    """Read frames from `taken` and write frames to `given` until the input ends.
 
-    A payload that is not a message is reported on standard error and skipped.
+    A payload that is not a message is reported on standard error and skipped. Raise `InputError` for a fault in a
+    function or in the stream of frames.
     """
     ports = software_ports(system)
     ids = {topic.block: number for number, topic in enumerate(ports.outputs)}
@@ -91,18 +92,18 @@ def _frames(row: BinaryIO, ids: int) -> Iterator[tuple[int, bytes]]:
         if len(header) < _HEADER_BYTES or len(payload := row.read(length)) < length:
             fail("the input ends within a frame")
         if header[0] >= ids:
-            fail(f"a frame has id {header[0]}, but the software's inputs have the ids 0 to {ids - 1}")
+            fail(f"a frame has the id {header[0]}, but the software's inputs have the ids 0 to {ids - 1}")
         yield header[0], payload
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("spec", type=Path, help="the specification of the system")
+    parser.add_argument("spec", type=Path, help="the system's YAML specification")
     parser.add_argument("--path", type=Path, action="append", default=[], metavar="DIR", help="message definitions")
     parser.add_argument("--distro", metavar="NAME", help="the ROS distribution that provides the standard messages")
     given = parser.parse_args(arguments)
-    # Standard output carries frames only, whatever the functions print.
+    # Standard output carries only frames, so the functions' output is redirected.
     frames = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     try:
@@ -112,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # The reader has gone, so there is no recipient for a report.
+        # The reader has ended, so a report would have no recipient.
         return 1
     return 0
 

@@ -10,18 +10,18 @@ from fusesoc_firm.node.description import NodeDescription
 
 @dataclass
 class Input:
-    """Messages to the hardware or to software: from a topic, or made by software."""
+    """The counts of one input of the hardware or of software; its messages come from a topic or from software."""
 
     received: int = 0
     dropped: int = 0
     sent: int = 0
     refused: int = 0
-    """rejected by the hardware, which found their frames broken"""
+    """messages that the hardware rejected because of broken frames"""
 
 
 @dataclass
 class Output:
-    """Messages from the hardware or from software, to a topic or to software."""
+    """The counts of one output of the hardware or of software; its messages go to a topic or to software."""
 
     frames: int = 0
     published: int = 0
@@ -29,7 +29,7 @@ class Output:
 
 @dataclass
 class Statistics:
-    """Counts of a run, by block. `faults` are illegal bursts and pulses of `id_error`."""
+    """The counts of a run, by block; `faults` counts illegal bursts and pulses of `id_error`."""
 
     inputs: dict[str, Input] = field(default_factory=dict)
     outputs: dict[str, Output] = field(default_factory=dict)
@@ -37,18 +37,18 @@ class Statistics:
     software_faults: int = 0
     restarts: int = 0
     unfinished: int = 0
-    """messages still in queues, or incomplete frames, when the time to end was over"""
+    """messages in queues, and incomplete frames, when the time limit for ending expired"""
 
     @classmethod
     def of(cls, description: NodeDescription) -> Statistics:
-        """Return zero counts for a node."""
+        """Return the statistics of a node with all counts at zero."""
         return cls(
             {item.block: Input() for item in description.inputs},
             {item.block: Output() for item in description.outputs},
         )
 
     def text(self) -> str:
-        """Return a table for the user."""
+        """Return the counts as a table for the user."""
         rows: list[tuple[str, ...]] = [("from", "received", "dropped", "sent", "refused")]
         rows += [
             (name, *map(str, (item.received, item.dropped, item.sent, item.refused)))
@@ -57,8 +57,8 @@ class Statistics:
         rows.append(("to", "frames", "published", "", ""))
         rows += [(name, str(item.frames), str(item.published), "", "") for name, item in self.outputs.items()]
         notes = {
-            "faults on the way from the hardware": self.faults,
-            "faults of software": self.software_faults,
+            "faults on the route from the hardware": self.faults,
+            "faults in software": self.software_faults,
             "restarts": self.restarts,
             "messages unfinished at the end": self.unfinished,
         }

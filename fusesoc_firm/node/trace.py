@@ -1,12 +1,13 @@
-"""Traces each message through a system: the time of each stage, in simulated time and by the wall clock.
+"""Trace each message through a system: record the time of each stage, in simulated time and by the wall clock.
 
     trace = Trace(path, description)
     ...                                        # the node reports its events
     trace.close()
 
 A row is a message from a subscriber to a publisher. A publisher's n-th message belongs to the n-th message of each
-subscriber that feeds the publisher's block; the row describes the latest of these messages. This holds for accelerators
-that respond to every message with one message. Steps in software before and after the hardware have separate rows.
+subscriber that feeds the publisher's block; the row describes the latest of these messages. This rule is valid for
+accelerators that respond to every message with one message. Steps in software before and after the hardware have
+separate rows.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Entry:
 
 @dataclass
 class _Answer:
-    """A message from the hardware, with the message that caused it."""
+    """A message from the hardware, with the message that caused the response."""
 
     entry: Entry | None
     publisher: int
@@ -69,10 +70,10 @@ class _Ways:
 
 
 class Trace:
-    """Writes the table; any thread may report events. Times count from the creation of the `Trace`."""
+    """The writer of the table; any thread may report events. Times count from the creation of the `Trace`."""
 
     def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
-        """Create the file at `path`; `clock` gives ns. Raises `InputError`."""
+        """Create the file at `path`; `clock` returns the time in ns. May raise `InputError`."""
         check_output(path)
         try:
             self._file = path.open("w", newline="", encoding="utf-8")
@@ -111,7 +112,7 @@ class Trace:
                 self._ways.untaken.popleft().cycles = (first_cycle, last_cycle)
 
     def refused(self, subscriber: int) -> None:
-        """Record that the hardware rejected the last frame that it took for a subscriber: there will be no response."""
+        """Record that the hardware rejected the last frame that it took for a subscriber and will not respond."""
         with self._lock:
             for publisher in self._reached.get(subscriber, ()):
                 queue = self._ways.pending.get((subscriber, publisher))
@@ -120,7 +121,7 @@ class Trace:
                     queue.remove(taken[-1])
 
     def came(self, publisher: int, size: int, cycles: tuple[int, int] | None, *, is_published: bool) -> None:
-        """Record a message from the hardware. If `is_published`, it goes to a topic later, otherwise to software."""
+        """Record a message from the hardware, which goes to a topic if `is_published` is set, otherwise to software."""
         with self._lock:
             answer = _Answer(self._cause(publisher), publisher, size, cycles, self._clock())
             if is_published:
@@ -183,7 +184,7 @@ class Trace:
         )
 
     def _differences(self, cycles: Iterable[int | None]) -> tuple[float | None, ...]:
-        """Return the cycles from beat to beat, and the time from the first to the last."""
+        """Return the cycles between successive beats, and the time from the first beat to the last."""
         first_in, last_in, first_out, last_out = cycles
         whole = _minus(last_out, first_in)
         clock = self._description.clock_hz
@@ -192,7 +193,7 @@ class Trace:
 
 
 def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:
-    """Return the names of the converters by id: subscribers, publishers."""
+    """Return the names of the subscribers and of the publishers by id."""
     return (
         {item.id: item.block for item in description.inputs if item.id is not None},
         {item.id: item.block for item in description.outputs if item.id is not None},

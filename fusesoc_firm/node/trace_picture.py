@@ -1,4 +1,4 @@
-"""Draws the table of a trace with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
+"""Draw the table of a trace with matplotlib, an extra dependency: `pip install 'fusesoc-firm[plots]'`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _CYCLES = (
 )
 _ROW_INCHES = 2.6
 _WIDTH_INCHES = 11.0
-# Without a date and matplotlib's random names, the same table gives the same bytes.
+# Without a date and matplotlib's random names, the same table always results in the same bytes.
 _SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
 _METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
@@ -42,14 +42,14 @@ _METADATA: dict[str, dict[str, None]] = {
 
 
 def draw_trace(table: Path, picture: Path) -> None:
-    """Draw a table that `Trace` has written: a row of panels for each route, wall time beside simulated time.
+    """Draw a table that `Trace` wrote: a row of panels for each route, with wall time beside simulated time.
 
-    Raises `InputError` for another kind of file, an unknown picture format, and if matplotlib is missing.
+    Raise `InputError` for another kind of file, for an unknown picture format, and if matplotlib is missing.
     """
     check_output(picture, SUFFIXES)
     ways = _ways(table)
     if not ways:
-        fail(f"{table} has no message that came back")
+        fail(f"{table} contains no messages with a response")
     plots = _plots()
     size = (_WIDTH_INCHES, _ROW_INCHES * len(ways) + 0.4)
     drawing, axes = plots.subplots(len(ways), 2, figsize=size, squeeze=False, layout="constrained")
@@ -69,7 +69,7 @@ def draw_trace(table: Path, picture: Path) -> None:
 def _draw(
     axis: Any, rows: Sequence[_Row], parts: Sequence[tuple[str, str, str]], scale: Callable[[float], float], unit: str
 ) -> None:
-    """Draw each message as a bar of its stages, stacked upwards; a stage that began before the one below is omitted."""
+    """Draw each message as a bar of stacked stages; a stage that began before the stage below it is omitted."""
     whole = [row for row in rows if all(row[name] is not None for _, *names in parts for name in names)]
     axis.set_xlabel("message")
     axis.set_ylabel(unit)
@@ -87,12 +87,12 @@ def _draw(
 
 
 def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:
-    """Return the rows of each route, for the messages with a response."""
+    """Return the rows of messages with a response, by route."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             if tuple(reader.fieldnames or ()) != COLUMNS:
-                fail(f"{table} is not the trace of a node", hint="firm live ... --trace F.csv writes one")
+                fail(f"{table} is not a node's trace", hint="'firm live ... --trace F.csv' writes a trace")
             found = [*reader]
     except OSError as error:
         fail(f"cannot read {table}: {error.strerror}")
@@ -110,11 +110,11 @@ def _values(row: dict[str, str], place: str) -> _Row:
     try:
         return {name: text if name in words else float(text) if text else None for name, text in row.items()}
     except (TypeError, ValueError):
-        fail(f"{place} is not a row of a trace")
+        fail(f"{place} is not a valid row of a trace")
 
 
 def _number(value: float | str | None) -> float:
-    assert isinstance(value, float), "only a row with all its values can be drawn"
+    assert isinstance(value, float), "only a row without missing values can be drawn"
     return value
 
 
@@ -122,7 +122,7 @@ def _plots() -> Any:
     try:
         matplotlib: Any = import_module("matplotlib")
     except ImportError:
-        fail("a picture needs matplotlib", hint="pip install 'fusesoc-firm[plots]'")
+        fail("pictures require matplotlib", hint="pip install 'fusesoc-firm[plots]'")
     matplotlib.use("Agg")
     plots: Any = import_module("matplotlib.pyplot")
     plots.rcParams.update(_SETTINGS)

@@ -1,12 +1,12 @@
-"""Answers FuseSoC's call of a generator.
+"""Answer FuseSoC's call of a generator.
 
-FuseSoC starts a generator in an empty folder with one argument, a YAML file with the new core's name, the requesting
-core's folder and the parameters. Afterwards it loads every `.core` in the folder, so that file is written last. FuseSoC
-shows the generator's output to the user unchanged.
+FuseSoC starts a generator in an empty folder with one argument: a YAML file with the new core's name, the requesting
+core's folder and the parameters. Afterwards, FuseSoC loads every `.core` file in the folder, so the generator writes
+this file last. FuseSoC shows the generator's output to the user unchanged.
 
-A call is derived once (`Generator.load`): the inputs determine the store's key and, after a miss, the core is generated
-from the same derived data. The state of every fact that determines the result is recorded before use. If one of these
-facts has changed at the end, an input was edited meanwhile, and nothing is stored.
+The data of a call are derived once (`Generator.load`): they determine the store's key and, after a miss, the generated
+core. The state of every fact that determines the result is recorded before the fact is used. If one of these facts has
+changed at the end, an input was edited during the call, and nothing is stored.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from fusesoc_firm.store.store import Entry, Files, Key, default_store, request_d
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.tools.programs import explanation, missing
 
-# FuseSoC removes it at the start of every run of a target.
-_REMOVED = """this generator's folder was removed during its run: the same target is being run twice at once
-      = 'firm build' can do this safely"""
+# FuseSoC removes this folder at the start of every run of a target.
+_REMOVED = """this generator's folder was removed while the generator was running: the same target is run twice at once
+      = 'firm build' runs targets safely in parallel"""
 
 
 class _NotStoredError(Exception):
@@ -44,9 +44,9 @@ class _NotStoredError(Exception):
 
 @dataclass
 class Basis:
-    """The basis of a result: `reads` of everything that determines its key, and `further` facts, first our own code.
+    """The facts that determine a result: the `reads` that determine the key, and `further` facts, first our own code.
 
-    Each fact has the state before its use. `run` is the run of FuseSoC.
+    Each fact contains the state before its use. `run` is the id of FuseSoC's run.
     """
 
     run: str
@@ -54,20 +54,20 @@ class Basis:
     reads: Reads = field(default_factory=Reads)
 
     def facts(self) -> list[Fact]:
-        """All facts of the basis."""
+        """Return all facts of the basis."""
         return [*self.further, *self.reads.facts()]
 
     def holds(self) -> bool:
-        """Whether no fact has changed since its use."""
+        """Return whether no fact has changed since its use."""
         return hold(self.facts(), self.run)
 
 
 def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GENERATORS) -> int:
-    """Run the generator `command` on FuseSoC's file; the exit status is 1 for faults and 130 for Ctrl-C."""
+    """Run the generator `command` with FuseSoC's arguments; return the exit status: 1 for faults, 130 for Ctrl-C."""
     try:
         if len(argv) != 1:
             fail(
-                f"{command} is a generator that FuseSoC calls with one file; use it in the 'generate' section of a core"
+                f"{command} is a generator that FuseSoC calls with one file; add it to the 'generate' section of a core"
             )
         _answer(command, generators[command], Path(argv[0]), run_of(os.getppid()))
     except InputError as error:
@@ -85,9 +85,9 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
 
 
 def answer_from_store(command: str, path: Path) -> bool:
-    """Answer a hit in FuseSoC's own process; return False, and write nothing, for a miss or a faulty call.
+    """Answer a hit in FuseSoC's own process; for a miss or a faulty call, write nothing and return False.
 
-    The generator then reports the faults.
+    After a faulty call, the generator reports the faults.
     """
     run = run_of(os.getpid())
     try:
@@ -101,10 +101,10 @@ def answer_from_store(command: str, path: Path) -> bool:
 def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only_looked_up: bool = False) -> None:
     """Write the core for FuseSoC's file to the current folder, report it, and store a note for recall.
 
-    Raises `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
+    May raise `InputError`. If `is_only_looked_up` is set, raise `_NotStoredError` for a miss.
     """
     start = time.monotonic()
-    # The code comes first, since its modules are imported from here on.
+    # The state of the code is recorded first, since its modules are imported from here on.
     basis = Basis(run)
     basis.further += facts("folder", _searched())
     request = read_request(command, path, generator, run, basis.further)
@@ -114,8 +114,8 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
     is_locked = _check_locked(loaded)
     key, entry = obtain(loaded, generator, basis, is_only_looked_up=is_only_looked_up)
     marks = find_requesting_core(request.files_root, request.name).name if command == MESSAGES else ""
-    # Locked calls are checked on every run, and missing programs are reported. This must precede writing the core,
-    # since the current folder may be in a searched folder.
+    # On every run, check calls with lock files and report missing programs, before the core is written: the current
+    # folder may be in a searched folder.
     if not (absent or is_locked) and basis.holds():
         note = {"key": key.digest, "facts": basis.facts(), "name": request.name, "core": request.vlnv, "marks": marks}
         default_store().note(call_digest(command, path.read_bytes()), note)
@@ -130,9 +130,9 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
 def read_request(
     command: str, path: Path, generator: Generator, run: str | None = None, further: list[Fact] | None = None
 ) -> Request:
-    """The request in FuseSoC's file, with the folders of message cores generated in `run`, or in any run if None.
+    """Return the request in FuseSoC's file, with the folders of the message cores that `run` generated (None: any run).
 
-    Facts about these are added to `further`. Raises `InputError`.
+    Add facts about these folders to `further`. May raise `InputError`.
     """
     generated = path.absolute().parent.parent
 
@@ -145,7 +145,7 @@ def read_request(
 
 
 def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
-    """Derive the data of a request. Raises `InputError`."""
+    """Derive the data of a request. May raise `InputError`."""
     with noted(basis.reads):
         return generator.load(request)
 
@@ -153,9 +153,9 @@ def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
 def obtain(
     loaded: LoadedRequest, generator: Generator, basis: Basis, *, is_only_looked_up: bool = False
 ) -> tuple[Key, Entry]:
-    """The core for a request, from the store if possible, and its key.
+    """Return the key and the core for a request; the core is from the store if possible.
 
-    Raises `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
+    May raise `InputError`. If `is_only_looked_up` is set, raise `_NotStoredError` for a miss.
     """
 
     def build() -> Files:
@@ -191,15 +191,15 @@ def _key(loaded: LoadedRequest, generator: Generator, basis: Basis) -> Key:
 
 
 def _searched() -> list[str]:
-    """The environment's folders with message definitions."""
+    """Return the folders with message definitions that environment variables name."""
     entries = [entry for name in SEARCHED for entry in os.environ.get(name, "").split(os.pathsep) if entry]
     return [folder for entry in entries for folder in (entry, str(Path(entry, "share")))]
 
 
 def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: str | None) -> tuple[Path, ...]:
-    """The folders below `generated` with the messages of cores, generated in `run`, or in any run if None.
+    """Return the folders below `generated` with the messages of cores that `run` generated (None: any run).
 
-    Raises `InputError` for a core without such a folder, as when the requesting core does not depend on it.
+    Raise `InputError` for a core without a folder, for example if the requesting core does not depend on that core.
     """
     faults = Diagnostics()
     found: list[Path] = []
@@ -207,7 +207,8 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
         current = message_folders(generated, core_name(name), run)
         if not current:
             hint = (
-                "the requesting core must depend on it, and its target 'default' must use the generator firm_messages"
+                f"the requesting core must depend on '{name}', whose target 'default' must use"
+                " the generator firm_messages"
             )
             faults.error(f"core '{name}' provides no messages", source, hint)
         found += map(Path, current)
@@ -216,14 +217,17 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
 
 
 def _check_locked(loaded: LoadedRequest) -> bool:
-    """Check a request against the lock files; return whether there are any. Raises `InputError` for differences."""
+    """Check a request against its lock files; return whether there are lock files.
+
+    Raise `InputError` for differences.
+    """
     request = loaded.request
     places: list[Path] = []
     if name := request.parameters.get("locked"):
         places.append(request.files_root / str(name))
     if name := os.environ.get(LOCKED):
         if not Path(name).is_absolute():
-            fail(f"{LOCKED} is '{name}'", hint=f"a generator runs in its own folder; write {LOCKED}=$PWD/{name}")
+            fail(f"{LOCKED} is '{name}'", hint=f"generators run in other folders, so write {LOCKED}=$PWD/{name}")
         places.append(Path(name))
     for place in places:
         from fusesoc_firm.plugin.lock_file import check_request
@@ -233,7 +237,7 @@ def _check_locked(loaded: LoadedRequest) -> bool:
 
 
 def _check_declared(of_build: Reads, of_key: Reads) -> None:
-    """Raise `InputError` if a file was read that the key does not cover: its edits would go unnoticed."""
+    """Raise `InputError` if a file was read that the key does not cover, since edits would go unnoticed."""
     faults = Diagnostics()
     known = {os.path.realpath(file) for file in of_key.files}
     parts = {os.path.realpath(file) for file in of_key.parts}
@@ -241,13 +245,14 @@ def _check_declared(of_build: Reads, of_key: Reads) -> None:
     for file, covered in found:
         if os.path.realpath(file) not in covered and Path(file).is_file():
             faults.error(
-                f"{file} was read, but is not an input", hint="list it under the generator's parameter 'files'"
+                f"{file} was read, but is not listed as an input",
+                hint="add the file to the generator's parameter 'files'",
             )
     faults.raise_if_any()
 
 
 def _write(files: Files, request: Request, marks: str, run: str) -> None:
-    """Write a core to the current folder. Raises `InputError`."""
+    """Write a core to the current folder. May raise `InputError`."""
     try:
         found = write_core(files, request.vlnv, marks, run)
     except OSError as error:
@@ -257,14 +262,14 @@ def _write(files: Files, request: Request, marks: str, run: str) -> None:
     if found:
         unit, other = found
         fail(
-            f"{request.vlnv} and {other} define the design unit '{unit}' differently, and tools keep only one",
+            f"{request.vlnv} and {other} define the design unit '{unit}' differently, but tools keep only one",
             find_requesting_core(request.files_root, request.name).instance(),
-            "give the units of one core distinct names by the parameter 'name' of generator 'firm', such as name: left",
+            "rename the units of one core with the parameter 'name' of generator 'firm', such as name: left",
         )
 
 
 def _is_here() -> bool:
-    """Whether the current folder still exists."""
+    """Return whether the current folder still exists."""
     try:
         return bool(Path.cwd())
     except FileNotFoundError:
@@ -272,7 +277,7 @@ def _is_here() -> bool:
 
 
 def _name(path: Path, request: Request) -> str:
-    """An input's name in the key, which is the same for all copies of a project."""
+    """Return an input's name in the key, which is equal in all copies of a project."""
     folders = [folder for found in request.message_folders.found.values() for folder in found]
     for root in (request.files_root, *folders):
         if path.is_relative_to(root):
@@ -283,7 +288,7 @@ def _name(path: Path, request: Request) -> str:
 
 
 def _named_content(item: Input, request: Request) -> tuple[str, bytes | None]:
-    """An input's name in the key, and the content that the key covers."""
+    """Return an input's name in the key, and the content that the key covers, None if it is missing."""
     if isinstance(item, Path):
         return _name(item, request), item.read_bytes() if item.is_file() else None
     return f"{_name(item.path, request)}:{item.name}", item.content

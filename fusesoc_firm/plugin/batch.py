@@ -1,4 +1,4 @@
-"""Generates the cores of many calls in advance and in parallel, since FuseSoC generates them one after another.
+"""Generate the cores of many calls in advance and in parallel, since FuseSoC generates them one after another.
 
     python -m fusesoc_firm.plugin.batch GENERATOR < calls.json
 
@@ -24,17 +24,17 @@ from fusesoc_firm.request.request import GeneratorCall, Request
 from fusesoc_firm.store.facts import facts
 from fusesoc_firm.text.diagnostics import InputError, SourceRef, fail
 
-# The least number of calls that justifies a process.
+# The minimum number of calls that justifies a process.
 _LEAST = 4
 # The parameter that lists message cores.
 _OF_CORES = "messages"
 
 
 def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None]:
-    """Process the calls in at most `jobs` processes; yield once for each call that was generated, found or skipped.
+    """Process calls in at most `jobs` processes; yield once for each call that is generated, cached or skipped.
 
-    On exit, all processes are ended. Meanwhile this process imports the modules needed to look calls up in the store,
-    so that its copies need not import them.
+    On exit, all processes are ended. While they run, this process imports the modules needed to look calls up in the
+    store, so that its copies need not import them.
     """
     ours = _ours(calls)
     for generator in dict.fromkeys(call.generator for call in ours):
@@ -72,7 +72,7 @@ def _run(generator: str, shares: list[list[GeneratorCall]], first: GeneratorCall
 
 
 def _ours(calls: Iterable[GeneratorCall]) -> list[GeneratorCall]:
-    """Our calls, except those with message cores: FuseSoC's run determines the folders of their messages."""
+    """Return the calls of our generators, except calls with message cores, whose folders FuseSoC's run determines."""
     return [
         call
         for call in calls
@@ -92,7 +92,8 @@ def main() -> None:
     """Process the calls on standard input; write a byte to standard output for each."""
     (name,) = sys.argv[1:]
     generator = GENERATORS[name]
-    # All calls use the modules of the first, so results are not stored if a module was edited since.
+    # All calls use the modules that the first call imported, so results are not stored if a module was edited since
+    # then.
     code = facts("code", [""])
     for item in json.load(sys.stdin):
         with suppress(InputError):

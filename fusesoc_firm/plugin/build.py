@@ -1,4 +1,4 @@
-"""Runs many builds at once, after generating their cores in advance: the work of `firm build`."""
+"""Run many builds in parallel after generating their cores in advance: the work of `firm build`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LAUNCHER = "EDALIZE_LAUNCHER"
 
 @dataclass(frozen=True)
 class How:
-    """How to build: the folders, the last step, the number of parallel builds (0: one per core), any cluster."""
+    """The options of builds: the folders, the last step, the number of parallel builds (0: one per core), a cluster."""
 
     is_clean: bool = False
     is_setup_only: bool = False
@@ -39,10 +39,10 @@ class How:
 def build(
     plan: Plan, how: How, tell: Callable[[str], None], progress: Callable[[str], None]
 ) -> Generator[Outcome, None, None]:
-    """Yield each build's outcome as it finishes. On exit, all processes that it started are ended.
+    """Yield the outcome of each build as it finishes. On exit, end all started processes.
 
-    `tell` is called for builds that wait, `progress` during generation. Raises `InputError`, also for differences from
-    the lock file of a core.
+    `tell` is called for builds that wait, and `progress` during generation. May raise `InputError`, also for
+    differences from a core's lock file.
     """
     os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
     if how.is_locked:
@@ -56,7 +56,7 @@ def build(
         return
     jobs = how.jobs or len(os.sched_getaffinity(0))
     plan.fetch()
-    # Each call with a lock file checks it.
+    # Each call with a lock file checks this file.
     if not how.is_locked and _generators_run_here():
         calls = plan.generator_calls()
         with closing(prepare(calls, jobs)) as steps:
@@ -68,7 +68,7 @@ def build(
 
 
 def _generators_run_here() -> bool:
-    """Whether generators run in the same Python as this process."""
+    """Return whether generators run in the same Python as this process."""
     chosen = os.environ.get("FUSESOC_FIRM_PYTHON")
     return not chosen or Path(chosen).absolute() == Path(sys.executable).absolute()
 

@@ -1,6 +1,6 @@
-"""The table of generators: the parameters of each, and the functions that it calls.
+"""The table of generators, with each generator's parameters and functions.
 
-A generator imports its stages when it is called, since these imports take longer than most of its work.
+A generator imports its stages only when it is called, since these imports take longer than most of the work.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _LARGEST_SEED = 2147483562
 
 @dataclass(frozen=True)
 class Generator:
-    """A generator: its parameters, and the function that derives a request.
+    """A generator: its parameters, and the function that derives the data of a request.
 
-    `load` derives all data of a request, and raises `InputError` for the user's faults. `programs` are required to run
-    the core. `tools` are the versions of programs that generate part of it.
+    `load` derives all data of a request, and raises `InputError` for faults in the user's input. `programs` returns the
+    programs required to run the core. `tools` returns the versions of the programs that generate part of the core.
     """
 
     parameters: tuple[Parameter, ...]
@@ -83,12 +83,14 @@ def _is_simulation(request: Request) -> bool:
 _PATHS = Parameter("paths", "list", "folders and bags with message definitions, relative to the core")
 
 _MESSAGES = Parameter(
-    "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
+    "messages",
+    "list",
+    "cores with message definitions, such as robot:msgs:arm; the requesting core depends on these cores",
 )
 
-_DISTRO = Parameter("distro", "str", "the ROS distribution of standard messages")
+_DISTRO = Parameter("distro", "str", "the ROS distribution that provides the standard messages")
 
-_LOCKED = Parameter("locked", "str", "a lock file, relative to the core; any difference from it is an error")
+_LOCKED = Parameter("locked", "str", "a lock file, relative to the core; any difference from this file is an error")
 
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
@@ -99,23 +101,23 @@ GENERATORS: Mapping[str, Generator] = {
                 "the type of a message, service or action, such as geometry_msgs/Quaternion",
                 is_required=True,
             ),
-            Parameter("ros", "int", "the version of ROS", is_required=True, choices=(1, 2)),
+            Parameter("ros", "int", "the ROS version", is_required=True, choices=(1, 2)),
             Parameter(
                 "direction", "str", "converters to generate", "both", choices=("subscriber", "publisher", "both")
             ),
-            Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter("width", "int", "the stream's width in bits", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
             Parameter(
                 "name",
                 "str",
-                "prefix of the names of all generated units, such as left; required for a second core of a message",
+                "prefix for the names of all generated units, such as left; required for a second core of a message",
                 rule=(PREFIX_RULE, is_prefix),
             ),
-            Parameter("include", "list", "fields with ports, such as pose.position; default all fields"),
-            Parameter("exclude", "list", "fields without ports; a publisher sends their defaults"),
+            Parameter("include", "list", "fields with ports, such as pose.position (default: all fields)"),
+            Parameter("exclude", "list", "fields without ports; a publisher sends the default values of these fields"),
             Parameter(
                 "config",
                 "str",
-                "a file that lists messages and the names of their interfaces, relative to the core",
+                "a file, relative to the core, that lists messages and the names of their interfaces",
                 replaces=("message", "ros", "direction", "width", "name", "include", "exclude"),
             ),
             _PATHS,
@@ -129,11 +131,13 @@ GENERATORS: Mapping[str, Generator] = {
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
             Parameter("product", "str", "the product to generate", "system", choices=("system", "simulation", "live")),
-            Parameter("board", "str", "the board: the name of a supported one, or a YAML file relative to the core"),
+            Parameter("board", "str", "the name of a supported board, or a YAML file relative to the core"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
-            Parameter("model", "str", "a Python file with a function that computes the system's answers"),
+            Parameter("model", "str", "a Python file with a function that computes the system's responses"),
             Parameter(
-                "environment", "list", "VHDL files of the environment at the pins; the last has the name of its entity"
+                "environment",
+                "list",
+                "VHDL files of the environment at the pins; the last file has the name of its entity",
             ),
             Parameter(
                 "simulator",
@@ -144,9 +148,9 @@ GENERATORS: Mapping[str, Generator] = {
             ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter(
-                "stall_percent", "int", "probability of a stall of a stream in a cycle, in percent", 25, bounds=(0, 99)
+                "stall_percent", "int", "percentage of cycles in which the host stalls a stream", 25, bounds=(0, 99)
             ),
-            Parameter("files", "list", "further files that the model or functions in software read"),
+            Parameter("files", "list", "other files that the model or software functions read"),
             _PATHS,
             _MESSAGES,
             _DISTRO,

@@ -1,8 +1,8 @@
-"""The lock file of a system: the message definitions, cores and tools that it uses, so that other builds use the same.
+"""The lock file of a system, which records the message definitions, cores and tools for later builds.
 
-A core's author may change the core's files, so they are not locked; everything from elsewhere is locked. `firm` checks
-a core as a whole against its lock (`check_lock`); a generator checks its own request (`check_request`), since it sees
-neither the other cores nor the programs of a target.
+The author of a core may change its files, so these are not locked; everything from other sources is locked. `firm`
+checks a whole core against its lock file (`check_lock`). A generator checks only its own request (`check_request`),
+since it knows neither the other cores nor the programs of a target.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
 from fusesoc_firm.tools.programs import facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
-"""Facts by kind (`messages`, `cores`, `tools`), by name of the item, and by name of the fact."""
+"""Facts by kind (`messages`, `cores`, `tools`), by the item's name, and by the fact's name."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
-_HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. Keep it under version control.\n"
+_HEAD = "# Written by 'firm lock', checked by 'firm lock --locked'. Keep this file under version control.\n"
 _WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
 
 
 def lock_path(core: ProjectCore) -> Path:
-    """The path of a core's lock file, next to its `.core` file."""
+    """Return the path of a core's lock file, next to its `.core` file."""
     return core.files[0].with_suffix(".lock")
 
 
 def lock_of(
     core: ProjectCore, depends: Iterable[ProjectCore], generated: Mapping[str, Sequence[LoadedRequest]]
 ) -> Lock:
-    """The definitions, cores and tools that a core now uses, directly or through the cores that it `depends` on.
+    """Return the definitions, cores and tools that a core now uses, directly or through the cores in `depends`.
 
-    `generated` holds the derived requests of each core by its name. A message that two cores take from different places
-    is listed for each.
+    `generated` maps each core's name to its derived requests. If two cores use a message from different sources, the
+    message is listed for each core.
     """
     depends = list(depends)
     messages: dict[str, dict[str, str]] = {}
@@ -63,26 +63,26 @@ def lock_of(
 
 
 def lock_text(lock: Lock) -> str:
-    """The text of the lock file."""
+    """Return the text of the lock file."""
     data = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
     return _HEAD + yaml_dump(data)
 
 
 def read_lock(path: Path) -> Lock:
-    """Read a lock file. Raises `InputError` if it is unreadable or invalid."""
+    """Read a lock file. Raise `InputError` if it is unreadable or invalid."""
     try:
         data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
         return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
     except OSError as error:
-        fail(f"cannot read {path}: {error.strerror}", hint="'firm lock' writes it")
+        fail(f"cannot read {path}: {error.strerror}", hint="run 'firm lock' to write the file")
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
-        fail(f"{path} is not a lock file", hint="'firm lock' rewrites it")
+        fail(f"{path} is not a lock file", hint="run 'firm lock' to rewrite the file")
 
 
 def check_lock(locked: Lock, used: Lock) -> None:
-    """Raise `InputError` with every difference between what is used and what is locked.
+    """Raise `InputError` with every difference between the used and the locked items.
 
-    An installed program that is not locked is not a difference: the locked build did not need it.
+    An installed program that is not locked is not a difference, since the locked build did not need this program.
     """
     faults = Diagnostics()
     for difference in _differences(locked, used):
@@ -97,11 +97,11 @@ def check_request(path: Path, loaded: LoadedRequest) -> None:
     for label, now in _messages(loaded).items():
         was = locked["messages"].get(_of_request(label, loaded), locked["messages"].get(label))
         for difference in _difference("message", label, was, now):
-            faults.error(difference, hint=f"by {path}")
+            faults.error(difference, hint=f"according to {path}")
     for name, now in packages(_PACKAGES).items():
         if (was := locked["tools"].get(name)) is not None:
             for difference in _difference("tool", name, was, now):
-                faults.error(difference, hint=f"by {path}")
+                faults.error(difference, hint=f"according to {path}")
     faults.raise_if_any()
 
 
@@ -116,17 +116,17 @@ def _differences(locked: Lock, used: Lock) -> Iterator[str]:
 
 
 def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mapping[str, str]) -> Iterator[str]:
-    """The differences between a used item and its locked state."""
+    """Yield the differences between a used item and its locked state."""
     if was is None:
         yield f"{word} {name} is used, but not locked"
         return
     for fact in sorted(was.keys() | now.keys()):
         if was.get(fact) != now.get(fact):
-            yield f"{word} {name}: {fact} is {now.get(fact)}, but {was.get(fact)} is locked"
+            yield f"{word} {name}: {fact} is {now.get(fact)}, but the lock file has {was.get(fact)}"
 
 
 def _messages(loaded: LoadedRequest) -> dict[str, dict[str, str]]:
-    """The facts of each message that a request uses."""
+    """Return the facts of each message that a request uses."""
     return {
         f"{name} ({library.ros.title})": _message(name, library, loaded.request.files_root.resolve())
         for library, definitions in loaded.definitions()
@@ -151,7 +151,10 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
 
 
 def _digest_of_core(core: ProjectCore, generated: Sequence[LoadedRequest]) -> str:
-    """The digest of a core's files and of the inputs of its generated cores, named relative to its `.core` file."""
+    """Return the digest of a core's files and of its generated cores' inputs.
+
+    Names are relative to the `.core` file.
+    """
     folder = core.files[0].parent
     made_of = [item for loaded in generated for item in loaded.inputs]
     return _digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
@@ -162,7 +165,7 @@ def _digest_of(found: Mapping[str, str | None]) -> str:
 
 
 def _named(item: Input, folder: Path) -> str:
-    """An input's name relative to a folder."""
+    """Return an input's name relative to a folder."""
     if isinstance(item, Path):
         return os.path.relpath(item.resolve(), folder)
     return f"{os.path.relpath(item.path.resolve(), folder)}:{item.name}"
@@ -177,7 +180,7 @@ def _digest(item: Input) -> str | None:
 def _tools() -> dict[str, dict[str, str]]:
     tools = packages(_PACKAGES)
     for program, path in installed_programs():
-        # A program of the same version counts as the same program on other machines, too.
+        # Programs with equal versions on different machines count as equal.
         if facts := {name: fact for name, fact in facts_of(program, path).items() if name != "sha256"}:
             tools[program] = facts
     return dict(sorted(tools.items()))

@@ -1,4 +1,4 @@
-"""A project's cores and their calls of our generators: the effects of an edit, a core's lock, and message folders."""
+"""A project's cores and their calls of our generators: effects of edits, lock files and message folders."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from fusesoc_firm.text.outputs import shown, write
 
 
 def graph(core: str, target: str) -> str:
-    """The dependencies of a core's target, in Graphviz's language. Raises `InputError`."""
+    """Return the dependencies of a core's target in Graphviz's language. May raise `InputError`."""
 
     def sources(call: GeneratorCall) -> list[str]:
         request = _request(call)
-        # Paths relative to the current folder distinguish files of the same name in two cores.
+        # Paths relative to the current folder distinguish files with equal names in two cores.
         return [] if request is None else [*map(shown, _input_files(request))]
 
     return core_graph(core, target, sources)
 
 
 def affected_since(revision: str) -> dict[str, str]:
-    """The cores that the edits since a revision affect, each with the reason. Raises `InputError`."""
+    """Return the cores that edits since a revision affect, each with the reason. May raise `InputError`."""
     changed = dict.fromkeys(path.resolve() for path in changed_files(revision, Path.cwd()))
     return affected(project_cores(), _touched(changed))
 
 
 def check_locked(core: str) -> Path:
-    """Compare a core, given by its name, with its lock file, and return the file's path.
+    """Compare the named core with its lock file, and return the file's path.
 
-    Raises `InputError` with every difference, or if the lock file is missing.
+    Raise `InputError` with every difference, or if the lock file is missing.
     """
     found, depends = dependencies(core)
     path = lock_path(found)
@@ -55,7 +55,7 @@ def check_locked(core: str) -> Path:
 
 
 def write_lock(core: str) -> Path:
-    """Write the lock file of a core, given by its name. Raises `InputError`."""
+    """Write the named core's lock file, and return the file's path. May raise `InputError`."""
     found, depends = dependencies(core)
     path = lock_path(found)
     write(path, lock_text(_used(found, depends)))
@@ -63,23 +63,24 @@ def write_lock(core: str) -> Path:
 
 
 def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
-    """The folders of message cores in their original places, since no run has copied them."""
+    """Return the original folders of message cores, since no run of FuseSoC has copied them."""
     found: list[Path] = []
     cores = {name: core for core in project_cores() for name in core.names}
     for name, source in named.items():
         core = cores.get(core_name(name))
         requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []
         if not requests:
-            fail(f"'{name}' is not a known core with messages", source)
+            fail(f"no known core '{name}' provides messages", source)
         found += [folder for request in requests if request for folder in folders(request)]
     return tuple(found)
 
 
 def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
-    """The definitions, cores and tools that a core uses now."""
+    """Return the definitions, cores and tools that a core uses now."""
     calls = {core.vlnv: [*_requests(core)]}
     for item in depends:
-        # Only part of a dependency may be used here. If another part cannot be generated, FuseSoC's run reports it.
+        # Only part of a dependency may be used here. If another part cannot be generated, FuseSoC's run reports the
+        # fault.
         with suppress(InputError):
             calls[item.vlnv] = [*_requests(item)]
     return lock_of(core, depends, calls)
@@ -93,11 +94,11 @@ def _requests(core: ProjectCore) -> Iterator[LoadedRequest]:
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
-    """A function that names the changed file by which a core itself is touched."""
+    """Return a function that returns the name of a changed file that touches a core itself, or None."""
 
     def touched(core: ProjectCore) -> str | None:
         found = _first(changed, core.files)
-        # The inputs of a generated core take longer to find.
+        # The inputs of generated cores are examined last, since finding them takes longer.
         for call in core.calls if changed and not found else ():
             found = found or _first(changed, _files_behind(call, changed))
         return shown(found) if found else None
@@ -110,28 +111,28 @@ def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
 
 
 def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
-    """All inputs of a generated core, including our own files."""
+    """Return all inputs of a generated core, including our own files."""
     try:
         request = _request(call)
         if request is None:
             return set()
         files = set(_input_files(request))
     except InputError:
-        # The core cannot be generated: any change next to it, or in our own files, may be the cause.
+        # The core cannot be generated; any change next to it, or in our own files, may be the cause.
         roots = (Path(call.files_root).resolve(), PACKAGE)
         return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
     return files | {PACKAGE / name for name in names()}
 
 
 def _request(call: GeneratorCall) -> Request | None:
-    """The request that FuseSoC would make; None for other generators."""
+    """Return the request that FuseSoC would make, or None if the generator is not ours."""
     if call.generator not in GENERATORS:
         return None
     return make_request(call, GENERATORS[call.generator].parameters, message_folders)
 
 
 def _input_files(request: Request) -> list[Path]:
-    """The files that a request depends on, even in part."""
+    """Return the files that a request depends on, including files of which only a part is used."""
     inputs = GENERATORS[request.command].load(request).inputs
     found = (item if isinstance(item, Path) else item.path for item in inputs)
     return [*dict.fromkeys(path.resolve() for path in found)]

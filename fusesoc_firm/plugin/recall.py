@@ -1,16 +1,17 @@
-"""Repeats the result of an earlier generator call if no fact that determined it has changed.
+"""Repeat the result of an earlier generator call if no fact that determined the result has changed.
 
-The store's key covers everything that determines a result. But to compute it, a specification must be read and a system
-derived, which takes longer than everything else if nothing has changed. So each answered call leaves a note in the
-store: the key, and the facts that determine it (`store.facts`). One kind of fact depends on the run of FuseSoC:
+The store's key covers everything that determines a result. To compute the key, a specification must be read and a
+system derived; for a hit, this takes longer than all other work. Each answered call therefore leaves a note in the
+store: the key, and the facts that determine the key (`store.facts`). One kind of fact depends on the run of FuseSoC:
 
-    messages    a message core in use: the folders that this run generated for it
+    messages    a message core in use: the folders that this run generated for the core
 
-The note is named by the digest of the call, as FuseSoC writes it, with the versions of Python and of the packages that
-we import. If each fact has its recorded state, the key would be the same, so the entry is the result. If a fact has
-changed, or anything is unusual, this module does nothing, and the key is computed. So the module affects only the time.
+The note's name is the digest of FuseSoC's file for the call and of the versions of Python and the packages that we
+import. If each fact has its recorded state, the key would be the same, so the entry is the result. If a fact has
+changed, or in any unusual situation, this module does nothing, and the key is computed. The module therefore affects
+only the duration of a call.
 
-It runs before all other modules of this package, and imports almost nothing.
+The module runs before all other modules of this package, and imports almost nothing.
 """
 
 from __future__ import annotations
@@ -44,9 +45,9 @@ LOCKED = "FUSESOC_FIRM_LOCKED"
 
 
 def answer(command: str, arguments: Sequence[str], run: str = "") -> bool:
-    """Write the core for a call; return False, and write nothing, unless the call is a hit.
+    """Write the core for a call if the call is a hit; otherwise write nothing and return False.
 
-    Without a `run`, the run of the parent process is used. After a failed write, the caller rewrites the whole core and
+    Without a `run`, the run is that of the parent process. After a failed write, the caller rewrites the whole core and
     reports the error.
     """
     start = time.monotonic()
@@ -73,37 +74,37 @@ def answer(command: str, arguments: Sequence[str], run: str = "") -> bool:
 
 
 def call_digest(command: str, call: bytes) -> str:
-    """The name of a call's note: the digest of FuseSoC's file for the call and of the Python that answers."""
+    """Return the name of a call's note: a digest of FuseSoC's file for the call and of the Python in use."""
     searched = [os.environ.get(name) for name in SEARCHED]
     python = [sys.version, os.uname().machine, _c_library(), _packages(), str(PACKAGE)]
     return digest_of([command, digest(call), searched, python])
 
 
 def messages_fact(generated: str, core: str, run: str) -> facts.Fact:
-    """A fact: the folders below `generated` with the messages of a core."""
+    """Return the fact about the folders below `generated` with the messages of a core."""
     name = json.dumps([generated, core])
     return "messages", name, state("messages", name, run)
 
 
 def hold(noted: Iterable[facts.Fact], run: str) -> bool:
-    """Whether all facts are in their recorded states."""
+    """Return whether all facts are in their recorded states."""
     return all(state(kind, name, run) == was for kind, name, was in noted)
 
 
 def state(kind: str, name: str, run: str) -> str | None:
-    """The current state of a fact; None if the object is missing or of another kind."""
+    """Return the current state of a fact, or None if the object is missing or of another kind."""
     try:
         if kind == "messages":
             generated, core = json.loads(name)
             return json.dumps(message_folders(generated, core, run))
         return facts.state(kind, name)
     except (OSError, ValueError, TypeError, RecursionError):
-        # A note written by others may contain anything, and one of our files may be changing at this moment.
+        # A note written by another user may contain anything, and one of our files may be changing at this moment.
         return None
 
 
 def _packages() -> list[list[object]]:
-    """Every installed version of the packages that we import, in each place of Python's path."""
+    """Return every installed version of the packages that we import, for each folder on Python's path."""
     found: list[list[object]] = []
     for folder in sys.path:
         try:

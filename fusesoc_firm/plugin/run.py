@@ -1,13 +1,15 @@
-"""One run of FuseSoC: writes a generated core, and the data that the run's calls leave for each other.
+"""One run of FuseSoC: write a generated core, and the data that the run's calls leave for each other.
 
 Each generator call is a separate process. FuseSoC makes the calls of a run one after another, in adjacent folders
-below `generator_cache`, which may still contain folders of earlier runs. So the data that a call leaves there names its
-run.
-* The messages of a core: the messages' generator marks its folder, and the generators of other cores find that folder.
-* The design units of a core: a tool keeps one unit of each name, and a later unit silently replaces an earlier one. So
-  each call compares its units with those of previous calls. Other targets generate elsewhere.
+below `generator_cache`, which may still contain folders of earlier runs. The data that a call leaves in its folder
+therefore include the run's id:
 
-A hit waits for this module, so it imports as little as possible.
+* The messages of a core: the generator of message cores marks its folder, and the generators of other cores find that
+  folder.
+* The design units of a core: a tool keeps only one unit of each name, and a later unit silently replaces an earlier
+  unit. Each call therefore compares its units with those of previous calls. Other targets generate elsewhere.
+
+Every hit loads this module, so it imports as little as possible.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from contextlib import suppress
 
 from fusesoc_firm.text.files import read_file, write_if_changed
 
-# The folder in which FuseSoC creates a folder for each call; adjacent folders elsewhere are not one design.
+# The folder in which FuseSoC creates a folder for each call; adjacent folders in other places are not one design.
 _GENERATED = "generator_cache"
 # A file that keeps FuseSoC from searching a folder for cores.
 _IGNORE = "FUSESOC_IGNORE"
@@ -31,21 +33,21 @@ _PATTERNS = {".vhd": _VHDL, ".vhdl": _VHDL, ".v": _VERILOG, ".sv": _VERILOG}
 
 
 Clash = tuple[str, str]
-"""A unit, and the full name of another core of the run that defines it differently."""
+"""A unit, and the full name of another core in the run that defines the unit differently."""
 
 
 def run_of(fusesoc: int) -> str:
-    """An id of this FuseSoC process's run that is unique on this machine."""
+    """Return an id, unique on this machine, for the run of the FuseSoC process with this id."""
     # The start time follows the name in parentheses, which may contain blanks.
     status = (read_file(f"/proc/{fusesoc}/stat") or b"").decode(errors="replace")
     return f"{fusesoc} {''.join(status.rpartition(')')[2].split()[19:20])}"
 
 
 def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str) -> Clash | None:
-    """Write a generated core, by its full name, to the current folder; the last file is its `.core`.
+    """Write the generated core with the full name `core` to the current folder; the last of `files` is its `.core`.
 
-    `messages_of` is the core whose messages these are, or "". If another core of the run defines a unit differently,
-    that clash is returned and nothing is written. Raises `OSError` with the absolute path that cannot be written.
+    `messages_of` is the core whose messages `files` define, or "". If another core in the run defines a unit
+    differently, return this clash and write nothing. Raise `OSError` with the absolute path that cannot be written.
     """
     folder = os.getcwd()
     units = _units_of(files)
@@ -64,7 +66,7 @@ def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str
 
 
 def message_folders(generated: str, core: str, run: str | None) -> list[str]:
-    """The folders in `generated` with the messages of a core (`vendor:library:name`), sorted; None means any run."""
+    """Return the sorted folders in `generated` with the messages of a core, from `run` or, for None, from any run."""
     found = []
     for folder in _folders(generated):
         marked, _, of_run = _read(folder, _MESSAGES).partition("\n")
@@ -74,7 +76,7 @@ def message_folders(generated: str, core: str, run: str | None) -> list[str]:
 
 
 def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
-    """The design units in generated files by their VHDL names, each with the digest of its file."""
+    """Return the VHDL names of the design units in generated files, each with the digest of its file."""
     found: dict[str, str] = {}
     for name, content in files.items():
         if pattern := _PATTERNS.get(os.path.splitext(name)[1].lower()):
@@ -84,7 +86,7 @@ def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
-    """The first unit that differs from a unit of the same name and run in a folder next to `folder`."""
+    """Return the first unit that differs from a unit with the same name and run beside `folder`, or None."""
     for core, others in _others(folder, run):
         for unit, digest in others.items():
             if units.get(unit, digest) != digest:
@@ -93,7 +95,7 @@ def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
 
 
 def _others(folder: str, run: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the core and units of each call in the run, except the call in `folder`, in order of folder name."""
+    """Yield the core and units of each call in the run, except the call in `folder`, in the order of folder names."""
     generated = os.path.dirname(folder)
     if os.path.basename(generated) != _GENERATED:
         return
@@ -119,12 +121,12 @@ def _read(folder: str, name: str) -> str:
 
 
 def _hide(generated: str) -> None:
-    """Keep generated cores from being found as cores of a library.
+    """Prevent FuseSoC from finding generated cores in a library.
 
-    FuseSoC takes every `.core` below a library's folder. If a project's own folder is a library, it contains the
-    project's builds, too.
+    FuseSoC loads every `.core` below a library's folder. If a project's own folder is a library, it also contains the
+    project's builds.
     """
-    # Everything else works without this file.
+    # A failed write has no other effect, so it is ignored.
     with suppress(OSError), open(os.path.join(generated, _IGNORE), "ab"):
         pass
 

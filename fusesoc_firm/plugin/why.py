@@ -1,9 +1,9 @@
-"""Explains generated lines: the lines of the template, specification and messages that they come from.
+"""Explain generated lines by the lines of the template, the specification and the messages that they originate from.
 
-Rendering a file again gives the template's line and the scope in its context. The lines of the specification and of
-messages are found by names. The blocks considered are named on the line or, if the line names no block, in the
-innermost scope that names any. The fields considered belong to these blocks' messages or, in a file about a message, to
-that message.
+The file is rendered again to find the template's line and the scope in the context. The lines in the specification and
+in messages are found by names. The relevant blocks are those named on the line or, if the line names no block, in the
+innermost scope that names blocks. The relevant fields belong to these blocks' messages or, in a file about a message,
+to that message.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _SIDE = re.compile(r"(?:in|out)\d*_")
 
 @dataclass(frozen=True)
 class Reason:
-    """A line of a generated file, and the places that it comes from."""
+    """A line of a generated file, with the places from which it originates."""
 
     line: TracedLine
     specification: tuple[SourceRef, ...]
@@ -46,7 +46,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Names:
-    """The places of the names on a line: blocks, and fields and constants, both by block and for all messages."""
+    """The places of the names of blocks, and of fields and constants, by block and for all messages together."""
 
     blocks: Mapping[str, SourceRef]
     fields: Mapping[str, Mapping[str, SourceRef]]
@@ -54,33 +54,33 @@ class Names:
 
 
 def why(path: Path) -> list[Reason]:
-    """The origin of each line of a generated file in a build. Raises `InputError`."""
+    """Return the origin of each line of a generated file in a build. May raise `InputError`."""
     call, name = call_file(path)
     command = _generator(call)
     request = read_request(command, call, GENERATORS[command])
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        fail(f"{path} is not a readable text: {error}")
+        fail(f"cannot read {path} as text: {error}")
     loaded = GENERATORS[command].load(request)
     rendering = rendering_of(loaded.generate, name, text, loaded.inputs)
     return reasons(rendering, _names(request))
 
 
 def _generator(path: Path) -> str:
-    """The generator of a call. FuseSoC's file does not name it, but the requesting core does."""
+    """Return the generator of a call, which the requesting core names, but FuseSoC's file does not."""
     call = read_call(path)
     generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
     if generator not in GENERATORS:
         fail(
-            f"no core in {call.files_root} generates {call.vlnv} any more",
-            hint="generate it again with fusesoc run --setup",
+            f"no core in {call.files_root} generates {call.vlnv} any longer",
+            hint="run 'fusesoc run --setup' to generate it again",
         )
     return generator
 
 
 def _names(request: Request) -> Names:
-    """The names that a line of a generated core may contain."""
+    """Return the names that the lines of a generated core may contain."""
     if request.command == "far":
         loaded = load_requested(request)
         return names_of(loaded.specification, loaded.messages())
@@ -90,33 +90,36 @@ def _names(request: Request) -> Names:
 def rendering_of(
     generate: Callable[[], GeneratedCore], name: str, text: str, inputs: Iterable[Input] = ()
 ) -> Rendering:
-    """The template and context of the file `name` in a generated core with these `inputs`.
+    """Return the template and context of the file `name` in a generated core with these `inputs`.
 
-    Raises `InputError` if no template generated the file, or if the generated text differs from `text`.
+    Raise `InputError` if no template generated the file, or if the generated text differs from `text`.
     """
     with recorded() as renderings:
         core = generate()
     if name not in core.files:
-        fail(f"'{name}' is not a file of the generated core", hint=f"its files: {', '.join(core.files)}")
+        fail(f"'{name}' is not a file of the generated core", hint=f"the core's files: {', '.join(core.files)}")
     content = core.files[name].content
     made = content if isinstance(content, str) else content.decode(errors="replace")
     if made != text:
-        fail(f"'{name}' is outdated or was edited", hint="generate it again with fusesoc run --setup")
+        fail(f"'{name}' is outdated or was edited", hint="run 'fusesoc run --setup' to generate it again")
     if made not in renderings:
         copied = [
             str(item)
             for item in inputs
             if isinstance(item, Path) and item.is_file() and item.read_bytes() == text.encode()
         ]
-        fail(f"'{name}' does not come from a template", hint=f"it is a copy of {copied[0]}" if copied else "it is data")
+        fail(
+            f"'{name}' was not generated from a template",
+            hint=f"the file is a copy of {copied[0]}" if copied else "the file contains data",
+        )
     return renderings[made]
 
 
 def reasons(rendering: Rendering, names: Names) -> list[Reason]:
-    """The origin of each line."""
+    """Return the origin of each line of a rendered file."""
     lines = traced_lines(rendering)
     text = "\n".join(line.text for line in lines)
-    # The file's own messages, for fields without a block before them.
+    # The messages that the file is about, for fields without a block before them.
     own: dict[str, SourceRef] = {}
     for message, fields in names.messages.items():
         if re.search(rf"\b{re.escape(message)}\b", text):
@@ -125,7 +128,7 @@ def reasons(rendering: Rendering, names: Names) -> list[Reason]:
 
 
 def names_of(specification: Specification | None, messages: Iterable[Message]) -> Names:
-    """The names in a specification and in messages, each given with all nested definitions."""
+    """Return the names in a specification and in messages, which are given with all nested definitions."""
     fields = {str(name): dict(_fields(name, definitions)) for name, definitions in messages}
     blocks: dict[str, SourceRef] = {}
     of_blocks: dict[str, dict[str, SourceRef]] = {}
@@ -142,7 +145,7 @@ def names_of(specification: Specification | None, messages: Iterable[Message]) -
 
 
 def _messages(name: str, specification: Specification | None) -> Iterator[str]:
-    """The messages of a block, as named in the specification."""
+    """Yield the messages of a block, as named in the specification."""
     assert specification is not None
     types = {str(item.name): item for item in specification.accelerators}
     for block in specification.blocks:
@@ -155,7 +158,7 @@ def _messages(name: str, specification: Specification | None) -> Iterator[str]:
 def _fields(
     name: MessageName, definitions: Definitions, above: tuple[str, ...] = ()
 ) -> Iterator[tuple[str, SourceRef]]:
-    """Yield the port name of each field, including nested ones, and the name of each constant, with its place."""
+    """Yield the port name of each field, including nested fields, and the name of each constant, with the place."""
     definition = definitions[name]
     for constant in definition.constants:
         yield constant.name.lower(), constant.source
@@ -183,7 +186,7 @@ def _reason(line: TracedLine, context: Mapping[str, object], names: Names, own: 
 
 
 def _scope_blocks(scope: str, context: Mapping[str, object], names: Names) -> list[SourceRef]:
-    """The places of the blocks named in the innermost scope that names any; the whole file's scope does not count."""
+    """Return the places of the blocks that the innermost scope with blocks names, except the whole file's scope."""
     data: object = context
     found: list[SourceRef] = []
     for key, number in _STEP.findall(scope):
@@ -204,22 +207,22 @@ def _words(text: str) -> list[str]:
 
 
 def _block(word: str, blocks: Iterable[str]) -> str | None:
-    """The block whose signal or instance this word names."""
+    """Return the block whose signal or instance has this name, or None."""
     bare = word.removeprefix("u_")
     found = [block for block in blocks if bare == block or bare.startswith(f"{block}_")]
     return max(found, key=len, default=None)
 
 
 def _longest(word: str, fields: Mapping[str, SourceRef]) -> SourceRef | None:
-    """The place of the longest field that begins a word; `_length`, `_axis_tdata` and the like may follow."""
+    """Return the place of the longest field name that begins a word; a suffix such as `_length` may follow the name."""
     found = [field for field in fields if word == field or word.startswith(f"{field}_")]
     return fields[max(found, key=len)] if found else None
 
 
 def call_file(path: Path) -> tuple[Path, str]:
-    """FuseSoC's call of the generator that generated a file, and the file's name in the generated core.
+    """Return FuseSoC's file for the call that generated a file, and the file's name in the generated core.
 
-    The file is below `generator_cache`, or is its copy below `src`. Raises `InputError` if there is no such call.
+    The file must be below `generator_cache`, or be a copy below `src`. Raise `InputError` if there is no such call.
     """
     path = path.absolute()
     places = [(folder, place) for folder in path.parents for place in (folder, *_caches(folder))]
@@ -228,13 +231,13 @@ def call_file(path: Path) -> tuple[Path, str]:
     if call is None:
         fail(
             f"{path} is not a generated file",
-            hint="generated files are in a build, below 'generator_cache' or in the folder of a core <core>-<instance>",
+            hint="generated files are in a build folder, below 'generator_cache' or in a folder <core>-<instance>",
         )
     return call, path.relative_to(folder).as_posix()
 
 
 def _caches(folder: Path) -> list[Path]:
-    """The folders in FuseSoC's cache for the core that was copied to `folder`."""
+    """Return the folders in FuseSoC's generator cache for the core that was copied to `folder`."""
     if folder.parent.name != "src":
         return []
     return sorted((folder.parent.parent / "generator_cache").glob(f"{folder.name}-*"))

@@ -1,4 +1,4 @@
-"""The command `firm replay`: sends a bag through a system, with a progress bar, error lines and a summary."""
+"""The command `firm replay`: send a bag through a system, with a progress bar, error lines and a summary."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fusesoc_firm.system.derived.model import Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 
-# The most lines about rejected messages; further ones are only counted.
+# The maximum number of lines about rejected messages; further messages are only counted.
 _SHOWN = 100
 
 
@@ -44,7 +44,7 @@ class Source:
     duration: float | None = None
 
     def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
-        """The selected messages of some topics."""
+        """Return the selected messages of some topics."""
         first = bag.start + round(self.start * 10**9)
         stop = None if self.duration is None else first + round(self.duration * 10**9)
         return islice((item for item in bag.messages(topics, stop) if item.stamp >= first), self.limit)
@@ -52,7 +52,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Target:
-    """The bag for the responses. The format is `form`, or else the one that the name implies, or else the source's."""
+    """The bag for the responses; without `form`, the name's ending or else the source determines the format."""
 
     path: Path
     form: Form | None = None
@@ -63,8 +63,8 @@ class Target:
 class Settings:
     """The settings of a replay: `names` renames topics of blocks.
 
-    The hardware is at rest after `quiet` cycles without a beat. With latency, a stamp is the cause's stamp plus the
-    hardware's latency.
+    The hardware is at rest after `quiet` cycles without a beat. If latency is included, a response's stamp is the
+    cause's stamp plus the hardware's latency.
     """
 
     names: Mapping[str, str]
@@ -81,14 +81,14 @@ def replay(
 ) -> None:
     """Replay a bag and print a summary; `start_simulator` is called after all other checks.
 
-    Raises `InputError`, also if a message was rejected; the responses to the others are then recorded.
+    May raise `InputError`, also if messages were rejected; the responses to all other messages are then recorded.
     """
     if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
-        fail(f"{target.path} is the bag to replay; write to another")
+        fail(f"cannot write {target.path}: it is the bag to replay")
     check_writable(target.path, force=target.force)
     system = loaded.system
     if settings.has_latency and system.clock is None:
-        fail("the latency in seconds is unknown: the specification has no 'clock'")
+        fail("cannot compute the latency in seconds: the specification has no 'clock'")
     clock = system.clock if settings.has_latency else None
     _check_names(settings.names, [item.block for item in (*stimulated(system), *published(system))])
     subscribers = renamed(stimulated(system), settings.names)
@@ -109,12 +109,12 @@ def replay(
         going.print_summary(target.path)
     if going.errors:
         errors = "1 error" if going.errors == 1 else f"{going.errors} errors"
-        fail(f"{errors}; {going.refused} of {going.played.total()} messages did not go through")
+        fail(f"{errors}; {going.refused} of {going.played.total()} messages had errors")
 
 
 @dataclass
 class _Replay:
-    """A replay in progress: the messages played from each stream, and the messages sent by each block."""
+    """A replay in progress: the numbers of messages played from each stream and sent by each block."""
 
     bag: Bag
     routes: Mapping[Stream, Route]
@@ -129,7 +129,7 @@ class _Replay:
     is_over: bool = False
 
     def play(self, source: Source) -> None:
-        """Replay all messages; an early end is reported."""
+        """Replay all messages, and report an early end."""
         expected = sum(count for stream, count in self.bag.streams.items() if stream in self.routes)
         total = expected if source.limit is None else min(expected, source.limit)
         topics = {stream.topic for stream in self.routes}
@@ -157,7 +157,7 @@ class _Replay:
             for subscriber in () if route.misfit else route.subscribers:
                 self.run.take(subscriber, recorded.payload, recorded.stamp)
         except (StuckError, TransportError) as error:
-            faults.append(f"the rest of the bag is not replayed: {error}")
+            faults.append(f"the rest of the bag was not replayed: {error}")
             self.is_over = True
         for sent in self.run.sent:
             self._record(sent)
@@ -185,7 +185,7 @@ class _Replay:
             tqdm.write(f"error: {self.bag.path}: {fault}", file=sys.stderr)
 
     def print_summary(self, path: Path) -> None:
-        """Print the messages that went in and came out, topic by topic."""
+        """Print the numbers of received and sent messages, topic by topic."""
         if self.errors > _SHOWN:
             print(f"and {self.errors - _SHOWN} more errors", file=sys.stderr)
         rows = [("in", *self._way(stream), str(self.played[stream])) for stream in self.routes]
@@ -195,7 +195,7 @@ class _Replay:
             print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
         dropped = {stream: count for stream, count in self.bag.streams.items() if stream not in self.routes}
         for stream, number in dropped.items():
-            print(f"no subscriber for {stream.topic} of {stream.type}: {number}")
+            print(f"no subscriber for {stream.topic} ({stream.type}): {number}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out, {sum(dropped.values())} dropped,"
             f" {self.errors} errors, {self.run.simulator.cycle} cycles"
@@ -207,7 +207,7 @@ class _Replay:
 
 
 def seconds(stamp: int) -> str:
-    """A time in ns as readable seconds, with all digits."""
+    """Return the text of a time in seconds with all digits; `stamp` is in ns."""
     return f"{stamp // 10**9}.{stamp % 10**9:09d}"
 
 
@@ -226,32 +226,32 @@ def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
     faults = Diagnostics()
     for block in names:
         if block not in blocks:
-            faults.error(f"the system has neither a subscriber nor a publisher '{block}'", hint=nearest(block, blocks))
+            faults.error(f"the system has no subscriber or publisher '{block}'", hint=nearest(block, blocks))
     faults.raise_if_any()
 
 
 def _form(target: Target, like: Form) -> Form:
-    """The format of the bag to write."""
+    """Return the format of the bag to write."""
     said = form_of(target.path)
     if target.form and said and target.form is not said:
-        fail(f"the format of {target.path} is to be {target.form.value}, but its ending means {said.value}")
+        fail(f"cannot write {target.path}: --format is {target.form.value}, but the file's ending means {said.value}")
     return target.form or said or like
 
 
 def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
-    """Raise `InputError` if the bag to write cannot hold the messages that the system publishes."""
+    """Raise `InputError` if the format of the bag cannot represent the messages that the system publishes."""
     faults = Diagnostics()
     for topic in topics:
         if topic.frame.ros != form.ros:
-            message = f"'{topic.block}' uses {topic.frame.ros.title}, but {path} would be a bag of {form.ros.title}"
-            faults.error(message, hint="choose another format with --format")
+            message = f"'{topic.block}' uses {topic.frame.ros.title}, but {path} would be a {form.ros.title} bag"
+            faults.error(message, hint="select another format with --format")
     faults.raise_if_any()
 
 
 def _routes(
     bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
 ) -> dict[Stream, Route]:
-    """The route of each stream. Raises `InputError` if there is no route, or a requested topic is missing."""
+    """Return the route of each stream. Raise `InputError` if there is no route, or if a requested topic is missing."""
     faults = Diagnostics()
     topics = {absolute_name(stream.topic) for stream in bag.streams}
     for item in subscribers:
@@ -260,9 +260,9 @@ def _routes(
     faults.raise_if_any()
     routes = routes_of(bag, subscribers, _signatures(loaded, subscribers))
     if not routes:
-        wanted = ", ".join(f"{item.name} of {item.frame.message}" for item in subscribers)
-        there = ", ".join(f"{stream.topic} of {stream.type}" for stream in bag.streams) or "nothing"
-        fail(f"{bag.path} holds no topic that the system takes: {wanted}", hint=f"it holds {there}")
+        wanted = ", ".join(f"{item.name} ({item.frame.message})" for item in subscribers)
+        there = ", ".join(f"{stream.topic} ({stream.type})" for stream in bag.streams) or "nothing"
+        fail(f"{bag.path} contains no topic for the system, which takes {wanted}", hint=f"the bag contains {there}")
     return routes
 
 

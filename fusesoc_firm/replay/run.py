@@ -1,7 +1,7 @@
-"""A system that receives one message at a time: the simulated hardware and the software.
+"""A run of a system, with simulated hardware and software, that receives one message at a time.
 
-Each message is sent when the hardware has come to rest after the previous one. So the cause of each response is known,
-and the same messages give the same responses in the same cycles.
+Each message is sent when the hardware is at rest after the previous message. The cause of each response is therefore
+known, and equal messages always result in equal responses in the same cycles.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from fusesoc_firm.simulation.software_run import sent_elsewhere
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, End, Topic
 from fusesoc_firm.text.diagnostics import InputError
 
-# A frame counts as stuck, and spontaneous sending as endless, after this many quiet periods plus this many cycles for
-# each byte of the frame.
+# After this number of quiet periods, plus this number of cycles for each byte of the frame, a frame counts as stuck,
+# and spontaneous sending as endless.
 _QUIETS = 100
 _CYCLES_A_BYTE = 64
 
 
 @dataclass
 class Cause:
-    """A message that was sent to the system: the stamp (ns), and the cycle of the first beat into the hardware."""
+    """A message that was sent to the system: the stamp in ns, and the cycle of the first beat into the hardware."""
 
     stamp: int
     first_cycle: int | None = None
@@ -38,9 +38,9 @@ class Cause:
 
 @dataclass(frozen=True)
 class Sent:
-    """A message that left the system, and its cause: the last earlier message whose route leads to it.
+    """A message that left the system, with its cause: the last earlier message on a route to this message.
 
-    `last_cycle` is the cycle of the message's last beat; None if software sent the message.
+    `last_cycle` is the cycle of the message's last beat, or None if software sent the message.
     """
 
     topic: Topic
@@ -49,19 +49,19 @@ class Sent:
     last_cycle: int | None
 
     def latency(self, clock_hz: Fraction) -> int:
-        """The time in ns from the cause's first beat to the response's last; 0 if either bypassed the hardware."""
+        """Return the time in ns from the cause's first to the response's last beat; 0 if one bypassed the hardware."""
         if self.last_cycle is None or self.cause.first_cycle is None:
             return 0
         return round((self.last_cycle - self.cause.first_cycle) * 10**9 / clock_hz)
 
 
 class StuckError(Exception):
-    """The hardware does not accept a frame, and therefore no later frame, either."""
+    """The hardware does not accept a frame, and would therefore not accept later frames."""
 
 
 @dataclass
 class SystemRun:
-    """A system in simulation. The hardware is at rest after `quiet` cycles without a beat in any direction.
+    """A system in simulation; the hardware is at rest after `quiet` cycles without a beat in either direction.
 
     `sent` and `faults` accumulate until the caller empties them.
     """
@@ -91,7 +91,7 @@ class SystemRun:
 
     @cached_property
     def _entries(self) -> Mapping[str, End]:
-        """The sources of messages from software elsewhere, by block."""
+        """The sources of messages from software in other programs, by block."""
         return {topic.block: end for topic, end in sent_elsewhere(self.system).items()}
 
     @cached_property
@@ -106,9 +106,9 @@ class SystemRun:
         return found
 
     def take(self, topic: Topic, payload: bytes, stamp: int) -> None:
-        """Send a message to the system and wait for the hardware to rest. Raises `StuckError` and `TransportError`.
+        """Send a message to the system, and wait until the hardware is at rest.
 
-        If the message is rejected, a fault is added.
+        If the message is rejected, add a fault. May raise `StuckError` and `TransportError`.
         """
         try:
             message = decode(topic.frame, payload)
@@ -127,10 +127,10 @@ class SystemRun:
     def unfinished(self) -> str:
         """The fault of an incomplete last frame from the hardware; empty if all frames were complete."""
         blocks = [self.system.publishers[number].block for number in self._joiner.unfinished]
-        return f"the system has not sent the rest of a frame of {', '.join(blocks)}" if blocks else ""
+        return f"the system has not completed a frame of {', '.join(blocks)}" if blocks else ""
 
     def _reached(self, block: str) -> set[str]:
-        """A block and all blocks that its messages reach."""
+        """Return a block and all blocks that its messages reach."""
         found: set[str] = set()
         new = {block}
         while new:
@@ -144,11 +144,11 @@ class SystemRun:
         self._postpone(len(payload))
 
     def _postpone(self, size: int) -> None:
-        """Extend the deadline after progress, with `size` bytes remaining."""
+        """Extend the deadline because of progress; `size` bytes remain."""
         self._deadline = max(self._deadline, self.simulator.cycle + _QUIETS * self.quiet + _CYCLES_A_BYTE * size)
 
     def _give(self, source: End, message: Message, cause: Cause) -> None:
-        """Give software a message, and send the results to the hardware or to publishers."""
+        """Pass a message to software, and send the results to the hardware or to publishers."""
         try:
             given = self.functions.take(source, message)
         except InputError as error:
@@ -176,7 +176,7 @@ class SystemRun:
                     case ErrorPulse(converter=converter):
                         self.faults.append(self._error(converter))
             if self._waiting and self.simulator.cycle >= self._deadline:
-                raise StuckError(f"the system does not accept it at '{self._waiting[0].block}'")
+                raise StuckError(f"the system does not accept the message at '{self._waiting[0].block}'")
 
     def _is_busy(self) -> bool:
         return self.simulator.quiet < self.quiet and self.simulator.cycle < self._deadline
@@ -209,12 +209,12 @@ class SystemRun:
 
 
 def published(system: DerivedSystem) -> list[Topic]:
-    """The topics that leave a system: the software's, and those of the hardware that software here does not use."""
+    """Return a system's output topics: those of software, and those of hardware that software here does not use."""
     here = _software_here(system)
     converters = [item for item in system.publishers if not item.software or item.software.block not in here]
     return [*converters, *system.software.publishers]
 
 
 def _software_here(system: DerivedSystem) -> set[str]:
-    """The blocks whose functions are available here."""
+    """Return the blocks in software whose functions are available here."""
     return {block.block for block in system.software.blocks if block.type.accelerator.sources}

@@ -1,4 +1,4 @@
-"""Converts FuseSoC's call of a generator to a request with checked parameters."""
+"""Convert FuseSoC's call of a generator to a request with checked parameters."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from fusesoc_firm.text.yaml_text import yaml_data
 
 
 def read_call(path: Path, generator: str = "") -> GeneratorCall:
-    """Read the call from FuseSoC's file, which does not name the generator. Raises `InputError`."""
+    """Read a call from FuseSoC's file, which does not name the generator. May raise `InputError`."""
     try:
         call = yaml_data(path.read_text(encoding="utf-8"))
         return GeneratorCall(generator, str(call["vlnv"]), str(Path(call["files_root"])), call.get("parameters") or {})
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
-        fail(f"{path} is not a generator call of FuseSoC: {error}")
+        fail(f"{path} is not a FuseSoC generator call: {error}")
 
 
 def make_request(call: GeneratorCall, parameters: Iterable[Parameter], find: CoreFolders) -> Request:
-    """The request of a call; `find` locates the folders of the message cores that it uses. Raises `InputError`."""
+    """Return the request of a call; `find` locates the folders of its message cores. May raise `InputError`."""
     folder = Path(call.files_root)
     origin = find_requesting_core(folder, call.vlnv.split(":")[2])
     checked = check_parameters(call.parameters, parameters, origin)

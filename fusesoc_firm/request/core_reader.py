@@ -1,4 +1,4 @@
-"""Reads a `.core` file with the positions of its contents. All other modules read cores through this one.
+"""Read a `.core` file with the positions of its contents; all other modules read cores through this module.
 
 `building` uses FuseSoC's own reader, which includes dependencies and a target's flags.
 """
@@ -26,7 +26,7 @@ class CoreFile:
 
     @cached_property
     def data(self) -> Mapping[str, Any]:
-        """The file's content with YAML's inheritance resolved; empty if it is not a mapping. Raises `InputError`."""
+        """The file's content with YAML's inheritance resolved, empty if it is not a mapping. May raise `InputError`."""
         try:
             data = data_of(self.text.root)
         except yaml.YAMLError as error:
@@ -34,18 +34,18 @@ class CoreFile:
         return data if isinstance(data, dict) else {}
 
     def section(self, name: str) -> dict[str, dict[str, Any]]:
-        """The items of a section by name, including empty ones. Raises `InputError`."""
+        """Return the items of a section by name, including empty items. May raise `InputError`."""
         section = self.data.get(name)
         items = section.items() if isinstance(section, dict) else ()
         return {str(key): item if isinstance(item, dict) else {} for key, item in items}
 
     def parameters(self, instance: str) -> dict[str, Any]:
-        """The parameters that the core gives a generator for an instance. Raises `InputError`."""
+        """Return the parameters of a generator instance in the core. May raise `InputError`."""
         parameters = self.section("generate").get(instance, {}).get("parameters")
         return parameters if isinstance(parameters, dict) else {}
 
     def item(self, *keys: str) -> tuple[yaml.Node, yaml.Node] | None:
-        """The key and value nodes of an item in nested mappings, as written; None if it is missing."""
+        """Return the key and value nodes of an item in nested mappings, as written, or None if it is missing."""
         node, found = self.text.root, None
         for key in keys:
             pairs = node.value if isinstance(node, yaml.MappingNode) else ()
@@ -55,21 +55,21 @@ class CoreFile:
         return found
 
     def source(self, node: yaml.Node) -> SourceRef:
-        """The place of a node."""
+        """Return the place of a node."""
         return self.text.source(node)
 
 
 def read_core(path: Path) -> CoreFile:
-    """Read a `.core` file. Raises `InputError`, at the place of the fault, if it is unreadable or not YAML."""
+    """Read a `.core` file. Raise `InputError`, at the place of the fault, if it is unreadable or not YAML."""
     return CoreFile(path, read_yaml(path, bounds=LARGE))
 
 
 @lru_cache(maxsize=8)
 def read_core_once(path: Path, _changed: int) -> CoreFile:
-    """Cached `read_core`, for a process that generates many instances of one core."""
+    """Cache `read_core`, for a process that generates many instances of one core."""
     return read_core(path)
 
 
 def core_name(vlnv: str) -> str:
-    """The name of a core without its version."""
+    """Return the name of a core without its version."""
     return ":".join(vlnv.split(":")[:3])

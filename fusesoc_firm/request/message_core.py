@@ -1,8 +1,8 @@
-"""Generates cores that carry message definitions for other cores: the generator `firm_messages`.
+"""Generate cores that provide message definitions to other cores: the generator `firm_messages`.
 
-A generator is given only the requesting core's folder. But FuseSoC runs a core's generators after the generators of its
-dependencies, each in a separate adjacent folder. So the generator copies a message core's definitions, and a core that
-lists the message core in `messages` finds the copies in an adjacent folder (`plugin.run`).
+A generator knows only the requesting core's folder. However, FuseSoC runs a core's generators after the generators of
+the core's dependencies, each in a separate adjacent folder. This generator therefore copies a message core's
+definitions, and a core that lists the message core in `messages` finds the copies in an adjacent folder (`plugin.run`).
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from fusesoc_firm.text.diagnostics import SourceRef, fail
 
 
 def folders(request: Request) -> list[Path]:
-    """The folders with a core's messages: the core's own folders, then the folders of the cores that it lists."""
+    """Return the folders with a core's messages: the core's own folders, then the folders of the listed cores."""
     paths = request.parameters["paths"] or []
     assert isinstance(paths, list)
     return [*(request.files_root / path for path in paths), *request.message_folders.of(request.listed("messages"))]
 
 
 def load(request: Request) -> LoadedRequest:
-    """Load the definitions as a core, with one folder per package, including the definitions of the listed cores."""
+    """Load a core with all definitions, including those of the listed cores, in one folder per package."""
     found = list(_files(request))
     # The messages are not parsed.
     return LoadedRequest(request, [path for _, path in found], lambda: _core(request, found), list)
@@ -33,15 +33,19 @@ def load(request: Request) -> LoadedRequest:
 def _core(request: Request, found: list[tuple[str, Path]]) -> GeneratedCore:
     files: dict[str, GeneratedFile] = {}
     for name, path in found:
-        # If two folders have the same file, the first takes precedence.
+        # If two folders contain the same file, the first folder takes precedence.
         files.setdefault(name, GeneratedFile(path.read_bytes(), "user"))
     if not files:
-        fail(f"{request.name} has no messages", request_place(request), "'paths' lists their folders")
+        fail(
+            f"{request.name} contains no messages",
+            request_place(request),
+            "list the folders of the messages in 'paths'",
+        )
     return GeneratedCore(f"Message definitions of {request.name}", files)
 
 
 def request_place(request: Request) -> SourceRef | None:
-    """The place that names the first of a core's folders."""
+    """Return the place in the requesting core that names the first folder."""
     return next(iter(request.listed("paths").values()), None)
 
 

@@ -1,4 +1,4 @@
-"""Defines the parameters of the generators, and checks the parameters that a core gives.
+"""Define the parameters of the generators, and check the parameters in a core's calls.
 
 A fault is reported at its place in the requesting `.core` file.
 """
@@ -26,7 +26,7 @@ class Parameter:
     """A parameter: `type` and `meaning` appear in the generator's usage text, `bounds` are the inclusive limits.
 
     `rule` describes the legal texts and tests a text. A parameter that is neither given nor required has its `default`.
-    A parameter may replace others (`replaces`); the replaced parameters are then neither required nor allowed.
+    If a given parameter replaces others (`replaces`), these are neither required nor allowed.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Parameter:
     rule: tuple[str, Callable[[str], bool]] | None = None
 
     def usage(self) -> str:
-        """`name (type): text`, as in the generator core's usage text."""
+        """Return `name (type): text`, as in the generator core's usage text."""
         facts = []
         if self.choices:
             facts.append(" | ".join(map(str, self.choices)))
@@ -57,7 +57,7 @@ class Parameter:
 
 
 def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origin: RequestingCore) -> dict[str, Plain]:
-    """The value of every known parameter, given or default. Raises `InputError` with all faults."""
+    """Return the given or default value of every known parameter. Raise `InputError` with all faults."""
     table = {parameter.name: parameter for parameter in known}
     replacing = {name: parameter.name for parameter in table.values() for name in parameter.replaces}
     faults = Diagnostics()
@@ -65,12 +65,12 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
         if name not in table:
             faults.error(f"unknown parameter '{name}'", origin.key(name), nearest(name, table))
         elif replacing.get(name) in given:
-            hint = "remove one of them"
+            hint = "remove one of these parameters"
             faults.error(f"parameter '{name}' cannot be combined with '{replacing[name]}'", origin.key(name), hint)
     for name, parameter in table.items():
         if name not in given:
             if parameter.is_required and replacing.get(name) not in given:
-                hint = f"or give '{replacing[name]}' instead" if name in replacing else ""
+                hint = f"alternatively, set '{replacing[name]}'" if name in replacing else ""
                 faults.error(f"parameter '{name}' is missing: {parameter.meaning}", origin.instance(), hint)
         elif fault := _fault(parameter, given[name]):
             faults.error(f"parameter '{name}' is {given[name]!r}, but must be {fault}", origin.value(name))
@@ -79,9 +79,9 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
 
 
 def _fault(parameter: Parameter, value: object) -> str:
-    """Return what `value` should be; "" if the value is valid."""
+    """Return the legal values if `value` is illegal, or an empty string."""
     expected, words = _TYPES[parameter.type]
-    # Exact types, since in Python a bool is an integer.
+    # Types are compared exactly, since in Python a bool is also an integer.
     if type(value) is not expected or (isinstance(value, list) and not all(type(item) is str for item in value)):
         return words
     texts = value if isinstance(value, list) else [value] if isinstance(value, str) else []

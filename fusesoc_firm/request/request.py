@@ -18,21 +18,25 @@ from fusesoc_firm.text.yaml_text import yaml_dump
 
 _LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None
-"""A value of a generator's parameter; None means not given and without default."""
+"""A value of a generator's parameter; None means that the parameter is not given and has no default."""
 CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
-"""Finds the folders with the messages of cores, given by name and place. Raises `InputError` for an unknown core."""
+"""A function that finds the folders of message cores, given by name and place; it may raise `InputError`."""
 
 
 def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
-    """Reject every core: none can be looked up."""
+    """Raise `InputError` for every core, since message cores cannot be looked up."""
     for name, source in names.items():
-        fail(f"core '{name}' cannot be looked up here", source, "name the folder of its messages")
+        fail(
+            f"message cores such as '{name}' cannot be looked up here",
+            source,
+            "give the folder with the message definitions",
+        )
     return ()
 
 
 @dataclass(frozen=True)
 class GeneratorCall:
-    """FuseSoC's call of a generator: the new core's name, the requesting core's folder, and parameters."""
+    """FuseSoC's call of a generator: the new core's name, the requesting core's folder, and the parameters."""
 
     generator: str
     vlnv: str
@@ -48,7 +52,7 @@ class MessageFolders:
         self._find = find
 
     def of(self, cores: Mapping[str, SourceRef | None]) -> list[Path]:
-        """The folders of some cores, each with its place. Raises `InputError` for an unknown core."""
+        """Return the folders of cores, given with their places. Raise `InputError` for an unknown core."""
         for name, source in cores.items():
             if name not in self.found:
                 self.found[name] = self._find({name: source})
@@ -59,8 +63,8 @@ class MessageFolders:
 class Request:
     """A generator call with checked parameters, from the core in the folder `files_root`, for the new core `vlnv`.
 
-    `places` holds the places of a list parameter's items, if known; they are not part of the request. `message_folders`
-    finds the folders of the message cores that the request or its specification lists.
+    `places` contains the places of list parameters' items, if known; the places are not part of the key.
+    `message_folders` finds the folders of the message cores that the request or its specification lists.
     """
 
     command: str
@@ -76,7 +80,7 @@ class Request:
         return self.vlnv.split(":")[2]
 
     def listed(self, parameter: str) -> dict[str, SourceRef | None]:
-        """The items of a list parameter, each with its place; empty if the parameter is not given."""
+        """Return the items of a list parameter, each with its place; without the parameter, an empty dictionary."""
         items = self.parameters.get(parameter) or []
         assert isinstance(items, list)
         places = self.places.get(parameter, ())
@@ -87,8 +91,9 @@ class Request:
 class GeneratedFile:
     """A file of a generated core.
 
-    `file_type` is FuseSoC's name for the type (`vhdlSource-93`, `user`, ...), `logical_name` the VHDL library, and
-    `copyto` the file's place in the tool's work folder; "" omits the attribute. An include file is read by other files.
+    `file_type` is FuseSoC's name for the type (`vhdlSource-93`, `user`, ...), `logical_name` is the VHDL library, and
+    `copyto` is the file's place in the tool's work folder; an empty value omits the attribute. `is_include_file` marks
+    a file that other files include.
     """
 
     content: str | bytes
@@ -101,7 +106,7 @@ class GeneratedFile:
 
 @dataclass(frozen=True)
 class GeneratedCore:
-    """A core as a generator returns it: files by path relative to the core, in the order in which a tool reads them."""
+    """The core that a generator returns: its files by relative path, in the order in which tools read them."""
 
     description: str
     files: Mapping[str, GeneratedFile] = field(default_factory=dict)
@@ -109,10 +114,10 @@ class GeneratedCore:
 
 @dataclass(frozen=True)
 class LoadedRequest:
-    """A request with its inputs and derived data, computed once.
+    """A request with its inputs and derived data, which are computed only once.
 
     `inputs` are the files on whose content the core depends; a path need not exist. `generate` creates the core;
-    `definitions` returns the library of each message with all nested definitions. Both raise `InputError`.
+    `definitions` returns the library of each message with all nested definitions. Both may raise `InputError`.
     """
 
     request: Request
@@ -122,24 +127,27 @@ class LoadedRequest:
 
 
 def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
-    """The files to write for FuseSoC, by path. The `.core` file is last: once it exists, all others must exist, too.
+    """Return the files to write for FuseSoC, by path; the `.core` file is last, so that it completes the core.
 
-    Raises `InputError` for a name that is too long for a file.
+    Raise `InputError` for a name that is too long for a file.
     """
     contents = {_checked(path): _encoded(file.content) for path, file in core.files.items()}
     return contents | {f"{request.name}.core": core_text(core, request.vlnv).encode()}
 
 
 def _checked(path: str) -> str:
-    """Return `path` unless a part exceeds the file systems' limit: entity names combine several names."""
+    """Return `path`.
+
+    Raise `InputError` if a part exceeds the file systems' limit, since entities combine several names.
+    """
     for part in path.split("/"):
         if (size := len(part.encode())) > _LONGEST_FILE_NAME:
-            fail(f"the file '{part[:40]}...' would have a name of {size} bytes; file systems take {_LONGEST_FILE_NAME}")
+            fail(f"the name of the file '{part[:40]}...' would have {size} bytes; legal: at most {_LONGEST_FILE_NAME}")
     return path
 
 
 def core_text(core: GeneratedCore, vlnv: str) -> str:
-    """The `.core` file, which is always the same text for the same core."""
+    """Return the text of the `.core` file, which is always the same for the same core."""
     description = {
         "name": vlnv,
         "description": core.description,

@@ -25,7 +25,7 @@ class Criterion(StrEnum):
 
 @dataclass(frozen=True)
 class Bound:
-    """The guarantees for a task, in cycles; None means no bound: the task may never be served.
+    """The bounds for a task, in cycles; None means that there is no bound, so the task may never be served.
 
     `buffer` is the number of bytes that the accelerator may have to store while the task is late (section 6.3.2).
     """
@@ -42,7 +42,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The results of a policy for the tasks; `bounds` are in the order of the tasks.
+    """The results of the analysis of a policy; `bounds` are in the order of the tasks.
 
     `priorities` are the tasks' names, the highest priority first, if the policy has fixed priorities. `lut` is None if
     it is unknown.
@@ -65,36 +65,36 @@ class Analysis:
 
     @property
     def worst_lateness(self) -> float:
-        """The greatest bound on a lateness; infinite if a task may starve."""
+        """The greatest bound on the lateness of any task; infinite if a task may starve."""
         return max(inf if bound.lateness is None else bound.lateness for bound in self.bounds)
 
     @property
     def latest(self) -> Bound:
-        """The task with the greatest bound on lateness."""
+        """The bound of the task with the greatest bound on lateness."""
         return max(self.bounds, key=lambda bound: inf if bound.lateness is None else bound.lateness)
 
     @property
     def buffer(self) -> int | None:
-        """The size of all buffers together in bytes; None if a buffer has no bound."""
+        """The total size of all buffers in bytes; None if a buffer has no bound."""
         sizes = [bound.buffer for bound in self.bounds]
         return None if None in sizes else sum(size for size in sizes if size is not None)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """The resource that the tasks share: the bytes of a beat, and the shortest run before an interruption in beats."""
+    """The resource that the tasks share: the bytes in a beat, and the shortest run in beats before an interruption."""
 
     beat_bytes: int = 1
     shortest_run: int = 1
 
 
 def utilisation(tasks: Sequence[Task]) -> float:
-    """The channel's utilisation by the tasks (equation 4.1)."""
+    """Return the channel's utilisation by the tasks (equation 4.1)."""
     return sum(task.transfer_time / task.period for task in tasks)
 
 
 def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overheads:
-    """The overheads of a policy's cores (cores/sched).
+    """Return the overheads of the core of a policy (cores/sched).
 
     A scheduler that chooses among all requests at once needs one cycle, or two if it compares times. A scheduler with a
     queue accepts one request in each cycle. Each request may cause three operations of the queue: the request is
@@ -110,12 +110,12 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
 
 
 def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *, is_ordered: bool = False) -> Analysis:
-    """Bounds under a policy; with fixed priorities, under the best known assignment.
+    """Return the bounds under a policy; with fixed priorities, under the best known assignment.
 
     If `is_ordered` is set, the tasks are in the order of their priorities, the highest first.
 
-    The bounds hold for the cores' cycle-exact models with a sink that accepts every beat. Tests compare them with
-    simulations.
+    The bounds are valid for the cycle-exact models of the cores with a sink that accepts every beat. Tests compare the
+    bounds with simulations.
     """
     overheads = overheads_of(policy, len(tasks), channel.shortest_run)
     order: Sequence[Task] = ()
@@ -135,10 +135,10 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
 
 
 def luts(policy: str, requesters: int) -> int | None:
-    """The LUTs of a scheduler, plus the Manager's LUTs for bursts if the scheduler is preemptive.
+    """Return the LUTs of a scheduler, plus the Manager's LUTs for bursts if the scheduler is preemptive.
 
-    The values are measured. If there is no measurement, the value from the dissertation's table 4.1 applies, which does
-    not include bursts. The result is None if both are missing.
+    The values are measured. Without a measurement, the value is from the dissertation's table 4.1 and does not include
+    bursts. The result is None if both values are missing.
     """
     measured = area.measured()
     if not measured:
@@ -151,13 +151,13 @@ def luts(policy: str, requesters: int) -> int | None:
 
 
 def _burst_luts(measured: Areas, requesters: int) -> int | None:
-    """The Manager's LUTs for bursts; a difference of two mappings, which multiplexer mapping can make negative."""
+    """Return the Manager's LUTs for bursts: a difference between two synthesis results, which may be negative."""
     bursts, whole = (area.at(measured, design, requesters) for design in (area.MANAGER_PREEMPTIVE, area.MANAGER))
     return bursts.lut - whole.lut if bursts and whole else None
 
 
 def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
-    """The bytes that arrive while a task is late: the data of later requests, at most one beat in each cycle.
+    """Return the number of bytes that arrive while a task is late: data of later requests, at most a beat per cycle.
 
     The result never exceeds the rule of section 6.3.2: one byte for each cycle of the greatest lateness.
     """
@@ -172,11 +172,12 @@ def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
 
 
 def assign_priorities(policy: str, tasks: Sequence[Task], overheads: Overheads) -> tuple[Task, ...]:
-    """The tasks, the highest priority first.
+    """Return the tasks in the order of their assigned priorities, the highest first.
 
     Deadline monotonic is optimal with preemption if no deadline is longer than its period (J. Leung and J. Whitehead,
-    1982). Otherwise, priorities are assigned from the lowest up: each goes to a task that meets its deadline at this
-    priority (N. Audsley, 1991). If several tasks or no task do, the task with the longest deadline gets the priority.
+    1982). Otherwise, priorities are assigned in ascending order: each is assigned to a task that meets its deadline at
+    this priority (N. Audsley, 1991). If several tasks meet their deadlines, or none does, the task with the longest
+    deadline gets the priority.
     """
     by_deadline = sorted(tasks, key=lambda task: task.deadline)
     if POLICIES[policy].is_preemptive and all(task.deadline <= task.period for task in tasks):
@@ -226,7 +227,7 @@ def _lst(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
 
 
 def _least(task: Task, lateness: float, counted: int) -> int:
-    """The smaller of two bounds; the first one limits the lateness of every task."""
+    """Return the smaller of a task's two response bounds: one from a bound on any task's `lateness`, and `counted`."""
     return counted if lateness == inf else min(task.deadline + floor(lateness), counted)
 
 
@@ -243,7 +244,7 @@ _RESPONSES: Mapping[Order, Callable[[Sequence[Task], Overheads], list[int | None
 
 @dataclass(frozen=True)
 class Choice:
-    """All policies, the best one first, with the reasons for this order."""
+    """All analysed policies, the best one first, with the reasons for the choice."""
 
     criterion: Criterion
     utilisation: float
@@ -252,7 +253,7 @@ class Choice:
 
     @property
     def best(self) -> Analysis:
-        """The chosen policy."""
+        """The analysis of the chosen policy."""
         return self.analyses[0]
 
 
@@ -263,11 +264,14 @@ def choose(
     *,
     is_ordered: bool = False,
 ) -> Choice:
-    """Choose the best policy, with `is_ordered` as in `analyse`; raises `ValueError` for no tasks or equal names."""
+    """Choose the best policy, with `is_ordered` as in `analyse`.
+
+    Raise `ValueError` if tasks are missing or share a name.
+    """
     if not tasks:
-        raise ValueError("there are no tasks")
+        raise ValueError("at least one task is required")
     if len({task.name for task in tasks}) < len(tasks):
-        raise ValueError("two tasks have the same name")
+        raise ValueError("task names must be unique")
     analyses = sorted(
         (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in TABLE_ORDER), key=_RANKS[criterion]
     )
@@ -280,7 +284,7 @@ def _luts_rank(analysis: Analysis) -> float:
     return inf if analysis.lut is None else analysis.lut
 
 
-# First the policies that keep all deadlines, then those that finish all tasks; within each group, the criterion
+# The policies that meet all deadlines precede the policies that finish all tasks; within each group, the criterion
 # decides.
 _RANKS: Mapping[Criterion, Callable[[Analysis], tuple[float, ...]]] = {
     Criterion.LUTS: lambda each: (
@@ -296,33 +300,35 @@ _RANKS: Mapping[Criterion, Callable[[Analysis], tuple[float, ...]]] = {
 
 def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float, names: tuple[str, ...]) -> list[str]:
     best = analyses[0]
-    found = [f"The publishers ask for {100 * load:.1f} % of the channel."]
+    found = [f"The publishers request {100 * load:.1f} % of the channel."]
     if load > 1:
         found[0] += " The channel is overloaded: each sends less often than its period allows."
     holding = [each for each in analyses if each.is_schedulable]
     finishing = [each for each in analyses if each.all_finish]
     if criterion is Criterion.FINISH:
-        found.append(f"All publishers finish under {len(finishing)} of {len(analyses)} policies.")
+        found.append(f"All publishers finish with {len(finishing)} of {len(analyses)} policies.")
     elif holding:
-        found.append(f"All deadlines hold under {len(holding)} of {len(analyses)} policies.")
+        found.append(f"All deadlines are met with {len(holding)} of {len(analyses)} policies.")
     else:
-        found.append("No policy is certain to hold all deadlines.")
+        found.append("No policy is guaranteed to meet all deadlines.")
     found.append(f"{best.policy} {_MERITS[criterion](best)}")
     if best.priorities == names:
-        found.append("Its priorities are the publishers' order in the specification.")
+        found.append("The priorities match the order of the publishers in the specification.")
     elif best.priorities:
-        found.append(f"Put the publishers in the order of its priorities: {', '.join(best.priorities)}.")
+        found.append(
+            f"List the publishers in the specification in the order of priority: {', '.join(best.priorities)}."
+        )
     return found
 
 
 def _lut_words(analysis: Analysis) -> str:
     if analysis.lut is None:
-        return "takes an unknown number of LUTs"
+        return "needs an unknown number of LUTs"
     if not area.measured():
-        source = "by the dissertation's table 4.1"
+        source = "from the dissertation's table 4.1"
     else:
         source = "measured, with the Manager's bursts" if POLICIES[analysis.policy].is_preemptive else "measured"
-    return f"takes the fewest LUTs of these, {analysis.lut} ({source})"
+    return f"needs the fewest LUTs of these policies, {analysis.lut} ({source})"
 
 
 _MERITS: Mapping[Criterion, Callable[[Analysis], str]] = {
@@ -333,11 +339,11 @@ _MERITS: Mapping[Criterion, Callable[[Analysis], str]] = {
 
 
 def end_of(analysis: Analysis) -> str:
-    """The greatest lateness relative to the deadline, in words."""
+    """Return a phrase for the greatest lateness relative to the deadline."""
     latest = analysis.latest
     name, lateness = latest.task.name, latest.lateness
     if lateness is None:
         return f"'{name}' may never be served."
     if lateness <= 0:
-        return f"the closest end, that of '{name}', is {-lateness} cycles before its deadline."
+        return f"'{name}' ends closest to its deadline, {-lateness} cycles early."
     return f"'{name}' may end {lateness} cycles after its deadline."

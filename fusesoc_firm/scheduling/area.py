@@ -1,8 +1,8 @@
 """LUTs and flip-flops of the schedulers and of the Manager, measured by `make bench BENCH=manager`.
 
-The file is `area.csv` next to this module, with the columns design, requesters, lut, ff. A design is a policy, a
-combination of policies by its name in table 4.5, or the Manager without a scheduler for 8-bit streams. The areas of all
-other designs and numbers of requesters are unknown.
+The file `area.csv` next to this module has the columns design, requesters, lut and ff. A design is a policy, a
+combination of policies with its name from table 4.5, or the Manager for 8-bit streams without a scheduler. The areas of
+all other designs and numbers of requesters are unknown.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ COLUMNS = ("design", "requesters", "lut", "ff")
 FILE = "area.csv"
 MANAGER = "manager"
 MANAGER_PREEMPTIVE = "manager_preemptive"
-"""The Manager that makes bursts of what a scheduler interrupts."""
+"""The Manager that splits interrupted frames into bursts."""
 
 
 @dataclass(frozen=True)
 class Area:
-    """The area of a design; LUTs used as memory count as LUTs."""
+    """The LUTs and flip-flops of a design; LUTs used as memory are counted as LUTs."""
 
     lut: int
     ff: int
@@ -37,25 +37,25 @@ Areas = Mapping[tuple[str, int], Area]
 
 @cache
 def measured() -> Areas:
-    """The areas by design and number of requesters; empty if nothing was measured."""
+    """Return the areas by design and number of requesters; the mapping is empty if nothing was measured."""
     file = resources.files(__package__) / FILE
     return read(file.read_text(encoding="utf-8")) if file.is_file() else {}
 
 
 def read(text: str) -> dict[tuple[str, int], Area]:
-    """Read the areas from the text of a file."""
+    """Return the areas in the text of a CSV file, by design and number of requesters."""
     rows = csv.DictReader(text.splitlines())
     return {(row["design"], int(row["requesters"])): Area(int(row["lut"]), int(row["ff"])) for row in rows}
 
 
 def write(path: Path, areas: Areas) -> None:
-    """Write the measured areas, in the order of names and numbers."""
+    """Write the measured areas to a CSV file, sorted by design and number of requesters."""
     lines: Iterable[tuple[object, ...]] = ((*key, area.lut, area.ff) for key, area in sorted(areas.items()))
     text = "\n".join(",".join(map(str, line)) for line in (COLUMNS, *lines))
     path.write_text(f"{text}\n", encoding="utf-8")
 
 
 def at(areas: Areas, design: str, requesters: int) -> Area | None:
-    """The area for a number of requesters, or for the next larger known number; None if there is no such number."""
+    """Return the area for the smallest known number of at least `requesters`, or None if there is none."""
     known = [number for name, number in areas if name == design and number >= requesters]
     return areas[design, min(known)] if known else None

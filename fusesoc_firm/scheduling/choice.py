@@ -1,4 +1,4 @@
-"""`firm scheduler choose`: presents a choice in words or as data."""
+"""`firm scheduler choose`: present the choice of a scheduler as text or as data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FORMATS = ("text", "yaml", "json")
 
 
 def show(choice: Choice, form: str) -> str:
-    """The choice in one of `FORMATS`, with a final newline."""
+    """Return the choice in one of `FORMATS`, with a final newline."""
     if form == "text":
         return _text(choice)
     data = as_data(choice)
@@ -24,7 +24,7 @@ def show(choice: Choice, form: str) -> str:
 
 
 def as_data(choice: Choice) -> dict[str, Any]:
-    """The choice as plain data; a missing bound is None."""
+    """Return the choice as plain data; a missing bound is None."""
     return {
         "scheduler": choice.best.policy,
         "criterion": str(choice.criterion),
@@ -82,7 +82,7 @@ def _text(choice: Choice) -> str:
         for analysis in choice.analyses
     ]
     columns = ("publisher", "period", "transfer time", "deadline", "response", "lateness", "buffer")
-    others = ("policy", "all deadlines hold", "all finish", "worst lateness", "buffers", "LUT")
+    others = ("policy", "all deadlines met", "all finish", "worst lateness", "buffers", "LUT")
     parts = [
         f"scheduler: {best.policy}\n",
         "\n".join(choice.reasons) + "\n",

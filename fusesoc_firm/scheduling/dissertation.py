@@ -13,7 +13,7 @@ Row = list[float]
 
 @dataclass(frozen=True)
 class Dissertation:
-    """Tables by policy and number of accelerators; comments in the file describe the rows."""
+    """The tables by policy and number of accelerators; comments in the data file describe the rows."""
 
     area: dict[str, dict[int, Row]]
     edf_ratio: dict[int, Row]
@@ -25,6 +25,6 @@ class Dissertation:
 
 @cache
 def dissertation() -> Dissertation:
-    """All tables."""
+    """Return all tables of the data file."""
     file = resources.files(__package__) / "dissertation.yaml"
     return Dissertation(**yaml.safe_load(file.read_text(encoding="utf-8")))

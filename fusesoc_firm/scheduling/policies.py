@@ -1,4 +1,4 @@
-"""The scheduling policies: each has a row here, a model in `models` and a core in cores/sched.
+"""The scheduling policies, each with a row here, a model in `models` and a core in cores/sched.
 
 `make policies` writes the cores' lists of policies (tests/cores/policies.py). docs/scheduling.md explains how to add a
 policy.
@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 
 class Order(StrEnum):
-    """The order in which tasks are served; the analysis derives its bounds from it."""
+    """The order in which a policy serves tasks; the analysis derives bounds from this order."""
 
     PRIORITY = "fixed priorities"
     TURNS = "each other task at most once before a task"
@@ -24,27 +24,27 @@ class Order(StrEnum):
 
 @dataclass(frozen=True)
 class Policy:
-    """A policy; `name` is used in specifications, and as the name of the model's function and file."""
+    """A policy; `name` is its name in specifications, and the name of the model's function and file."""
 
     name: str
     short: str
-    """The dissertation's abbreviation, or one like it."""
+    """The abbreviation in the dissertation, or a similar one."""
     title: str
-    """The dissertation's name in its tables, or one like it."""
+    """The name in the dissertation's tables, or a similar one."""
     order: Order = Order.OTHER
     is_preemptive: bool = False
     has_deadlines: bool = False
-    """Whether it compares the times to deadlines, so that its core has them as generics."""
+    """Whether the policy compares times to deadlines, so that its core has deadlines as a generic."""
     has_transfer_times: bool = False
-    """Whether its core has transfer times as a generic, too."""
+    """Whether the policy's core also has transfer times as a generic."""
     most_at_once: int = 256
-    """Up to how many requesters its core compares in one cycle; the tasks of more wait in a queue."""
+    """The maximum number of requesters that the core compares in one cycle; with more, tasks wait in a queue."""
     queue_cycles: int = 2
-    """Cycles of an operation of that queue."""
+    """The number of cycles of an operation of that queue."""
     model: str = ""
-    """The model's file, unless it is called like the policy."""
+    """The name of the model's file if it differs from the policy's name."""
     core: str = ""
-    """The core in cores/sched, unless it is called like the policy: its entity is firm_sched_<core>."""
+    """The core in cores/sched, with the entity firm_sched_<core>, if its name differs from the policy's name."""
 
     @property
     def model_file(self) -> str:
@@ -58,12 +58,12 @@ class Policy:
 
     @property
     def entity(self) -> str:
-        """The core's entity."""
+        """The name of the core's entity."""
         return f"firm_sched_{self.core_file}"
 
     @property
     def generics(self) -> tuple[str, ...]:
-        """The generics of the entity other than REQUESTERS."""
+        """The generics of the entity except REQUESTERS."""
         uses = {
             "PREEMPTIVE": self.is_preemptive and self.order is Order.PRIORITY,
             "PERIODS": self.has_deadlines,
@@ -127,7 +127,7 @@ POLICIES: Mapping[str, Policy] = MappingProxyType({policy.name: policy for polic
 DEFAULT = "fixed_priority"
 
 EVALUATED = ("lru", "fixed_priority", "fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
-"""The six of the dissertation, in the order of its tables."""
+"""The dissertation's six policies, in the order of its tables."""
 
 TABLE_ORDER = (*EVALUATED, *(name for name in POLICIES if name not in EVALUATED))
-"""All policies, those of the dissertation's tables first."""
+"""All policies; those in the dissertation's tables are first."""

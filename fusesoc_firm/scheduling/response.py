@@ -1,7 +1,7 @@
-"""Bounds on the response time of sporadic tasks under each policy: from the first sight of a request to its last beat.
+"""Bounds on the response time of sporadic tasks: from the cycle that first shows a request to the task's last beat.
 
-All times are integers, in cycles. `Overheads` are the costs of the hardware beyond the transfers. Without overheads,
-these are the analyses of the literature:
+All times are integers, in cycles. `Overheads` are the costs of the hardware in addition to the transfers. Without
+overheads, the bounds are those of the literature:
 
 * fixed priority, preemptive: M. Joseph and P. Pandya, Finding response times in a real-time system, 1986;
 
@@ -10,8 +10,9 @@ analysis: refuted, revisited and revised, 2007;
 
 * EDF: S. Baruah, A. Mok, L. Rosier, Preemptively scheduling hard-real-time sporadic tasks on one processor, 1990.
 
-A requester has one task at a time. It requests at least a period after its last request, and never before its last task
-has ended. At any load, a task therefore waits for at most one earlier task of each other requester.
+A requester has one task at a time. Successive requests are at least a period apart, and a request never precedes the
+end of the requester's last task. At any load, a task therefore waits for at most one earlier task of each other
+requester.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ import numpy as np
 
 from fusesoc_firm.scheduling.tasks import Task
 
-# The number of deadlines that the processor-demand test examines; a straight line bounds the demand of later ones.
+# The number of deadlines that the processor-demand test examines; a straight line bounds the demand up to later
+# deadlines.
 _MOST_DEADLINES = 500_000
-# The maximum number of steps in a fixed-point iteration; one that has not converged by then counts as divergent.
+# The maximum number of steps in a fixed-point iteration; an iteration that needs more steps counts as divergent.
 _MOST_STEPS = 10_000
 
 
@@ -35,42 +37,43 @@ class Overheads:
     """The costs of a scheduler, in cycles; `analysis.overheads_of` returns the costs of the cores."""
 
     decision: int = 0
-    """From a request to the grant if nobody sends."""
+    """The time from a request to the grant if no other requester sends."""
     acceptance: int = 0
-    """Until a scheduler that takes in one request after the other knows of a request."""
+    """The time until a scheduler that accepts one request per cycle knows of a request."""
     shortest_run: int = 0
-    """Beats that a run has at least before another requester may interrupt it."""
+    """The minimum number of beats in a run before another requester may interrupt it."""
     resume: int = 0
-    """Beats more that each run but a task's first begins with."""
+    """The number of additional beats at the beginning of each run of a task except the first run."""
     shortest_service: int = 1
-    """Cycles that a task takes at least, however few beats it has."""
+    """The minimum number of cycles of a task with any number of beats."""
 
     def service(self, task: Task) -> int:
-        """The cycles of an uninterrupted task."""
+        """Return the number of cycles of an uninterrupted task."""
         return max(task.transfer_time, self.shortest_service)
 
     @property
     def blocking(self) -> int:
-        """The wait for a run that the task may interrupt, which may begin while the scheduler decides."""
+        """The longest wait for a run that the task may interrupt; the run may begin while the scheduler decides."""
         return max(self.decision, self.decision - 1 + self.shortest_run + self.resume)
 
 
 def fixed_priority_preemptive(task: Task, higher: Sequence[Task], overheads: Overheads) -> int | None:
-    """The bound with these tasks of higher priority; None if they may take all the time.
+    """Return the bound for a task with lower priority than `higher`, or None if `higher` may block it forever.
 
-    Each request of higher priority may interrupt once, which costs a resumption. The blocking run is one of lower
-    priority, or the last run of the same requester's previous task, after which requests of higher priority may wait.
+    Each request of higher priority may interrupt the task once, which costs a resumption. The blocking run is a run of
+    lower priority, or the last run of the same requester's previous task, during which requests of higher priority may
+    arrive.
     """
     wait = overheads.blocking + overheads.service(task)
     return _fixed_point(wait, higher, overheads, after=overheads.resume)
 
 
 def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], overheads: Overheads) -> int | None:
-    """The bound without preemption; None if there is no bound.
+    """Return the bound without preemption, or None if there is no bound.
 
-    If the tasks of this and of higher priorities leave some time, the bound is the greatest response in a busy period
-    (the revised analysis of CAN). Otherwise a simpler bound applies, in which the requester's previous task may block
-    as well.
+    If the tasks of this priority and of higher priorities do not use the whole channel, the bound is the greatest
+    response in a busy period (the revised analysis of CAN). Otherwise, a simpler bound applies, in which the
+    requester's previous task may also block.
     """
     blocking = max([overheads.decision, *map(overheads.service, lower)])
     service = overheads.service(task)
@@ -84,24 +87,24 @@ def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], ov
             responses.append(None if start is None else start - number * task.period + service)
         known = [response for response in responses if response is not None]
         return max(known) if len(known) == len(responses) else None
-    # Only tasks of higher priority can have waited for the task.
+    # Only tasks of higher priority can have waited while the task was served.
     start = _start(max(blocking, service) if higher else blocking, higher, overheads)
     return None if start is None else start + service
 
 
 def taking_turns(task: Task, others: Sequence[Task], overheads: Overheads) -> int:
-    """The bound under round robin and LRU: each other requester is served at most once before the task."""
+    """Return the bound under round robin and LRU, which serve each other requester at most once before the task."""
     waits = overheads.acceptance + overheads.decision + sum(map(overheads.service, others))
     return waits + overheads.service(task)
 
 
 def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
-    """The greatest lateness of any task under EDF; infinite if the tasks exceed the channel's capacity.
+    """Return the greatest lateness of any task under EDF, or infinity if the tasks exceed the channel's capacity.
 
-    Shifting all deadlines by the same time does not change the order. So the greatest lateness is the smallest shift x
-    for which the processor-demand test passes, that is, the greatest excess of the demand over the time. Deadlines
-    count from the time at which the scheduler knows of a request. A late notice makes the task late, and requests may
-    seem closer together.
+    Shifting all deadlines by the same time does not change their order. The greatest lateness is therefore the smallest
+    shift for which the processor-demand test passes, that is, the greatest excess of the demand over the time.
+    Deadlines count from the time at which the scheduler knows of a request. If the scheduler learns of a request late,
+    the task becomes later by that time, and requests may seem closer together.
     """
     load = _load(tasks, overheads)
     if load > 1:
@@ -118,7 +121,7 @@ def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
     horizon = min(affordable, needed)
     most = max(least, _most_excess(tasks, services, late, int(horizon)))
     if needed > horizon:
-        # From the latest first deadline on, a lower line holds.
+        # After the latest of the first deadlines, a lower line bounds the demand.
         if horizon >= max(task.deadline for task in tasks):
             slope = sum(share * each for share, each in zip(shares, spare, strict=True))
         most = max(most, slope - (1 - load) * horizon)
@@ -126,7 +129,7 @@ def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
 
 
 def _most_excess(tasks: Sequence[Task], services: Sequence[int], late: int, horizon: int) -> float:
-    """The greatest excess of the demand over the time, for the deadlines up to the horizon."""
+    """Return the greatest excess of the demand over the time at the deadlines up to `horizon`."""
     times, demands = [], []
     for task, service in zip(tasks, services, strict=True):
         releases = np.arange(0, horizon - task.deadline + late + 1, task.period)
@@ -134,16 +137,17 @@ def _most_excess(tasks: Sequence[Task], services: Sequence[int], late: int, hori
         demands.append(np.full(releases.size, service))
     time, demand = np.concatenate(times), np.concatenate(demands)
     order = np.argsort(time, kind="stable")
-    # At equal deadlines only the last sum is the demand; the earlier sums are smaller and do not affect the maximum.
+    # Among equal deadlines, only the last sum is the demand; the earlier sums are smaller and do not affect the
+    # maximum.
     excess = np.cumsum(demand[order]) - time[order]
     return float(excess.max()) if excess.size else -inf
 
 
 def edf_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) -> int:
-    """A bound under EDF at any load: counts the tasks of other requesters that may have an earlier deadline.
+    """Return a bound under EDF at any load by counting the other requesters' tasks that may have earlier deadlines.
 
-    For each requester, these are the task that is waiting, and the tasks that arrive early enough for their deadline
-    not to be later.
+    For each requester, these are the waiting task, and the tasks that arrive early enough to have a deadline that is
+    not later.
     """
     wait = overheads.acceptance + overheads.blocking
     for other in others:
@@ -153,11 +157,11 @@ def edf_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) ->
 
 
 def lst_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) -> int:
-    """A bound under LST at any load, by counting as under EDF.
+    """Return a bound under LST at any load, by counting as under EDF.
 
-    The slack of a waiting task shrinks in every cycle, so a task that arrives late enough never has less slack. While a
-    task is being sent, its slack is constant and the slack of other tasks shrinks, which extends the window in which
-    other tasks count.
+    The slack of a waiting task decreases in every cycle, so a task that arrives late enough never has less slack. While
+    a task is being sent, its slack is constant and the slack of other tasks decreases, which extends the window in
+    which other tasks are counted.
     """
     wait = overheads.acceptance + overheads.blocking
     own = _interrupted_service(task, overheads)
@@ -168,10 +172,10 @@ def lst_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) ->
 
 
 def lst_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
-    """The greatest lateness of any task under LST, which is as optimal as EDF (A. Mok, 1983).
+    """Return the greatest lateness of any task under LST, which is optimal like EDF (A. Mok, 1983).
 
-    Optimality requires that the task of least slack runs in every cycle. Here a run lasts some cycles too long, and
-    each other task may delay the late one in this way.
+    Optimality requires that the task with the least slack runs in every cycle. In hardware, a run lasts some cycles
+    longer, and each other task may delay the late task by these cycles.
     """
     stretched = [Task(task.name, task.period, _interrupted_service(task, overheads), task.deadline) for task in tasks]
     bare = Overheads(overheads.decision, overheads.acceptance, overheads.shortest_run, 0, overheads.shortest_service)
@@ -180,13 +184,13 @@ def lst_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
 
 
 def _interrupted_service(task: Task, overheads: Overheads) -> int:
-    """The cycles of a task with the most possible interruptions; each run but the first costs a resumption."""
+    """Return the number of cycles of a task with as many interruptions as possible; each costs a resumption."""
     runs = -(-task.transfer_time // max(1, overheads.shortest_run))
     return overheads.service(task) + (runs - 1) * overheads.resume
 
 
 def _requests(window: int, period: int) -> int:
-    """The number of a requester's tasks: a waiting task, and the tasks that arrive within the window, if it is open."""
+    """Return the number of a requester's tasks: a waiting task, and the tasks that arrive in `window` cycles."""
     return 1 + (window // period + 1 if window >= 0 else 0)
 
 
@@ -195,17 +199,17 @@ def _load(tasks: Sequence[Task], overheads: Overheads) -> float:
 
 
 def _start(before: int, higher: Sequence[Task], overheads: Overheads) -> int | None:
-    """The start of a task that cannot be interrupted; a request of higher priority in that very cycle is too late."""
+    """Return the start of a task that cannot be interrupted, even by a request of higher priority in that cycle."""
     return _fixed_point(before, higher, overheads, before=1)
 
 
 def _fixed_point(
     first: int, tasks: Sequence[Task], overheads: Overheads, before: int = 0, after: int = 0
 ) -> int | None:
-    """The least w = first + the service of all requests in w cycles, with simultaneous first requests.
+    """Return the least w = first + the service of all requests in w cycles, with simultaneous first requests.
 
-    Further requests come with their periods. `before` widens the window, `after` lengthens each service. The result is
-    None if there is no such w.
+    Further requests follow with their periods. `before` widens the window in which requests count, and `after`
+    lengthens each service. The result is None if there is no such w.
     """
     if not tasks:
         return first

@@ -1,4 +1,4 @@
-"""Tables and figures as plain values, and their Markdown and CSV."""
+"""Tables and figures as plain values, with their forms in Markdown and CSV."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UNKNOWN = "-"
 
 @dataclass(frozen=True)
 class Table:
-    """A reproduced table of the dissertation: its number there (`4.3`), a title, rows of cells, and remarks."""
+    """A reproduced table: its number in the dissertation (`4.3`), a title, rows of cells, and remarks."""
 
     number: str
     title: str
@@ -29,9 +29,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Panel:
-    """A diagram: values by scheduler name, one for each number of accelerators; NaN means no value.
+    """A diagram: for each scheduler's name, one value for each number of accelerators; NaN means no value.
 
-    `dissertation` has the dissertation's values, if its tables contain them.
+    `dissertation` contains the corresponding values from the dissertation's tables, if there are any.
     """
 
     title: str
@@ -41,7 +41,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A reproduced figure of the dissertation: diagrams side by side over the numbers of accelerators."""
+    """A reproduced figure of the dissertation: panels side by side, each over the numbers of accelerators."""
 
     number: str
     title: str
@@ -56,18 +56,18 @@ class Figure:
 
 
 def decimal(value: float | None) -> str:
-    """A value in the format of the dissertation's tables, with two decimal places."""
+    """Return a value with two decimal places, as in the dissertation's tables."""
     return UNKNOWN if value is None or math.isnan(value) else f"{value:.2f}"
 
 
 def markdown(table: Table) -> str:
-    """The table under its heading, with aligned columns."""
+    """Return the table in Markdown, under its heading and with aligned columns."""
     text = f"### Table {table.number}: {table.title}\n\n{grid(table.columns, table.rows)}"
     return f"{text}\n{table.note}\n" if table.note else text
 
 
 def figure_markdown(figure: Figure) -> str:
-    """The values of a figure under its heading, with a table for each panel."""
+    """Return the values of a figure in Markdown, under its heading and with a table for each panel."""
     parts = [f"### Figure {figure.number}: {figure.title} ({figure.unit})\n"]
     for panel in figure.panels:
         columns = ("accelerators", *panel.series)
@@ -80,7 +80,7 @@ def figure_markdown(figure: Figure) -> str:
 
 
 def grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table; the first column is left-aligned, numbers are right-aligned."""
+    """Return a Markdown table; the first column is left-aligned, numbers are right-aligned."""
     lines = [columns, *rows]
     widths = [max(len(line[column]) for line in lines) for column in range(len(columns))]
     rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (width + 1) + ":" for width in widths[1:]), ""])
@@ -92,12 +92,12 @@ def grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def table_csv(table: Table) -> str:
-    """The table's cells as CSV; unknown values are empty."""
+    """Return the table's cells as CSV; unknown values are empty."""
     return _csv(table.columns, [["" if cell == UNKNOWN else cell for cell in row] for row in table.rows])
 
 
 def figure_csv(figure: Figure) -> str:
-    """A row for each point, with the dissertation's value where it is known."""
+    """Return CSV text with a row for each point, which includes the dissertation's value where it is known."""
     rows = [
         [
             panel.title,

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 class Task:
     """A sporadic task, in cycles.
 
-    Its requests are at least `period` apart, and never before the end of the last transfer. Each request is for
-    `transfer_time` beats, to be sent within `deadline` cycles after the scheduler first sees it. The deadline may be
-    shorter or longer than the period (section 4.1).
+    Requests are at least `period` apart, and never precede the end of the last transfer. Each request is for
+    `transfer_time` beats, to be sent within `deadline` cycles after the scheduler first sees the request. The deadline
+    may be shorter or longer than the period (section 4.1).
     """
 
     name: str
@@ -22,4 +22,4 @@ class Task:
     def __post_init__(self) -> None:
         for key in ("period", "transfer_time", "deadline"):
             if getattr(self, key) < 1:
-                raise ValueError(f"{key} of '{self.name}' is {getattr(self, key)}; legal: 1 and more cycles")
+                raise ValueError(f"{key} of '{self.name}' is {getattr(self, key)}; legal: 1 or more cycles")

@@ -15,10 +15,10 @@ from fusesoc_firm.text.naming import identifier
 def environment_files(
     paths: Mapping[Path, SourceRef | None], system: DerivedSystem
 ) -> dict[PurePosixPath, GeneratedFile]:
-    """Return the environment's files, in order, as files of the simulation core.
+    """Return the environment's files by path in the simulation core, in order.
 
-    The test bench instantiates the entity named like the last file. Raises `InputError` for a file that cannot be part
-    of the environment.
+    The test bench instantiates the entity that has the name of the last file. Raise `InputError` for a file that cannot
+    be part of the environment.
     """
     taken = {
         system.entity,
@@ -29,12 +29,12 @@ def environment_files(
     files: dict[PurePosixPath, GeneratedFile] = {}
     for path, source in paths.items():
         if not any(block.type.accelerator.pins for block in system.accelerators):
-            fail(f"system '{system.name}' has no pins, so there is no place for an environment", source)
+            fail(f"system '{system.name}' has no pins, so it cannot have an environment", source)
         if not path.is_file():
             fail(f"there is no file '{path}'", source, "the paths of 'environment' are relative to the core")
         if path.suffix.lower() not in SOURCE_SUFFIXES["VHDL"] or identifier(path.stem) != path.stem:
-            fail(f"'{path.name}' is not the name of a VHDL entity's file", source, "such as motors.vhd")
+            fail(f"'{path.name}' is not a legal file name for a VHDL entity", source, "a legal name is motors.vhd")
         if path.stem.lower() in {entity.lower() for entity in taken}:
-            fail(f"the system has an entity '{path.stem}' already; the environment needs another name", source)
+            fail(f"the system already has an entity '{path.stem}'; rename the environment", source)
         files[PurePosixPath("environment", path.name)] = GeneratedFile(path.read_bytes(), "vhdlSource-93")
     return files

@@ -1,7 +1,8 @@
 """The functions of accelerators in software, and the messages in transit between the functions.
 
-A function is called when all its messages have arrived. Each block of a type has its own function with its own state. A
-message keeps only the fields that its connection carries. A function's result is converted as by a middleware.
+A function is called when all its messages have arrived. Each block of a type has a separate function with a separate
+state. A message contains only the fields that its connection carries. A function's result is converted as by a
+middleware.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ Message = dict[str, Any]
 
 @contextmanager
 def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Iterator[None]:
-    """Let sources in `folder` import each other. Raises `InputError` if one imports an unlisted file."""
+    """Let sources in `folder` import each other. Raise `InputError` if a source imports an unlisted file."""
     listed = {(folder / source).resolve(): item for item in accelerators for source in item.sources}
     owners = {path.parent: item for path, item in reversed(listed.items())}
     paths, known, writes = [*sys.path], {*sys.modules}, sys.dont_write_bytecode
-    # After all other folders, so that the user's files hide no module of Python's standard library.
+    # The folders are last on the path, so that the user's files do not hide modules of Python's standard library.
     sys.path += map(str, owners)
     # Write no __pycache__ beside the user's files.
     sys.dont_write_bytecode = True
@@ -44,8 +45,8 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
         yield
         for _, file, place in _imported(known, owners):
             if file not in listed:
-                message = f"software imports {file.relative_to(place)}, which is not one of its sources"
-                fail(message, owners[place].sources[0].source, "list all its files in 'sources'")
+                message = f"software imports {file.relative_to(place)}, which is not one of the sources"
+                fail(message, owners[place].sources[0].source, "list all files of the accelerator in 'sources'")
     finally:
         sys.path[:], sys.dont_write_bytecode = paths, writes
         for name, _, _ in [*_imported(known, owners)]:
@@ -53,7 +54,7 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
 
 
 def _imported(known: Collection[str], folders: Iterable[Path]) -> Iterator[tuple[str, Path, Path]]:
-    """Yield the modules from one of the folders that are not `known`, each with its file and the folder."""
+    """Yield each module that is not `known` and is from one of the folders, with its file and its folder."""
     for name in sorted(sys.modules.keys() - known):
         file = Path(getattr(sys.modules[name], "__file__", None) or "").resolve()
         first = name.partition(".")[0]
@@ -64,7 +65,7 @@ def _imported(known: Collection[str], folders: Iterable[Path]) -> Iterator[tuple
 
 @dataclass(frozen=True)
 class _Way:
-    """The destination of a message, with the fields that are carried."""
+    """The destination of a message, with the fields that the connection carries."""
 
     sink: End
     frame: Frame
@@ -72,9 +73,10 @@ class _Way:
 
 @dataclass
 class Functions:
-    """The blocks with sources, producers before consumers, and the messages that wait at each end.
+    """The blocks with source files, in the order of the data flow, and the messages that wait at each end.
 
-    Messages from several blocks to one end are combined in order: the first with the first, and so on.
+    Messages from several blocks to one end are combined in order: the first messages together, then the second, and so
+    on.
     """
 
     blocks: list[AcceleratorBlock]
@@ -85,9 +87,9 @@ class Functions:
 
     @classmethod
     def of(cls, software: Software, folder: Path, outside: Mapping[End, str] = MappingProxyType({})) -> Functions:
-        """Load all functions. Raises `InputError`, also for a fault within a file.
+        """Load all functions. May raise `InputError`, also for a fault within a file.
 
-        Messages to a block without sources are dropped, unless `outside` has a name for it.
+        Messages to a block without sources are dropped, unless `outside` contains a name for the block.
         """
         here = {block.block: block for block in software.blocks if block.type.accelerator.sources}
         elsewhere = {block.block for block in software.blocks} - here.keys()
@@ -109,15 +111,16 @@ class Functions:
         return made
 
     def take(self, source: End, message: Message) -> list[tuple[str, Message]]:
-        """Take a message; return the resulting messages to other blocks, each with its destination block.
+        """Process a message from `source`; return the resulting messages to other blocks, each with its destination.
 
-        After an `InputError`, `run` returns the remaining messages: only the failed call is lost.
+        If the method raises `InputError`, only the messages of the failed call are lost; `run` returns the other
+        messages.
         """
         self._send(source, message)
         return self.run()
 
     def run(self) -> list[tuple[str, Message]]:
-        """Call each function whose messages are complete; return messages as `take` does. Raises `InputError`."""
+        """Call each function whose messages have all arrived; return messages like `take`. May raise `InputError`."""
         for block in self.blocks:
             ends = [End(block.block, side.prefix) for side in block.type.inputs]
             while all(map(self._is_there, ends)):
@@ -167,7 +170,7 @@ def _load(block: AcceleratorBlock, folder: Path) -> UserFunction:
 
 
 def _answer(function: UserFunction, when: str, side: MessageSide, value: object) -> Message | None:
-    """Return a function's result after its conversion by the middleware."""
+    """Return a function's result as converted by the middleware, or None without a result."""
     if value is None:
         return None
     if not isinstance(value, Mapping):
@@ -183,14 +186,14 @@ def _expected(outputs: Sequence[MessageSide]) -> str:
     messages = ", ".join(str(side.frame.message) for side in outputs)
     match len(outputs):
         case 0:
-            return "it has no output, so it returns nothing"
+            return "the accelerator has no output, so the function must return nothing"
         case 1:
-            return f"it returns {messages} as a mapping, or None to send nothing"
-    return f"it returns a tuple of {messages}, each a mapping, or None to send nothing"
+            return f"the function must return {messages} as a mapping, or None to send nothing"
+    return f"the function must return a tuple of {messages}, each as a mapping, or None to send nothing"
 
 
 def _joined(one: Any, other: Any) -> Any:
-    """Combine two parts of a message; elements of an array may be in parts, too."""
+    """Return the combination of two parts of a message; elements of arrays may also be in parts."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         both = {name: _joined(one[name], other[name]) for name in one.keys() & other.keys()}
         return {**one, **other, **both}

@@ -1,4 +1,4 @@
-"""Writes the simulated host's two text files: stimuli and expected frames (docs/reference/simulation-host.md)."""
+"""Write the simulated host's two text files: stimuli and expected frames (docs/reference/simulation-host.md)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LABEL_WIDTH = 160
 
 
 def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter]) -> str:
-    """Return the stimulus file."""
+    """Return the text of the stimulus file."""
     ids = {item.block: item.id for item in subscribers}
     lines: list[str] = []
     for stimulus in stimuli:
@@ -28,7 +28,7 @@ def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter])
 
 
 def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]) -> str:
-    """Return the file of expected frames; padding may hold any byte."""
+    """Return the text of the file of expected frames, in which padding matches any byte."""
     ids = {item.block: item.id for item in publishers}
     lines: list[str] = []
     for response in responses:
@@ -48,7 +48,7 @@ def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:
 
 
 def _label(topic: Topic, message: dict[str, Any]) -> str:
-    """Return block, type and values on one line of plain ASCII, truncated if it gets long."""
+    """Return the block, type and values on one line of plain ASCII, which is truncated if it is long."""
     values = " ".join(f"{name}={value}" for name, value in _values(message))
     label = f"{topic.block} {topic.frame.message} {values}".encode("ascii", "replace").decode()
     return label if len(label) <= _LABEL_WIDTH else label[: _LABEL_WIDTH - 3] + "..."
@@ -63,7 +63,7 @@ def _values(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _shown(value: Any) -> str:
-    """Return a value without blanks, except in quoted texts; arrays are cut to the length of a label."""
+    """Return a value without blanks, except in quoted texts; arrays are truncated to the length of a label."""
     match value:
         case str():
             return json.dumps(value, ensure_ascii=False)

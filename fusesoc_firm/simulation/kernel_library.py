@@ -1,4 +1,4 @@
-"""Compiles the C++ of an HLS accelerator to the shared library that the simulation calls."""
+"""Compile the C++ of an HLS accelerator to the shared library that the simulation calls."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import render
 
 _COMPILER = "g++"
-# The results must not depend on the processor (no contraction to fused operations), nor the file on its build (no
-# build id, no symbols that name temporary files).
+# Results must not depend on the processor (no contraction to fused operations), and the file must not depend on the
+# build (no build id, no symbols that name temporary files).
 _FLAGS = (
     "-std=c++17",
     "-O2",
@@ -26,9 +26,9 @@ _FLAGS = (
     "-shared",
     "-s",
     "-Wl,--build-id=none",
-    # Find undefined functions here, not when the simulator loads the library.
+    # Find undefined functions when linking, not when the simulator loads the library.
     "-Wl,-z,defs",
-    # List the included files except the system's.
+    # List the included files, except system headers.
     "-MMD",
     "-Wno-unknown-pragmas",
 )
@@ -39,7 +39,7 @@ _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
 
 
 def toolchain() -> dict[str, str]:
-    """Return the versions of the compiler and of the C library: other versions may be unable to load the library."""
+    """Return the versions of the compiler and the C library, since other versions may be unable to load the library."""
     try:
         shown = subprocess.run([_COMPILER, "--version"], capture_output=True, text=True, check=False).stdout
     except FileNotFoundError:
@@ -48,7 +48,10 @@ def toolchain() -> dict[str, str]:
 
 
 def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:
-    """Return the simulated kernel, and the library that it loads from the work folder. Raises `InputError`."""
+    """Return the simulated kernel, and the library that the kernel loads from the work folder.
+
+    May raise `InputError`.
+    """
     configuration = kernel_configuration(accelerator)
     library = library_name(accelerator)
     shim = render(SHIM_TEMPLATE, configuration)
@@ -59,7 +62,7 @@ def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, Genera
 
 
 def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
-    """Return the library's bytes, which are the same for the same sources in any folder."""
+    """Return the library's bytes, which do not depend on the folder of the sources."""
     first, *others = accelerator.accelerator.sources
     name = accelerator.accelerator.name
     units = [str((folder / source).resolve()) for source in others if Path(source).suffix in _CPP_SUFFIXES]
@@ -67,13 +70,13 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary)
         (place / "kernel.cpp").write_text(shim, encoding="utf-8")
-        # An `assert` puts its file name into the library.
+        # Without a relative path, `assert` would add the folder's name to the library.
         options = ["-I", str(above), f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
         command = [_COMPILER, *_FLAGS, "kernel.cpp", *units, *options]
         try:
             result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
         except FileNotFoundError:
-            fail(f"'{_COMPILER}' is needed to simulate '{name}' and is not installed")
+            fail(f"'{_COMPILER}' is required to simulate '{name}', but is not installed")
         if result.returncode:
             fail(
                 f"the C++ of '{name}' does not compile:\n{result.stderr.rstrip()}",
@@ -85,7 +88,7 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
 
 
 def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> None:
-    """Check that every included file is a source: changes to other files would go unnoticed."""
+    """Check that every included file is a source, since changes to other files would go unnoticed."""
     sources = {(folder / source).resolve() for source in accelerator.accelerator.sources}
     included = {
         (place / _ESCAPED.sub(r"\1", word)).resolve()
@@ -95,7 +98,7 @@ def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> 
     missing = sorted(str(path) for path in included - sources if not path.is_relative_to(place.resolve()))
     if missing:
         fail(
-            f"'{accelerator.accelerator.name}' includes {', '.join(missing)}",
+            f"'{accelerator.accelerator.name}' includes files that are not sources: {', '.join(missing)}",
             accelerator.accelerator.sources[0].source,
-            "list it under 'sources', too, so that a change of it is noticed",
+            "list all included files in 'sources', so that changes to these files are noticed",
         )

@@ -1,10 +1,10 @@
-"""Runs the model with which a simulation is compared: a user's Python file with a function `respond`.
+"""Run the model that a simulation is compared with: a user's Python file with a function `respond`.
 
     def respond(subscriber: str, message: dict) -> list[tuple[str, dict]]:
 
 The function receives each sent message, with the name of the subscriber's block. It returns the responses that the
-system must send, each with the name of the publisher's block. It is called in the order of the stimuli and may keep
-state. It also returns the messages to accelerators in software (`software`).
+system must send, each with the name of the publisher's block, and the messages to accelerators in software. Calls are
+in the order of the stimuli, and the function may keep state.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from fusesoc_firm.simulation.user_code import UserFunction, load_function
 from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.text.diagnostics import nearest
 
-_ANSWER = "it returns a list of (publisher, message), the message a mapping of fields"
+_ANSWER = "'respond' must return a list of (publisher, message), where the message is a mapping of fields"
 
 
 @dataclass(frozen=True)
 class Response:
     """A message that the system must send: its payload and its decoded value.
 
-    `cause` is the number, from 0, of the stimulus that causes it, or None if no single one is known.
+    `cause` is the number, from 0, of the stimulus that causes the response, or None if no single stimulus is known.
     """
 
     publisher: Topic
@@ -39,7 +39,7 @@ class Response:
 
 
 def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topic]) -> list[Response]:
-    """Return the responses of the model in `path` to all stimuli. Raises `InputError`, also for faults in the model.
+    """Return the responses of the model in `path` to all stimuli. May raise `InputError`, also for faults in the model.
 
     The model may respond for each of `publishers`.
     """
@@ -54,25 +54,25 @@ def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topi
 
 @dataclass(frozen=True)
 class _Model:
-    """The user's function. In all methods, `when` names the message for which the function was called."""
+    """The user's function; in all methods, `when` names the message for which the function was called."""
 
     respond: UserFunction
 
     def answer(self, stimulus: Stimulus, when: str) -> list[object]:
         """Return the result of `respond` as a list."""
         with self.respond.guarded(when):
-            # A copy, because reports show the message itself.
+            # A copy, because reports show the original message.
             answer: object = self.respond.call(stimulus.subscriber.block, deepcopy(stimulus.message))
-            # A generator runs the user's code only here.
+            # If `respond` is a generator, the user's code runs only here.
             items = list(answer) if isinstance(answer, Iterable) and not isinstance(answer, str | Mapping) else None
         if items is None:
             self.respond.fail(f"for {when}, 'respond' returned {answer!r}, which is not a list", _ANSWER)
         return items
 
     def response(self, item: object, cause: int, when: str, known: Mapping[str, Topic]) -> Response:
-        """Return an item of the result as a response."""
+        """Return an item of the function's result as a response."""
         if not isinstance(item, tuple | list) or len(item) != 2:
-            self.respond.fail(f"for {when}, 'respond' returned {item!r} in its list", _ANSWER)
+            self.respond.fail(f"for {when}, 'respond' returned a list that contains {item!r}", _ANSWER)
         block, message = item
         if not isinstance(block, str) or block not in known:
             self.respond.fail(

@@ -1,6 +1,6 @@
-"""Generates the simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels.
+"""Generate the simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels.
 
-A live simulation has no frames. Its test bench serves the requests that another program sends over a pipe
+A live simulation has no files of frames. Its test bench carries out the requests that another program sends over a pipe
 (docs/reference/transports.md).
 """
 
@@ -33,18 +33,21 @@ from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
 
-# Neither synthesis nor a translation to Verilog may use a test bench.
+# Synthesis and the translation to Verilog must not use a test bench.
 _BENCH_TAGS = ("simulation",)
 
 
 def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """Return the inputs of system, stimuli, model and environment, and the files that the user's code reads."""
+    """Return the files of the system, stimuli, model and environment, and the files that the user's code reads."""
     found = [*live_inputs(request, loaded), *_files(request)]
     return [*found, *_stimuli_files(_path(request, "stimuli")), _path(request, "model")]
 
 
 def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
-    """Return the core, which complements the system's core from the same specification. Raises `InputError`."""
+    """Return the simulation core, which complements the system's core from the same specification.
+
+    May raise `InputError`.
+    """
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "sim")
     stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
@@ -69,12 +72,12 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
 
 
 def live_inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """Return the inputs of the system and the environment."""
+    """Return the files of the system and the environment."""
     return [*system_core.inputs(request, loaded), *_environment(request)]
 
 
 def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
-    """Return the core of a live simulation. Seed and rate of stalls are set at its start. Raises `InputError`."""
+    """Return the core of a live simulation, whose start sets the seed and the stall rate. May raise `InputError`."""
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "live")
     environment = environment_files(_environment(request), system)
@@ -96,36 +99,40 @@ def _surroundings(loaded: LoadedSystem, environment: Mapping[PurePosixPath, Gene
 
 
 def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
-    """Return the entity of the environment's files."""
+    """Return the environment's entity, or None without an environment."""
     return [*environment][-1].stem if environment else None
 
 
 def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None:
-    """Fail if the simulator does not support the language of an accelerator or of the host's end of a link.
+    """Raise `InputError` if the simulator does not support the language of an accelerator or of the host's link.
 
-    The hint points the user to the `target` of the default simulator.
+    The hint names the `target` of the default simulator.
     """
     known = SIMULATORS[simulator]
     if not known.reads_vhdl and system.clocks:
         fail(
-            f"{simulator} cannot simulate a system of several clocks",
-            hint=f"the additional clocks are generated in VHDL: use --target={target}",
+            f"{simulator} cannot simulate a system with several clocks",
+            hint=f"the additional clocks are generated in VHDL; use --target={target}",
         )
     if not known.reads_vhdl and system.link:
         fail(
-            f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",
-            hint=f"the host's end of a link is written in VHDL: use --target={target}",
+            f"{simulator} cannot simulate the interconnect '{system.link.kind.value}'",
+            hint=f"the host's end of a link is written in VHDL; use --target={target}",
         )
     for type_ in system.accelerator_types:
         accelerator = type_.accelerator
         if known.reads_vhdl and accelerator.type == "Verilog":
             others = " or ".join(f"'{name}'" for name in fitting(has_verilog=True)).replace("'", "'simulator: ", 1)
-            hint = f"{others} link it with the Verilog that GHDL makes of the VHDL"
+            hint = f"use {others}, for which GHDL translates the VHDL to Verilog"
             message = f"{known.title} cannot simulate Verilog, the language of '{accelerator.name}'"
             fail(message, accelerator.name.source, hint)
         if not known.calls_functions and accelerator.type == "HLS":
-            hint = f"only GHDL calls a C++ function from within a simulation: --target={target}"
-            fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
+            hint = f"only GHDL can call C++ functions during a simulation; use --target={target}"
+            fail(
+                f"{simulator} cannot simulate '{accelerator.name}', which has the type HLS",
+                accelerator.name.source,
+                hint,
+            )
 
 
 def _vhdl_bench(configuration: Context) -> dict[str, GeneratedFile]:
@@ -136,7 +143,7 @@ def _vhdl_bench(configuration: Context) -> dict[str, GeneratedFile]:
 def _verilog_bench(
     configuration: Context, system: DerivedSystem, frames: int = 0, beats: int = 0
 ) -> dict[str, GeneratedFile]:
-    """Return the bench and, if there is an environment, the entity that connects it to the system."""
+    """Return the test bench and, if there is an environment, the entity that connects the environment to the system."""
     has_environment = configuration["environment"] is not None
     bench = verilog_bench_configuration(configuration, system, frames, beats, has_environment=has_environment)
     files = {
@@ -151,7 +158,7 @@ def _verilog_bench(
 
 
 def _beats(expected: list[Response], width: int) -> int:
-    """Return the number of beats in all expected frames: the most that can wait for the end of a frame."""
+    """Return the number of beats in all expected frames, the maximum that can wait for the end of a frame."""
     lanes = width // 8
     return sum(-(-(ID_BYTES + LENGTH_BYTES + len(response.payload)) // lanes) for response in expected) or 1
 
@@ -159,15 +166,15 @@ def _beats(expected: list[Response], width: int) -> int:
 def _path(request: Request, parameter: str) -> Path:
     value = request.parameters[parameter]
     if value is None:
-        fail(f"{request.name}: product 'simulation' needs the parameter '{parameter}'")
+        fail(f"{request.name}: the product 'simulation' needs the parameter '{parameter}'")
     return request.files_root / str(value)
 
 
 def _stimuli_files(path: Path) -> list[Path]:
-    """Return the files of stimuli; a bag may be a folder."""
+    """Return the files with the stimuli, which for a bag may be all files in a folder."""
     if path.is_file():
         return [path]
-    # A hit must not pay for the import of rosbags' readers.
+    # A hit must not spend time on importing the readers of rosbags.
     from fusesoc_firm.message.bag_reader import bag_files
 
     return bag_files(path)

@@ -1,11 +1,11 @@
-"""Builds a simulator from a specification, with FuseSoC and Edalize's makefile.
+"""Build a simulator from a specification, with FuseSoC and Edalize's makefile.
 
     built = build_simulator(Path("robot.yaml"))
     with Simulator(built.command(seed=7), built.folder) as simulator:           # node/transport/simulator.py
         ...
 
-The core that describes the system is searched for beside the specification. If there is none, one is written to the
-build folder. A second call rebuilds only what has changed.
+The system's core is searched for beside the specification. If there is no core, one is written to the build folder. A
+second call rebuilds only changed parts.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _SHOWN_LINES = 20
 
 @dataclass(frozen=True)
 class CoreSources:
-    """The content of a core written for a specification; an existing core takes precedence."""
+    """The message sources and files of a core to write for a specification; an existing core takes precedence."""
 
     paths: Sequence[Path] = ()
     distro: str = ""
@@ -52,19 +52,19 @@ class CoreSources:
 
 @dataclass(frozen=True)
 class BuiltSimulator:
-    """A simulator and the folder in which it must be started."""
+    """A simulator, and the folder in which it must be started."""
 
     tool: str
     folder: Path
     words: tuple[str, ...] = field(repr=False)
 
     def command(self, *, seed: int = 1, stall_percent: int = 0) -> list[str]:
-        """Return the command to run in `folder`; `seed` determines which `stall_percent` of the cycles have stalls."""
+        """Return the command to run in `folder`; `seed` selects the `stall_percent` of cycles with stalls."""
         mark = _live(self.tool).parameter
         return [*self.words, f"{mark}SEED={seed}", f"{mark}STALL_PERCENT={stall_percent}"]
 
     def script(self, *, seed: int = 1, stall_percent: int = 0) -> Path:
-        """Return a program that starts the simulator from any folder."""
+        """Write a program that starts the simulator from any folder, and return its path."""
         path = self.folder / f"run-simulator-seed{seed}-stall{stall_percent}"
         command = shlex.join(self.command(seed=seed, stall_percent=stall_percent))
         text = "#!/bin/sh\n# The simulated system at the end of a pipe: descriptors 3 and 4.\n"
@@ -76,17 +76,17 @@ class BuiltSimulator:
 def build_simulator(
     spec: Path, tool: str | None = None, *, build_root: Path | None = None, sources: CoreSources | None = None
 ) -> BuiltSimulator:
-    """Build a simulator of a specification's system, or rebuild its changed parts. Raises `InputError`.
+    """Build a simulator of a specification's system, or rebuild the changed parts. May raise `InputError`.
 
-    All systems and tools share `build_root`; its default is a folder of the user's cache. `sources` applies only if no
-    core beside the specification names it.
+    All systems and tools share `build_root`, by default a folder in the user's cache. `sources` applies only if no core
+    beside the specification names the specification.
     """
     tool = tool or default_simulator(is_live=True)
     _live(tool)
     if not spec.is_file():
         fail(f"there is no specification '{spec}'")
     if absent := missing(dict.fromkeys([*simulation_programs(tool), "make"])):
-        fail(f"not installed: {' '.join(absent)}", hint="; ".join(ways(program) for program in absent))
+        fail(f"missing programs: {', '.join(absent)}", hint="; ".join(ways(program) for program in absent))
     spec = spec.resolve()
     folder = _build_folder(spec, tool, build_root or Path(default_root()) / "simulators")
     with locked(folder):
@@ -98,14 +98,14 @@ def build_simulator(
         except InputError:
             if is_new:
                 raise
-            # A library may refer to deleted files.
+            # FuseSoC's list of libraries may refer to deleted files.
             shutil.rmtree(work)
             _build(spec, core, tool, work)
         return BuiltSimulator(tool, work, tuple(_words(work, tool)))
 
 
 def _write_core(spec: Path, folder: Path, sources: CoreSources) -> CoreFile:
-    """Write a core for a specification that has none."""
+    """Write a core for a specification without a core, and return it."""
     paths = [path.absolute() for path in sources.paths]
     loaded = load_beside(spec, paths, sources.distro or None, core_folders=sources.core_folders)
     system = loaded.system
@@ -122,7 +122,7 @@ def _write_core(spec: Path, folder: Path, sources: CoreSources) -> CoreFile:
 
 
 def _build_folder(spec: Path, tool: str, root: Path) -> Path:
-    """Return a separate folder for each specification and tool; the specification's name is in it for readability."""
+    """Return a separate folder for each specification and tool, whose name includes the specification's name."""
     digest = hashlib.sha256(str(spec).encode()).hexdigest()[:12]
     folder = root.absolute() / f"{_short_name(spec)}-{digest}-{tool}"
     try:
@@ -138,13 +138,13 @@ def _short_name(spec: Path) -> str:
 
 
 def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
-    """Let FuseSoC set up the target, and run make."""
+    """Set up the target with FuseSoC, and run make."""
     targets, target = core.section("targets"), "live" if tool == default_simulator(is_live=True) else f"live_{tool}"
     if target not in targets:
-        fail(f"{core.path} has no target '{target}'", hint=f"firm system core {spec}")
+        fail(f"{core.path} has no target '{target}'", hint=f"run 'firm system core {spec}' to add the target")
     made_with = targets[target].get("flow_options", {}).get("tool", tool)
     if made_with != tool:
-        fail(f"{core.path}: target '{target}' is for {made_with}", hint=f"--tool {made_with}")
+        fail(f"target '{target}' of {core.path} is for {made_with}", hint=f"use --tool {made_with}")
     command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
     command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, core.data.get("name", "")]
     _run(spec, list(map(str, command)), _project_folder(spec))
@@ -153,7 +153,7 @@ def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
 
 
 def _project_folder(spec: Path) -> Path:
-    """Return the specification's nearest parent folder with FuseSoC's configuration, or else the current folder."""
+    """Return the specification's nearest parent folder that contains a `fusesoc.conf`, or the current folder."""
     return next((folder for folder in spec.parents if (folder / "fusesoc.conf").is_file()), Path.cwd())
 
 
@@ -173,7 +173,7 @@ def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
     if done.returncode:
         lines = [line for line in done.stdout.splitlines() if not line.startswith("INFO:")]
         shown = "\n".join(lines[-_SHOWN_LINES:])
-        fail(f"cannot build the simulator of {spec}: {shlex.join(command)} in {folder} failed:\n{shown}")
+        fail(f"cannot build the simulator for {spec}: {shlex.join(command)} in {folder} failed:\n{shown}")
     return done.stdout
 
 
@@ -191,7 +191,7 @@ def _words(work: Path, tool: str) -> list[str]:
 
 
 def _live(tool: str) -> Live:
-    """Return the tool's support for live simulation. Raises `InputError` if the tool has no support."""
+    """Return the tool's support for live simulation. Raise `InputError` if the tool has no support."""
     if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
-        fail(f"unknown simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
+        fail(f"unknown simulator '{tool}' for live systems", hint=f"legal: {', '.join(known)}")
     return live

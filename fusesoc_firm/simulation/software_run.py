@@ -1,10 +1,10 @@
-"""Runs the software of a system for its simulation: the user's functions run while the simulation is generated.
+"""Run the software of a system for its simulation: the user's functions run while the simulation is generated.
 
-The model supplies the messages from hardware to a block in software. A message from such a block to hardware becomes a
-stimulus after the stimulus that caused it. A message from such a block to a publisher bypasses the hardware and is
-compared here.
+The model supplies the messages from hardware to a block in software. A message from a block in software to hardware
+becomes a stimulus, after the stimulus that caused it. A message from a block in software to a publisher bypasses the
+hardware and is compared here.
 
-A block without sources is software elsewhere: the stimuli hold its messages.
+A block without sources is software in another program; the stimuli contain its messages.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 @dataclass(frozen=True)
 class Traffic:
-    """All messages to the hardware in order, and all messages that it must send, in the order of each publisher."""
+    """All messages to the hardware in order, and all messages that it must send, in order for each publisher."""
 
     stimuli: list[Stimulus] = field(default_factory=list)
     responses: list[Response] = field(default_factory=list)
@@ -52,9 +52,9 @@ def answered(system: DerivedSystem) -> list[Topic]:
 
 
 def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> Traffic:
-    """Return the messages to and from the hardware when its software, with sources in `folder`, takes part.
+    """Return the messages to and from the hardware, including those that the software in `folder` causes.
 
-    Raises `InputError` for messages missing in stimuli or model, and for faults of the software.
+    Raise `InputError` for messages that are missing in the stimuli or the model, and for faults in the software.
     """
     _check_complete(system, stimuli, responses)
     caused: dict[int | None, list[Response]] = {}
@@ -69,12 +69,12 @@ def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], re
 
 
 def sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
-    """Return the outputs of software elsewhere."""
+    """Return the outputs of software in other programs, as topics with their ends."""
     return _elsewhere(system, lambda type_: type_.outputs)
 
 
 def taken_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
-    """Return the inputs of software elsewhere."""
+    """Return the inputs of software in other programs, as topics with their ends."""
     return _elsewhere(system, lambda type_: type_.inputs)
 
 
@@ -89,25 +89,25 @@ def _elsewhere(system: DerivedSystem, sides: Callable[[AcceleratorType], Iterabl
 
 
 def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> None:
-    """Raise `InputError` if stimuli or model contain no message for a topic that software requires."""
+    """Raise `InputError` if the stimuli or the model lack messages for a topic that software requires."""
     faults = Diagnostics()
     sent = {stimulus.subscriber.block for stimulus in stimuli}
     for topic, end in sent_elsewhere(system).items():
         if topic.block not in sent:
             hint = f"'{end.block}' has no sources, so the stimuli must contain its messages"
-            faults.error(f"the stimuli hold no message of '{topic.block}'", hint=hint)
+            faults.error(f"the stimuli contain no message for '{topic.block}'", hint=hint)
     said = {response.publisher.block for response in responses}
     here = {block.block for block in system.software.blocks if block.type.accelerator.sources}
     for publisher in system.publishers:
         if publisher.software and publisher.software.block in here and publisher.block not in said:
             message = f"the model returns no message from hardware to '{publisher.software.block}'"
-            faults.error(message, hint=f"'respond' returns it among the others: ('{publisher.block}', message)")
+            faults.error(message, hint=f"'respond' must also return ('{publisher.block}', message)")
     faults.raise_if_any()
 
 
 @dataclass
 class _Run:
-    """A run of the software: the hardware's traffic so far, and the messages from software to publishers."""
+    """The state of a run of software: the hardware's traffic so far, and the messages from software to publishers."""
 
     system: DerivedSystem
     functions: Functions
@@ -127,7 +127,7 @@ class _Run:
         return {item.block: way_to(item.block, self.system) for item in self.system.publishers}
 
     def take(self, stimulus: Stimulus, responses: Sequence[Response]) -> None:
-        """Send a message, and run the software for this message and for the responses of the hardware."""
+        """Send a message, and run the software for this message and for the hardware's responses."""
         block = stimulus.subscriber.block
         if block in self._subscribers and block not in self._ends:
             self.traffic.stimuli.append(stimulus)
@@ -147,7 +147,7 @@ class _Run:
                 self.published.setdefault(name, []).append(given)
 
     def _cause(self, publisher: str) -> int | None:
-        """Return the last message so far on the path to a publisher."""
+        """Return the number of the last stimulus so far on the route to a publisher, or None."""
         stimuli = self.traffic.stimuli
         way = self._ways[publisher]
         numbers = (number for number in reversed(range(len(stimuli))) if stimuli[number].subscriber.block in way)
@@ -155,7 +155,7 @@ class _Run:
 
 
 def way_to(publisher: str, system: DerivedSystem) -> set[str]:
-    """Return the blocks in hardware from which a publisher's message derives."""
+    """Return the blocks in hardware on the routes to a publisher."""
     found: set[str] = set()
     new = {publisher}
     while new:
@@ -165,7 +165,7 @@ def way_to(publisher: str, system: DerivedSystem) -> set[str]:
 
 
 def _check_published(system: DerivedSystem, published: dict[str, list[Message]], responses: Sequence[Response]) -> None:
-    """Compare the messages from software to publishers with the model."""
+    """Raise `InputError` if the messages from software to publishers differ from the model's."""
     for topic in system.software.publishers:
         wanted = [response for response in responses if response.publisher.block == topic.block]
         found = published.get(topic.block, [])
@@ -175,13 +175,13 @@ def _check_published(system: DerivedSystem, published: dict[str, list[Message]],
                 sent, said = decode(topic.frame, payload), decode(topic.frame, response.payload)
                 name, *values = next(_differences(sent, said, ""), ("it", sent, said))
                 one, other = map(shown, values)
-                fail(f"message {number} from software to '{topic.block}': {name} is {one}, but {other} in the model")
+                fail(f"message {number} from software to '{topic.block}': {name} is {one}, but the model has {other}")
         if len(found) != len(wanted):
-            fail(f"software sends {len(found)} messages to '{topic.block}', but {len(wanted)} in the model")
+            fail(f"software sends {len(found)} messages to '{topic.block}', but the model sends {len(wanted)}")
 
 
 def _differences(one: Any, other: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the differing values of two messages, each with its path."""
+    """Yield the path and both values of each difference between two messages."""
     if isinstance(one, Mapping):
         for name, value in one.items():
             yield from _differences(value, other[name], f"{path}.{name}" if path else name)

@@ -1,10 +1,10 @@
-"""Reads the messages to send to a system from a YAML file or a recorded bag.
+"""Read the messages to send to a system from a YAML file or a recorded bag.
 
-A YAML file is a list; each item names the subscriber's block and gives its message:
+A YAML file is a list; each item consists of the name of a subscriber's block and a message:
 
     - QuaternionToEuler_sub: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
 
-Fields for which the subscriber has no port may be omitted; they are sent as their defaults, zero or empty.
+Fields for which the subscriber has no port may be omitted; they are sent with their defaults, or as zero or empty.
 """
 
 from __future__ import annotations
@@ -38,23 +38,26 @@ class Stimulus:
 
 
 def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
-    """Return all messages of a file or bag in order. Raises `InputError`, also for a file without messages."""
+    """Return all messages in a file or bag, in order. May raise `InputError`, also for a file without messages."""
     if not path.exists():
         fields = "{<field>: <value>, ...}"
         items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
-        fail(f"there are no stimuli at {path}", hint=f"a bag, or a YAML file with a list of messages: {items}")
+        fail(
+            f"the stimuli {path} do not exist",
+            hint=f"legal here: a bag, or a YAML file with a list of messages: {items}",
+        )
     if path.suffix in _YAML_SUFFIXES:
         stimuli = _from_yaml(path, subscribers)
     else:
-        # A hit must not pay for the import of rosbags' readers.
+        # A hit must not spend time on importing the readers of rosbags.
         from fusesoc_firm.bags.routes import read_bag
         from fusesoc_firm.message.bag_reader import BAGS
 
-        hint = f"stimuli are YAML (.yaml, .yml) or a bag; {BAGS}"
+        hint = f"stimuli are a YAML file (.yaml, .yml) or a bag; {BAGS}"
         stimuli = [Stimulus(*recorded) for recorded in read_bag(path, subscribers, hint)]
     if not stimuli:
         names = ", ".join(subscriber.block for subscriber in subscribers)
-        fail(f"{path} holds no message for {names}")
+        fail(f"{path} contains no message for {names}")
     return stimuli
 
 
@@ -68,18 +71,18 @@ def _from_yaml(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
         stimuli = []
         if text.root is not None and not is_null(text.root):
             faults.error(
-                f"stimuli are a list, not {kind(text.root)}",
+                f"stimuli must be a list, not {kind(text.root)}",
                 text.source(text.root),
-                "an item is '- <subscriber>: {<field>: <value>, ...}'",
+                "an item has the form '- <subscriber>: {<field>: <value>, ...}'",
             )
     faults.raise_if_any()
     return [stimulus for stimulus in stimuli if stimulus is not None]
 
 
 def _item(text: YamlText, node: yaml.Node, known: dict[str, Topic], faults: Diagnostics) -> Stimulus | None:
-    """Return one item of the list; None, with its faults noted, if it is not a message."""
+    """Return one item of the list; if the item is not a message, note the faults and return None."""
     if not isinstance(node, yaml.MappingNode) or len(node.value) != 1:
-        faults.error("a stimulus is one block with its message: '- <subscriber>: {...}'", text.source(node))
+        faults.error("a stimulus must be one subscriber with its message: '- <subscriber>: {...}'", text.source(node))
         return None
     key, value = node.value[0]
     subscriber = known.get(key.value) if isinstance(key, yaml.ScalarNode) else None

@@ -1,7 +1,7 @@
-"""Reads a message written in YAML, checks each value against its type, and reports each fault at its place.
+"""Read a message written in YAML, check each value against its type, and report each fault at its place.
 
-The message's types determine the values, not YAML: `1e-3` is text to PyYAML and `1` an integer, but both are legal for
-a float64.
+The message's types, not YAML's rules, determine the values: to PyYAML, `1e-3` is text and `1` is an integer, but both
+are legal for a float64.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
 
 @dataclass
 class _Branch:
-    """A field: each of its elements is a value of `type`, a `text`, or a message of `fields`.
+    """A field, each element of which is a value of `type`, a `text`, or a message with `fields`.
 
-    An array of fixed size has `count` elements; one of variable size is an `array`. A field is required if it `is_used`
-    or if any of its `fields` is.
+    An array of fixed size has `count` elements; `array` describes an array of variable size. A field is required if it
+    `is_used` or if one of its `fields` is required.
     """
 
     count: int | None = None
@@ -53,7 +53,7 @@ class _Branch:
 
 
 def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnostics) -> dict[str, Any]:
-    """Return the message of `frame` that a node holds; faults are noted and their values omitted.
+    """Return the message of `frame` in a node; note faults and omit the faulty values.
 
     Unused fields may be missing.
     """
@@ -85,18 +85,18 @@ def _tree(frame: Frame) -> _Branch:
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads one message; `name` names it in faults of the whole message."""
+    """A reader for one message; `name` is the message's name in faults that concern the whole message."""
 
     text: YamlText
     faults: Diagnostics
     name: str
 
     def message(self, node: yaml.Node, branch: _Branch, path: str) -> dict[str, Any]:
-        """Return the message at `path`, which is empty for the whole."""
+        """Return the message at `path`, which is empty for the whole message."""
         what = f"'{path}'" if path else f"a {self.name}"
         if not isinstance(node, yaml.MappingNode):
             fields = ", ".join(branch.fields)
-            self._error(f"{what} is a mapping of its fields, not {kind(node)}", node, f"its fields: {fields}")
+            self._error(f"{what} must be a mapping of fields, not {kind(node)}", node, f"legal fields: {fields}")
             return {}
         found: dict[str, Any] = {}
         hints = []
@@ -117,10 +117,10 @@ class _Reader:
             return self._element(node, branch, path)
         size = "" if branch.count is None else f" of {branch.count}"
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{path}' is a list{size}, not {kind(node)}", node)
+            self._error(f"'{path}' must be a list{size}, not {kind(node)}", node)
             return None
         if branch.count is not None and len(node.value) != branch.count:
-            self._error(f"'{path}' is a list{size}, not of {len(node.value)}", node)
+            self._error(f"'{path}' must be a list{size}, not of {len(node.value)}", node)
         elif branch.array is not None:
             self._check_bound(branch.array, len(node.value), node)
         return [self._element(item, branch, f"{path}[{number}]") for number, item in enumerate(node.value)]
@@ -131,17 +131,19 @@ class _Reader:
         if branch.type is None:
             return self.message(node, branch, path)
         if not isinstance(node, yaml.ScalarNode) or is_null(node) or node.style:
-            self._error(f"'{path}' is a {branch.type.name}, not {kind(node)}", node)
+            self._error(f"'{path}' must be of type {branch.type.name}, not {kind(node)}", node)
             return None
         try:
             return _value(str(node.value), branch.type)
         except ValueError as error:
-            self._error(f"'{path}' is a {branch.type.name}, not '{node.value}'", node, str(error))
+            self._error(f"'{path}' must be of type {branch.type.name}, not '{node.value}'", node, str(error))
             return None
 
     def _text(self, node: yaml.Node, text: Data, path: str) -> str | None:
         if not isinstance(node, yaml.ScalarNode) or is_null(node):
-            self._error(f"'{path}' is a {text.kind.value}, not {kind(node)}", node, "an empty one is ''")
+            self._error(
+                f"'{path}' must be of type {text.kind.value}, not {kind(node)}", node, "write an empty text as ''"
+            )
             return None
         self._check_bound(text, len(units_of(text, node.value)) // text.element.size, node)
         return str(node.value)
@@ -157,7 +159,7 @@ class _Reader:
 
 
 def _value(text: str, type_: WireType) -> bool | int | float:
-    """Return the value of a word. Raises `ValueError` with the legal values if the word is not one of them."""
+    """Return the value of a text. Raise `ValueError`, with the legal values, for an illegal text."""
     if type_.code == "?":
         return _boolean(text)
     return _float(text, type_) if type_.code in "fd" else _integer(text, type_)
@@ -192,9 +194,9 @@ def _float(text: str, type_: WireType) -> float:
         value = float(text)
         is_too_large = math.isinf(struct.unpack(f"<{type_.code}", struct.pack(f"<{type_.code}", value))[0])
     except ValueError:
-        raise ValueError("a number such as 1, -0.5, 1e-3, .inf, .nan") from None
+        raise ValueError("legal here: numbers such as 1, -0.5, 1e-3, .inf, .nan") from None
     except OverflowError:
         is_too_large = True
     if is_too_large:
-        raise ValueError("it is too large; infinity is written .inf")
+        raise ValueError("the number is too large; write infinity as .inf")
     return value

@@ -1,4 +1,4 @@
-"""The facts that determine the result of a call. Each has a kind, a name and a state, taken when it is first read.
+"""The facts that determine the result of a call; each has a kind, a name and the state at the first reading.
 
     file        the SHA-256 of the content
     part        the size and time of a file that was read in part
@@ -6,8 +6,7 @@
     code        the state of this package's own files
     program     the path, size and time of the file on the PATH
 
-As long as no state changes, the result does not change. A hit waits for this module, so it imports as little as
-possible.
+While no state changes, the result does not change. Every hit loads this module, so it imports as little as possible.
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ from fusesoc_firm.store.layout import digest, digest_of
 from fusesoc_firm.text.files import read_file
 
 Fact = tuple[str, str, str | None]
-"""Kind, name and state of a fact; the state of a missing object is None."""
+"""The kind, name and state of a fact; the state of a missing object is None."""
 
 
 def facts(kind: str, names: Iterable[str]) -> list[Fact]:
-    """The facts of a kind, in their current state."""
+    """Return the facts of one kind in their current states."""
     return [(kind, name, state(kind, name)) for name in names]
 
 
 def state(kind: str, name: str) -> str | None:
-    """The current state of a fact; None if the object is missing. Raises `ValueError` for an impossible name."""
+    """Return a fact's current state, or None if the object is missing. Raise `ValueError` for an impossible name."""
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)
@@ -41,7 +40,7 @@ def state(kind: str, name: str) -> str | None:
         return own_code.state()
     if kind == "program":
         return _program(name)
-    # A kind from another version of this module.
+    # The kind is from another version of this module.
     return None
 
 

@@ -1,18 +1,20 @@
-"""The files in the store and their formats; `store` decides what to keep, `plugin.recall` reads hits quickly.
+"""The files in the store and their formats.
+
+`store` decides which files to keep, and `plugin.recall` reads hits quickly.
 
     <root>/v4/<first two digits>/<key>.entry                 generated files
     <root>/v4/<first two digits>/<digest of a call>.call     the facts that determine a call's key, and the key
     <root>/v4/<first two digits>/<key>.lock                  held while an entry is built
 
-Each file except the lock begins with a line that contains the SHA-256 of the rest. A single rename puts the file in
-place, so the file is either complete or missing. An entry continues with a line of JSON (the request, names, lengths)
-and the contents; the others are JSON.
+Each file except the lock begins with a line that contains the SHA-256 of the rest. A single rename creates the file, so
+it is either complete or missing. In an entry, a line of JSON (the request, names and lengths) and the contents follow;
+in other files, JSON follows.
 
-Anyone who can write to the store can write files with correct digests. So a file with unexpected content counts as
-damaged, just like a file with a wrong digest. Examples are data of other types, and names that lead out of the folder
-to which the files are written.
+Anyone who can write to the store can write files with correct digests. A file with unexpected content therefore counts
+as damaged, like a file with a wrong digest. Examples are data of other types, and names that lead out of the output
+folder.
 
-This module imports as little of Python's library as possible.
+This module imports as little of Python's standard library as possible.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 LAYOUT = "v4"
 ENTRY, CALL, LOCK = ".entry", ".call", ".lock"
 KEPT = (ENTRY, CALL)
-"""The endings of the files that are kept; the least recently used are removed first."""
+"""The endings of the files that are kept; the least recently used files are removed first."""
 
 # The size limits for plain data and for all other files, since each file is read in one piece.
 _MOST_PLAIN_BYTES = 2**24
@@ -42,12 +44,12 @@ _LONGEST_NAME_BYTES, _LONGEST_PATH_BYTES = 255, 4000
 _DIGITS = frozenset("0123456789abcdef")
 _DIGEST_DIGITS = 64
 _FACT_PARTS, _FILE_PARTS = 3, 2
-# Keys of a call's note.
+# The keys in a call's note.
 _WORDS = ("name", "core", "marks")
 
 
 def default_root(environment: Mapping[str, str] = os.environ) -> str:
-    """FUSESOC_FIRM_CACHE, or `fusesoc_firm` in XDG_CACHE_HOME, or in ~/.cache; absolute."""
+    """Return the store's absolute path: FUSESOC_FIRM_CACHE, by default `fusesoc_firm` in XDG_CACHE_HOME or ~/.cache."""
     if chosen := environment.get("FUSESOC_FIRM_CACHE"):
         return os.path.abspath(os.path.expanduser(chosen))
     base = environment.get("XDG_CACHE_HOME") or "~/.cache"
@@ -55,12 +57,12 @@ def default_root(environment: Mapping[str, str] = os.environ) -> str:
 
 
 def place(digest: str, suffix: str) -> str:
-    """The path in a store of the file for a digest."""
+    """Return the path, relative to the store's root, of the file for a digest."""
     return f"{LAYOUT}/{digest[:2]}/{digest}{suffix}"
 
 
 def write(root: str, name: str, data: bytes) -> None:
-    """Store data with its digest. Raises `OSError`."""
+    """Write data with its digest to the store. May raise `OSError`."""
     whole = digest(data).encode() + b"\n" + data
     if len(whole) > _most(name):
         raise OSError(EFBIG, os.strerror(EFBIG))
@@ -68,18 +70,18 @@ def write(root: str, name: str, data: bytes) -> None:
 
 
 def write_json(root: str, name: str, data: object) -> None:
-    """Store plain data as JSON. Raises `OSError`."""
+    """Write plain data as JSON to the store. May raise `OSError`."""
     write(root, name, json.dumps(data).encode())
 
 
 def write_entry(root: str, name: str, about: Mapping[str, str], files: Mapping[str, bytes]) -> None:
-    """Store generated files with a description of their request. Raises `OSError`."""
+    """Write generated files to the store, with a description of the request. May raise `OSError`."""
     header = {"about": dict(about), "files": [[path, len(content)] for path, content in files.items()]}
     write(root, name, b"".join([json.dumps(header).encode(), b"\n", *files.values()]))
 
 
 def read_note(root: str, name: str) -> dict[str, Any] | None:
-    """The note of a call: `key`, `facts`, `name`, `core` and `marks`; None if it is missing or damaged."""
+    """Return a call's note: `key`, `facts`, `name`, `core` and `marks`, or None if the note is missing or damaged."""
     note = _plain(_read(root, name))
     if not isinstance(note, dict) or not {"key", "facts", *_WORDS} <= note.keys():
         return None
@@ -88,7 +90,7 @@ def read_note(root: str, name: str) -> dict[str, Any] | None:
 
 
 def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] | None:
-    """The description of the request, and the files in order of generation; None if missing or damaged."""
+    """Return an entry's request description and files, in order of generation, or None if it is missing or damaged."""
     line, _, contents = (_read(root, name) or b"").partition(b"\n")
     header = _plain(line)
     about = header.get("about") if isinstance(header, dict) else None
@@ -105,33 +107,33 @@ def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] 
 
 
 def is_whole(root: str, name: str) -> bool:
-    """Whether a stored file is undamaged."""
+    """Return whether a stored file is undamaged."""
     reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, CALL: read_note}
     return reads[name[name.rindex(".") :]](root, name) is not None
 
 
 def mark_used(root: str, *names: str) -> None:
-    """Set the time of last use of these files to now, if the store is writable."""
+    """Set the time of last use of these files to the current time, if the store is writable."""
     for name in names:
         try:
             shared_files.mark_used(root, name)
         except OSError:
-            # A read-only store is used without this record.
+            # In a read-only store, times of use are not recorded.
             return
 
 
 def digest_of(data: object) -> str:
-    """The SHA-256 of plain data."""
+    """Return the SHA-256 of plain data in hexadecimal digits."""
     return digest(json.dumps(data, sort_keys=True).encode())
 
 
 def digest(data: bytes) -> str:
-    """The SHA-256 of bytes."""
+    """Return the SHA-256 of bytes in hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 
 def _read(root: str, name: str) -> bytes | None:
-    """The data stored under its digest; None if it is missing or damaged."""
+    """Return the data in a file after the digest, or None if the file is missing or damaged."""
     found = shared_files.read(root, name, _most(name))
     if found is None:
         return None
@@ -144,7 +146,7 @@ def _most(name: str) -> int:
 
 
 def _plain(data: bytes | None) -> object:
-    """The data in a JSON text; None if it is invalid or nested too deep."""
+    """Return the data in a JSON text, or None if the text is invalid or nested too deeply."""
     if not data or len(data) > _MOST_PLAIN_BYTES:
         return None
     try:
@@ -166,14 +168,14 @@ def _is_digest(text: object) -> bool:
 
 
 def _are_facts(facts: object) -> bool:
-    """Whether each item has a kind, a name and a state."""
+    """Return whether each item has a kind, a name and a state."""
     return isinstance(facts, list) and all(
         isinstance(fact, list) and len(fact) == _FACT_PARTS and _are_texts(fact[:2]) for fact in facts
     )
 
 
 def _lengths(listed: object) -> dict[str, int] | None:
-    """The length of each file by path; None if a length or a path is illegal."""
+    """Return the length of each file by path, or None if a length or a path is illegal."""
     lengths: dict[str, int] = {}
     for item in listed if isinstance(listed, list) else [None]:
         if not isinstance(item, list) or len(item) != _FILE_PARTS or type(item[1]) is not int or item[1] < 0:
@@ -185,7 +187,7 @@ def _lengths(listed: object) -> dict[str, int] | None:
 
 
 def _is_path(path: object) -> bool:
-    """Whether a relative path leads directly to a file below its base folder."""
+    """Return whether a value is a relative path that leads directly to a file below its base folder."""
     if not isinstance(path, str):
         return False
     try:
@@ -198,5 +200,5 @@ def _is_path(path: object) -> bool:
 
 
 def _folders(paths: Iterable[str]) -> set[str]:
-    """All folders above these paths."""
+    """Return all parent folders of these paths."""
     return {path[:place] for path in paths for place, letter in enumerate(path) if letter == "/"}

@@ -1,6 +1,6 @@
 """The state of this package's files and imported packages, on which all generated output depends.
 
-A hit waits for this module, so it imports as little as possible.
+Every hit loads this module, so it imports as little as possible.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
 IMPORTED = ("chevron", "numpy", "pyyaml", "rosbags")
-"""The packages that affect generated text besides our own code."""
+"""The packages that, besides our own code, affect generated text."""
 
-# Modules, templates and data. The other folders hold cores and pages, as files or links.
+# Modules, templates and data. The other folders contain cores and pages, as files or links.
 _COUNTED = (".py", ".mustache", ".yaml", ".csv")
 _LEFT_OUT = ("__pycache__", "demos", "docs", "library")
 # File times are too coarse to distinguish two edits within this period.
@@ -25,15 +25,15 @@ _STARTED = time.time_ns()
 
 
 def digest(package: Path = PACKAGE) -> str:
-    """The SHA-256 of the names and contents of all our files; every copy of the package has the same digest."""
+    """Return the SHA-256 of our files' names and contents, which is equal for all copies of the package."""
     return _digest(package, state(package))
 
 
 def state(package: Path = PACKAGE) -> str:
-    """A value that changes when one of our files is edited, added or removed.
+    """Return a value that changes when one of our files is edited, added or removed.
 
-    The value is computed from names, sizes and times, which is many times faster than `digest`. If a file is so new at
-    the start of this process that its time may be unreliable, the file's content is used instead.
+    The value is computed from names, sizes and times, which is much faster than `digest`. If a file is so new at the
+    start of this process that its time may be unreliable, its content is used instead.
     """
     found = []
     for name, entry in _files(str(package)):
@@ -45,13 +45,13 @@ def state(package: Path = PACKAGE) -> str:
 
 
 def names(package: Path = PACKAGE) -> list[str]:
-    """The names of our files relative to the package, sorted."""
+    """Return the names of our files relative to the package, sorted."""
     return sorted(name for name, _ in _files(str(package)))
 
 
 @lru_cache(maxsize=1)
 def _digest(package: Path, _state: str) -> str:
-    """The digest of our files; `_state` invalidates the cache."""
+    """Return the digest of our files; `_state` invalidates the cache."""
     found = {name: _content(entry.path) for name, entry in _files(str(package))}
     return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
 

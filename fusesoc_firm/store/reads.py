@@ -1,11 +1,11 @@
-"""Records the files and folders that this process reads, with their state, by Python's audit hooks (PEP 578).
+"""Record the files and folders that this process reads, with their states, by Python's audit hooks (PEP 578).
 
-The key must cover everything that a generator reads, or an edit would go unnoticed. Four groups are not recorded:
-Python and its installed packages, whose versions are part of the key; this package, whose files are counted separately;
-the machine's `/dev`, `/etc`, `/proc` and `/sys`; and files that other programs read.
+The key must cover everything that a generator reads; otherwise an edit would go unnoticed. Four groups are not
+recorded: Python and its installed packages, whose versions are part of the key; this package, whose files have a
+separate digest; the machine's `/dev`, `/etc`, `/proc` and `/sys`; and files that other programs read.
 
-If a file is too large to be an input, such as a bag, a reader takes parts and declares this with `in_part`. Each `Part`
-is then an input; a repeated call is a hit as long as the file has the same size and time.
+If a file, such as a bag, is too large to be an input as a whole, its reader reads parts and declares this with
+`in_part`. Each `Part` is then an input; a repeated call is a hit while the file's size and time are unchanged.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 from fusesoc_firm.store.facts import Fact, state
 from fusesoc_firm.store.own_code import PACKAGE
 
-# Python's events whose first argument is a path.
+# The audit events whose first argument is a path.
 _OF_FILES = ("open", "sqlite3.connect")
 _OF_FOLDERS = ("os.listdir", "os.scandir")
 _OF_TEMPORARY = ("tempfile.mkdtemp", "tempfile.mkstemp")
@@ -34,14 +34,14 @@ _PACKAGE_FOLDERS = ("site-packages", "dist-packages")
 
 @cache
 def _apart() -> tuple[str, ...]:
-    """Folders that count separately. `sysconfig` reads files, so call this function before the hook needs it."""
+    """Return the folders that are not recorded; call this before the hook needs it, since `sysconfig` reads files."""
     paths = sysconfig.get_paths()
     return (*_MACHINE, str(PACKAGE), *(paths[name] for name in _PATHS_OF_PYTHON), sys.executable)
 
 
 @dataclass(frozen=True)
 class Part:
-    """The part of the file or folder at `path` that was read; each part has a separate name."""
+    """A part of the file or folder at `path` that was read; each part has a distinct name."""
 
     path: Path
     name: str
@@ -49,15 +49,15 @@ class Part:
 
 
 Input = Path | Part
-"""An input of a generator: a whole file, or part of one."""
+"""An input of a generator: a whole file, or part of a file."""
 
 
 @dataclass
 class Reads:
-    """The absolute paths that were read, in order, each with the file's state before the first reading.
+    """The absolute paths that were read, in order, each with the state before the first reading.
 
     `parts` are files that were read in part. Files in `apart` and in new temporary folders are not recorded.
-    `python_path` lists the places where Python finds packages.
+    `python_path` lists the folders in which Python finds packages.
     """
 
     files: dict[str, str | None] = field(default_factory=dict)
@@ -71,12 +71,12 @@ class Reads:
         _note_state(self.files, "file", path)
 
     def facts(self) -> list[Fact]:
-        """All recorded files, parts and folders."""
+        """Return the facts for all recorded files, parts and folders."""
         kinds = {"file": self.files, "part": self.parts, "folder": self.folders}
         return [(kind, path, was) for kind, found in kinds.items() for path, was in found.items()]
 
 
-# The active records, the innermost last.
+# The active records; the innermost record is last.
 _current: list[Reads] = []
 # Absolute paths of the files that are being read in part.
 _partly: list[set[str]] = []
@@ -84,7 +84,7 @@ _partly: list[set[str]] = []
 
 @contextmanager
 def noted(reads: Reads) -> Iterator[None]:
-    """Add everything that is read in the context to `reads`."""
+    """Add everything that is read within this context to `reads`."""
     _install_hook()
     _current.append(reads)
     try:
@@ -95,7 +95,7 @@ def noted(reads: Reads) -> Iterator[None]:
 
 @contextmanager
 def in_part(files: Iterable[Path]) -> Iterator[None]:
-    """Treat these files as read in part within the context."""
+    """Treat these files as read in part within this context."""
     paths = {_absolute(str(file)) for file in files}
     if _current:
         for path in sorted(paths):
@@ -109,7 +109,7 @@ def in_part(files: Iterable[Path]) -> Iterator[None]:
 
 @cache
 def _install_hook() -> None:
-    """Install the hook once; it remains for the life of the process."""
+    """Install the hook once; it remains installed until the process ends."""
     sys.addaudithook(_hook)
 
 
@@ -122,7 +122,7 @@ def _hook(event: str, arguments: tuple[object, ...]) -> None:
         elif _is_read(*arguments[1:]):
             _note(arguments[0], is_file=True)
     elif event in _OF_FOLDERS:
-        # An import lists the folders of Python's path, and never scans them.
+        # Imports list the folders on Python's path, but never scan them.
         if event != "os.listdir" or arguments[0] not in _current[-1].python_path:
             _note(arguments[0], is_file=False)
     elif event in _OF_TEMPORARY:
@@ -136,19 +136,19 @@ def _is_read(mode: object, flags: object) -> bool:
 
 
 def _of_uri(name: object) -> object:
-    """The path in a database's name, which may be a URI."""
+    """Return the path in a database's name, which may be a URI."""
     text = os.fsdecode(name) if isinstance(name, str | bytes) else ""
     return text.removeprefix("file:").partition("?")[0] if text.startswith("file:") else name
 
 
 def _note(path: object, *, is_file: bool) -> None:
-    # A number is a file that is already open, and None is the current folder.
+    # A number denotes a file that is already open, and None denotes the current folder.
     if not isinstance(path, str | bytes) or (text := os.fsdecode(path)) == ":memory:":
         return
     absolute, reads = _absolute(text), _current[-1]
     if any(absolute in paths for paths in _partly):
         return
-    # An archive may be on Python's path, too.
+    # An archive may also be on Python's path.
     is_apart = is_file and absolute in reads.python_path
     if not is_apart and not _is_below(absolute, reads.apart) and not _is_of_package(absolute, reads):
         _note_state(reads.files if is_file else reads.folders, "file" if is_file else "folder", absolute)
@@ -170,7 +170,7 @@ def _is_below(path: str, folders: Iterable[str]) -> bool:
 
 
 def _is_of_package(path: str, reads: Reads) -> bool:
-    """Whether a file belongs to a package that Python finds elsewhere."""
+    """Return whether a file belongs to a package that Python finds elsewhere."""
     for folder in reads.python_path:
         if path.startswith(f"{folder}{os.sep}"):
             if os.path.basename(folder) in _PACKAGE_FOLDERS:

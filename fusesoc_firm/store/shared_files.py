@@ -1,13 +1,13 @@
-"""Accesses files in a folder that other people may write to, such as a team's store.
+"""Access files in a folder that other people may write to, such as a team's store.
 
-Nothing below the root is trusted: a name may be a link, a pipe, a device or a folder. Every folder is opened from its
-parent without following links, files are opened without waiting, and only regular files count. The root itself is the
-user's choice, and may be a link. All names are relative to it.
+Nothing below the root is trusted: a name may be a link, a pipe, a device or a folder. Every folder is opened relative
+to its parent without following links, files are opened without waiting, and only regular files are accepted. The user
+chooses the root itself, which may be a link. All names are relative to the root.
 
 New files and folders in a group-writable folder belong to the folder's group, which may write to them regardless of the
 umask, as in a shared Git repository.
 
-This module imports as little of Python's library as possible.
+This module imports as little of Python's standard library as possible.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TRIES = 100
 
 
 def read(root: str, name: str, most: int) -> bytes | None:
-    """Return the content of a regular file of at most `most` bytes; None for any other, missing or unreadable file."""
+    """Return the content of a readable regular file of at most `most` bytes, or None for any other file."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             handle = os.open(os.path.basename(name), os.O_RDONLY | _FILE, dir_fd=folder)
@@ -38,7 +38,7 @@ def read(root: str, name: str, most: int) -> bytes | None:
             if not stat.S_ISREG(status.st_mode) or status.st_size > most:
                 return None
             with open(handle, "rb", closefd=False) as file:
-                # Our files appear whole, so a file that is still growing is not ours.
+                # Our files are complete when they appear, so a file that is still growing is not ours.
                 content = file.read(status.st_size + 1)
             return content if len(content) == status.st_size else None
         finally:
@@ -48,18 +48,18 @@ def read(root: str, name: str, most: int) -> bytes | None:
 
 
 def write_whole(root: str, name: str, data: bytes) -> None:
-    """Write a temporary file next to the target, then rename it; creates missing folders. Raises `OSError`."""
+    """Write a temporary file next to the target, then rename it; create missing folders. May raise `OSError`."""
     for _ in range(_TRIES - 1):
-        # Another process may remove the folder, or files in it.
+        # Another process may remove the folder, or files in the folder.
         with suppress(FileNotFoundError):
             return _write(root, name, data)
     return _write(root, name, data)
 
 
 def open_lock(root: str, name: str) -> int:
-    """Open a file to be locked; creates it if it is missing, and keeps its content.
+    """Open a file to be locked and return its handle; create a missing file, and keep the content of an existing one.
 
-    Raises `OSError`, also if the name belongs to another kind of file.
+    May raise `OSError`, also if the path is not a regular file.
     """
     for _ in range(_TRIES - 1):
         with suppress(FileNotFoundError):
@@ -68,7 +68,7 @@ def open_lock(root: str, name: str) -> int:
 
 
 def state(root: str, name: str) -> os.stat_result | None:
-    """The state of a path, without following a link; None if the path is missing or inaccessible."""
+    """Return the status of a path without following links, or None if the path is missing or inaccessible."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             return os.stat(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
@@ -77,7 +77,7 @@ def state(root: str, name: str) -> os.stat_result | None:
 
 
 def listed(root: str, name: str) -> list[tuple[str, os.stat_result]]:
-    """The entries of each subfolder, with their states, and any other file found in place of a subfolder."""
+    """Return the entries of all subfolders, and any other files in place of subfolders, each with its status."""
     found = []
     for inner, status in _entries(root, name) if _is_folder(root, name) else [(name, state(root, name))]:
         if status is not None:
@@ -86,23 +86,23 @@ def listed(root: str, name: str) -> list[tuple[str, os.stat_result]]:
 
 
 def mark_used(root: str, name: str) -> None:
-    """Set the time of a file, or of a link itself, to now. Raises `OSError`."""
+    """Set the times of a file, or of a link itself, to the current time. May raise `OSError`."""
     with _opened(root, os.path.dirname(name)) as folder:
         os.utime(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
 
 
 def remove(root: str, name: str) -> int:
-    """Remove a file, or a folder with its contents; returns the number of bytes removed. Raises `OSError`."""
+    """Remove a file, or a folder with its contents; return the number of bytes removed. May raise `OSError`."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             return _remove(os.path.basename(name), folder)
     except FileNotFoundError:
-        # Another process removed the file first.
+        # Another process has already removed the file.
         return 0
 
 
 def _write(root: str, name: str, data: bytes) -> None:
-    # This name is unique across machines; process ids are unique only on one machine.
+    # This name is unique across machines, unlike a process id.
     temporary = f"{TEMPORARY}{os.urandom(8).hex()}"
     with _opened(root, os.path.dirname(name), is_made=True) as folder:
         try:
@@ -147,7 +147,7 @@ def _remove(name: str, above: int) -> int:
 
 
 def _remove_folder(name: str, above: int) -> None:
-    """Remove an empty folder or a link; keeps a folder that another process has written to."""
+    """Remove an empty folder or a link; keep a folder that another process has written to."""
     try:
         os.rmdir(name, dir_fd=above)
     except NotADirectoryError:
@@ -165,7 +165,7 @@ def _entries(root: str, name: str) -> list[tuple[str, os.stat_result]]:
     found = []
     with suppress(OSError), _opened(root, name) as folder:
         for inner in sorted(os.listdir(folder)):
-            # Another process may remove the folder in between.
+            # Another process may remove the folder between the two steps.
             with suppress(OSError):
                 found.append((f"{name}/{inner}", os.stat(inner, dir_fd=folder, follow_symlinks=False)))
     return found
@@ -173,7 +173,7 @@ def _entries(root: str, name: str) -> list[tuple[str, os.stat_result]]:
 
 @contextmanager
 def _opened(root: str, name: str, *, is_made: bool = False) -> Iterator[int]:
-    """Open a folder; with `is_made`, create it and its parents if they are missing."""
+    """Open a folder within this context and yield its handle; with `is_made`, create missing folders."""
     if is_made:
         os.makedirs(root, exist_ok=True)
     handle = os.open(root, _FOLDER)
@@ -200,13 +200,13 @@ def _make_folder(name: str, above: int) -> None:
 
 
 def _share(handle: int, above: int) -> None:
-    """Give a new file the group and the group rights of its folder, if the group may write to the folder."""
+    """Set a new file's group and group rights to those of its folder, if the group may write to the folder."""
     folder, made = os.fstat(above), os.fstat(handle)
     if not folder.st_mode & stat.S_IWGRP:
         return
     is_folder = stat.S_ISDIR(made.st_mode)
     rights = stat.S_IRGRP | stat.S_IWGRP | (stat.S_IXGRP | stat.S_ISGID if is_folder else 0)
-    # This fails if the user is not in the group, or another user created the file.
+    # The calls fail if the user is not in the group, or if another user created the file.
     with suppress(PermissionError):
         if made.st_gid != folder.st_gid:
             os.fchown(handle, -1, folder.st_gid)

@@ -1,16 +1,16 @@
 """A store of generated files, indexed by key, so that nothing is generated twice.
 
-FuseSoC's own generator cache is unsuitable: it ignores the generator's code and templates, keeps partial output after
-an interrupt, and has no lock. Here an entry's key covers everything that determines its content, including this
-package's files.
+FuseSoC's own generator cache is not suitable: it ignores the generator's code and templates, keeps partial output after
+an interrupt, and has no lock. In this store, an entry's key covers everything that determines the content, including
+this package's files.
 
-Each answered call leaves a note of all facts that determine its key, so that `plugin.recall` can answer it the next
-time without computing the key. `layout` describes the files of the store.
+Each answered call leaves a note of all facts that determine its key, so that `plugin.recall` can answer the same call
+again without computing the key. `layout` describes the files in the store.
 
-A file is written under a temporary name and then renamed; it is read whole and checked before use. So no reader, on
-this machine or on another that shares the folder, sees a partial file or is disturbed when a file is removed. Locks
-only avoid duplicate work: they need not work between machines, and are never trusted. `shared_files` describes how the
-store treats files from other people.
+A file is written under a temporary name and then renamed; it is read as a whole and checked before use. Therefore no
+reader, on this machine or on another that shares the folder, sees a partial file or is disturbed when a file is
+removed. Locks only avoid duplicate work: they need not work between machines and are never trusted. `shared_files`
+describes how the store treats files from other people.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ from fusesoc_firm.text.file_lock import take
 from fusesoc_firm.text.files import TEMPORARY
 
 Files = Mapping[str, bytes]
-"""Contents by file name; a name may contain `/`."""
+"""The contents of files by name; a name may contain `/`."""
 
 _FORMER_LAYOUTS = ("v1", "v2", "v3")
 _DEFAULT_LIMIT = "1G"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
-# Shrinking leaves a margin, so that the limit is not exceeded again at once.
+# Shrinking leaves a margin, so that the limit is not exceeded again immediately.
 _KEPT_OF_LIMIT = 0.8
 # The process that holds a lock may be stopped, or its machine may be down. This limit exceeds the time to generate a
 # core.
 _LONGEST_WAIT_SECONDS = 120
-# A temporary file of this age was left by a killed process; no write takes this long.
+# A temporary file of this age is from a process that was killed, since no write takes this long.
 _ABANDONED_SECONDS = 3600
 
 
 @dataclass(frozen=True)
 class Key:
-    """The digest of all inputs of a result; `about` is plain data that describes the request for people."""
+    """The digest of all inputs of a result; `about` describes the request for people, as plain data."""
 
     digest: str
     about: Mapping[str, str] = field(default_factory=dict, compare=False)
@@ -60,7 +60,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Entry:
-    """Generated files, and whether they are a hit (True) or were built (False)."""
+    """Generated files, and whether they were in the store (True) or were built (False)."""
 
     files: Files
     is_from_store: bool
@@ -68,7 +68,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class StoredFile:
-    """A file by its name in the store: its size in bytes, and the time of last use (seconds since the epoch)."""
+    """A file in the store: its name, its size in bytes, and the time of last use in seconds since the epoch."""
 
     name: str
     size: int
@@ -77,17 +77,18 @@ class StoredFile:
 
 @dataclass(frozen=True)
 class Store:
-    """A store of about `limit` bytes at most, in the folder `root`, which is created on the first write."""
+    """A store of at most about `limit` bytes in the folder `root`, which is created by the first write."""
 
     root: Path
     limit: int
 
     def obtain(self, key: Key, build: Callable[[], Files], is_current: Callable[[], bool] = lambda: True) -> Entry:
-        """Return the files of a key: undamaged files from the store, or else the files from `build`, which are stored.
+        """Return the files for a key: undamaged files from the store or, after a miss, the files from `build`.
 
-        Files are stored only if the key `is_current` after `build`: otherwise an input changed during the build.
-        Concurrent processes that need the same key wait for the first of them. Exceptions from `build` propagate. If
-        the store is not writable, the files are built without it, and one line on stderr reports this.
+        Built files are stored only if `is_current` returns true after `build`; otherwise, an input changed during the
+        build. Concurrent processes that need the same key wait for the first of them. Exceptions from `build`
+        propagate. If the store is not writable, a line on standard error reports this, and the files are returned
+        without being stored.
         """
         if (files := self._find(key)) is not None:
             return Entry(files, True)
@@ -101,41 +102,41 @@ class Store:
         return Entry(files, False)
 
     def note(self, call: str, note: Mapping[str, object]) -> None:
-        """Store a call's note by the call's digest, so that the call can be recalled."""
-        # If this fails, only time is lost.
+        """Store a call's note under the call's digest, so that `plugin.recall` can answer the call."""
+        # A failed write only makes the next call slower.
         with suppress(OSError):
             if self.is_writable():
                 layout.write_json(self._root, place(call, CALL), note)
 
     def entries(self) -> list[StoredFile]:
-        """All entries, the most recently used first."""
+        """Return all entries in the order of last use, the most recent first."""
         return [file for file in self._files() if file.name.endswith(ENTRY)]
 
     def size(self) -> int:
-        """The number of bytes that count against the limit."""
+        """Return the number of bytes that count against the limit."""
         return sum(file.size for file in self._files())
 
     def is_writable(self) -> bool:
-        """Whether this user may add entries; also True if the store's folder is missing."""
+        """Return whether this user may add entries, which is also the case if the store's folder is missing."""
         there = next((folder for folder in (self.root / LAYOUT, self.root) if os.access(folder, os.F_OK)), None)
         return there is None or os.access(there, os.W_OK)
 
     def remove_damaged(self) -> list[Path]:
-        """Remove damaged files and those that cannot belong to a store, and return them. Raises `OSError`."""
+        """Remove damaged files and files that cannot belong to a store; return their paths. May raise `OSError`."""
         damaged = []
         for name, status in self._listed():
             is_kept = name.endswith(KEPT)
             is_good = stat.S_ISREG(status.st_mode) and (not is_kept or layout.is_whole(self._root, name))
-            # A missing file was removed by another process.
+            # If the file is missing, another process has removed it.
             if not is_good and shared_files.state(self._root, name) is not None:
                 shared_files.remove(self._root, name)
                 damaged.append(self.root / name)
         return damaged
 
     def shrink(self, limit: int) -> int:
-        """Remove the least recently used files until at most `limit` bytes are left; return the bytes removed.
+        """Remove the least recently used files until at most `limit` bytes remain; return the number of removed bytes.
 
-        Raises `OSError`.
+        May raise `OSError`.
         """
         total = removed = 0
         for file in self._files():
@@ -145,7 +146,7 @@ class Store:
         return removed
 
     def clean(self) -> int:
-        """Remove the whole store, including former versions; return the number of bytes removed. Raises `OSError`."""
+        """Remove the whole store, including older formats; return the number of removed bytes. May raise `OSError`."""
         return sum(shared_files.remove(self._root, layout) for layout in (*_FORMER_LAYOUTS, LAYOUT))
 
     def _find(self, key: Key) -> Files | None:
@@ -157,15 +158,15 @@ class Store:
 
     @contextmanager
     def _lock(self, key: Key) -> Iterator[None]:
-        """Hold the lock of a key, which the system releases if the process ends.
+        """Hold the lock of a key within this context; the operating system releases the lock if the process ends.
 
-        A process that cannot take the lock, or has waited too long for it, continues without it.
+        A process that cannot get the lock, or has waited too long, continues without the lock.
         """
         name = place(key.digest, LOCK)
         try:
             handle, is_held = _locked(self._root, name)
         except OSError:
-            # A read-only store is reported when the entry is written.
+            # The write of the entry reports a read-only store.
             yield
             return
         try:
@@ -182,7 +183,7 @@ class Store:
             layout.write_entry(self._root, place(key.digest, ENTRY), key.about, files)
             self._shrink_if_needed()
         except OSError as error:
-            # Users of a read-only store expect this; `firm cache show` reports it.
+            # Users of a read-only store expect this failure, and `firm cache show` reports it.
             if self.is_writable():
                 print(f"warning: results cannot be cached in the store {self.root}: {error.strerror}", file=sys.stderr)
 
@@ -196,7 +197,7 @@ class Store:
                     shared_files.remove(self._root, name)
 
     def _files(self) -> list[StoredFile]:
-        """The files that count against the limit, the most recently used first."""
+        """Return the files that count against the limit, the most recently used first."""
         found = [
             StoredFile(name, status.st_size, status.st_mtime)
             for name, status in self._listed()
@@ -213,7 +214,7 @@ class Store:
 
 
 def default_store(environment: Mapping[str, str] = os.environ) -> Store:
-    """The store selected by the environment variables. Raises `InputError` if the limit is not a size."""
+    """Return the store selected by the environment variables. Raise `InputError` if the limit is not a size."""
     limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
         fail(
@@ -224,15 +225,16 @@ def default_store(environment: Mapping[str, str] = os.environ) -> Store:
 
 
 def parse_size(text: str) -> int | None:
-    """The number of bytes in a text, with K, M, G or T for powers of 1024; None if it is invalid."""
+    """Return the number of bytes in a text such as `5G` (K, M, G, T: powers of 1024), or None if it is invalid."""
     found = re.fullmatch(r"(\d+)([KMGT]?)", text.strip().upper())
     return int(found[1]) * _UNITS[found[2]] if found else None
 
 
 def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | None], code: str) -> str:
-    """The digest of everything that determines the result of `request` (plain data).
+    """Return the digest of everything that determines the result of `request` (plain data).
 
-    `inputs` holds the bytes of each file by name, None for missing files; `code` is the digest of our own files.
+    `inputs` maps the name of each file to its bytes, or to None for a missing file; `code` is the digest of our own
+    files.
     """
     parts = {
         "request": request,
@@ -240,7 +242,7 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
         "code": code,
         "versions": {name: _version(name) for name in IMPORTED},
         "python": sys.version_info[:2],
-        # A compiled accelerator runs on only one kind of machine.
+        # A compiled accelerator runs only on one kind of machine.
         "machine": platform.machine(),
     }
     return digest_of(parts)
@@ -248,15 +250,18 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
 
 @cache
 def _version(package: str) -> str:
-    """The version of an imported package, cached: the look-up takes longer than the rest of a key."""
+    """Return the version of an imported package.
+
+    It is cached, since the look-up takes longer than the rest of a key.
+    """
     return version(package)
 
 
 def _locked(root: str, name: str) -> tuple[int, bool]:
-    """Open and lock a file; return the handle and whether the lock is held. Raises `OSError`.
+    """Open and lock a file; return the handle, and whether the lock is held. May raise `OSError`.
 
-    The previous holder may have removed the file in the meantime. If the file system has no locks, or only locks within
-    one machine, the worst result is a duplicate build.
+    The previous holder may have removed the file in the meantime. If the file system does not support locks, or only
+    within one machine, the worst result is a duplicate build.
     """
     end = time.monotonic() + _LONGEST_WAIT_SECONDS
     while True:

@@ -1,7 +1,7 @@
 """The message sources that the core next to a specification names, so that all commands search where a build does.
 
-The order of the search is also the same: the specification's `paths`, the command's arguments, the core's paths, a
-sourced ROS, a distribution.
+Commands and builds also search in the same order: the specification's `paths`, the command's arguments, the core's
+paths, a sourced ROS, a distribution.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
-# The generator instance that makes the system.
+# The generator instance that generates the system.
 _INSTANCE = "system"
 
 
@@ -31,7 +31,7 @@ class MessageSources:
 
 
 def core_of(spec: Path) -> CoreFile | None:
-    """The core next to a specification that uses and can simulate the specification; None if there is no such core."""
+    """Return the core file in a specification's folder that generates the system, or None if there is no such file."""
     # Path.resolve() raises a different error for a cyclic link.
     spec = Path(os.path.realpath(spec))
     for path in sorted(spec.parent.glob("*.core")):
@@ -47,9 +47,9 @@ def core_of(spec: Path) -> CoreFile | None:
 def sources_of(
     spec: Path, paths: Sequence[Path] = (), distro: str | None = None, core_folders: CoreFolders = no_core_folders
 ) -> MessageSources:
-    """The command's arguments, followed by the sources of the core next to a specification.
+    """Return the command's arguments, followed by the message sources that the core next to a specification names.
 
-    If messages come from a core that FuseSoC does not know here, the build reports it.
+    Unknown message cores are ignored here, because the build reports them.
     """
     core = core_of(spec)
     parameters = core.parameters(_INSTANCE) if core else {}
@@ -68,19 +68,19 @@ def load_beside(
     needs_sources: bool = True,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """The system of a specification, for a command with the arguments `paths` and `distro`; raises `InputError`."""
+    """Return the system of a specification; `paths` and `distro` are a command's arguments. May raise `InputError`."""
     sources = sources_of(spec, paths, distro, core_folders)
     known = libraries(sources.paths, os.environ, sources.distro)
     return load_system(spec, known, needs_sources=needs_sources, core_folders=core_folders)
 
 
 def known_names(spec: Path, own: Sequence[str], sources: MessageSources, core_folders: CoreFolders) -> list[str]:
-    """All messages that a specification at `spec` with `own` paths can name, sorted; raises `InputError`."""
+    """Return the sorted names of all messages available to a specification with `own` paths; may raise `InputError`."""
     known = libraries(sources.paths, os.environ, sources.distro)
     found = with_paths(known, dict.fromkeys(own), spec.parent, core_folders, Diagnostics())
     return sorted({str(name) for library in found.values() for name in library.names()})
 
 
 def _words(value: object) -> list[str]:
-    """A list of words; empty for any other value, which the build reports."""
+    """Return the texts in a list; for any other value, which the build reports, return an empty list."""
     return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []

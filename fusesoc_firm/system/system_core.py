@@ -48,7 +48,7 @@ from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, S
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
 
-# FuseSoC's file types for accelerators' languages, and the suffixes of files that are not compiled separately.
+# FuseSoC's file types by suffix, and the suffixes of files that are not compiled separately.
 _FILE_TYPES = {
     ".vhd": VHDL,
     ".vhdl": VHDL,
@@ -64,7 +64,7 @@ _INCLUDE_SUFFIXES = (".vh", ".svh")
 class LoadedSystem:
     """A specification, its folder, an optional board, and the derived system; paths are relative to the folder.
 
-    `warnings` are messages to the author of the specification.
+    `warnings` are for the author of the specification.
     """
 
     specification: Specification
@@ -75,16 +75,16 @@ class LoadedSystem:
     warnings: tuple[Diagnostic, ...] = ()
 
     def inputs(self) -> list[Input]:
-        """The accelerators' sources and the definitions of all messages."""
+        """Return the accelerators' sources and the definitions of all messages."""
         return [*source_files(self.specification, self.folder), *self._message_files()]
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
-        """Each converter's message once, regardless of used fields, with its definition and all nested definitions."""
+        """Return each message of the converters once, with its definition and all nested definitions."""
         messages = dict.fromkeys((frame.ros, frame.message) for frame in self.system.frames)
         return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
 
     def definitions(self) -> list[tuple[MessageLibrary, Definitions]]:
-        """The library of each message, including software's messages, with its definition and nested definitions."""
+        """Return each message's library, definition and nested definitions, including the messages of software."""
         types = self.system.software.types
         sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
         frames = dict.fromkeys((*self.system.frames, *sides))
@@ -103,7 +103,7 @@ def load_system(
     board: Board | None = None,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """Read and derive the system of a specification, on an optional board; raises `InputError` with all faults.
+    """Read a specification and derive its system, optionally for a board; raise `InputError` with all faults.
 
     Unless `needs_sources` is set, accelerators' source files may be missing. Messages in the specification's `paths`
     take precedence over messages in `libraries`.
@@ -127,9 +127,9 @@ def with_paths(
     core_folders: CoreFolders,
     faults: Diagnostics,
 ) -> dict[Middleware, MessageLibrary]:
-    """The libraries, with the `paths` of a specification in `folder` first.
+    """Return the libraries, in which the `paths` of a specification in `folder` take precedence.
 
-    Raises `InputError` with all `faults` if one of these paths is wrong, since a wrong path leads to unknown messages.
+    Raise `InputError` with all `faults` if one of these paths is wrong, since a wrong path leads to unknown messages.
     """
     before = len(faults.found)
     places: dict[Path, SourceRef | None] = {}
@@ -150,7 +150,7 @@ def with_paths(
 
 
 def load_requested(request: Request) -> LoadedSystem:
-    """The system of a generator call."""
+    """Return the system of a generator call."""
     return load_system(
         specification_path(request),
         libraries(*library_sources(request)),
@@ -160,12 +160,12 @@ def load_requested(request: Request) -> LoadedSystem:
 
 
 def specification_path(request: Request) -> Path:
-    """The path of the specification that a generator call names."""
+    """Return the path of the specification that a generator call names."""
     return request.files_root / str(request.parameters["spec"])
 
 
 def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """The specification of a request with all files that the specification uses."""
+    """Return the specification of a request, and all files that the specification uses."""
     board = [_board_path(request)] if request.parameters.get("board") else []
     return [specification_path(request), *board, *loaded.inputs()]
 
@@ -203,7 +203,7 @@ class Artifact:
 
 
 def artifacts(loaded: LoadedSystem) -> list[Artifact]:
-    """All generated files of a system, each once, in compilation order with the top level last."""
+    """Return all generated files of a system, each once, in compilation order with the top level last."""
     return list({item.path: item for item in _artifacts(loaded)}.values())
 
 
@@ -227,7 +227,7 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
 
 
 def system_core(loaded: LoadedSystem) -> GeneratedCore:
-    """The core of a loaded system, with its files in compilation order; raises `InputError`."""
+    """Return the core of a loaded system, with its files in compilation order; may raise `InputError`."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
     top = f"{system.entity}.vhd"
@@ -240,7 +240,7 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
 
 
 def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
-    """The top level and the constraints that fit a system to a board."""
+    """Return the top level and the constraints that fit a system to a board."""
     check_fits(loaded.system, board)
     if board.is_linked:
         return _linked_files(loaded, board)
@@ -257,7 +257,7 @@ def _linked_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile
 
 
 def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
-    """The block design, and the scripts that turn C++ functions into IPs."""
+    """Return the block design, and the scripts that turn C++ functions into IPs."""
     system, clock = loaded.system, _clock(loaded)
     files: dict[str, GeneratedFile] = {}
     for type_ in system.kernels:
@@ -273,19 +273,19 @@ def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedF
 
 
 def _clock_files(loaded: LoadedSystem, board: Board, form: str, file_type: str) -> dict[str, GeneratedFile]:
-    """The timing constraints of clocks."""
+    """Return the timing constraints of clocks."""
     text = render(f"board/{form}", clocks_configuration(loaded.system, board, _clock(loaded)))
     return {f"{board.name}.{form}": GeneratedFile(text, file_type)}
 
 
 def _clock(loaded: LoadedSystem) -> Fraction:
-    """The frequency of clk in Hz."""
+    """Return the frequency of clk in Hz."""
     assert loaded.system.clock is not None, "a board has a clock"
     return loaded.system.clock
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:
-    """The user's VHDL and Verilog; a shared package is listed once, since a package must not be analysed twice."""
+    """Return the user's VHDL and Verilog files, each once, since tools must not analyse a shared package twice."""
     files: dict[str, GeneratedFile] = {}
     taken: set[Path] = set()
     for type_ in types:
@@ -302,7 +302,7 @@ def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, Genera
 
 
 def source_name(accelerator: Accelerator, source: str) -> str:
-    """The path of a source file in the generated core: in its accelerator's folder, as in the specification."""
+    """Return the path of a source in the generated core: the accelerator's folder, then the specification's path."""
     names = {"..": "above", "/": "root"}
     parts = [names.get(part, part) for part in PurePosixPath(source).parts]
     return str(PurePosixPath(identifier(accelerator.name), *parts))

@@ -1,9 +1,9 @@
-"""Reports faults in the user's input, with their places and the legal alternatives, and warns of doubtful input.
+"""Report faults in the user's input, with their places and the legal alternatives, and warn of doubtful input.
 
 Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics` collector and
-continues as far as it can. The collector then raises one `InputError` with all faults of the file. Only the two entry
-points (`cli`, `plugin.answer`) catch it: they print it and exit with 1. Warnings are only printed: they change neither
-the output nor the exit status.
+continues as far as possible. The collector then raises one `InputError` with all faults in the file. Only the two entry
+points (`cli`, `plugin.answer`) catch this error; they print it and exit with 1. Warnings are only printed and change
+neither the output nor the exit status.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-# In a file of an entirely different kind, every line would be a fault.
+# The maximum number of reported faults; in a file of a different kind, every line would be a fault.
 _MOST_SHOWN = 200
-# The most characters of a line shown around a fault, and the shortest word that is shortened.
+# The maximum number of characters shown around a fault, and the minimum length of a word that is shortened.
 _WIDEST = 200
 _LONG_WORD = re.compile(r"\S{500,}")
 
 
 @dataclass(frozen=True)
 class SourceRef:
-    """A place in a text: `line` and `column` count from 1, `text` is the whole line, `width` counts characters."""
+    """A place in a text: `line` and `column` count from 1, `text` is the whole line, `width` is in characters."""
 
     file: str
     line: int
@@ -35,7 +35,7 @@ class SourceRef:
         return f"{self.file}:{self.line}:{self.column}"
 
     def excerpt(self) -> str:
-        """The line with a caret under the place; empty if the text is unknown."""
+        """Return the line with a caret under the place, or an empty string if the text is unknown."""
         if not self.text:
             return ""
         number = f"{self.line:5d}"
@@ -48,7 +48,7 @@ class SourceRef:
 
 
 def byte_place(file: str, data: bytes, position: int) -> SourceRef:
-    """The place of a byte in a binary file; the column counts bytes."""
+    """Return the place of a byte in a binary file; its column is counted in bytes."""
     line_start = data.rfind(b"\n", 0, position) + 1
     return SourceRef(file, data.count(b"\n", 0, position) + 1, position - line_start + 1)
 
@@ -73,13 +73,13 @@ class Diagnostic:
 
 
 def _readable(text: str) -> str:
-    """`text` for a terminal: control characters are escaped, and very long words are shortened."""
+    """Return `text` for a terminal: control characters are escaped, and very long words are shortened."""
     escaped = "".join(c if c.isprintable() or c in "\t\n" else repr(c)[1:-1] for c in text)
     return _LONG_WORD.sub(lambda word: f"{word[0][:100]}...{word[0][-20:]}", escaped)
 
 
 class InputError(Exception):
-    """All faults of an input; `str()` is ready to be printed."""
+    """All faults in an input; `str()` returns the text to print."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
@@ -91,7 +91,7 @@ class InputError(Exception):
 
 @dataclass
 class Diagnostics:
-    """Collects faults so that a user sees all of them at once."""
+    """A collector of faults, so that a user sees all faults together."""
 
     found: list[Diagnostic] = field(default_factory=list)
     warned: list[Diagnostic] = field(default_factory=list)
@@ -105,7 +105,7 @@ class Diagnostics:
             self.found.append(diagnostic)
 
     def warn(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
-        """Add a warning of legal but probably unintended input."""
+        """Add a warning about input that is legal but probably unintended."""
         self.warned.append(Diagnostic(message, source, hint, is_warning=True))
 
     @property
@@ -114,7 +114,7 @@ class Diagnostics:
         return tuple(sorted(self.warned, key=_position))
 
     def take(self, error: InputError, source: SourceRef | None) -> None:
-        """Add another reader's faults; `source`, the place that caused the reading, replaces a missing place."""
+        """Add another reader's faults; `source`, the place that caused that reader's run, replaces a missing place."""
         for fault in error.diagnostics:
             self.error(fault.message, fault.source or source, fault.hint)
 
@@ -130,12 +130,12 @@ def _position(diagnostic: Diagnostic) -> tuple[str, int, int]:
 
 
 def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoReturn:
-    """Raise an `InputError` with a single fault, when nothing after it can be checked."""
+    """Raise an `InputError` with a single fault, after which no further checks are possible."""
     raise InputError([Diagnostic(message, source, hint)])
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:
-    """A hint for an unknown word: the nearest legal word, or all legal words if none is near."""
+    """Return a hint for an unknown word: the nearest legal word, or all legal words if none is similar."""
     legal = sorted(set(choices))
     if near := closest(word, legal):
         return f"did you mean '{near}'?"
@@ -146,7 +146,7 @@ def nearest(word: str, choices: Iterable[str]) -> str:
 
 
 def closest(word: str, choices: Iterable[str]) -> str | None:
-    """The word that was probably meant, regardless of case; None if none is near."""
+    """Return the word that was probably meant, regardless of case, or None if none is similar."""
     lowered = {choice.lower(): choice for choice in sorted(set(choices))}
     # Swapped letters are nearer than a missing letter: `clocsk` is `clocks`, not `clock`.
     close = [choice for choice in lowered if sorted(choice) == sorted(word.lower())]

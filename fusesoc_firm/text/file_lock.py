@@ -1,7 +1,7 @@
-"""A lock on a file or folder for one process of this machine, which the system releases when the process ends.
+"""A lock on a file or folder for one process on this machine, which the system releases when the process ends.
 
-Processes on several machines that share a folder may hold the lock at the same time. `building/folder_lock.py` has a
-lock that works between machines.
+Processes on several machines that share a folder may hold the lock at the same time. `building/folder_lock.py` provides
+a lock that also excludes processes on other machines.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _POLL_SECONDS = 0.02
 
 @contextmanager
 def locked(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Wait for the lock of an existing file or folder, and hold it. Creates no file. Raises `OSError`."""
+    """Wait for the lock of an existing file or folder, and hold it; create no file. May raise `OSError`."""
     handle = os.open(path, os.O_RDONLY)
     try:
         take(handle)
@@ -27,9 +27,9 @@ def locked(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def take(handle: int, seconds: float | None = None) -> bool:
-    """Lock an open file until it is closed; False if another process holds the lock for `seconds`.
+    """Lock an open file until it is closed; return False if another process holds the lock for `seconds`.
 
-    Without a limit it waits indefinitely. On a file system without locks, every lock counts as taken.
+    If `seconds` is None, wait without a limit. On a file system without locks, return True without a lock.
     """
     end = None if seconds is None else time.monotonic() + seconds
     while True:

@@ -1,6 +1,6 @@
-"""Writes files atomically: no reader, on this machine or on another that shares the folder, sees a partial file.
+"""Write files atomically: no reader, on this machine or on another that shares the folder, sees a partial file.
 
-A hit waits for this module, so it imports as little as possible.
+Every hit loads this module, so it imports as little as possible.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ TEMPORARY = ".new-"
 
 
 def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a temporary file next to the target, then rename it. Raises `OSError`."""
+    """Write a temporary file next to the target, then rename it. May raise `OSError`."""
     folder = os.path.dirname(os.fspath(path))
     os.makedirs(folder or ".", exist_ok=True)
-    # This name is unique across machines; process ids are unique only on one machine.
+    # This name is unique across machines, unlike a process id.
     temporary = os.path.join(folder, f"{TEMPORARY}{os.urandom(8).hex()}")
     try:
         with open(temporary, "xb") as file:
@@ -31,9 +31,9 @@ def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool:
-    """Write a whole file unless its content is unchanged; return whether it was written.
+    """Write a file as with `write_whole`, unless its content is unchanged; return whether it was written.
 
-    An unchanged file keeps its time, so that later steps are not repeated. Raises `OSError`.
+    An unchanged file keeps its modification time, so that later steps are not repeated. May raise `OSError`.
     """
     data = content.encode() if isinstance(content, str) else content
     if read_file(path) == data:
@@ -43,7 +43,7 @@ def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes | None:
-    """Return the content of a regular file; None if the file is missing or unreadable. Does not wait for pipes."""
+    """Return the content of a regular file, or None if the file is missing or unreadable; do not wait for pipes."""
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
@@ -58,14 +58,14 @@ def read_file(path: str | os.PathLike[str]) -> bytes | None:
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a regular file exists; False for an impossible path, such as one that is too long."""
+    """Return whether a regular file exists; an impossible path, such as one that is too long, results in False."""
     return os.path.isfile(path)
 
 
 def read_regular(path: str | os.PathLike[str], most: int) -> bytes:
     """Return the content of a regular file of at most `most` bytes.
 
-    Raises `OSError`, with the reason, for other kinds of file: opening a FIFO would wait for a writer, and a device may
+    Raise `OSError`, with the reason, for other kinds of file: opening a FIFO would wait for a writer, and a device may
     never end.
     """
     with open(path, "rb", opener=_open_at_once) as file:

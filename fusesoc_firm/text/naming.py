@@ -1,6 +1,6 @@
-"""Converts ROS names to legal, distinct names in VHDL, Verilog and SystemVerilog.
+"""Convert ROS names to legal, distinct names in VHDL, Verilog and SystemVerilog.
 
-Names stay unchanged if possible. Changes are the same on every run, and a comment in the generated code gives the ROS
+Names are unchanged if possible. Changes are the same on every run. A comment in the generated code contains the ROS
 name of each port, so that the mapping can be reversed.
 """
 
@@ -40,8 +40,9 @@ VERILOG_KEYWORDS = frozenset(
 )
 KEYWORDS = VHDL_KEYWORDS | VERILOG_KEYWORDS
 
-# The libraries, and the declarations of std.standard, std_logic_1164 and numeric_std. A constant with such a name, in a
-# package imported with `.all`, would hide the predefined name; `severity error` would no longer compile.
+# The libraries, and the declarations of std.standard, std_logic_1164 and numeric_std. In a package imported with
+# `.all`, a constant with one of these names would hide the predefined name: `severity error`, for example, would no
+# longer compile.
 VHDL_PREDEFINED = frozenset(
     """ack bel bit bit_vector boolean boolean_vector bs can character cr dc1 dc2 dc3 dc4 del delay_length dle em enq eot
     error esc etb etx failure false ff file_open_kind file_open_status firm foreign fs fsp gs gsp hr ht ieee integer
@@ -54,12 +55,12 @@ VHDL_PREDEFINED = frozenset(
     shift_left shift_right signed std_match unresolved_signed unresolved_unsigned unsigned""".split()
 )
 
-# The longest name or description, in characters.
+# The maximum length of a name or description, in characters.
 LONGEST_TEXT = 200
-# The longest path, such as the path of a source file or of a field in a deeply nested message.
+# The maximum length of a path, such as the path of a source file or of a field in a deeply nested message.
 LONGEST_PATH = 4096
 
-PREFIX_RULE = "lower-case letters, digits and single '_' between them, a letter first, at most 100"
+PREFIX_RULE = "at most 100 lower-case letters, digits and single '_' between them, starting with a letter"
 """The form of a legal prefix of design units."""
 
 _PREFIX = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -69,7 +70,7 @@ _UNDERSCORES = re.compile(r"_{2,}")
 
 
 def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None:
-    """Return the reason that `text` cannot be a name or a description, and what is legal; None if `text` is valid.
+    """Return the reason why `text` cannot be a name or description and the legal form, or None if `text` is valid.
 
     The text appears in comments, strings, labels and messages, so it must be one printable line. It must not contain
     control characters, Unicode line ends, lone surrogates, or characters that change the writing direction.
@@ -78,15 +79,15 @@ def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None
     if len(text) > longest:
         return f"has {len(text)} characters", legal
     if unprintable := next((character for character in text if not character.isprintable()), None):
-        return f"holds the character U+{ord(unprintable):04X}", legal
+        return f"contains the character U+{ord(unprintable):04X}", legal
     return None
 
 
 def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "field") -> str:
-    """Join the parts with `_` to one legal identifier.
+    """Join the parts with `_` and return a legal identifier.
 
-    The identifier has no `__`, no `_` at either end and no leading digit. A word in `avoid` (in lower case) gets the
-    suffix; by default, `avoid` holds the keywords of VHDL and Verilog.
+    The identifier has no `__`, no `_` at either end and no leading digit. If it equals a word in `avoid` (in lower
+    case), the suffix is added; by default, `avoid` contains the keywords of VHDL and Verilog.
     """
     joined = _UNDERSCORES.sub("_", _ILLEGAL.sub("_", "_".join(parts))).strip("_")
     if not joined or joined[0].isdigit():
@@ -95,16 +96,16 @@ def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "fie
 
 
 def distinct_identifiers(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
-    """An identifier for each name, in order; they differ from each other and from `reserved`, regardless of case.
+    """Return an identifier for each name, in order; all differ from each other and from `reserved` in more than case.
 
     VHDL does not distinguish `Stamp` from `stamp`; ROS does. If a name clashes with an earlier name or with a port of
-    the entity, it gets the first free suffix of `_2`, `_3`, ...
+    the entity, the function adds the first free suffix of `_2`, `_3`, ...
     """
     return _distinct((identifier(*name) for name in names), reserved)
 
 
 def distinct_constants(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
-    """Like `distinct_identifiers`, for constants of a VHDL package: in capitals, and none predefined in VHDL.
+    """Return identifiers for constants like `distinct_identifiers`, but in capitals and not predefined in VHDL.
 
     `STATUS_OK` is unchanged; `ERROR` and `IN` become `ERROR_VALUE` and `IN_VALUE`.
     """
@@ -125,15 +126,15 @@ def _distinct(bases: Iterable[str], reserved: Iterable[str]) -> list[str]:
 
 
 def is_prefix(text: str) -> bool:
-    """Whether a text may prefix the names of design units."""
+    """Return whether a text may prefix the names of design units."""
     return len(text) <= _LONGEST_PREFIX and _PREFIX.fullmatch(text) is not None
 
 
 def prefixed(prefix: str, name: str) -> str:
-    """`<prefix>_<name>`; the name alone if the prefix is empty."""
+    """Return `<prefix>_<name>`, or the name alone if the prefix is empty."""
     return f"{prefix}_{name}" if prefix else name
 
 
 def entity_name(package: str, message: str) -> str:
-    """`geometry_msgs`, `Quaternion` -> `geometry_msgs_quaternion`: the stem of a converter's entity and file."""
+    """Return the stem of a converter's entity and file, such as `geometry_msgs_quaternion`."""
     return identifier(package, message).lower()

@@ -1,4 +1,4 @@
-"""Writes the files that a user names for a command's output, and checks them before the work begins."""
+"""Write the files that a user names for a command's output, and check them before the work begins."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from fusesoc_firm.text.diagnostics import fail
 
 
 def check_output(path: Path, endings: Sequence[str] = ()) -> None:
-    """Raise `InputError` if the file cannot be written or, if `endings` are given, its name has none of them.
+    """Raise `InputError` if the file cannot be written, or if its name has none of the given `endings`.
 
     The file's folder must exist, since a missing folder is usually a misspelling.
     """
     if endings and path.suffix not in endings:
         fail(
-            f"cannot write {path}: its ending does not name a format",
+            f"cannot write {path}: the file's ending does not select a format",
             hint=f"legal endings: {', '.join(endings)}",
         )
     if path.is_dir():
-        fail(f"cannot write {path}: it is a folder")
+        fail(f"cannot write {path}: the path is a folder")
     check_parent(path)
 
 
@@ -36,7 +36,7 @@ def check_parent(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder for a command's output, with its parents. Raises `InputError`."""
+    """Create a folder for a command's output, with its parents. May raise `InputError`."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -44,7 +44,7 @@ def make_folder(path: Path) -> None:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file for the user, and create any missing parent folders. Raises `InputError`."""
+    """Write a file for the user, and create any missing parent folders. May raise `InputError`."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.encode() if isinstance(content, str) else content)

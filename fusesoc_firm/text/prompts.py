@@ -1,7 +1,7 @@
-"""Asks questions at a terminal or through a pipe, with the same questions and the same rules for answers.
+"""Ask questions at a terminal or through a pipe, with the same questions and the same rules for answers.
 
 At a terminal, prompt_toolkit completes answers, explains the question and accepts only valid answers. From a pipe, each
-answer is a line; an invalid one ends the questions with an error at its line.
+line is an answer; an invalid answer ends the questions with an error at that line.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Question:
-    """A question: `name` in short, `meaning` in a sentence.
+    """A question; `name` is a short name, and `meaning` is an explanation in one sentence.
 
-    `words` complete an answer; if the question `is_choice`, only they are legal. An empty answer means `default`, which
-    is empty if the answer is optional; if the question `is_required` and has no default, an empty answer is a fault.
-    `check` returns the fault in an answer.
+    The `words` complete an answer; if `is_choice` is set, all other answers are illegal. An empty answer means
+    `default`, which is empty if the answer is optional; if `is_required` is set and there is no default, an empty
+    answer is a fault. `check` returns the fault in an answer.
     """
 
     name: str
@@ -36,9 +36,9 @@ class Question:
     check: Callable[[str], str | None] = lambda _: None
 
     def fault(self, answer: str) -> str | None:
-        """The fault in an answer, or None."""
+        """Return the fault in an answer, or None."""
         if not answer:
-            return f"'{self.name}' is needed: {self.meaning}" if self.is_required and not self.default else None
+            return f"'{self.name}' is required: {self.meaning}" if self.is_required and not self.default else None
         if self.is_choice and answer not in self.words:
             return f"'{self.name}' cannot be '{answer}'; {nearest(answer, self.words)}"
         return self.check(answer)
@@ -54,21 +54,21 @@ class Asker(Protocol):
     """A source of answers."""
 
     def ask(self, question: Question) -> str:
-        """Return the answer without surrounding blanks, or the question's default."""
+        """Return the user's answer without surrounding blanks, or the question's default."""
 
     def tell(self, text: str) -> None:
-        """Show a text."""
+        """Show a text to the user."""
 
 
 class PipeAsker:
-    """Reads an answer from each line of a stream, and writes questions and answers to another."""
+    """An asker that reads an answer from each line of a stream, and writes questions and answers to `output`."""
 
     def __init__(self, answers: Iterable[str], output: TextIO) -> None:
         self._answers = enumerate(answers, start=1)
         self._output = output
 
     def ask(self, question: Question) -> str:
-        """Return the answer in the next line. Raises `InputError` for an invalid or missing answer."""
+        """Return the answer in the next line. Raise `InputError` for an invalid or missing answer."""
         line, text = next(self._answers, (0, ""))
         if not line:
             fail(f"the answers end before '{question.name}': {question.meaning}")
@@ -84,7 +84,7 @@ class PipeAsker:
 
 
 class TerminalAsker:
-    """Asks a person at the terminal."""
+    """An asker at a terminal."""
 
     def __init__(self) -> None:
         from prompt_toolkit import PromptSession
@@ -119,7 +119,7 @@ class TerminalAsker:
 
 
 def asker() -> Asker:
-    """Return the asker that suits the standard input."""
+    """Return the asker for the kind of the standard input: a terminal or a pipe."""
     if sys.stdin.isatty() and sys.stdout.isatty():
         return TerminalAsker()
     return PipeAsker(sys.stdin, sys.stdout)

@@ -1,4 +1,4 @@
-"""Quotes users' text for the language of the generated file.
+"""Quote users' text for the language of the generated file.
 
 Names, descriptions, file names and constants of messages may contain any printable character. A template specifies the
 kind of each text, `{{comment block}}` or `{{string topic}}`; the template's ending determines the language.
@@ -34,12 +34,12 @@ def comment(text: str) -> str:
 
 
 def lines_of(text: str) -> list[str]:
-    """Split data into lines, each with its newline; unlike with `splitlines`, only a newline ends a line."""
+    """Split a text into lines with their newlines; unlike in `splitlines`, only a newline ends a line."""
     return [f"{line}\n" for line in text.removesuffix("\n").split("\n")]
 
 
 def c_string(text: str) -> str:
-    """A string literal of C and C++ with UTF-8 bytes; the escapes are octal, since hexadecimal escapes have no end."""
+    """Return a C and C++ string literal in UTF-8; escapes are octal, since hexadecimal escapes have no fixed length."""
     letters = "".join(map(_c_byte, text.encode("utf-8", "surrogateescape")))
     # The second of two question marks could begin a trigraph.
     escaped = _SECOND_QUESTION_MARK.sub(r"\\?", letters)
@@ -53,7 +53,7 @@ def _c_byte(byte: int) -> str:
 
 
 def python_string(text: str) -> str:
-    """A string literal of Python, in double quotes unless more than a trailing newline needs an escape."""
+    """Return a Python string literal, in double quotes unless more than a trailing newline needs an escape."""
     body = text.removesuffix("\n")
     if not body.isprintable() or {'"', "\\"} & {*body}:
         return repr(text)
@@ -61,7 +61,7 @@ def python_string(text: str) -> str:
 
 
 def tcl_word(text: str) -> str:
-    """A word of Tcl that evaluates to `text`: nothing is substituted, and surrounding braces stay balanced."""
+    """Return a Tcl word that evaluates to `text` without substitutions, and that keeps surrounding braces balanced."""
     if _PLAIN_WORD.fullmatch(text):
         return text
     return f'"{"".join(map(_tcl_character, text))}"'
@@ -82,7 +82,7 @@ def yaml_scalar(text: str) -> str:
 
 
 def yaml_list(texts: Iterable[str]) -> str:
-    """A YAML list of strings on one line."""
+    """Return a YAML list of strings on one line."""
     words = [*texts]
     return _yaml(words, "".join(words))
 
@@ -96,22 +96,22 @@ def _yaml(value: str | list[str], text: str) -> str:
 
 
 def dot_text(text: str) -> str:
-    """`text` for a quoted string in Graphviz's language."""
+    """Return `text` escaped for a quoted string in Graphviz's language."""
     return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
 def plot_text(text: str) -> str:
-    """`text` for matplotlib, with dollars escaped so that none begins a formula."""
+    """Return `text` for matplotlib, with dollars escaped so that they do not begin formulas."""
     return text.replace("\\", "\\\\").replace("$", "\\$")
 
 
 def make_prerequisite(name: str) -> str:
-    """A file's name as a prerequisite in a makefile."""
+    """Return a file's name, escaped as a prerequisite in a makefile."""
     return re.sub("[ #:]", r"\\\g<0>", name).replace("$", "$$")
 
 
 def make_argument(text: str) -> str:
-    """An argument of a command in a makefile's recipe, escaped for Make and then for a shell."""
+    """Return an argument of a command in a makefile's recipe, escaped for Make and then for a shell."""
     return shlex.quote(text).replace("$", "$$")
 
 

@@ -1,8 +1,8 @@
-"""Renders strict mustache templates: where mustache would guess, rendering fails with an error.
+"""Render strict mustache templates: where mustache would guess, rendering fails with an error.
 
-Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks up missing keys in
-outer scopes. In hardware descriptions each of these is a fault that compiles. So chevron only parses the templates, and
-this module expands the tree by these rules:
+Mustache was designed for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks up missing keys in
+outer scopes. In a hardware description, the result of each of these rules may compile but be wrong. Therefore chevron
+only parses the templates, and this module expands the tree by these rules:
 
 * `{{x}}` prints a string or an integer unchanged. A bool or None is an error, since neither has a standard spelling.
 * `{{comment x}}` prints a user's text, quoted for this purpose in the language given by the ending of the template's
@@ -10,14 +10,14 @@ this module expands the tree by these rules:
 * `{{x-1}}` and `{{x+1}}` print an integer minus or plus a number: `std_logic_vector({{width-1}} downto 0)`.
 * A key is looked up only in the innermost scope; `../x` is `x` in the enclosing scope. The key must exist, even in
   an omitted section.
-* `{{#x}}` takes a bool (the section or nothing, same scope), a list (the section once per item), or a mapping or None
+* `{{#x}}` expects a bool (the section or nothing, same scope), a list (the section once per item), or a mapping or None
   (the section in the mapping's scope, or nothing). `{{^x}}` is the section for false, an empty list or None.
 * `{{#x?}}` is a section in the same scope, once, unless `x` is false, "", an empty list or None.
 * A list holds mappings, each the scope of its iteration, or strings and integers, which `{{.}}` prints. Within the
   section, the bools `@first` and `@last` mark the first and the last iteration.
-* `{{|}}` begins a column: in adjacent lines, the text after it is aligned. `{{|20}}` begins it after at least 20
-  characters. `{{|!}}` in a line separates it from the lines before.
-* `{{> name}}` includes `partials/name.mustache`; if the tag is alone on a line, the tag's indentation applies to every
+* `{{|}}` begins a column: in adjacent lines, the text after the tag is aligned. `{{|20}}` begins a column after at
+* least 20 characters. `{{|!}}` separates a line from the lines before it. `{{> name}}` includes
+* `partials/name.mustache`; if the tag is alone on a line, the tag's indentation applies to every
   included line.
 """
 
@@ -43,12 +43,12 @@ TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 
 
 class TemplateError(Exception):
-    """A template and its context do not match: an error in this package, never the user's."""
+    """A mismatch between a template and its context, which is an error in this package, not in the user's input."""
 
 
 @dataclass(frozen=True)
 class Rendering:
-    """A template below `TEMPLATES`, and its context."""
+    """A template below `TEMPLATES`, with its context."""
 
     template: str
     context: Mapping[str, object]
@@ -56,7 +56,7 @@ class Rendering:
 
 @dataclass(frozen=True)
 class TracedLine:
-    """A line of a rendered text, its line in the template file, and the scope's path in the context."""
+    """A line of rendered text, the corresponding line in the template file, and the scope's path in the context."""
 
     text: str
     template: str
@@ -65,11 +65,11 @@ class TracedLine:
 
 
 _RECORDS: list[dict[str, Rendering]] = []
-# Private-use characters, which no template contains, enclose the place of a line.
+# Private-use characters, which templates never contain, enclose the place of a line.
 _MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
-# A line that is removed as a whole, regardless of the tag's expansion.
+# A line that is always removed as a whole, regardless of the tag's expansion.
 _STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
-# The start of a column, and the least number of characters before it.
+# The start of a column, and the minimum number of characters before it.
 _COLUMN = re.compile("\ue002(\\d*)\ue003")
 _PARTED = "\ue004"
 _COLUMN_KEY = re.compile(r"\|(?P<least>\d*)")
@@ -110,7 +110,7 @@ _Node = _Literal | _Value | _Section | _Partial
 class _Scope:
     """A scope for key lookup, and its path from the context's root (`ports[3]`), for messages.
 
-    `turn` has `@first` and `@last` of the innermost list around it.
+    `turn` contains `@first` and `@last` of the innermost list around the scope.
     """
 
     data: object
@@ -127,10 +127,10 @@ class _Scope:
 
 
 def render(template_name: str, context: Mapping[str, object], templates: Path = TEMPLATES) -> str:
-    """The text of `templates/<template_name>.mustache` for `context`.
+    """Return the text of `templates/<template_name>.mustache` for `context`.
 
-    The context may contain only dict, list, str, int, bool and None. If template and context do not match, raises
-    `TemplateError`, which names template, key and scope.
+    The context may contain only dict, list, str, int, bool and None. If template and context do not match, raise
+    `TemplateError`, which names the template, the key and the scope.
     """
     try:
         _require_plain(context, "")
@@ -145,7 +145,7 @@ def render(template_name: str, context: Mapping[str, object], templates: Path = 
 
 @contextmanager
 def recorded() -> Iterator[dict[str, Rendering]]:
-    """Record every text rendered in the context, with its template and its data."""
+    """Record every text rendered within the `with` block, with its template and its data."""
     renderings: dict[str, Rendering] = {}
     _RECORDS.append(renderings)
     try:
@@ -155,7 +155,7 @@ def recorded() -> Iterator[dict[str, Rendering]]:
 
 
 def traced_lines(rendering: Rendering) -> list[TracedLine]:
-    """Each line of the rendered text, with its origin."""
+    """Return each line of the rendered text, with its origin."""
     name = rendering.template
     expansion = _TracedExpansion(TEMPLATES, _quotes(name))
     marked = expansion.expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
@@ -164,7 +164,7 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
     traced: list[TracedLine] = []
     place = (f"{name}.mustache", 1, "")
     for line, text in zip(lines, texts, strict=True):
-        # The later lines of a multi-line value, and blank lines, have no mark: they belong to the line above.
+        # The later lines of a multi-line value, and blank lines, have no mark: they share the place of the line above.
         if found := _MARK.search(line):
             place = (found["file"], int(found["line"]), found["scope"])
         traced.append(TracedLine(text, *place))
@@ -172,7 +172,7 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
 
 
 def template_text(name: str, templates: Path = TEMPLATES) -> str:
-    """The text of `templates/<name>.mustache`. Raises `OSError`."""
+    """Return the text of `templates/<name>.mustache`. May raise `OSError`."""
     return (templates / f"{name}.mustache").read_text(encoding="utf-8")
 
 
@@ -184,7 +184,7 @@ class _Expansion:
     quotes: Mapping[str, Quote]
 
     def expand(self, nodes: tuple[_Node, ...], scope: _Scope, is_taken: bool) -> str:
-        """The text of `nodes`; if `is_taken` is false, only look up every key and return no text."""
+        """Return the text of `nodes`; if `is_taken` is false, only look up every key and return no text."""
         text = "".join([self._node(node, scope, is_taken) for node in nodes])
         return text if is_taken else ""
 
@@ -241,7 +241,7 @@ class _TracedExpansion(_Expansion):
 
 
 def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
-    """Yield the scopes in which a section's body is expanded, and for each whether the text is used."""
+    """Yield each scope in which a section's body is expanded, and whether the resulting text is used."""
     if section.is_inverted:
         yield scope, not _is_there(value)
     elif section.is_question or isinstance(value, bool):
@@ -277,7 +277,7 @@ def _look_up(key: str, scope: _Scope) -> object:
 
 
 def _quotes(template_name: str) -> Mapping[str, Quote]:
-    """The quoting functions of a template's language: `vhdl/board.vhd`, or `board/pcf`."""
+    """Return the quoting functions of a template's language: `vhdl/board.vhd`, or `board/pcf`."""
     return QUOTES.get(template_name.rpartition("/")[2].rpartition(".")[2], {})
 
 
@@ -289,7 +289,7 @@ def _printed(value: object, path: str) -> str:
 
 def _sum(value: object, addend: int, path: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise TemplateError(f"'{path}' is {_kind(value)}; only to an integer can {addend} be added")
+        raise TemplateError(f"'{path}' is {_kind(value)}; {addend} can be added only to an integer")
     return value + addend
 
 
@@ -298,12 +298,12 @@ def _kind(value: object) -> str:
 
 
 def _indented(text: str, indentation: str) -> str:
-    """Indent every line that is not empty."""
+    """Return a text in which every line that is not empty is indented."""
     return "\n".join(indentation + line if line.strip() else line for line in text.split("\n"))
 
 
 def _in_columns(text: str) -> str:
-    """Align the columns of a text; each run of lines with columns is aligned independently."""
+    """Return a text with aligned columns; each run of lines with columns is aligned independently."""
     if not _COLUMN.search(text):
         return text
     lines: list[str] = []
@@ -320,7 +320,7 @@ def _in_columns(text: str) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """The aligned lines of rows, in which cells alternate with the minimum length of the cell before."""
+    """Yield the aligned lines for rows, in which each cell is followed by its minimum length."""
     widths: dict[int, int] = {}
     for row in rows:
         for number, (cell, least) in enumerate(zip(row[:-1:2], row[1::2], strict=True)):
@@ -331,7 +331,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 
 
 def _require_plain(value: object, path: str) -> None:
-    """Raise unless `value` is plain data: values computed during rendering could not be printed beforehand."""
+    """Raise `TemplateError` unless `value` is plain data, since other values could not be printed before rendering."""
     # Exact types, since a subclass may print differently (an IntEnum does).
     if value is None or type(value) in (str, int, bool):
         return
@@ -349,7 +349,7 @@ def _require_plain(value: object, path: str) -> None:
 
 @cache
 def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file."""
+    """Return the tree of a template file."""
     try:
         return _tree(name, template_text(name, templates))
     except OSError as error:
@@ -357,7 +357,7 @@ def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
 
 
 def _parse_marked(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file with a mark at the start of every non-blank line that produces output."""
+    """Return the tree of a template file with a mark at the start of every non-blank line that produces output."""
     lines = template_text(name, templates).split("\n")
     marked = [
         line if not line.strip() or _STANDALONE.fullmatch(line) else f"\ue000{name}.mustache:{number}:\ue001{line}"
@@ -375,7 +375,7 @@ def _tree(name: str, text: str) -> tuple[_Node, ...]:
 
 
 def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
-    """The nodes up to the end of the current section of `tokens`, or of the file."""
+    """Return the nodes up to the end of the current section of `tokens`, or of the file."""
     nodes: list[_Node] = []
     for kind, key in tokens:
         match kind:
@@ -394,7 +394,7 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
 
 
 def _value(key: str) -> _Node:
-    """The node of a value tag: `x`, `comment x`, `x-1`, or the start of a column."""
+    """Return the node of a value tag: `x`, `comment x`, `x-1`, or the start of a column."""
     if key == _PARTED_KEY:
         return _Literal(_PARTED)
     if column := _COLUMN_KEY.fullmatch(key):

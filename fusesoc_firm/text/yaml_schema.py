@@ -1,7 +1,7 @@
-"""Describes the grammar of a YAML file as a JSON Schema, with which editors check and complete it.
+"""Describe the grammar of a YAML file as a JSON Schema, with which editors check and complete the file.
 
-The schema covers the same rules as the file's sections (`yaml_sections`). Unknown names are only found by reading the
-file.
+The schema covers the same rules as the file's sections (`yaml_sections`). Unknown names are found only when the file is
+read.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 
 Schema = dict[str, Any]
 
-# YAML may read words as numbers.
+# YAML may parse words as numbers.
 _WORD = {"type": ["string", "number", "boolean"]}
 
 
 def json_schema(section: type[Section], title: str) -> Schema:
-    """The schema of a file with one section, in JSON Schema's draft 2020-12."""
+    """Return the schema, in JSON Schema draft 2020-12, of a file whose content is one section."""
     definitions: dict[str, Schema] = {}
     _define(section, definitions)
     return {
@@ -48,7 +48,7 @@ def _define(section: type[Section], definitions: dict[str, Schema]) -> None:
 
 
 def _spelt(name: str, entry: Key) -> Schema:
-    """A schema that requires the key in exactly one of its spellings."""
+    """Return a schema that requires the key in exactly one of its spellings."""
     ways = [{"required": [spelling]} for spelling in (name, *entry.aliases)]
     found = ways[0] if len(ways) == 1 else {"oneOf": ways}
     if entry.unless is None:
@@ -58,7 +58,7 @@ def _spelt(name: str, entry: Key) -> Schema:
 
 
 def _property(entry: Key) -> Schema:
-    """The schema of a key's value; unless the key is required, it may be null."""
+    """Return the schema of a key's value; unless the key is required, it may be null."""
     value = _value(entry)
     legal = value if entry.is_required else {"anyOf": [value, {"type": "null"}]}
     return {"description": entry.meaning, **legal}

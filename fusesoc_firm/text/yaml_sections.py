@@ -1,8 +1,9 @@
-"""Typed sections of a YAML file: each dataclass field defines its key's name, form and meaning in one place.
+"""Typed sections of a YAML file: each dataclass field defines a key's name, form and meaning in one place.
 
-`read` converts a node to a section and reports every fault, with its place and what is legal. After a fault, `read`
+`read` converts a node to a section and reports every fault, with its place and the legal values. After a fault, `read`
 continues: it always returns a section, with empty values in place of unreadable values, and marks a faulty section as
-not sound. So all faults in a file are reported at once, and callers can distinguish faults from their consequences.
+not sound. All faults in a file are therefore reported together, and callers can distinguish faults from their
+consequences.
 """
 
 from __future__ import annotations
@@ -19,22 +20,22 @@ from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest, neare
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.yaml_text import Text, YamlText, integer, is_null, items, kind
 
-# The fault of a text, and what is legal; None if there is no fault.
+# The fault in a text and the legal form, or None if there is no fault.
 TextRule = Callable[[str], tuple[str, str] | None]
 S = TypeVar("S", bound="Section")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A mapping of the file. `source`, `places` and `is_sound` are not keys."""
+    """A mapping in the file; the fields `source`, `places` and `is_sound` are not keys."""
 
     source: SourceRef
     is_sound: bool = True
-    # The place of each given key's value, by field name.
+    # The place of the value of each key that is present, by field name.
     places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def place(self, field: str) -> SourceRef:
-        """The place of the value of a field's key, or the place of the section if the key is missing."""
+        """Return the place of the value of a field's key, or the place of the section if the key is missing."""
         return self.places.get(field, self.source)
 
 
@@ -42,10 +43,10 @@ class Section:
 class Key:
     """The grammar of a key.
 
-    `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list); `type` is the type of a
-    "section" or of each of the "sections". `aliases` are other spellings of the key. `choices` lists all legal values,
-    if possible. A required key may be omitted if another key has a certain value: `unless`. `only_of` limits the key to
-    one kind of item, if its section describes several kinds. A text must satisfy the `rule`.
+    `form` is "text", "integer", "texts" (a text or a list of texts), "section" or "sections" (a list); `type` is the
+    type of a "section" or of each item in "sections". `aliases` are other spellings of the key. `choices` lists all
+    legal values, if possible. A required key may be omitted if another key has the value in `unless`. If a section
+    describes several kinds of items, `only_of` limits the key to one kind. A text must satisfy the `rule`.
     """
 
     meaning: str
@@ -60,12 +61,12 @@ class Key:
     rule: TextRule = text_fault
 
     def is_needed(self, others: Mapping[str, object]) -> bool:
-        """Whether the key is required, given the values of the `others` as words."""
+        """Return whether the key is required, given the values of the `others` as texts."""
         return self.is_required and (self.unless is None or others.get(self.unless[0]) != self.unless[1])
 
 
 def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
-    """A field of a section; unless `is_required`, a missing key has the value `default`."""
+    """Return a dataclass field for a key; unless `is_required` is set, a missing key has the value `default`."""
     made = Key(meaning, **facts)
     if made.form in ("sections", "texts"):
         default = ()
@@ -73,7 +74,7 @@ def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
 
 
 def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
-    """The field name and `Key` of each key, by its name in the file, in the grammar's order."""
+    """Return the field name and `Key` for each key's name in the file, in the grammar's order."""
     return {
         (field.metadata["key"].name or field.name): (field.name, field.metadata["key"])
         for field in dataclasses.fields(section)
@@ -82,27 +83,27 @@ def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
 
 
 def keys_only_of(section: type[Section], kind: str) -> list[str]:
-    """The names of the keys that are limited to this kind of item."""
+    """Return the names of the keys that are limited to this kind of item."""
     return [name for name, (_, entry) in keys_of(section).items() if entry.only_of == kind]
 
 
 def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics, what: str) -> S:
-    """Read a section from a node of `file`, and add all its faults to `faults`.
+    """Read a section from a node of `file`, and add all faults in the section to `faults`.
 
-    `what` names the section in messages: "a block".
+    `what` names the section in messages, such as "a block".
     """
     return _Reader(file, faults).section(section, node, what)
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads the nodes of one file; values with faults are reported and read as None."""
+    """A reader for the nodes of one file, which reports faulty values and reads them as None."""
 
     file: YamlText
     faults: Diagnostics
 
     def section(self, section: type[S], node: yaml.Node, what: str) -> S:
-        """The section with all readable keys, and empty values for required keys that are missing or unreadable."""
+        """Return a section with all readable keys; required keys that are missing or unreadable have empty values."""
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
@@ -114,13 +115,13 @@ class _Reader:
         found = {field: value for field, value in values.items() if value is not None}
         blanks = _blanks(section, source)
         needed = {known[name][0] for name in _needed(known, given)}
-        # After a fault in the file's form, the rest is unknown.
+        # If the file becomes invalid YAML, the keys after that place are unknown.
         is_sound = len(self.faults.found) == before and needed <= found.keys() and not self.file.is_cut
         places = {known[name][0]: self.file.source(value) for name, value in given.items()}
         return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
-        """The nodes of the known keys with a value, by the key's main name."""
+        """Return the value nodes of the known keys that have a value, by the keys' main names."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
         meant: set[str] = set()
@@ -136,13 +137,13 @@ class _Reader:
                 given[name] = value
         needed = _needed(known, given)
         for name in needed:
-            # A misspelt key is not reported as missing, too.
+            # A misspelt key is not also reported as missing.
             if name not in given and not self.file.is_cut and name not in meant:
                 self._error(f"{what} needs the key '{name}': {known[name][1].meaning}", node)
         return {name: value for name, value in given.items() if not is_null(value) or name in needed}
 
     def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
-        """The value of a key in its form, or None if it is invalid."""
+        """Return the value of a key in its form, or None if it is invalid."""
         match entry.form:
             case "section":
                 return self.section(_section_type(entry), node, f"'{name}'")
@@ -197,13 +198,13 @@ class _Reader:
 
 
 def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:
-    """The names of the keys that are required in addition to the given keys."""
+    """Return the names of the keys that are required in addition to the given keys."""
     words = {name: value.value for name, value in given.items()}
     return [name for name, (_, entry) in known.items() if entry.is_needed(words)]
 
 
 def _blanks(section: type[Section], source: SourceRef) -> dict[str, Any]:
-    """An empty value for each required field."""
+    """Return an empty value for each required field."""
     blanks: dict[str, Any] = {}
     for field, entry in keys_of(section).values():
         if entry.is_required:
@@ -226,10 +227,10 @@ def _empty(section: type[S], source: SourceRef) -> S:
 
 
 def _words_of_keys(section: type[Section]) -> str:
-    """The keys that a section requires or, if it requires none, the keys that it may have."""
+    """Return a phrase with the keys that a section requires or, if it requires no keys, the keys that it may have."""
     keys = keys_of(section)
     required = [name for name, (_, entry) in keys.items() if entry.is_required]
-    return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
+    return f"required keys: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
 
 
 def _section_type(entry: Key) -> type[Section]:

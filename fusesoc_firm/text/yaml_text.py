@@ -1,9 +1,9 @@
 """YAML with source positions.
 
-The marks in PyYAML's nodes become `SourceRef`s, and values keep their places: a `Text` is a string with a place.
+The marks in PyYAML's nodes become `SourceRef`s, and values keep their places; a `Text` is a string with a place.
 
-The bytes, levels and nodes of a file are limited before anything is built from it, since a few lines of aliases can
-expand beyond any memory.
+The numbers of bytes, levels and nodes in a file are limited before any value is built, since a few lines of aliases can
+expand to more than the available memory.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from fusesoc_firm.text.files import read_regular
 
 MOST_LEVELS = 64
 LONGEST_NUMBER = 40
-"""The most characters of a number. Python itself raises `ValueError` for numbers with thousands of digits."""
+"""The maximum number of characters in a number; Python itself raises `ValueError` beyond thousands of digits."""
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
-# PyYAML's errors for a line whose indentation does not match any line above.
+# The errors that PyYAML reports for a line whose indentation does not match any line above.
 _INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", "mapping values are not allowed here")
 # A block begins with the dash of a list's item, or with the first word of a line that is not a comment.
 _BLOCK_BEGIN = re.compile(r" *(-(?= )|[^\s#:-][^\s:]*)")
@@ -36,20 +36,20 @@ _LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 
 @dataclass(frozen=True)
 class Bounds:
-    """The limits of a file; an alias counts as the node that it refers to."""
+    """The limits for a file; an alias counts as the node that it refers to."""
 
     bytes: int
     nodes: int
 
 
 SMALL = Bounds(2**20, 50_000)
-"""The limits of a specification, a configuration or a board."""
+"""The limits for a specification, a configuration file or a board file."""
 LARGE = Bounds(2**26, 5_000_000)
-"""The limits of data, such as stimuli with images, and of files that others may generate, such as cores."""
+"""The limits for data, such as stimuli with images, and for files that other programs may generate, such as cores."""
 
 
 class TooLargeError(Exception):
-    """A text exceeds a limit: `what` names it, `mark` gives the place."""
+    """A text exceeds a limit; `what` describes the limit, and `mark` is the place."""
 
     def __init__(self, what: str, mark: yaml.Mark) -> None:
         super().__init__(f"more than {what}")
@@ -57,7 +57,7 @@ class TooLargeError(Exception):
 
 
 class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
-    """Composes nodes from a parser's events, and raises `TooLargeError` at the first one beyond the limits."""
+    """A composer of nodes from a parser's events, which raises `TooLargeError` at the first node beyond the limits."""
 
     def __init__(self, parser: Any, bounds: Bounds) -> None:
         yaml.composer.Composer.__init__(self)
@@ -91,7 +91,7 @@ class Text(str):
     source: SourceRef | None
 
     def __new__(cls, value: str, source: SourceRef | None = None) -> Text:
-        """Create a text written at `source`; None means that it is not in a file (a default)."""
+        """Create a text with the place `source`, or None if the text is not in a file (a default)."""
         text = super().__new__(cls, value)
         text.source = source
         return text
@@ -99,9 +99,9 @@ class Text(str):
 
 @dataclass(frozen=True)
 class YamlText:
-    """A YAML file's lines and its root node; `file` is its name in messages.
+    """The lines and the root node of a YAML file; `file` is the file's name in messages.
 
-    `is_cut` means that the text becomes invalid YAML at some point, and `root` holds only the part above it.
+    `is_cut` means that the text becomes invalid YAML at some place, and that `root` contains only the part above it.
     """
 
     file: str
@@ -110,24 +110,24 @@ class YamlText:
     is_cut: bool = False
 
     def source(self, node: yaml.Node) -> SourceRef:
-        """The place of a node; for a multi-line node, the first line is shown."""
+        """Return the place of a node; the place of a multi-line node is its first line."""
         start, end = node.start_mark, node.end_mark
         text = self.lines[start.line] if start.line < len(self.lines) else ""
         last = end.column if end.line == start.line else len(text.rstrip())
         return SourceRef(self.file, start.line + 1, start.column + 1, text, max(1, last - start.column))
 
     def text(self, node: yaml.ScalarNode) -> Text:
-        """A scalar's characters, regardless of its YAML type."""
+        """Return a scalar's characters, regardless of its YAML type."""
         return Text(str(node.value), self.source(node))
 
 
 def read_yaml(
     path: Path, file: str | None = None, faults: Diagnostics | None = None, bounds: Bounds = SMALL
 ) -> YamlText:
-    """Read a file within `bounds`, called `file` in messages.
+    """Read a YAML file within `bounds`; messages call it `file`.
 
-    Raises `InputError` if the file cannot be read or is not YAML. With `faults`, invalid YAML is reported there
-    instead, and the part above it is returned.
+    Raise `InputError` if the file cannot be read or is not YAML. If `faults` is given, add invalid YAML to `faults`
+    instead, and return the part above it.
     """
     name = file or str(path)
     try:
@@ -145,7 +145,7 @@ def read_yaml(
 
 
 def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL) -> YamlText:
-    """Parse a YAML text; if it becomes invalid, report the place and keep the part above."""
+    """Parse a YAML text; if it becomes invalid, report the place and return the part above."""
     lines = tuple(_LINE_END.split(text.rstrip()))
     _note_control_characters(text, file, faults)
     text = _CONTROL_CHARACTERS.sub(_REPLACEMENT, text)
@@ -163,7 +163,7 @@ def _note_control_characters(text: str, file: str, faults: Diagnostics) -> None:
     for number, line in enumerate(_LINE_END.split(text)):
         for found in _CONTROL_CHARACTERS.finditer(line):
             shown = _CONTROL_CHARACTERS.sub("?", line)
-            message = f"this is not YAML: it holds the control character 0x{ord(found.group()):02x}"
+            message = f"invalid YAML: it contains the control character 0x{ord(found.group()):02x}"
             faults.error(message, SourceRef(file, number + 1, found.start() + 1, shown))
 
 
@@ -171,13 +171,13 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
     problem = error.problem or error.context or "syntax error"
     context = error.context_mark
     mark = error.problem_mark or context
-    # If a colon is missing, or a construct is still open at the end, report the place where it began.
+    # If a colon is missing, or a construct is still open at the end, report the place where the construct began.
     is_late = problem.startswith("could not find expected ':'") or (mark is not None and mark.line >= len(lines))
     if context is not None and is_late:
         mark, context = context, None
     hint = ""
     if "'\\t'" in problem:
-        hint = "YAML is indented with blanks, never with tabs"
+        hint = "indent YAML with blanks, not with tabs"
     elif error.context and context is not None:
         hint = f"{error.context}, which begins at {file}:{context.line + 1}:{context.column + 1}"
     elif error.context and is_late:
@@ -187,11 +187,11 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
         line, column = mark.line, mark.column
         if problem.startswith(_INDENTATION_PROBLEMS):
             hint = _indentation_hint(lines, line) or hint
-    faults.error(f"this is not YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
+    faults.error(f"invalid YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
 
 
 def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
-    """The indentations of a line and of the blocks open above it; empty if the line matches one of those blocks."""
+    """Return a hint about a line that matches no open block, with the indentations; otherwise an empty string."""
     indent = len(lines[number]) - len(lines[number].lstrip(" "))
     # The first word of each open block by its indentation, the outermost first.
     open_blocks: dict[int, str] = {}
@@ -202,11 +202,11 @@ def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
     if indent in open_blocks or not open_blocks:
         return ""
     legal = ", ".join(f"{blanks} ({begin})" for blanks, begin in open_blocks.items())
-    return f"the line is indented by {indent}, but the open blocks above it by {legal}"
+    return f"the line is indented by {indent}, but the open blocks above are indented by {legal}"
 
 
 def _block_begins(line: str) -> Iterator[tuple[int, str]]:
-    """The column, from 0, and the first word of each block that may begin in a line: several after an item's dash."""
+    """Yield the column (from 0) and the first word of each block that may begin in a line."""
     position = 0
     while found := _BLOCK_BEGIN.match(line, position):
         yield found.start(1), found[1]
@@ -216,14 +216,14 @@ def _block_begins(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _composed(text: str, bounds: Bounds = SMALL) -> yaml.Node | None:
-    """The root node of a text. Raises `yaml.MarkedYAMLError` with the message of PyYAML's own parser."""
+    """Return the root node of a text. Raise `yaml.MarkedYAMLError` with the message of PyYAML's own parser."""
     with suppress(yaml.YAMLError):
         return _composed_by(getattr(yaml, "CSafeLoader", yaml.SafeLoader), text, bounds)
     return _composed_by(yaml.SafeLoader, text, bounds)
 
 
 def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
-    """Compose with one of PyYAML's parsers; libyaml's is much faster, but its messages are less exact."""
+    """Compose a text with one of PyYAML's parsers; the libyaml parser is much faster, but has less exact messages."""
     parser = loader(text)
     try:
         node: yaml.Node | None = _Composer(parser, bounds).get_single_node()
@@ -233,7 +233,7 @@ def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
 
 
 def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
-    """The root node of the lines above a fault, or above the construct still open there; None if there is none."""
+    """Return the root node of the lines above a fault or the construct open there, or None if there is no node."""
     for mark in (error.problem_mark, error.context_mark):
         if mark is not None:
             with suppress(yaml.YAMLError, TooLargeError):
@@ -242,7 +242,7 @@ def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node 
 
 
 def integer(text: str) -> int:
-    """The integer value of a plain scalar of at most `LONGEST_NUMBER` characters. Raises `ValueError`."""
+    """Return the integer value of a plain scalar of at most `LONGEST_NUMBER` characters. May raise `ValueError`."""
     if len(text) > LONGEST_NUMBER:
         raise ValueError(f"more than {LONGEST_NUMBER} characters")
     value = yaml.safe_load(text)
@@ -252,7 +252,7 @@ def integer(text: str) -> int:
 
 
 def yaml_data(text: str) -> Any:
-    """The mappings, lists and scalars in a text. Raises `yaml.YAMLError` for invalid values."""
+    """Return the mappings, lists and scalars in a text. Raise `yaml.YAMLError` for invalid values."""
     try:
         return data_of(_composed(text, LARGE))
     except TooLargeError as error:
@@ -260,7 +260,7 @@ def yaml_data(text: str) -> Any:
 
 
 def data_of(root: yaml.Node | None) -> Any:
-    """The data in a node and its children. Raises `yaml.YAMLError` for invalid values."""
+    """Return the data in a node and its children. Raise `yaml.YAMLError` for invalid values."""
     try:
         return None if root is None else yaml.SafeLoader("").construct_document(root)
     except (ValueError, TypeError, LookupError, OverflowError) as error:
@@ -269,17 +269,17 @@ def data_of(root: yaml.Node | None) -> Any:
 
 
 def yaml_dump(data: Any) -> str:
-    """Write data as readable YAML, in the given order."""
+    """Return data as readable YAML, with keys in the given order."""
     return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
 
 
 def is_null(node: yaml.Node) -> bool:
-    """Whether a key has no value, like `type:` in listing 6.1 of the dissertation."""
+    """Return whether a node is the missing value of a key, as in `type:` in the dissertation's listing 6.1."""
     return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"
 
 
 def kind(node: yaml.Node) -> str:
-    """The kind of a node for messages: its word, "a list", "a mapping" or "nothing"."""
+    """Return a description of a node for messages: the scalar in quotes, "a list", "a mapping" or "nothing"."""
     if is_null(node):
         return "nothing"
     if isinstance(node, yaml.MappingNode):
@@ -290,7 +290,10 @@ def kind(node: yaml.Node) -> str:
 def items(
     yaml_text: YamlText, node: yaml.MappingNode, faults: Diagnostics
 ) -> Iterator[tuple[Text, yaml.ScalarNode, yaml.Node]]:
-    """Yield key text, key node and value node of each item; a key that is not a scalar, or is repeated, is a fault."""
+    """Yield the key's text, the key node and the value node of each item.
+
+    Note keys that are repeated or not scalars.
+    """
     seen: dict[str, SourceRef] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):

@@ -1,7 +1,7 @@
-"""Makes Ctrl-C work in our commands, however the process was started.
+"""Make Ctrl-C work in our commands, regardless of how the process was started.
 
-A script's shell makes background commands (`make test &`) ignore SIGINT, and so do some CI runners. All child programs
-inherit this setting, and Python keeps it.
+In scripts, shells start background commands (`make test &`) with SIGINT ignored, as do some CI runners. All child
+processes inherit this setting, and Python does not change it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import signal
 
 
 def accept_interrupts() -> None:
-    """Let SIGINT raise `KeyboardInterrupt` even if it was ignored. Programs started afterwards receive it, too.
+    """Let SIGINT raise `KeyboardInterrupt` even if it was ignored; programs started later also receive SIGINT.
 
     Call this at the start of a process, in its main thread.
     """

@@ -1,9 +1,9 @@
-"""Starts the programs of a build for Edalize, like `firm tool`.
+"""Start the programs of a build for Edalize, like `firm tool`.
 
-Edalize's makefiles put the launcher before each program. The launcher finds a program on the path or as YoWASP's
-package from PyPI, reports how to install a missing program, and records in the build's manifest each program that ran.
-It removes the output of a failed program, such as the layout that nextpnr writes before it finds that the clock is too
-slow. Otherwise make would accept this output when started again.
+Edalize's makefiles prefix each program with the launcher. The launcher finds a program on the path or in YoWASP's
+package from PyPI, reports how to install a missing program, and records each program that ran in the build's manifest.
+The launcher also removes the output of a failed program, such as the layout that nextpnr writes before it finds that
+the clock is too slow; otherwise, make would accept this output in the next run.
 
 `generators/launcher.mk` is the GNUmakefile of a build. Unless another launcher is set, the makefile uses the adjacent
 `firm_launcher.sh`, which starts this module for the first run of each program in a build.
@@ -25,14 +25,14 @@ from fusesoc_firm.tools.interrupts import accept_interrupts
 from fusesoc_firm.tools.manifest import note
 from fusesoc_firm.tools.programs import find, ways
 
-# Options that name an output file.
+# The options that precede the name of an output file.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
-# Set by `firm_launcher.sh`: the file that records that a program was noted, and the program's path.
+# Variables from `firm_launcher.sh`: the file that shows that a program is in the manifest, and the program's path.
 _NOTED = "FIRM_NOTED"
 
 
 def launch(program: str, arguments: Sequence[str]) -> int:
-    """Run a program until it ends, and return the exit status. Raises `InputError` if it is not installed."""
+    """Run a program until it ends, and return the exit status. Raise `InputError` if the program is not installed."""
     path = find(program)
     if path is None:
         fail(f"the program '{program}' is not installed", hint=ways(program))
@@ -42,12 +42,12 @@ def launch(program: str, arguments: Sequence[str]) -> int:
         for option, value in pairwise(arguments):
             if option in _OUTPUTS:
                 Path(value).unlink(missing_ok=True)
-    # The status after a signal, as in a shell.
+    # After a signal, use the exit status that a shell would use.
     return status if status >= 0 else 128 - status
 
 
 def _run(command: Sequence[str]) -> int:
-    """Run a command and return the exit status; if this process is terminated, as by make, so is the command."""
+    """Run a command and return the exit status; if make terminates this process, terminate the command."""
     program: subprocess.Popen[bytes] | None = None
     is_wanted = True
 
@@ -60,7 +60,7 @@ def _run(command: Sequence[str]) -> int:
     before = signal.signal(signal.SIGTERM, end)
     try:
         with subprocess.Popen(command) as program:
-            # The signal may have arrived during the start.
+            # The signal may have arrived while the command was being started.
             if not is_wanted:
                 program.terminate()
             return program.wait()
@@ -69,20 +69,20 @@ def _run(command: Sequence[str]) -> int:
 
 
 def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
-    """Let `firm_launcher.sh` start a program from now on, unless its failed output would need to be removed."""
+    """Let `firm_launcher.sh` start a program from now on, unless output must be removed after a failure."""
     if not any(option in arguments for option in _OUTPUTS) and (path := shutil.which(arguments[0])):
         noted.parent.mkdir(exist_ok=True)
         noted.write_text(f"{path}\n", encoding="utf-8")
 
 
 def starts_everything() -> bool:
-    """Whether this package starts the build's programs, rather than a launcher that may find them elsewhere."""
+    """Return whether this package's launcher starts the build's programs; another launcher may find other programs."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
     return not words or words[-1] == "tool"
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run `firm tool` without loading the other commands, since a build starts a dozen programs."""
+    """Run `firm tool` without loading the other commands, since a build starts about a dozen programs."""
     accept_interrupts()
     noted = os.environ.pop(_NOTED, "")
     try:

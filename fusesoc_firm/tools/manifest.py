@@ -1,7 +1,7 @@
 """The manifest of a build: the tools that took part in the build, stored next to the tools' outputs.
 
-Every program that has run is added, so the tools of an output that is not rebuilt remain in the list. The file contains
-no dates and no paths, so the same tools and the same build give the same manifest on every machine.
+Each program is added when it has run, so the tools of an output that is not rebuilt remain in the list. The file
+contains no dates and no paths, so equal tools and builds result in equal manifests on every machine.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _PACKAGES = ("edalize", "fusesoc", "fusesoc-firm")
 
 
 def note(program: str, folder: Path) -> None:
-    """Record in a folder's manifest a program that has run in this folder, and the packages that started the program.
+    """Record a program that has run in a folder, and the packages that started it, in the folder's manifest.
 
     Unknown programs, such as mkdir, are not recorded. Several programs may be recorded at the same time.
     """
@@ -26,14 +26,14 @@ def note(program: str, folder: Path) -> None:
         return
     programs = (program, *PROGRAMS[program].starts)
     found = packages(_PACKAGES) | {name: facts_of(name, path) for name in programs if (path := find(name))}
-    # The folder itself is locked, so no lock file is left over.
+    # The lock is on the folder itself, so no lock file remains.
     with locked(folder):
         tools = read(folder) | found
         _replace(folder / FILE, json.dumps({"tools": tools}, indent=2, sort_keys=True) + "\n")
 
 
 def read(folder: Path) -> dict[str, dict[str, str]]:
-    """The facts of each tool in a folder's manifest; empty if the manifest is missing or unreadable."""
+    """Return the facts about each tool in a folder's manifest; empty if the manifest is missing or unreadable."""
     try:
         tools = json.loads((folder / FILE).read_text(encoding="utf-8"))["tools"]
     except (OSError, ValueError, LookupError, TypeError):

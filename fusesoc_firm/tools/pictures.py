@@ -8,7 +8,7 @@ from pathlib import Path
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output, write
 
-# The formats of a picture, by the ending of the file's name; DOT is Graphviz's own language.
+# The picture formats, by the ending of the file's name; DOT is Graphviz's own language.
 ENDINGS = (".svg", ".png", ".pdf", ".dot")
 # The text formats, which can be printed.
 TEXTS = ("svg", "dot")
@@ -21,13 +21,13 @@ def check_picture(path: Path | None, form: str | None) -> None:
     check_output(path, ENDINGS)
     if form and path.suffix != f".{form}":
         fail(
-            f"{path} is not a picture in the format {form}",
-            hint=f"without --format, the ending sets the format: {', '.join(ENDINGS)}",
+            f"the ending of {path} does not match the format {form}",
+            hint=f"without --format, the ending selects the format: {', '.join(ENDINGS)}",
         )
 
 
 def draw(dot: str, path: Path | None, form: str | None) -> None:
-    """Write a DOT graph as a picture to `path`, or print it in `form`, by default SVG. Raises `InputError`."""
+    """Write a DOT graph as a picture to `path`, or print the picture in `form`. May raise `InputError`."""
     if path:
         write(path, picture(dot, path.suffix.removeprefix(".")))
     else:
@@ -35,12 +35,12 @@ def draw(dot: str, path: Path | None, form: str | None) -> None:
 
 
 def picture(dot: str, form: str) -> bytes:
-    """Convert a DOT graph to `svg`, `png`, `pdf` or `dot`. Raises `InputError` if Graphviz is missing."""
+    """Return a DOT graph converted to `svg`, `png`, `pdf` or `dot`. Raise `InputError` if Graphviz is missing."""
     if form == "dot":
         return dot.encode()
     try:
         return subprocess.run(["dot", f"-T{form}"], input=dot.encode(), capture_output=True, check=True).stdout
     except subprocess.CalledProcessError as error:
-        fail(f"Graphviz cannot draw this as {form}: {error.stderr.decode(errors='replace').strip()}")
+        fail(f"Graphviz cannot draw the picture as {form}: {error.stderr.decode(errors='replace').strip()}")
     except FileNotFoundError:
-        fail("pictures need the program 'dot' of Graphviz", hint="Debian and Ubuntu: apt install graphviz")
+        fail("pictures require Graphviz's program 'dot'", hint="on Debian and Ubuntu: apt install graphviz")

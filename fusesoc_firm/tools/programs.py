@@ -1,7 +1,7 @@
-"""The programs and Python packages that a build uses: how to find, install and identify each.
+"""The programs and Python packages that a build uses, and how to find, install and identify each.
 
-A program is found on the path or, as a PyPI package, next to the interpreter. The facts of a program contain no path,
-so they are the same wherever the same program is installed.
+A program is found on the path or, as a PyPI package, next to the interpreter. The facts about a program contain no
+path, so equal programs have equal facts on all machines.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fusesoc_firm.tools.simulators import SIMULATORS
 
 @dataclass(frozen=True)
 class Program:
-    """A program: its Debian package, PyPI package or maker, and the option that prints its version."""
+    """A program: the Debian package, PyPI package or maker, and the option that prints the version."""
 
     debian: str = ""
     pypi: str = ""
@@ -31,7 +31,7 @@ class Program:
     version: str = "--version"
     # The program's name in the PyPI package, if not yowasp-<name>.
     pypi_name: str = ""
-    # Programs that this program starts.
+    # The programs that this program starts.
     starts: tuple[str, ...] = ()
 
 
@@ -53,12 +53,12 @@ PROGRAMS: Mapping[str, Program] = {
     "openFPGALoader": Program("openfpgaloader", version="-V"),
     **{f"quartus_{name}": _QUARTUS for name in ("sh", "map", "syn", "fit", "asm", "sta", "pgm")},
     "verilator": Program("verilator"),
-    "vivado": Program(maker="Vivado, from AMD's site; its settings64.sh puts it into PATH", version="-version"),
+    "vivado": Program(maker="Vivado, from AMD's site; source settings64.sh to add it to PATH", version="-version"),
     "vvp": Program("iverilog", version="-V"),
-    # Edalize controls the program with Tcl, which YoWASP's build does not support.
+    # Edalize controls the program through Tcl, which YoWASP's build does not support.
     "yosys": Program("yosys", version="-V"),
 }
-# The programs that Edalize's tools start, except programs that only load or inspect.
+# The programs that Edalize's tools start, except programs that only load a bitstream or inspect results.
 _STARTED: Mapping[str, tuple[str, ...]] = {
     "ecppack": ("ecppack",),
     "gowinpack": ("gowin_pack",),
@@ -71,7 +71,7 @@ _OWN = "fusesoc-firm"
 
 
 def find(program: str) -> Path | None:
-    """The path of a program, or None."""
+    """Return the path of a program, or None if it is not installed."""
     known = PROGRAMS.get(program, Program())
     beside = Path(sys.executable).parent
     if found := shutil.which(program):
@@ -84,7 +84,7 @@ def find(program: str) -> Path | None:
 
 
 def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({})) -> tuple[str, ...]:
-    """The programs that Edalize's tool starts with these options, as far as known."""
+    """Return the known programs that a tool of Edalize starts with these options."""
     if tool == "nextpnr":
         return tuple(filter(None, [_NEXTPNR.get(str(options.get("arch")))]))
     if tool == "verilator" and options.get("mode") == "lint-only":
@@ -93,36 +93,36 @@ def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({}))
 
 
 def missing(programs: Iterable[str]) -> list[str]:
-    """The programs that are not installed."""
+    """Return the programs that are not installed."""
     return [program for program in programs if find(program) is None]
 
 
 def simulation_programs(simulator: str) -> tuple[str, ...]:
-    """The programs that a simulation needs, including GHDL if it requires a netlist."""
+    """Return the programs that a simulation needs, including GHDL if the simulator requires a netlist."""
     known = SIMULATORS[simulator]
     return known.programs if known.reads_vhdl else ("ghdl", *known.programs)
 
 
 def ways(program: str) -> str:
-    """The commands or instructions for installing a missing program."""
+    """Return the commands or instructions with which a missing program can be installed."""
     known = PROGRAMS.get(program, Program())
     found = [f"apt-get install --no-install-recommends {known.debian}"] if known.debian else []
     found += [f"pip install {known.pypi}"] if known.pypi else []
-    return " or ".join(found) or known.maker or "see the tool's own page"
+    return " or ".join(found) or known.maker or "see the tool's website"
 
 
 def explanation(programs: Iterable[str]) -> str:
-    """Instructions for installing missing programs, one line each."""
+    """Return the instructions for installing missing programs, one line for each."""
     names = list(programs)
     lines = (f"      = {name}: {ways(name)}" for name in names)
-    return "\n".join([f"error: not installed: {' '.join(names)}", *lines])
+    return "\n".join([f"error: missing programs: {', '.join(names)}", *lines])
 
 
 def facts_of(program: str, path: Path) -> dict[str, str]:
-    """The identity of a program: the version that it prints, and the SHA-256 of the program's file or package."""
+    """Return the facts that identify a program: the printed version, and the SHA-256 of its file or package."""
     known = PROGRAMS.get(program, Program())
     if package := _package(known, path):
-        # A script contains the environment's path, and the program takes seconds to print its version.
+        # The script contains the environment's path, and the program takes seconds to print its version.
         return {"package": package}
     facts = {"sha256": _digest(path)}
     if known.version and (version := _version(path, known.version)):
@@ -138,7 +138,7 @@ def installed_programs() -> Iterator[tuple[str, Path]]:
 
 
 def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """The versions of these Python packages; for our own, also a digest of the files, which change between versions."""
+    """Return the versions of Python packages; for our own package, also a digest of the files."""
     found = {name: {"version": metadata.version(name)} for name in names}
     if _OWN in found:
         from fusesoc_firm.store.own_code import digest
@@ -148,7 +148,7 @@ def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def _digest(path: Path) -> str:
-    """The SHA-256 of a file; for a script, without its first line, which contains the interpreter's path."""
+    """Return the SHA-256 of a file; for a script, omit the first line, which contains the interpreter's path."""
     content = path.read_bytes()
     return hashlib.sha256(content.partition(b"\n")[2] if content.startswith(b"#!") else content).hexdigest()
 
@@ -163,7 +163,7 @@ def _package(known: Program, path: Path) -> str:
 
 
 def _version(path: Path, option: str) -> str:
-    """Return the first line with a digit; some programs print a title before the version."""
+    """Return the first printed line with a digit, since some programs print a title before the version."""
     done = subprocess.run(
         [path, option],
         stdin=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""The supported simulators, as Edalize names them: one row each.
+"""The supported simulators, one row for each, under Edalize's names.
 
 A new simulator needs a row here, and a row in `programs.PROGRAMS` for each program that it starts.
 """
@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Live:
-    """How to build a simulator that another program starts, and how to start it (docs/reference/transports.md).
+    """The build and the start of a simulator that another program starts (docs/reference/transports.md).
 
-    `parameter` precedes `NAME=value` on the simulator's command line. If FuseSoC's build produces nothing, the
-    makefile's target `made_by` does. The start command is the line of the makefile's target `run` that begins with
-    `started_by`, or else the program `V<toplevel>`.
+    `parameter` precedes `NAME=value` on the simulator's command line. If FuseSoC's build does not create the simulator,
+    the makefile's target `made_by` does. The start command is the line of the makefile's target `run` that begins with
+    `started_by` or, without such a line, the program `V<toplevel>`.
     """
 
     parameter: str
@@ -25,10 +25,10 @@ class Live:
 
 @dataclass(frozen=True)
 class Simulator:
-    """A simulator: the title, the differences from other simulators, and the programs that it starts.
+    """A simulator: the title, the differences from other simulators, and the programs that the simulator needs.
 
-    A simulator that does not read VHDL gets a Verilog netlist from GHDL. `options` are the options of the simulator's
-    flow in Edalize, and `system_verilog` the additional options for SystemVerilog. C++ functions need GHDL's native
+    A simulator that does not read VHDL reads a Verilog netlist from GHDL. `options` are the options of the simulator's
+    flow in Edalize, and `system_verilog` are additional options for SystemVerilog. C++ functions require GHDL's native
     interface (VHPIDIRECT).
     """
 
@@ -49,7 +49,7 @@ SIMULATORS: dict[str, Simulator] = {
         calls_functions=True,
         programs=("ghdl",),
         options={"sim_options": "[--ieee-asserts=disable-at-0]"},
-        # FuseSoC builds nothing before the run. The makefile's line contains the options of the analysis.
+        # FuseSoC does not build anything before the run. The makefile's line contains the options of the analysis.
         live=Live("-g", "analyze", "ghdl -r "),
     ),
     "icarus": Simulator(
@@ -70,16 +70,16 @@ SIMULATORS: dict[str, Simulator] = {
         live=Live("+"),
     ),
 }
-"""The simulators by Edalize's names; the first suitable one is the default."""
+"""The simulators by Edalize's names; the first suitable simulator is the default."""
 
 
 def default_simulator(*, has_verilog: bool = False, is_live: bool = False) -> str:
-    """The first simulator that can simulate a system with or without Verilog accelerators."""
+    """Return the first simulator that can simulate a system with or without Verilog accelerators."""
     return next(iter(fitting(has_verilog=has_verilog, is_live=is_live)))
 
 
 def fitting(*, has_verilog: bool = False, is_live: bool = False) -> dict[str, Simulator]:
-    """The simulators that can simulate a system with or without Verilog accelerators; none reads both languages."""
+    """Return the simulators for systems with or without Verilog accelerators; none reads both languages."""
     return {
         name: item
         for name, item in SIMULATORS.items()

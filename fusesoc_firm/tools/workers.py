@@ -1,4 +1,4 @@
-"""Runs tasks in processes on this machine, or on the workers of a Dask cluster."""
+"""Run tasks in processes on this machine, or on the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ Result = TypeVar("Result")
 _CONNECT_SECONDS = 10
 # Protocols without authentication.
 _OPEN_PROTOCOLS = ("", "tcp", "ws")
-# Tasks submitted per worker, so that no worker is idle between tasks.
+# The number of tasks submitted per worker, so that no worker is idle between tasks.
 _AHEAD = 4
 
 
 @dataclass(frozen=True)
 class Workers:
-    """An executor, and the number of tasks that it runs at once."""
+    """An executor, and the number of tasks that it runs in parallel."""
 
     executor: Executor
     count: int
 
     def run(self, function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[tuple[Task, Result]]:
-        """Yield each task with its result as it finishes; tasks are taken from their source only when there is room."""
+        """Yield each task with its result as it finishes; read further tasks only when workers are free."""
         pending: dict[Future[Result], Task] = {}
         for task in tasks:
             pending[self.executor.submit(function, task)] = task
@@ -56,9 +56,9 @@ def _finished(pending: dict[Future[Result], Task]) -> Iterator[tuple[Task, Resul
 
 @contextmanager
 def local_workers(jobs: int | None = None) -> Iterator[Workers]:
-    """Start processes on this machine: `jobs` of them, or one per processor core."""
+    """Start `jobs` processes on this machine, by default one per processor core, and yield them as workers."""
     count = jobs or len(os.sched_getaffinity(0))
-    # Processes are spawned: a forked copy of a process with threads, such as a progress bar's thread, may hang.
+    # Processes are spawned, since a forked copy of a process with threads, such as a progress bar's, may hang.
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(count, mp_context=context, initializer=_leave_interrupts_to_the_parent)
     try:
@@ -69,39 +69,39 @@ def local_workers(jobs: int | None = None) -> Iterator[Workers]:
 
 @contextmanager
 def cluster_workers(address: str) -> Iterator[Workers]:
-    """The workers of the Dask cluster whose scheduler is at `address`, such as tls://10.0.0.1:8786.
+    """Connect to the Dask cluster whose scheduler is at `address`, such as tls://10.0.0.1:8786; yield its workers.
 
-    Each end of a connection runs code from the other end. With tls://, both ends authenticate each other by the
+    Each end of a connection runs code from the other end. With tls://, both ends authenticate each other with the
     certificates in Dask's configuration. Without tls://, a warning is printed unless the scheduler is on this machine.
 
-    Raises `InputError` if the cluster does not respond, has no suitable workers, or is lost.
+    Raise `InputError` if the cluster does not respond, has no suitable workers, or if the connection is lost.
     """
     try:
         # Dask's type hints are incomplete.
         distributed: Any = import_module("distributed")
     except ImportError:
-        fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
-    # A lost connection is reported here, once and in one sentence.
+        fail("--cluster requires the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
+    # A lost connection is reported only here, in one sentence.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     security = _security(distributed, address)
     with _connected(distributed, address, security) as client:
         count = sum(client.ncores().values())
         if not count:
-            fail(f"the Dask cluster at '{address}' has no workers", hint=f"start some: dask worker {address}")
+            fail(f"the Dask cluster at '{address}' has no workers", hint=f"start workers: dask worker {address}")
         _check_versions(client, address)
         executor = client.get_executor(pure=False)
         try:
             yield Workers(executor, count)
         except (CancelledError, distributed.KilledWorker) as error:
             fail(
-                f"the Dask cluster at '{address}' was lost", hint=" ".join(str(error).split()) or "its scheduler ended"
+                f"the Dask cluster at '{address}' was lost", hint=" ".join(str(error).split()) or "the scheduler ended"
             )
         finally:
             executor.shutdown(wait=False)
 
 
 def _security(distributed: Any, address: str) -> Any:
-    """The security settings of a connection to the scheduler. Raises `InputError` if certificates are missing."""
+    """Return the security settings for the scheduler's address. Raise `InputError` if certificates are missing."""
     protocol, _, place = address.rpartition("://")
     if protocol != "tls":
         if protocol in _OPEN_PROTOCOLS and not _is_here(place):
@@ -120,14 +120,14 @@ def _security(distributed: Any, address: str) -> Any:
                 "Dask's configuration names the certificates: ca-file, client.cert and client.key "
                 "(docs/explanation/security.md)"
             )
-            fail(f"'{address}' needs distributed.comm.tls.{name}", hint=hint)
+            fail(f"'{address}' requires distributed.comm.tls.{name}", hint=hint)
         if not Path(file).is_file():
-            fail(f"the file '{file}' of distributed.comm.tls.{name} in Dask's configuration is missing")
+            fail(f"the file '{file}', set by distributed.comm.tls.{name} in Dask's configuration, is missing")
     return security
 
 
 def _is_here(place: str) -> bool:
-    """Whether the host in `host:port` is a loopback address."""
+    """Return whether the host in `host:port` is a loopback address."""
     host = place.rpartition(":")[0].strip("[]")
     try:
         return host == "localhost" or ip_address(host).is_loopback
@@ -136,26 +136,26 @@ def _is_here(place: str) -> bool:
 
 
 def _connected(distributed: Any, address: str, security: Any) -> Any:
-    """A client of the scheduler. Raises `InputError` if the scheduler does not respond."""
+    """Return a client of the scheduler. Raise `InputError` if the scheduler does not respond."""
     try:
         return distributed.Client(address, timeout=_CONNECT_SECONDS, security=security)
     # Dask raises the last two for an invalid configuration.
     except (OSError, ValueError, RuntimeError, TypeError) as error:
         reason = str(error).split("\n", 1)[0]
-    # A discarded client stops its loop when it is garbage-collected. If that happened while another client starts, both
+    # A discarded client stops its loop when it is garbage-collected. If this happened while another client starts, both
     # would wait for the same lock forever.
     gc.collect()
-    return fail(f"no Dask scheduler answers at '{address}'", hint=reason)
+    return fail(f"no Dask scheduler responds at '{address}'", hint=reason)
 
 
 def _check_versions(client: Any, address: str) -> None:
-    """Raise `InputError` unless the workers have our package versions: results must be the same on all machines."""
+    """Raise `InputError` unless the workers have our package versions, since results must be equal on all machines."""
     found = client.run(_version, on_error="return")
     for worker, version in sorted(found.items()):
         if version != __version__:
-            has = f"has {version}" if isinstance(version, str) else "cannot import it"
+            has = f"has {version}" if isinstance(version, str) else "cannot import fusesoc-firm"
             fail(
-                f"the Dask cluster at '{address}' cannot do this: its worker {worker} {has}",
+                f"the Dask cluster at '{address}' is not compatible: worker {worker} {has}",
                 hint=f"all workers need fusesoc-firm {__version__}",
             )
 
@@ -165,5 +165,5 @@ def _version() -> str:
 
 
 def _leave_interrupts_to_the_parent() -> None:
-    # A handler, not SIG_IGN: simulators would inherit that, but Ctrl-C must end them.
+    # A handler instead of SIG_IGN, which simulators would inherit: Ctrl-C must end simulators.
     signal.signal(signal.SIGINT, lambda *_: None)

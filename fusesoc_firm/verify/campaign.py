@@ -1,4 +1,4 @@
-"""A campaign: selects messages, verifies each layout once, and collects the results."""
+"""A campaign: select messages, verify each layout once, and collect the results."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Settings:
 class Entry:
     """A message and its result.
 
-    `same_as` is the message with the same layout that was verified instead; `statistics` is None for an illegal
-    definition.
+    `same_as` is the verified message with the same layout, if this message itself was not verified; `statistics` is
+    None for an illegal definition.
     """
 
     name: MessageName
@@ -44,10 +44,10 @@ class Entry:
 
 
 def select(library: MessageLibrary, patterns: Sequence[str]) -> list[MessageName]:
-    """Return the sorted messages that names, or patterns with `*` and `?`, select; all if there are no patterns.
+    """Return the sorted messages that names or patterns (with `*` and `?`) select; without patterns, all messages.
 
-    A service or an action selects its messages. Raises `InputError` for a name or pattern without a match, and for
-    every fault in the definitions of a named message.
+    The name of a service or an action selects all its messages. Raise `InputError` for a name or pattern without a
+    match, and for all faults in the definitions of a named message.
     """
     if not patterns:
         return library.names()
@@ -55,7 +55,7 @@ def select(library: MessageLibrary, patterns: Sequence[str]) -> list[MessageName
     for pattern in patterns:
         names = list(_matching(library, pattern)) if set(pattern) & set("*?[") else _named(library, pattern)
         if not names:
-            fail(f"no message matches '{pattern}'", hint="`firm message list` shows all")
+            fail(f"no message matches '{pattern}'", hint="'firm message list' lists all messages")
         found |= set(names)
     return sorted(found)
 
@@ -76,7 +76,7 @@ def _named(library: MessageLibrary, full_name: str) -> Sequence[MessageName]:
 
 
 def run(library: MessageLibrary, names: Iterable[MessageName], settings: Settings, workers: Workers) -> Iterator[Entry]:
-    """Verify messages; yield an entry for each as it is done. Raises `InputError` if none can be verified here."""
+    """Verify messages; yield each entry when it is ready. Raise `InputError` if no message can be verified here."""
     tasks = _Tasks(library, settings)
     for task, result in workers.run(verify, tasks.of(names)):
         yield from tasks.finished
@@ -87,12 +87,12 @@ def run(library: MessageLibrary, names: Iterable[MessageName], settings: Setting
 
 @dataclass
 class _Tasks:
-    """Creates a task for the first message with each layout, and keeps the other messages with the same layout."""
+    """The tasks of a campaign: all messages with the same layout share the task of the first one."""
 
     library: MessageLibrary
     settings: Settings
     finished: list[Entry] = field(default_factory=list)
-    """Entries without a task: refused definitions, and messages whose layout was already verified."""
+    """The entries without a task: rejected definitions, and messages whose layout was already verified."""
     _first: dict[Any, MessageName] = field(default_factory=dict)
     _waiting: dict[MessageName, list[MessageName]] = field(default_factory=dict)
     _results: dict[MessageName, Result] = field(default_factory=dict)
@@ -116,7 +116,7 @@ class _Tasks:
                 self._waiting.setdefault(first, []).append(name)
 
     def entries(self, task: Task, result: Result) -> Iterator[Entry]:
-        """Yield the entries of a task's message and of all messages that wait for it."""
+        """Yield the entries of a task's message and of all messages that share the task."""
         self._results[task.name] = result
         yield Entry(task.name, task.ros, result, self._statistics[task.name])
         for name in self._waiting.pop(task.name, ()):

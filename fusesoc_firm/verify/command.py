@@ -1,4 +1,4 @@
-"""`firm message verify`: the campaign with a progress bar, a summary, and the files of failed messages."""
+"""`firm message verify`: run a campaign with a progress bar, a summary, and the files of failed messages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SHOWN = 20
 
 @dataclass(frozen=True)
 class Places:
-    """The folders for work and results; `command` is the beginning of a command that repeats a message."""
+    """The folders for work and results; `command` is the beginning of a command that verifies one message again."""
 
     jobs: int | None = None
     cluster: str | None = None
@@ -40,11 +40,11 @@ class Places:
 def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: Settings, places: Places) -> None:
     """Verify messages and print the results.
 
-    Raises `InputError` if one fails, or if none could be verified.
+    Raise `InputError` if a message fails, or if no message could be verified.
     """
     if settings.width not in WIDTHS:
         legal = ", ".join(map(str, WIDTHS))
-        fail(f"a converter cannot have a stream of {settings.width} bits", hint=f"legal here: {legal}")
+        fail(f"converters do not support {settings.width}-bit streams", hint=f"legal here: {legal}")
     if places.report:
         check_output(places.report, (".json",))
     if places.keep:
@@ -77,7 +77,7 @@ def _workers(places: Places) -> AbstractContextManager[Workers]:
 
 
 def _keep(entry: Entry, folder: Path | None) -> None:
-    """Write the work folder of a message that failed."""
+    """Write the contents of the work folder of a failed message below `folder`."""
     if folder is None or not entry.result.files:
         return
     below = folder / f"ros{entry.ros.number}_{entry.name.package}_{entry.name.name}"

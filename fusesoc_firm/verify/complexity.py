@@ -1,4 +1,4 @@
-"""Measures messages: the dissertation's levels (figure 5.7), and fields, types and depth (figures 5.8 to 5.10)."""
+"""Measure messages: the dissertation's levels (figure 5.7), and fields, types and depth (figures 5.8 to 5.10)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from fusesoc_firm.message.model import (
 
 
 class Level(IntEnum):
-    """The most complex kind of element in a message; each level includes those below it."""
+    """The most complex kind of element in a message; each level includes the lower levels."""
 
     SIMPLE = 1
     """Single numbers."""
     EXPANDING = 2
-    """Arrays of fixed size and nested messages: they unfold into simple elements."""
+    """Arrays of fixed size and nested messages, which unfold into simple elements."""
     ARRAYS = 3
     """Strings and variable arrays of numbers."""
     VARIABLE_SUBMESSAGES = 4
@@ -32,9 +32,9 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Statistics:
-    """The figures of a message.
+    """The measures of a message.
 
-    `fields` counts the leaves with all messages unfolded, an array counting once. `types` counts the distinct types
+    `fields` counts the leaves with all messages unfolded; an array counts once. `types` counts the distinct types
     among all fields, including messages and the elements of arrays. `depth` is 1 for a message without nested messages.
     """
 
@@ -45,7 +45,7 @@ class Statistics:
 
 
 def statistics(name: MessageName, definitions: Definitions) -> Statistics:
-    """Return the figures of a message."""
+    """Return the measures of a message."""
     return Statistics(
         level=_level(name, definitions),
         fields=_fields(name, definitions),

@@ -24,7 +24,7 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.text.diagnostics import SourceRef
 
 _SEPARATOR = "=" * 80
-# Replaces a wstring; this is a message so that arrays of wstrings are possible.
+# A message that replaces a wstring, so that arrays of wstrings are possible.
 _WIDE = MessageName("firm_wide_msgs", "Wide")
 _UNITS = "units"
 _PLACE = SourceRef("", 0, 0)
@@ -35,18 +35,18 @@ class NoJudgementError(Exception):
 
 
 def plain_text(definition: MessageDefinition) -> str:
-    """Return the fields only: defaults and constants are not sent, and some parsers reject some of them."""
+    """Return the text of a definition's fields; defaults and constants, which some parsers reject, are never sent."""
     return "".join(f"{field.type} {field.name}\n" for field in definition.fields)
 
 
 def joint_text(name: MessageName, definitions: Definitions) -> str:
-    """Return a message and all nested messages in one text, separated as by ROS's tools."""
+    """Return one text with a message and all nested messages, separated as by the tools of ROS."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{plain_text(definitions[other])}" for other in definitions if other != name]
     return "\n".join([plain_text(definitions[name]), *others])
 
 
 def with_wide_arrays(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
-    """Return ROS 2 definitions with each wstring replaced by `uint32[]`: UTF-16 units in 32 bits each."""
+    """Return ROS 2 definitions with each wstring replaced by `uint32[]`, an array with one element per UTF-16 unit."""
     field = Field(_UNITS, SequenceType(PrimitiveType("uint32")), _PLACE)
     made = {_WIDE: MessageDefinition(_WIDE, ROS2, (field,), (), _PLACE)}
     for name, definition in definitions.items():
@@ -58,7 +58,7 @@ def with_wide_arrays(definitions: Definitions) -> dict[MessageName, MessageDefin
 def with_wide_units(
     definition: MessageDefinition, definitions: Definitions, value: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Convert a message's value to match the definitions from `with_wide_arrays`."""
+    """Return a message's value converted to match the definitions from `with_wide_arrays`."""
     return {field.name: _wide_value(field.type, definitions, value[field.name]) for field in definition.fields}
 
 

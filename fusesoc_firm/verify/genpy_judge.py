@@ -1,4 +1,4 @@
-"""The reference for ROS 1: genpy in a server process (`genpy_server` gives the reason)."""
+"""The reference for ROS 1: genpy in a server process (`genpy_server` explains why)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SERVER = Path(__file__).with_name("genpy_server.py")
 
 
 def is_installed() -> bool:
-    """Return whether any Python on this machine has genpy."""
+    """Return whether a known Python on this machine has genpy."""
     return _server() is not None
 
 
@@ -33,7 +33,7 @@ def version() -> str:
 
 
 def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
-    """Return the payload of each value. Raises `NoJudgementError` if genpy rejects the message."""
+    """Return the payload of each value. Raise `NoJudgementError` if genpy rejects the message."""
     server = _server()
     assert server is not None, "ask is_installed() first"
     texts = {str(other): plain_text(definition) for other, definition in definitions.items()}
@@ -45,7 +45,7 @@ def serialise(name: MessageName, definitions: Definitions, values: Sequence[Mess
 
 
 class _Server:
-    """A running server. Raises `EOFError` if that Python has no genpy."""
+    """A running server process. Raises `EOFError` if that Python lacks genpy."""
 
     def __init__(self, python: str) -> None:
         self._process = subprocess.Popen(
@@ -75,7 +75,10 @@ class _Server:
 
 @cache
 def _server() -> _Server | None:
-    """Return this process's server, run by the first Python that has genpy; on Debian, the system's Python."""
+    """Return this process's server, or None without genpy.
+
+    The first Python with genpy (on Debian, the system's) runs the server.
+    """
     pythons = dict.fromkeys(filter(None, (sys.executable, shutil.which("python3"), "/usr/bin/python3")))
     for python in pythons:
         try:

@@ -1,12 +1,12 @@
-"""Serialises ROS 1 messages with genpy, in a separate program because genpy belongs to the system's Python.
+"""Serialise ROS 1 messages with genpy, in a separate program because genpy belongs to the system's Python.
 
-The program uses only genpy, genpy's parser genmsg and the standard library. Requests arrive on the standard input as
-pickles of (type, text of each definition, values). Results go to the standard output as pickles of (True, payloads) or
+The program uses only genpy, genpy's parser genmsg and the standard library. Requests arrive on standard input as
+pickles of (type, text of each definition, values). Results go to standard output as pickles of (True, payloads) or
 (False, reason). The first result is genpy's version. The program ends when its input ends.
 
-`genpy.dynamic.generate_dynamic` would make the classes of all nested messages, which takes seven times as long. Only
-the method of the outermost class serialises, so only that class is created; the values of the other messages are plain
-objects.
+`genpy.dynamic.generate_dynamic` would create the classes of all nested messages, which takes seven times as long. The
+outermost class alone serialises the whole message, so only this class is created; the values of nested messages are
+plain objects.
 """
 # mypy: ignore-errors
 # ruff: noqa: ANN001, ANN202 - genpy has no types, and no other module may be imported here
@@ -20,7 +20,7 @@ from types import SimpleNamespace
 
 
 def main() -> int:
-    """Serve until the input ends; 1 if genpy is not installed."""
+    """Serve requests until the input ends; return the exit status, which is 1 if genpy is not installed."""
     try:
         import genpy.generator  # noqa: F401
     except ImportError:
@@ -67,7 +67,7 @@ def _class_of(context, name):
 
     spec = context.get_registered(name)
     lines = msg_generator(context, spec, {})
-    # The classes of nested messages are only needed for default values.
+    # The classes of nested messages would be needed only for default values.
     text = "\n".join(line for line in lines if not (line.startswith("import ") and line.endswith(".msg")))
     scope = {}
     exec(text, scope)
@@ -97,7 +97,7 @@ def _argument(context, type_, value):
         return value if isinstance(value, bytes) else [_argument(context, element, item) for item in value]
     if element in ("time", "duration"):
         time = genpy.Time() if element == "time" else genpy.Duration()
-        # The constructor would normalise nanoseconds above a second.
+        # The constructor would normalise nanoseconds that exceed a second.
         time.secs, time.nsecs = value["sec"], value["nsec"]
         return time
     return _filled(context, SimpleNamespace(), element, value) if context.is_registered(element) else value

@@ -1,7 +1,7 @@
-"""Determines the bytes of a message with independent serialisers.
+"""Determine the bytes of a message with independent serialisers.
 
-The reference for ROS 1 is genpy, ROS's own, or rosbags if genpy is not installed. The reference for ROS 2 is rosbags.
-If mcap-ros2-support is installed, it must read the same values from the bytes of rosbags.
+The reference for ROS 1 is genpy, which is part of ROS, or rosbags if genpy is not installed. The reference for ROS 2 is
+rosbags. If mcap-ros2-support is installed, it must read the same values from the bytes that rosbags wrote.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Serialise = Callable[[MessageName, Definitions, Sequence[MessageValue]], list[by
 
 @dataclass(frozen=True)
 class Judgement:
-    """The payload of each value, and the serialisers that determined it."""
+    """The payload of each value, and the serialisers that determined the payloads."""
 
     payloads: tuple[bytes, ...]
     judge: str
@@ -30,7 +30,7 @@ def judge(name: MessageName, definitions: Definitions, values: Sequence[MessageV
     """Return the payloads of a message's values.
 
     Raises:
-        NoJudgementError: no installed serialiser can read the message, or two of them disagree.
+        NoJudgementError: no installed serialiser can read the message, or two serialisers disagree.
     """
     if definitions[name].ros is ROS2:
         return _judge_ros2(name, definitions, values)
@@ -44,13 +44,13 @@ def judge(name: MessageName, definitions: Definitions, values: Sequence[MessageV
 
 
 def ros1_judges() -> list[tuple[str, Serialise]]:
-    """Return the installed serialisers of ROS 1, the preferred one first."""
+    """Return the names and functions of the installed ROS 1 serialisers, the preferred one first."""
     genpy = [(genpy_judge.TITLE, genpy_judge.serialise)] if genpy_judge.is_installed() else []
     return [*genpy, (rosbags_judge.TITLE, rosbags_judge.serialise)]
 
 
 def versions() -> dict[str, str]:
-    """Return the installed references and their versions."""
+    """Return the installed references with their versions."""
     found = {
         rosbags_judge.TITLE: rosbags_judge.version(),
         genpy_judge.TITLE: genpy_judge.version(),

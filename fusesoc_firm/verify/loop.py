@@ -1,4 +1,4 @@
-"""Writes the test bench of a Frame: its converters in a loop, with a gate in every handshake between them."""
+"""Write the test bench of a Frame: both converters in a loop, with a gate in every handshake between them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ SUBSCRIBER_ID = 1
 PUBLISHER_ID = 2
 
 _TEMPLATE = "verify/loop.vhd"
-# Cycles without a beat at the host, after which it gives up, and during which it waits for surplus frames.
+# The number of cycles without a beat after which the host gives up, and during which it waits for surplus frames.
 _WATCHDOG = 5000
 _QUIET = 100
 
 
 @dataclass(frozen=True)
 class Gate:
-    """A handshake with a gate in it.
+    """A handshake that passes a gate.
 
     `valid` comes from the source and `ready` from the sink; `assignments` connect both to the other side.
     """
@@ -69,9 +69,9 @@ def loop_text(frame: Frame, width: int) -> str:
 
 
 def gates(ports: Sequence[MessagePort], segments: int, *, has_msg_valid: bool) -> list[Gate]:
-    """Return the gates of a message side: one per segment, stream, element, element's segment, and for the message.
+    """Return the gates of a message side: for each segment, stream, element, element's segment, and the message.
 
-    A handshake is found by its `ready`, the only kind of port with the opposite direction.
+    A handshake is identified by its `ready`, the only kind of port with the opposite direction.
     """
     by_name = {port.name: port for port in ports}
     found: list[Gate] = []
@@ -93,7 +93,7 @@ def _is_stream(port: MessagePort) -> bool:
 
 
 def _element_gates(name: str, ports: dict[str, MessagePort], first: int) -> list[Gate]:
-    """Return the gates of an array's elements. An element is valid when all its segments are."""
+    """Return the gates of an array's elements. An element is valid when all its segments are valid."""
     own = ports.get(f"{name}_segment_valid")
     count = own.width if own and own.width else 0
     taken = f"pub_{name}_valid and pub_{name}_ready"
@@ -104,7 +104,7 @@ def _element_gates(name: str, ports: dict[str, MessagePort], first: int) -> list
 
 
 def _message_gate(segments: int, gate: int) -> Gate:
-    """Return the gate of a message, which is valid when all its segments are."""
+    """Return the gate of a message, which is valid when all its segments are valid."""
     shown = " and ".join(["sub_msg_valid", *(f"pub_segment_valid({number})" for number in range(segments))])
     return Gate("msg_valid", shown, "msg_ready", (("pub_msg_valid", f"{shown} and is_open({gate})"),))
 

@@ -29,7 +29,7 @@ _PLAIN = {"byte": "uint8", "char": "uint8"}
 
 @cache
 def version() -> str:
-    """Return the package's version; empty if the package is not installed."""
+    """Return the package's version, or an empty string if the package is not installed."""
     try:
         return metadata.version(TITLE)
     except metadata.PackageNotFoundError:
@@ -55,13 +55,13 @@ def check(
         try:
             found = decode(payload)
         except Exception as error:
-            raise NoJudgementError(f"{TITLE} refuses the bytes: {type(error).__name__}: {error}") from error
+            raise NoJudgementError(f"{TITLE} rejects the bytes: {type(error).__name__}: {error}") from error
         if not _is_same_message(found, definitions[name], definitions, value):
             raise NoJudgementError(f"{TITLE} reads a different value")
 
 
 def _renamed(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
-    """Rename messages so that the package accepts them: action messages contain a `_`, which only ROS may use."""
+    """Return definitions with names that the package accepts: it rejects the `_` in action messages."""
     names = {name: MessageName("renamed", f"M{number}") for number, name in enumerate(definitions)}
     return {
         names[name]: replace(

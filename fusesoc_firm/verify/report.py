@@ -1,4 +1,4 @@
-"""Reports the results of a campaign: JSON for programs, HTML for people. Neither contains a path of the machine."""
+"""Report the results of a campaign as JSON for programs and as HTML for people, without paths of the machine."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LEVELS = {
     Level.ARRAYS: "3 Arrays",
     Level.VARIABLE_SUBMESSAGES: "4 VariableSubmessages",
 }
-# The size in pixels of a figure, and of the labels below and to the left of the bars.
+# The sizes, in pixels, of a figure and of the labels below and to the left of the bars.
 _WIDTH, _HEIGHT, _MARGIN, _LABELS = 560, 200, 40, 34
 
 
@@ -48,7 +48,7 @@ class Report:
 
     @property
     def failures(self) -> list[Entry]:
-        """The failed messages; messages that were themselves simulated come first."""
+        """The entries of failed messages; messages that were themselves simulated are first."""
         failed = [entry for entry in self.entries if entry.result.verdict is Verdict.FAIL]
         return sorted(failed, key=lambda entry: entry.same_as is not None)
 
@@ -104,7 +104,7 @@ def _entry(entry: Entry) -> dict[str, Any]:
 
 
 def as_html(report: Report) -> str:
-    """Return the report as a page that needs no other file."""
+    """Return the report as a self-contained HTML page."""
     settings = report.settings
     versions_of_ros = [ros for ros in middlewares() if any(entry.ros is ros for entry in report.entries)]
     return render(
@@ -172,7 +172,7 @@ class Histogram:
 
 
 def histogram(values: Sequence[int], first: int, step: int, most: int) -> Histogram:
-    """Return the histogram of values from `first` to `most`, no wider than the values need."""
+    """Return the histogram of values from `first` to at most `most`, with no more steps than the values need."""
     inside = [value for value in values if value <= most]
     counts = Counter((value - first) // step for value in inside)
     return Histogram(

@@ -27,7 +27,7 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.verify.definitions import NoJudgementError, plain_text
 
 TITLE = "rosbags"
-# rosbags lacks `time` and `duration`: the ROS 2 messages, which have the same bits, replace them.
+# rosbags lacks `time` and `duration`; the corresponding ROS 2 messages, which have the same bits, replace them.
 _TIMES = {"time": MessageName("builtin_interfaces", "Time"), "duration": MessageName("builtin_interfaces", "Duration")}
 _TIME_TEXT = "int32 sec\nuint32 nanosec\n"
 _LARGEST_INT8, _LARGEST_INT32 = 2**7 - 1, 2**31 - 1
@@ -39,7 +39,7 @@ def version() -> str:
 
 
 def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
-    """Return the payload of each value; CDR padding is zero. Raises `NoJudgementError` if rosbags cannot read it."""
+    """Return the payload of each value, with zero padding. Raise `NoJudgementError` if rosbags rejects the message."""
     ros = definitions[name].ros
     texts = {other: plain_text(definition) for other, definition in definitions.items()}
     if ros is ROS1:
@@ -51,14 +51,14 @@ def serialise(name: MessageName, definitions: Definitions, values: Sequence[Mess
 
 
 class _Store:
-    """A type store that is kept, since rosbags compiles a serialiser for every type that it receives."""
+    """A cached type store, since rosbags compiles a serialiser for every type that it receives."""
 
     def __init__(self) -> None:
         self._store = get_typestore(Stores.EMPTY)
         self._texts: dict[MessageName, str] = {}
 
     def holding(self, texts: Mapping[MessageName, str]) -> Typestore:
-        """Return a store with exactly these definitions for these names. Raises `NoJudgementError`."""
+        """Return a store with exactly these definitions for these names. May raise `NoJudgementError`."""
         if any(self._texts.get(name, text) != text for name, text in texts.items()):
             self._store, self._texts = get_typestore(Stores.EMPTY), {}
         for name, text in texts.items():

@@ -1,4 +1,4 @@
-"""Simulates the loop of a message in GHDL: frames in, expected frames compared, a verdict out."""
+"""Simulate the loop of a message in GHDL: send frames, compare the responses, and return a verdict."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fusesoc_firm.verify.loop import ENTITY
 STIMULUS_FILE, EXPECTED_FILE, OUTPUT_FILE = "stimulus.txt", "expected.txt", "output.txt"
 BYTES_PER_LINE = 64
 STALL_PERCENT = 30
-# In seconds. The host gives up on hanging hardware long before, so this limit stops a simulation that makes no
+# In seconds. The host gives up on hanging hardware much earlier, so this limit only stops a simulation without
 # progress.
 TIMEOUT = 300
 
@@ -45,7 +45,7 @@ _lock = threading.Lock()
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a simulation: `detail` describes the fault, `output` is all of GHDL's output."""
+    """The result of a simulation: `detail` describes the fault, and `output` is GHDL's whole output."""
 
     is_right: bool
     cycles: int
@@ -54,8 +54,8 @@ class Outcome:
 
 
 def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, timeout: float = TIMEOUT) -> Outcome:
-    """Compile `sources` of `folder`, the bench last, with the cores in `library`, and run the bench in `folder`."""
-    # One process compiles and runs all in memory, which is twice as fast as separate steps.
+    """Compile the sources in `folder`, with the bench last and the cores in `library`; run the bench."""
+    # One process compiles and runs everything in memory, which is twice as fast as separate steps.
     command = [ghdl(), "-c", *_OPTIONS, f"-P{library}", *sources, "-r", ENTITY]
     command += [f"-gSEED={seed}", f"-gSTALL_PERCENT={STALL_PERCENT}"]
     try:
@@ -79,7 +79,7 @@ def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, tim
 
 
 def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes]) -> None:
-    """Write the host's files (docs/reference/simulation-host.md): stimulus k causes response k and nothing else."""
+    """Write the host's files (docs/reference/simulation-host.md): stimulus k causes only response k."""
     sent = (f"> stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(stimuli))
     expected = (f"< @{number} answer to stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(answers))
     (folder / STIMULUS_FILE).write_text("".join(sent), encoding="ascii")
@@ -88,20 +88,20 @@ def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes
 
 @cache
 def ghdl() -> str:
-    """Return the path of GHDL. Raises `InputError` if it is not installed."""
+    """Return the path of GHDL. Raise `InputError` if it is not installed."""
     path = shutil.which("ghdl")
     if path is None:
-        fail("GHDL is not installed, and messages are verified in simulation", hint="apt-get install ghdl-mcode")
+        fail("GHDL is not installed, but messages are verified in simulation", hint="apt-get install ghdl-mcode")
     return path
 
 
 def ghdl_version() -> str:
-    """Return the first line of GHDL's description of itself."""
+    """Return the first line that `ghdl --version` prints."""
     return subprocess.run([ghdl(), "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
 
 
 def firm_library() -> Path:
-    """Return a folder with the bench's cores as the library `firm`, analysed once per process and finally deleted."""
+    """Return a folder with the library `firm` of the bench's cores, analysed once per process and deleted at exit."""
     with _lock:
         return _analysed_library()
 
@@ -129,9 +129,11 @@ def _hex_lines(frame: bytes) -> str:
 
 
 def _detail(output: str) -> str:
-    """Return the first lines that name a fault: the host's, an assertion's, or the compiler's."""
+    """Return the first lines that report a fault of the host, of an assertion or of the compiler."""
     lines = output.splitlines()
     faults = [line.partition(": ")[2] for line in lines if line.startswith("fault in cycle")]
     faults += [_REPORT.sub("", line) for line in lines if "(assertion failure)" in line and "FAIL" not in line]
-    faults = faults or [line for line in lines if "error" in line] or lines[:1] or ["GHDL ended without a message"]
+    faults = (
+        faults or [line for line in lines if "error" in line] or lines[:1] or ["GHDL ended without an error message"]
+    )
     return "; ".join(faults[:_DETAIL_LINES])

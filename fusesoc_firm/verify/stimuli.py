@@ -1,4 +1,4 @@
-"""Draws values for any message from its definition: empty, typical and extreme values, and single elements."""
+"""Draw values for any message from its definition: empty, typical and extreme values, and single elements."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ _EXTREME_FLOATS = (0.0, -0.0, float("inf"), float("-inf"), float("nan"))
 _LARGEST = {"float32": 3.4028234663852886e38, "float64": 1.7976931348623157e308}
 _SMALLEST = {"float32": 1.401298464324817e-45, "float64": 5e-324}
 _LETTERS = "ab_/ Z9"
-# Two, three and four bytes in UTF-8; the second-to-last character takes two UTF-16 units.
+# Two, three and four bytes in UTF-8; the second-to-last character has two UTF-16 units.
 _WIDE_LETTERS = "\x00é€語🤖\u200b"
 _LONGEST_TEXT = 12
-# The variable parts of a message share this number of values, so that a stimulus does not exceed a few kilobytes.
-# Bounds beyond a part's share are not reached, and nested arrays are short.
+# The variable parts of a message share this number of values, so that a stimulus does not exceed a few kilobytes. A
+# part does not reach a bound beyond its share, and nested arrays are short.
 _MOST_VALUES = 1000
 
 
@@ -45,7 +45,7 @@ def kinds(count: int) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Stimuli:
-    """Draws values.
+    """A source of random values for messages.
 
     A variable part has no elements in an empty value, one element in a value of kind `ONE`, and 1 to `longest` elements
     in a typical value. In an extreme value, variable parts are at their bounds, or have 0 to `longest` elements if
@@ -61,7 +61,7 @@ class Stimuli:
     _part_counts: dict[MessageName, int] = field(default_factory=dict, compare=False, repr=False)
 
     def message(self, name: MessageName, kind: str) -> dict[str, Any]:
-        """Return a value of a message, or of ROS 1's `time`, as dictionaries."""
+        """Return a value of a message, or of `time` in ROS 1, as nested dictionaries."""
         return self._message(name, kind, max(1, _MOST_VALUES // max(1, self._parts(name))))
 
     def _message(self, name: MessageName, kind: str, most: int) -> dict[str, Any]:
@@ -89,7 +89,7 @@ class Stimuli:
         raise AssertionError(type_)
 
     def _size(self, type_: FieldType) -> int:
-        """Return the number of values in a message in which every variable part holds one element."""
+        """Return the number of values in a message whose variable parts contain one element each."""
         match type_:
             case SequenceType(element):
                 return self._size(element)
@@ -121,7 +121,7 @@ class Stimuli:
         return {"byte": byte, "char": "uint8"}.get(name, name)
 
     def _count(self, bound: int | None, kind: str, most: int) -> int:
-        """Return the number of elements of a variable part; there is always room for one."""
+        """Return the number of elements to draw for a variable part; one element is always allowed."""
         if kind in (EMPTY, ONE):
             return int(kind == ONE)
         if kind == EXTREME and bound is not None and bound <= most:

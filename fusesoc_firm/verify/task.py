@@ -1,4 +1,4 @@
-"""Verifies one message, from its definition to a verdict: stimuli, reference, converters, simulation."""
+"""Verify one message, from its definition to a verdict: stimuli, reference, converters, simulation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _VHDL_ENCODING = "ascii"
 
 
 class Verdict(StrEnum):
-    """The verdict on a message; `REFUSED` means that its definition is illegal, so nothing could be generated."""
+    """The verdict on a message; `REFUSED` means that the definition is illegal, so nothing could be generated."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -39,7 +39,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Task:
-    """A message with all nested definitions and its settings; it needs no file, so any machine can process it."""
+    """A message with all nested definitions and the settings; it refers to no files, so any machine can process it."""
 
     name: MessageName
     definitions: Definitions
@@ -54,15 +54,16 @@ class Task:
         return self.definitions[self.name].ros
 
     def chance(self) -> random.Random:
-        """The random numbers of this message, which do not depend on the other messages of a campaign."""
+        """Return the random generator for this message, independent of the campaign's other messages."""
         return random.Random(f"{self.seed} {self.name} {self.ros.number}")
 
 
 @dataclass(frozen=True)
 class Result:
-    """The verdict on a message. `payload_bytes` has one item per stimulus; `cycles` runs from first to last beat.
+    """The verdict on a message; `payload_bytes` lists the size of each stimulus's payload.
 
-    `files` is the content of the work folder by name, if the task keeps it and the message did not pass.
+    `cycles` is the time from the first to the last beat. If the task keeps files and the message failed, `files` is the
+    content of the work folder by name.
     """
 
     verdict: Verdict
@@ -75,7 +76,7 @@ class Result:
 
 
 def verify(task: Task) -> Result:
-    """Verify a message. Raises `InputError` only for a fault that affects every message: GHDL is not installed."""
+    """Verify a message. Raise `InputError` only if no message can be verified, because GHDL is not installed."""
     library = firm_library()
     started = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="firm_verify_") as name:
@@ -116,7 +117,7 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
 
 
 def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
-    """Write converters and bench; return their names in the order of compilation."""
+    """Write the converters and the bench; return the file names in compilation order."""
     files = subscriber_files([frame], width) | publisher_files([frame], width)
     texts = {name: str(file.content) for name, file in files.items()} | {_BENCH: loop_text(frame, width)}
     for name, text in texts.items():
@@ -125,7 +126,7 @@ def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
 
 
 def _layout_fault(frame: Frame, value: MessageValue, payload: bytes) -> str:
-    """Describe how this project's layout of a value differs from the reference's bytes; empty if it does not."""
+    """Return the difference between this project's layout of a value and the reference's bytes, or an empty string."""
     try:
         ours = encode(frame, value)
         used_bytes(frame, payload)
@@ -142,10 +143,10 @@ def _layout_fault(frame: Frame, value: MessageValue, payload: bytes) -> str:
 
 
 def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
-    """Return the frame of a payload, with garbage in the padding and after the last field, as writers may send it.
+    """Return the frame of a payload, with random bytes in the padding and after the last field, as writers may send.
 
-    The positions of padding come from this project's layout. If it is wrong, a value is damaged, and the response
-    differs from the reference.
+    The positions of padding are those in this project's layout. If the layout is wrong, a value is damaged, and the
+    response differs from the reference.
     """
     used = used_bytes(frame, payload)
     noisy = bytes(byte if is_used else chance.randrange(256) for byte, is_used in zip(payload, used, strict=True))
@@ -155,8 +156,8 @@ def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
 def _answer(frame: Frame, payload: bytes, sent: bytes) -> bytes:
     """Return the expected response: the reference's bytes.
 
-    For a variable-size message, the length equals the length in the received frame: the publisher must send the length
-    before it can detect bytes after the last field. It sends zeros for these bytes.
+    For a message of variable size, the length equals the length in the received frame, since the publisher must send
+    the length before it can detect bytes after the last field. The publisher sends zeros for these bytes.
     """
     trailing = 0 if frame.is_fixed_size else len(sent) - len(pack_frame(SUBSCRIBER_ID, payload))
     return pack_frame(PUBLISHER_ID, payload + bytes(trailing))

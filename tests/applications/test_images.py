@@ -179,7 +179,7 @@ def test_many_types_side_by_side(tmp_path: Path, width: int) -> None:
     [
         ({"MAX_COLUMNS": 65536}, "MAX_COLUMNS is 65536; legal: 1 to 65535/OUT_BYTES"),
         ({"MAX_COLUMNS": 40000, "OUT_BYTES": 2}, "MAX_COLUMNS is 40000; legal"),
-        ({"FRAME_ID_BYTES": 1}, "FRAME_ID_BYTES is 1; legal: two full beats and more"),
+        ({"FRAME_ID_BYTES": 1}, "FRAME_ID_BYTES is 1; legal: two full beats or more"),
         ({"COLUMNS_OUT": 2}, "COLUMNS_OUT is 2; legal: 1 to COLUMNS_IN"),
         ({"ROWS_OUT": 0}, "ROWS_OUT is 0; legal: 1 to ROWS_IN"),
     ],

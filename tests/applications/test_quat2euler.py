@@ -217,7 +217,7 @@ def test_the_model_uses_the_same_angles() -> None:
         ("firm_cordic_vectoring", {"FRACTION": 65}, "FRACTION is 65, legal: 8 to 64"),
         ("firm_cordic_vectoring", {"ITERATIONS": 1}, r"ITERATIONS is 1, legal: 2 to FRACTION \(60\)"),
         ("firm_cordic_vectoring", {"FRACTION": 20, "ITERATIONS": 21}, "ITERATIONS is 21, legal: 2 to FRACTION"),
-        ("firm_cordic_vectoring", {"WIDTH": 3}, "WIDTH is 3, legal: 4 and more"),
+        ("firm_cordic_vectoring", {"WIDTH": 3}, "WIDTH is 3, legal: 4 or more"),
         ("firm_cordic_sincos", {"FRACTION": 7, "ITERATIONS": 7}, "FRACTION is 7, legal: 8 to 58"),
         ("firm_cordic_sincos", {"FRACTION": 59}, "FRACTION is 59, legal: 8 to 58"),
         ("firm_cordic_sincos", {"ITERATIONS": 30}, r"ITERATIONS is 30, legal: 2 to FRACTION \(29\)"),

@@ -125,7 +125,7 @@ def test_a_bag_of_the_other_version(tmp_path: Path, kind: str, ros: Middleware) 
     with pytest.raises(InputError) as raised:
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", ros)])
     assert str(raised.value).splitlines() == [
-        f"error: topic /{topic} of {path} is of {version(kind).title}, but 'p' speaks {ros.title}" for topic in "pq"
+        f"error: topic /{topic} in {path} uses {version(kind).title}, but 'p' uses {ros.title}" for topic in "pq"
     ]
 
 
@@ -136,15 +136,15 @@ def test_a_topic_that_could_go_to_two(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InputError) as raised:
         read_stimuli(path, subscribers)
     assert str(raised.value) == (
-        f"error: topic /middle of {path} could go to left, right\n"
-        "      = name the topic like one of them, or give one the key 'topic'"
+        f"error: topic /middle in {path} could go to several blocks: left, right\n"
+        "      = give the topic the name of one of these blocks, or add the key 'topic' to one of them"
     )
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bag_without_a_message_for_anybody(tmp_path: Path, kind: str) -> None:
     path = write(tmp_path, kind, [("/chatter", STRING, 0.0, 0)])
-    with pytest.raises(InputError, match="holds no message for p"):
+    with pytest.raises(InputError, match="contains no message for p"):
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", version(kind))])
 
 
@@ -219,7 +219,10 @@ def test_a_bag_of_ros1_is_known_by_its_beginning(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "hint"),
-    [("ros1", "it was not closed: rosbag reindex {path}"), ("mcap", "it was not closed, or is cut off: mcap recover")],
+    [
+        ("ros1", "the bag was not closed; run: rosbag reindex {path}"),
+        ("mcap", "the bag was not closed or is cut off; run: mcap recover"),
+    ],
 )
 def test_a_bag_that_was_not_closed(tmp_path: Path, kind: str, hint: str) -> None:
     path = tmp_path / ("a.bag" if kind == "ros1" else "a")
@@ -239,7 +242,7 @@ def test_messages_in_a_journal_are_not_missed(tmp_path: Path) -> None:
         database.execute("update messages set timestamp = timestamp + 1")
         database.commit()
         for bag in (path, path / "recorded.db3"):
-            with pytest.raises(InputError, match=r"in its journal recorded\.db3-wal\n.*sqlite3 FILE 'pragma"):
+            with pytest.raises(InputError, match=r"in the journal recorded\.db3-wal\n.*sqlite3 FILE 'pragma"):
                 read_x(bag, "sqlite3")
         database.execute("pragma wal_checkpoint(truncate)")
         assert read_x(path, "sqlite3") == list(range(10))
@@ -279,7 +282,9 @@ def test_another_message_of_the_same_name(tmp_path: Path, kind: str) -> None:
     name = parse_name("geometry_msgs/Point")
     ours = signature(name, MessageLibrary(version(kind)).closure(name))
     assert routed(path, kind, ours) == [""]
-    assert routed(path, kind, "other") == [f"its geometry_msgs/Point differs from that of 'p': {ours}, not other"]
+    assert routed(path, kind, "other") == [
+        f"its definition of geometry_msgs/Point differs from the one of 'p': {ours}, not other"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -298,7 +303,9 @@ def test_two_types_on_one_topic(tmp_path: Path) -> None:
     with Rosbag1Writer(tmp_path / "a.bag") as writer:
         fill(writer, "ros1", [("/q", POINT, 1.0, 0)])
         fill(writer, "ros1", [("/q", STRING, 1.0, 1)])
-    with pytest.raises(InputError, match=r"topic /q of .*: it is a std_msgs/String, but 'p' takes geometry_msgs/Point"):
+    with pytest.raises(
+        InputError, match=r"topic /q in .*: its type is std_msgs/String, but 'p' takes geometry_msgs/Point"
+    ):
         read_x(tmp_path / "a.bag", "ros1")
 
 

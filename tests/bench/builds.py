@@ -25,11 +25,12 @@ SECONDS, SPEED_UP = 10.0, 1.7
 
 _COLUMNS = ("converters", "by", "processors", "wall, s", "processor, s", "speed-up", "bar", "result")
 _NOTE = f"""
-    The cores contain a subscriber and a publisher for {CONVERTERS // len(WIDTHS)} messages of ROS 2 at {len(WIDTHS)}
-    widths. They are set up for a tool in a new build root; times include the start of Python. The time of `firm
-    build` is that of the fastest of {RUNS} runs, since other load only adds to it; runs on one and two processors
-    alternate. `fusesoc run` is started for one core after another. All runs produce the same bytes. FuseSoC itself
-    processes the generated cores of one core sequentially, so a single core gains less from a second processor.
+    The cores contain a subscriber and a publisher for each of {CONVERTERS // len(WIDTHS)} ROS 2 messages at
+    {len(WIDTHS)} widths. The cores are set up for a tool in a new build root; times include the start of Python. The
+    time of `firm build` is the time of the fastest of {RUNS} runs, since other load can only increase it. Runs on one
+    and two processors alternate. `fusesoc run` is started for one core after another. All runs produce the same bytes.
+    FuseSoC itself processes the generated cores of one core sequentially, so a single core gains less from a second
+    processor.
     """
 
 

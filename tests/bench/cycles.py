@@ -38,16 +38,16 @@ _LENGTH_BYTES = 4
 
 _LATENCY_COLUMNS = ("converter", "ROS", "bits", "beats", "first to last", "message", "dissertation", "bar", "result")
 _LATENCY_NOTE = f"""
-    Neither side stalls; the values are for the slowest of {MESSAGES} consecutive messages. 'first to last'
-    counts from the first to the last beat, both included. 'message' counts from the last beat to msg_valid for a
-    subscriber, and from segment_valid to the first beat for a publisher. To pass, a converter must take no cycle beyond
-    the beats, and at most {MOST_BEHIND} for the message.
+    Neither side stalls; the values are for the slowest of {MESSAGES} consecutive messages. 'first to last' is the
+    number of cycles from the first to the last beat, both included. 'message' is the number of cycles from the last
+    beat to msg_valid for a subscriber, and from segment_valid to the first beat for a publisher. To pass, a converter
+    must need no more cycles from first to last than there are beats, and at most {MOST_BEHIND} cycles for the message.
     """
 _IMAGE_COLUMNS = ("converter", "ROS", "bits", "start lanes", "beats", "most cycles", "beats used", "bar", "result")
 _IMAGE_NOTE = """
-    'beats used' is the share of cycles with a beat. For a subscriber, the cycles are counted from the first beat
-    to the message, and for a publisher from segment_valid to the last beat. The value is for the worst lane in
-    which the pixels can start. In ROS 2, the pixels start at multiples of 4 bytes.
+    'beats used' is the share of cycles with a beat. The cycles are counted from the first beat to msg_valid for a
+    subscriber, and from segment_valid to the last beat for a publisher. The value is for the worst lane in which the
+    pixels can start. In ROS 2, the pixels start at multiples of 4 bytes.
     """
 
 

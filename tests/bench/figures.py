@@ -82,41 +82,44 @@ _HEADINGS = {
     "live": "Live nodes",
 }
 _METHODS = {
-    "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the
-        cells LUT1 to LUT6, and inverters except inverters of resets, which a slice contains. FF are FDRE, FDSE, FDCE
-        and FDPE. A design with a latch fails. The dissertation's values are LUT/FF by Vivado for an UltraScale+.""",
-    "manager": "Measured as in [Area](converters.md#area).",
-    "timing": f"""The clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
-        (`{nextpnr.DEVICE}`), in a harness with registers at all ports. MHz is the median of the seeds of the placement,
-        {", ".join(map(str, nextpnr.SEEDS))} unless fewer are listed. LUT4 and FF are without the harness; a carry cell
-        counts as the two LUT4 that it occupies. `make bench BENCH='timing --row "Image.* 64 bits"'` measures only the
-        rows whose names match. A design that is unchanged since its last measurement is not placed again.""",
-    "use": "Counted in the cycle-exact models of the schedulers.",
+    "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT counts
+        the cells LUT1 to LUT6 and all inverters, except inverters of resets, because a slice contains these. FF
+        counts the cells FDRE, FDSE, FDCE and FDPE. A design with a latch fails. The dissertation's values are LUT/FF
+        reported by Vivado for an UltraScale+.""",
+    "manager": "LUT and FF are counted as in [Area](converters.md#area).",
+    "timing": f"""The tables list the clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and
+        nextpnr (`{nextpnr.DEVICE}`), in a harness with registers at all ports. MHz is the median of the seeds of the
+        placement, {", ".join(map(str, nextpnr.SEEDS))} unless fewer are listed. LUT4 and FF do not include the harness;
+        a carry cell counts as the two LUT4 that it occupies.
+        `make bench BENCH='timing --row "Image.* 64 bits"'` measures only the rows whose names match. A design that is
+        unchanged since its last measurement is not placed again.""",
+    "use": "The beats are counted in the cycle-exact models of the schedulers.",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
         not be delivered.""",
-    "loops": """The netlists are searched bit by bit, as [`lint`](../reference/netlist.md) does.""",
-    "images": """The accelerators of specs/image_pipeline and specs/sobel are measured alone, LUT/FF as in
+    "loops": """GHDL's netlist is searched bit by bit, as [`lint`](../reference/netlist.md) does.""",
+    "images": """The accelerators of specs/image_pipeline and specs/sobel are measured on their own: LUT/FF as in
         [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
-    "links": "Measured as in [Area](converters.md#area).",
+    "links": "LUT and FF are counted as in [Area](converters.md#area).",
     "applications": f"""Each of the [demo systems](../reference/applications.md) is measured as a whole, with its
-        streams as ports, as in [Area](converters.md#area). For ECP5, Yosys runs `{yosys.ECP5.synthesis}`, and for iCE40
-        UltraPlus `{yosys.ICE40.synthesis}`. The targets `synth_*` run the same commands with the installed Yosys.""",
-    "systems": "Time to check and generate a large system.",
-    "builds": "Time to generate many cores.",
+        streams as ports, as in [Area](converters.md#area). Yosys runs `{yosys.ECP5.synthesis}` for ECP5 and
+        `{yosys.ICE40.synthesis}` for iCE40 UltraPlus. The targets `synth_*` run the same commands with the installed
+        Yosys.""",
+    "systems": "The table lists the time to check and generate a large system.",
+    "builds": "The table lists the time to generate many cores.",
     "simulators": """The system of specs/quat2euler, with converters, Manager and accelerator, is connected to the
-        simulated host. Frames and stalls are the same in every simulator, and so are the received bytes.""",
-    "store": "The number of cores that a second run of FuseSoC generates, and its time.",
-    "replay": "`firm replay` replays bags that rosbags has written. The recorded bags are read with rosbags.",
-    "live": "[`firm live`](../how-to/run-live.md) with a running ROS.",
+        simulated host. Frames, stalls and received bytes are the same in every simulator.""",
+    "store": "The tables list the number of cores that a second run of FuseSoC generates, and the time of this run.",
+    "replay": "`firm replay` replays bags that rosbags has written. rosbags also reads the recorded bags.",
+    "live": "[`firm live`](../how-to/run-live.md) runs as a node of a running ROS.",
 }
 _INTRODUCTION = """# {title}
 
 For readers who compare designs, versions or tools.
-After it you can look up {subject}.
+After reading it, you can look up {subject}.
 
-Written by `make bench BENCH='{parts}'`.
+`make bench BENCH='{parts}'` writes this page.
 [Figures](index.md) explains the terms in the tables.
 """
 
@@ -152,7 +155,8 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
 def section(part: str, tables: Sequence[Table]) -> str:
     """The text of a part: heading, method, versions, tables."""
     body = "\n".join(str(table) for table in tables)
-    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{_versions(part)}\n\n{body}"
+    versions = filled(f"These figures were measured with {_versions(part)}.")
+    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{versions}\n\n{body}"
 
 
 def write(sections: Mapping[str, str]) -> None:
@@ -179,13 +183,13 @@ def _section_of(text: str, heading: str) -> str:
 def _versions(part: str) -> str:
     if part in ("systems", "store"):
         packages = ["rosbags", *(["fusesoc"] if part == "store" else [])]
-        return f"With {', '.join([f'Python {platform.python_version()}', *map(_package, packages)])}."
+        return ", ".join([f"Python {platform.python_version()}", *map(_package, packages)])
     if part == "builds":
-        return f"With Python {platform.python_version()}, {_package('fusesoc')} and two processors."
+        return f"Python {platform.python_version()}, {_package('fusesoc')} and two processors"
     if part == "loops":
-        return f"With {_first_line('ghdl')}, {_package('rosbags')}."
+        return f"{_first_line('ghdl')}, {_package('rosbags')}"
     if part == "use":
-        return f"With Python {platform.python_version()}, NumPy {metadata.version('numpy')}."
+        return f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}"
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
@@ -198,7 +202,7 @@ def _versions(part: str) -> str:
         tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
-    return f"With {', '.join(tools)}."
+    return ", ".join(tools)
 
 
 def _package(name: str) -> str:

@@ -25,11 +25,11 @@ FULL_HD = (1080, 1920)
 _HERE = Path(__file__).parent
 _COLUMNS = ("accelerator", "bits", "cycles", "first to last", "pixels a cycle", "LUT/FF", "block RAM", "bar", "result")
 _NOTE = """
-    The input is a noise image, without stalls; the result equals the model's byte for byte. 'cycles' counts the
-    whole message, from its first segment to its end. 'first to last' counts from the first to the last beat of
-    data, both included, at the slower side of the accelerator. 'pixels a cycle' is the number of pixels divided by
-    'first to last'. The sums of the integral image have 32 bits, so a stream of 64 bits carries at most two pixels
-    in a cycle.
+    The input is a noise image without stalls; every byte of the result equals the model's. 'cycles' is the number of
+    cycles of the whole message, from its first segment to its end. 'first to last' is the number of cycles from the
+    first to the last beat of data, both included, at the slower side of the accelerator. 'pixels a cycle' is the number
+    of pixels divided by 'first to last'. The sums of the integral image have 32 bits, so a 64-bit stream carries at
+    most two pixels per cycle.
     """
 
 

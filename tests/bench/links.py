@@ -23,10 +23,10 @@ _CROSSINGS: dict[str, tuple[str, dict[str, Generic]]] = {
     },
 }
 _NOTES = {
-    LINKS_TITLE: """The FIFOs have their default depths and are in block RAM; the clock is 100 MHz, and the UART has 1
-        Mbaud.""",
-    CROSSINGS_TITLE: """The crossing of a message of fixed size has no registers for fields, since the fields are stable
-        until the answer.""",
+    LINKS_TITLE: """The FIFOs have their default depths and are in block RAM. The clock is 100 MHz, and the UART runs
+        at 1 Mbaud.""",
+    CROSSINGS_TITLE: """The crossing of a message of fixed size has no registers for fields, since the fields are
+        stable until the message is accepted.""",
 }
 
 

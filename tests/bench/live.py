@@ -24,10 +24,10 @@ _NODES = {1: ("firm live, ROS 1", "rospy's echo"), 2: ("firm live, ROS 2", "rclp
 _COLUMNS = ("node", "sent", "lost", "out of order", "median, ms", "99 %, ms", "to echo", "bar", "result")
 _NOTE = f"""
     A peer of rospy or rclpy publishes geometry_msgs/Quaternion at {RATE} Hz for {SECONDS:g} s and receives
-    geometry_msgs/Point. Times are from the call that publishes to the callback. Verilator simulates quat2euler at 8
-    bits. All queues hold 1,000 messages. The echo is a node of a few lines that answers in its callback; the same
-    peer sends to both alternately. 'to echo' is the quotient of the medians. 'out of order' includes wrong values.
-    To pass, no message may be lost or out of order.
+    geometry_msgs/Point. Times are measured from the publishing call to the callback. Verilator simulates quat2euler at
+    8 bits. All queues have a capacity of 1,000 messages. The echo is a node of a few lines that publishes its response
+    in its callback. The same peer sends alternately to both nodes. 'to echo' is the quotient of the medians. 'out of
+    order' includes wrong values. To pass, no message may be lost or out of order.
     """
 _WAYS = [("/QuaternionToEuler_sub", "/QuaternionToEuler_pub"), ("/echo_sub", "/echo_pub")]
 # Angles are right to this, in rad.

@@ -42,11 +42,11 @@ _SCHEDULER_BARS = {
 
 _MANAGER_TITLE, _SCHEDULERS_TITLE, _COMBINED_TITLE = "Manager without scheduler", "Schedulers", "Combined schedulers"
 _NOTES = {
-    _MANAGER_TITLE: f"""There are as many subscribers as publishers. {MANAGER_PREEMPTIVE} sends bursts under a
-        preemptive scheduler. The dissertation's value is the sum of table 3.3.""",
+    _MANAGER_TITLE: f"""There are as many subscribers as publishers. {MANAGER_PREEMPTIVE} is the Manager for
+        preemptive schedulers, which sends bursts. The dissertation's value is the sum in table 3.3.""",
     _SCHEDULERS_TITLE: f"""Times have {schedulers.TIME_BITS} bits; periods and transfer times are
-        {schedulers.SHORTEST_TIME} to {schedulers.LONGEST_TIME} cycles. LUTs as RAM count for a bar. The dissertation's
-        values are from table 4.1.""",
+        {schedulers.SHORTEST_TIME} to {schedulers.LONGEST_TIME} cycles. For a bar, LUTs as RAM count as LUTs. The
+        dissertation's values are from table 4.1.""",
     _COMBINED_TITLE: """The times are the same as for the schedulers above. The dissertation's values are from
         table 4.5.""",
 }

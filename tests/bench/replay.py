@@ -31,10 +31,10 @@ DISTRIBUTIONS = ("noetic", "humble")
 _ANGLES = f"{QUATERNIONS:,} quaternions to angles"
 _COLUMNS = ("bag", "simulator", "messages", "build, s", "replay, s", "found", "bar", "result")
 _NOTE = """
-    The angles are compared with results from Python's math, modulo a turn. The other bags contain messages of rosbags'
-    type store of the distribution, which rosbags has serialised. Each of their systems forwards messages of 18 types.
-    The recorded messages must have the same bytes, padding included, the same stamps and the same order. Seconds are
-    wall-clock time under any other load of the machine.
+    The angles are compared, modulo a turn, with results from Python's math. The other bags contain messages of the
+    distribution's types, which rosbags has serialised. The system for each of these bags forwards messages of 18 types.
+    The recorded messages must have the same bytes, including padding, the same stamps and the same order. Seconds are
+    wall-clock time, with any other load on the machine.
     """
 
 

@@ -30,8 +30,8 @@ LEAST_FACTOR = 20
 _CORES = ("acc/cordic/cordic", "acc/float64/float64")
 _COLUMNS = ("simulator", "cycles", "seconds", "cycles a second", "to GHDL", "bar", "result")
 _NOTE = f"""
-    Stalls are 25 %. Seconds are processor time minus that of a run of a hundred messages. To pass, Verilator
-    must be at least {LEAST_FACTOR} times as fast as GHDL.
+    Streams stall in 25 % of the cycles. Seconds are processor time minus the processor time of a run with a hundred
+    messages. To pass, Verilator must be at least {LEAST_FACTOR} times as fast as GHDL.
     """
 _CYCLES = re.compile(r"^(\d+) frames in, .* (\d+) cycles from the first beat in", re.MULTILINE)
 

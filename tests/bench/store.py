@@ -32,19 +32,19 @@ _RUN_COLUMNS = (
     *("beyond, wall, s", "beyond, processor, s", "bar, s", "result"),
 )
 _RUN_NOTE = f"""
-    The command is `fusesoc run --setup`. 'FuseSoC itself' is the set-up of a core with the same files, which are in
-    a library and not generated. The first run has an empty store. The second run has only hits and generates
-    nothing. Times are medians of {RUNS} runs, which alternate between FuseSoC itself and the second run; 'beyond'
-    is the median of their differences. The bar applies to the processor time, which equals the wall-clock time on
-    an idle machine.
+    The command is `fusesoc run --setup`. 'FuseSoC itself' is the set-up of a core with the same files, which are in a
+    library and not generated. The first run starts with an empty store. In the second run, all calls are hits, and
+    nothing is generated. Times are medians of {RUNS} runs, which alternate between FuseSoC itself and the second run;
+    'beyond' is the median of their differences. The bar applies to the processor time, which equals the wall-clock time
+    on an idle machine.
     """
 _EDIT_COLUMNS = ("edited", "depend on it", "generated", "from the store", "as expected")
 _EDIT_NOTE = """
     A core calls the generator `firm` once for each message: 24 of fixed size; 18 of fixed size that contain another
     message, Base; 18 of variable size, 6 of which contain Base. On every run, FuseSoC calls the generator for each
     message; unaffected calls are hits. All messages depend on this package's modules and templates. 'as expected' is
-    met under three conditions. Only the cores that depend on the edited file are generated. The text changes in those
-    cores only that use the edited part. After the edit is undone, all calls are hits.
+    met under three conditions: only the cores that depend on the edited file are generated; the text changes only in
+    the cores that use the edited part; after the edit is undone, all calls are hits.
     """
 CORE = "bench:store:all:1"
 

@@ -30,9 +30,9 @@ RUNS = 5
 
 _COLUMNS = ("what", "wall, s", "processor, s", "bar, s", "result")
 _NOTE = f"""
-    Times are medians of {RUNS} runs, each in a new process, including the start of Python. The system is a random
-    one (tests/random_systems.py) with messages that rosbags ships and skeletons as accelerators. 'cold' starts with
-    an empty store; 'from the store' repeats the call. The bar applies to the processor time, which equals the
+    Times are medians of {RUNS} runs, each in a new process, including the start of Python. The system is random
+    (tests/random_systems.py); its messages are included in rosbags, and its accelerators are skeletons. 'cold' starts
+    with an empty store; 'from the store' repeats the call. The bar applies to the processor time, which equals the
     wall-clock time of one thread on an idle machine.
     """
 

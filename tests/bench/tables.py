@@ -56,4 +56,4 @@ def known_rows(text: str, title: str, columns: Sequence[str]) -> dict[tuple[str,
 
 def filled(text: str) -> str:
     """A paragraph in lines as long as docs have them."""
-    return textwrap.fill(" ".join(text.split()), _LINE_LENGTH)
+    return textwrap.fill(" ".join(text.split()), _LINE_LENGTH, break_on_hyphens=False)

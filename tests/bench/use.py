@@ -21,9 +21,9 @@ _CYCLES = 3000
 
 _COLUMNS = ("design", *map(str, TASK_BEATS), f"shortest with {LEAST_USED} %", "bar", "result")
 _NOTE = f"""
-    The columns are the numbers of beats of a task. There are no pauses and no stalls of the sink. The value is the
-    worst of {_SETS} sets of periods from {SHORTEST_TIME} to {LONGEST_TIME} cycles, over {_CYCLES} cycles, which
-    begin {_SKIPPED_CYCLES} cycles after reset. The shortest task is the one from which all longer ones reach
+    The column headings are the numbers of beats per task. Neither requesters nor the sink pause. The value is the worst
+    for {_SETS} sets of periods from {SHORTEST_TIME} to {LONGEST_TIME} cycles, measured over {_CYCLES} cycles that begin
+    {_SKIPPED_CYCLES} cycles after reset. The shortest task is the smallest number of beats from which all tasks reach
     {LEAST_USED} %.
     """
 

@@ -210,7 +210,7 @@ def test_graph_as_a_picture(project: Path) -> None:
 def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(project))
     assert main(["graph", "me:p:branch"]) == 1
-    assert capsys.readouterr().err.startswith("error: pictures need the program 'dot' of Graphviz")
+    assert capsys.readouterr().err.startswith("error: pictures require Graphviz's program 'dot'")
 
 
 @pytest.mark.parametrize(
@@ -302,7 +302,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     main(["lock", "me:p:top"])
     capsys.readouterr()
     install("GHDL 3.0.0")
-    assert locked(capsys) == ["tool ghdl: version is GHDL 3.0.0, but GHDL 2.0.0 is locked"]
+    assert locked(capsys) == ["tool ghdl: version is GHDL 3.0.0, but the lock file has GHDL 2.0.0"]
     (project / "bin" / "ghdl").unlink()
     assert locked(capsys) == ["tool ghdl is locked, but not installed"]
     # Additional installed programs do not count as a difference, either.
@@ -369,7 +369,7 @@ def test_a_generator_refuses_what_is_not_locked(
     error = capsys.readouterr().err
     assert "error: message my_msgs/Size (ROS 2): sha256 is " in error
     assert "error: message my_msgs/Size (ROS 2): signature is RIHS01_" in error
-    assert f"      = by {lock}\n" in error
+    assert f"      = according to {lock}\n" in error
     assert call(project, **{**more, "message": "geometry_msgs/Vector3"}) == 1
     assert "message geometry_msgs/Vector3 (ROS 2) is used, but not locked" in capsys.readouterr().err
     size.write_text("uint8 a\n")

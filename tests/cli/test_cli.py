@@ -260,9 +260,9 @@ def test_a_fault_in_a_message_is_shown_in_its_file(tmp_path: Path, capsys: Captu
         (["message", "show", "Quaternion"], "Quaternion"),
         (
             ["message", "show", "sensor_msgs/Image", "--stage", "vhdl", "--width", "24"],
-            "a converter cannot have a stream of 24 bits",
+            "converters do not support 24-bit streams",
         ),
-        (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9 bits"),
+        (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9-bit"),
         (["message", "list", "--path", "no/such/folder"], "no/such/folder"),
         (["message", "list", "--distro", "jazy"], "did you mean 'jazzy'?"),
         (["system", "check", str(SPEC), "--distro", "jazy"], "did you mean 'jazzy'?"),
@@ -365,7 +365,7 @@ def test_a_picture_is_what_its_name_says(
         assert out(capsys, *command, "-o", str(path)) == ""
         assert path.read_bytes().lstrip(b"/ \n").startswith(BEGINS[ending]), ending
     message = error(capsys, *command, "--format", "dot", "-o", str(tmp_path / "picture.svg"))
-    assert "not a picture in the format dot" in message
+    assert "does not match the format dot" in message
 
 
 @pytest.mark.parametrize(
@@ -386,12 +386,12 @@ def test_where_nothing_can_be_written_is_told_before_the_work(
     monkeypatch.chdir(tmp_path)
     message = error(capsys, *command, name)
     assert message == (
-        f"error: cannot write {name}: its ending does not name a format\n      = legal endings: {legal}\n"
+        f"error: cannot write {name}: the file's ending does not select a format\n      = legal endings: {legal}\n"
     )
     good = f"x{legal.split(',', maxsplit=1)[0]}"
     assert error(capsys, *command, f"none/{good}") == f"error: cannot write none/{good}: there is no folder none\n"
     (tmp_path / good).mkdir()
-    assert error(capsys, *command, good) == f"error: cannot write {good}: it is a folder\n"
+    assert error(capsys, *command, good) == f"error: cannot write {good}: the path is a folder\n"
     assert [path.name for path in tmp_path.iterdir()] == [good]
 
 
@@ -416,7 +416,7 @@ def test_steps_of_a_node_in_cpp_need_its_system(capsys: Captured, tmp_path: Path
         "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n"
         "1,received,0,0,32,,\n2,sent,0,0,32,,\n3,burst,0,0,29,,\n4,published,0,0,24,,\n"
     )
-    assert "give the specification with --system SPEC" in error(capsys, "trace", str(steps))
+    assert "add the system's specification with --system SPEC" in error(capsys, "trace", str(steps))
     ways = tmp_path / "steps-ways.csv"
     assert out(capsys, "trace", str(steps), "--system", str(SPEC), "-o", str(picture)) == f"{ways}\n{picture}\n"
     assert "0,QuaternionToEuler_sub,QuaternionToEuler_pub,32,24,0,0,1,2,3," in ways.read_text(encoding="utf-8")

@@ -148,7 +148,7 @@ def test_faults(tmp_path: Path, capsys: Captured) -> None:
     for number in (last + 1, 0):
         assert f"has no line {number}; its last line is {last}" in fault(f"{path}:{number}")
     source = SPECS / "quat2euler/rtl/quat2euler.vhd"
-    assert f"does not come from a template\n      = it is a copy of {source}\n" in fault(
+    assert f"was not generated from a template\n      = the file is a copy of {source}\n" in fault(
         f"{copy / 'quat2euler/rtl/quat2euler.vhd'}:1"
     )
     (copy / "robot.vhd").write_text("")

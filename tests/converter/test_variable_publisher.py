@@ -121,7 +121,7 @@ def test_a_block_that_ends_an_element_ends_it_with_its_last_word() -> None:
 
 
 def test_a_message_that_is_too_large_is_an_error() -> None:
-    with pytest.raises(InputError, match=r"the fields of p/M take .* bytes, too many for a converter"):
+    with pytest.raises(InputError, match=r"the fields of p/M have .* bytes, which is too many for a converter"):
         configured(layout(ROS1, "uint8[300000000] a\nstring s\n"))
 
 

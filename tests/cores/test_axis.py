@@ -135,7 +135,7 @@ def test_the_search_for_latches_finds_one(tmp_path: Path, entity: str) -> None:
     [
         ("firm_axis_register_slice", {"WIDTH": 24}, "8, 16, 32, 64, 128, 256, 512"),
         ("firm_axis_fifo", {"WIDTH": 1024}, "8, 16, 32, 64, 128, 256, 512"),
-        ("firm_axis_fifo", {"DEPTH": 1}, "2 and more"),
+        ("firm_axis_fifo", {"DEPTH": 1}, "2 or more"),
         ("firm_axis_demux", {"WIDTH": 12}, "8, 16, 32, 64, 128, 256, 512"),
         ("firm_axis_demux", {"DESTINATIONS": 0}, "1 to 256"),
         ("firm_axis_demux", {"DESTINATIONS": 257}, "1 to 256"),

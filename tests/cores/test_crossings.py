@@ -323,13 +323,13 @@ def test_there_is_no_latch(tmp_path: Path, entity: str, generics: dict[str, Gene
 @pytest.mark.parametrize(
     ("entity", "generics", "words"),
     [
-        ("firm_cdc_sync", {"BITS": 0}, "BITS is 0; legal: 1 and more"),
-        ("firm_cdc_sync", {"STAGES": 1}, "STAGES is 1; legal: 2 and more"),
-        ("firm_cdc_message", {"SEGMENTS": 0}, "SEGMENTS is 0; legal: 1 and more"),
-        ("firm_cdc_message", {"FIELD_BITS": 0}, "FIELD_BITS is 0; legal: 1 and more"),
-        ("firm_cdc_message", {"PARTS": 0}, "PARTS is 0; legal: 1 and more"),
-        ("firm_cdc_stream", {"DEPTH": 12}, "DEPTH is 12; legal: powers of two, 4 and more"),
-        ("firm_cdc_stream", {"DEPTH": 2}, "DEPTH is 2; legal: powers of two, 4 and more"),
+        ("firm_cdc_sync", {"BITS": 0}, "BITS is 0; legal: 1 or more"),
+        ("firm_cdc_sync", {"STAGES": 1}, "STAGES is 1; legal: 2 or more"),
+        ("firm_cdc_message", {"SEGMENTS": 0}, "SEGMENTS is 0; legal: 1 or more"),
+        ("firm_cdc_message", {"FIELD_BITS": 0}, "FIELD_BITS is 0; legal: 1 or more"),
+        ("firm_cdc_message", {"PARTS": 0}, "PARTS is 0; legal: 1 or more"),
+        ("firm_cdc_stream", {"DEPTH": 12}, "DEPTH is 12; legal: powers of two, 4 or more"),
+        ("firm_cdc_stream", {"DEPTH": 2}, "DEPTH is 2; legal: powers of two, 4 or more"),
         ("firm_axis_resize", {"S_WIDTH": 24}, "S_WIDTH is 24 and M_WIDTH is 64; legal: 8, 16"),
     ],
 )

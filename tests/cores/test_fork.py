@@ -78,10 +78,10 @@ def test_there_is_no_latch(library: Library, sinks: int) -> None:
 def test_an_illegal_generic_is_named(library: Library, sinks: int) -> None:
     result = library.run("firm_message_fork", {"SINKS": sinks})
     assert result.exit_code != 0
-    assert f"firm_message_fork: SINKS is {sinks}; legal: 1 and more" in result.output
+    assert f"firm_message_fork: SINKS is {sinks}; legal: 1 or more" in result.output
 
 
 def test_an_illegal_number_of_segments_is_named(library: Library) -> None:
     result = library.run("firm_message_fork", {"SEGMENTS": 0})
     assert result.exit_code != 0
-    assert "firm_message_fork: SEGMENTS is 0; legal: 1 and more" in result.output
+    assert "firm_message_fork: SEGMENTS is 0; legal: 1 or more" in result.output

@@ -131,7 +131,7 @@ def test_there_is_no_latch(library: Library, width: int, depth: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("generics", "legal"), [({"WIDTH": 24}, "8, 16, 32, 64, 128, 256, 512"), ({"DEPTH": 1}, "2 and more")]
+    ("generics", "legal"), [({"WIDTH": 24}, "8, 16, 32, 64, 128, 256, 512"), ({"DEPTH": 1}, "2 or more")]
 )
 def test_illegal_generics_are_named(library: Library, generics: dict[str, int], legal: str) -> None:
     result = library.run("firm_axis_length_buffer", generics)

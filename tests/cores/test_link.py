@@ -182,7 +182,7 @@ def test_the_host_is_asked_to_wait_in_time(library: Library, tmp_path: Path) -> 
         ("firm_uart_link", {"BAUD": 0}, "1 to a quarter of CLOCK_HZ"),
         ("firm_uart_link", {"CLOCK_HZ": 12_000_000, "BAUD": 2_600_000}, "off by more than 2.5 %"),
         ("firm_uart_link", {"TIMEOUT_MS": 0}, "1 to 4000"),
-        ("firm_uart_link", {"DEPTH": 63}, "64 and more"),
+        ("firm_uart_link", {"DEPTH": 63}, "64 or more"),
         ("firm_uart_link", {"WIDTH": 24}, "8, 16, 32, 64, 128, 256, 512"),
         ("firm_spi_link", {"DEPTH": 8}, "16 to 32768"),
         ("firm_spi_link", {"DEPTH": 65536}, "16 to 32768"),

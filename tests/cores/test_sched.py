@@ -119,7 +119,7 @@ def test_an_illegal_shortest_run_is_named(library: Library, is_preemptive: bool,
     entity = "firm_sched_fixed_priority"
     result = library.run(entity, {"PREEMPTIVE": is_preemptive, "SHORTEST_RUN": shortest_run})
     assert result.exit_code != 0
-    assert f"{entity}: SHORTEST_RUN is {shortest_run}; legal: 1 and more beats" in result.output
+    assert f"{entity}: SHORTEST_RUN is {shortest_run}; legal: 1 or more beats" in result.output
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_an_illegal_shortest_run_is_named(library: Library, is_preemptive: bool,
     [
         (6, "SIZES => (2, 3)", "the sizes of the groups add up to 5; legal: 6, the number of requesters"),
         (5, "SIZES => (0, 5)", "the size of group 0 is 0; legal: 1 to 256"),
-        (6, "SIZES => (1, 2, 3)", "SIZES has 3 groups and POLICIES 2; legal: 1 and more, as many in both"),
+        (6, "SIZES => (1, 2, 3)", "SIZES has 3 groups and POLICIES 2; legal: 1 or more, as many in both"),
         (5, "SIZES => (2, 3), TOP_POLICY => LST", "TOP_POLICY is lst; legal: a policy without deadlines"),
         (257, "SIZES => (2, 255)", "REQUESTERS is 257; legal: 1 to 256"),
     ],
@@ -141,8 +141,8 @@ def test_illegal_groups_are_named(tmp_path: Path, requesters: int, generics: str
     [
         ("4, (10, 20, 30), IMPLICIT, 16, 1", "PERIODS has 3 times; legal: one for each of 4 requesters"),
         ("2, (10, 20), (5, 6, 7), 16, 1", "DEADLINES has 3 times; legal: one for each of 2 requesters"),
-        ("2, (10, 0), IMPLICIT, 16, 1", "the deadline of requester 1 is 0; legal: 1 and more cycles"),
-        ("2, (10, 0), (5, 5), 16, 1", "the period of requester 1 is 0; legal: 1 and more cycles"),
+        ("2, (10, 0), IMPLICIT, 16, 1", "the deadline of requester 1 is 0; legal: 1 or more cycles"),
+        ("2, (10, 0), (5, 5), 16, 1", "the period of requester 1 is 0; legal: 1 or more cycles"),
         ("4, (1, 2, 3, 9000), IMPLICIT, 16, 1", "TIME_BITS is 16; the deadline 9000 of requester 3 needs 17"),
         ("2, (1, 8191), IMPLICIT, 16, 1", ""),
         ("2, (1, 8192), IMPLICIT, 16, 1", "TIME_BITS is 16; the deadline 8192 of requester 1 needs 17"),
@@ -150,7 +150,7 @@ def test_illegal_groups_are_named(tmp_path: Path, requesters: int, generics: str
         ("2, (10, 20), IMPLICIT, 7, 1", "TIME_BITS is 7; legal: 8 to 31"),
         ("2, (10, 20), IMPLICIT, 32, 1", "TIME_BITS is 32; legal: 8 to 31"),
         ("0, (10, 20), IMPLICIT, 16, 1", "REQUESTERS is 0; legal: 1 to 256"),
-        ("2, (10, 20), IMPLICIT, 16, 0", "SHORTEST_RUN is 0; legal: 1 and more beats"),
+        ("2, (10, 20), IMPLICIT, 16, 0", "SHORTEST_RUN is 0; legal: 1 or more beats"),
     ],
 )
 def test_faults_of_times_are_found(tmp_path: Path, times: str, fault: str) -> None:

@@ -73,7 +73,7 @@ def _generics(trace: Trace, top: str, groups: str) -> dict[str, str]:
     [
         ({}, "PERIODS has 1 times; legal: one for each of 5 requesters"),
         ({"PERIODS": "(10, 20, 30)"}, "PERIODS has 3 times; legal: one for each of 5 requesters"),
-        ({"PERIODS": "(10, 20, 30, 0, 50)"}, "the deadline of requester 3 is 0; legal: 1 and more cycles"),
+        ({"PERIODS": "(10, 20, 30, 0, 50)"}, "the deadline of requester 3 is 0; legal: 1 or more cycles"),
         (
             {"PERIODS": "(10, 20, 30, 40, 9000)"},
             "TIME_BITS is 16; the deadline 9000 of requester 4 needs 17",
@@ -87,7 +87,7 @@ def _generics(trace: Trace, top: str, groups: str) -> dict[str, str]:
             "TRANSFER_TIMES has 2 times; legal: one for each of 5 requesters",
         ),
         ({"PERIODS": "(1, 2, 3, 4, 5)", "TIME_BITS": "7"}, "TIME_BITS is 7; legal: 8 to 31"),
-        ({"PERIODS": "(1, 2, 3, 4, 5)", "SHORTEST_RUN": "0"}, "SHORTEST_RUN is 0; legal: 1 and more beats"),
+        ({"PERIODS": "(1, 2, 3, 4, 5)", "SHORTEST_RUN": "0"}, "SHORTEST_RUN is 0; legal: 1 or more beats"),
     ],
 )
 def test_illegal_times_are_named(tmp_path: Path, generics: Mapping[str, str], message: str) -> None:

@@ -241,12 +241,12 @@ ILLEGAL = [
     (0, "PERIODS => (10, 20)", "REQUESTERS is 0; legal: 1 to 256"),
     (257, "PERIODS => (10, 20)", "REQUESTERS is 257; legal: 1 to 256"),
     (3, "PERIODS => (10, 20)", "PERIODS has 2 times; legal: one for each of 3 requesters"),
-    (2, "PERIODS => (10, 0)", "the deadline of requester 1 is 0; legal: 1 and more cycles"),
+    (2, "PERIODS => (10, 0)", "the deadline of requester 1 is 0; legal: 1 or more cycles"),
     (2, "PERIODS => (10, 9000)", "TIME_BITS is 16; the deadline 9000 of requester 1 needs 17"),
     (2, "PERIODS => (10, 20); TIME_BITS => 7", "TIME_BITS is 7; legal: 8 to 31"),
     (2, "PERIODS => (10, 20); TIME_BITS => -1", "TIME_BITS is -1; legal: 8 to 31"),
     (2, "PERIODS => (10, 20); TIME_BITS => 40", "TIME_BITS is 40; legal: 8 to 31"),
-    (20, "PERIODS => (10, 20); SHORTEST_RUN => 0", "SHORTEST_RUN is 0; legal: 1 and more beats"),
+    (20, "PERIODS => (10, 20); SHORTEST_RUN => 0", "SHORTEST_RUN is 0; legal: 1 or more beats"),
     (2, "PERIODS => (10, 20); DEADLINES => (5, 6, 7)", "DEADLINES has 3 times; legal: one for each of 2 requesters"),
 ]
 
@@ -264,7 +264,7 @@ def test_illegal_generics_are_named(tmp_path: Path, policy: str, requesters: int
     ("times", "message"),
     [
         ("(1, 2, 3)", "TRANSFER_TIMES has 3 times; legal: one for each of 2 requesters"),
-        ("(1, 0)", "the transfer time of requester 1 is 0; legal: 1 and more cycles"),
+        ("(1, 0)", "the transfer time of requester 1 is 0; legal: 1 or more cycles"),
         ("(8192, 1)", "TIME_BITS is 16; the transfer time 8192 of requester 0 needs 17"),
     ],
 )

@@ -150,8 +150,8 @@ def test_a_long_frame(host: Bench, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        ("unstable", "the stream from the system changes before s_axis_tready came"),
-        ("withdrawn", "s_axis_tvalid falls before s_axis_tready came"),
+        ("unstable", "the stream from the system changes before s_axis_tready rises"),
+        ("withdrawn", "s_axis_tvalid falls before s_axis_tready rises"),
         ("undefined", "'answer to first': byte 4: expected 00, got 0X"),
         ("unknown_valid", "s_axis_tvalid is 'X'"),
         ("sparse", "'answer to first': tkeep is undefined or not contiguous from the lowest lane"),
@@ -160,10 +160,10 @@ def test_a_long_frame(host: Bench, tmp_path: Path) -> None:
         ("wrong_tid", "'answer to first': tid is a5"),
         ("unknown_last", "'answer to first': tlast is 'X'"),
         ("early_last", "'answer to first': ends after 6 bytes, expected 7"),
-        ("late_last", "'answer to first': goes on behind its 7 bytes"),
+        ("late_last", "'answer to first': continues after its 7 bytes"),
         ("unknown_ready", "m_axis_tready is 'X'"),
         ("stuck", "'answer to first': stops after 4 bytes without tlast"),
-        ("endless", "'answer to first': goes on behind its 7 bytes"),
+        ("endless", "'answer to first': continues after its 7 bytes"),
         ("stuck", "'first x=1': only 4 bytes taken"),
         ("mute", "missing: 'answer to first'"),
         ("id_pulse", "id_error pulses, announced: 0"),
@@ -183,8 +183,8 @@ def test_a_broken_system_fails(host: Bench, tmp_path: Path, fault: str, message:
     [
         (EXPECTED.replace("aabb", "aabc"), "'answer to first': byte 6: expected bc, got bb"),
         (EXPECTED.replace("02000000 aabb", "03000000 aabbcc"), "'answer to first': ends after 7 bytes, expected 8"),
-        (EXPECTED.replace("02000000 aabb", "01000000 aa"), "'answer to first': goes on behind its 6 bytes"),
-        (EXPECTED[: EXPECTED.index("< @1")], "frame of id 1: nobody expects it"),
+        (EXPECTED.replace("02000000 aabb", "01000000 aa"), "'answer to first': continues after its 6 bytes"),
+        (EXPECTED[: EXPECTED.index("< @1")], "frame with id 1: no such frame is expected"),
         (EXPECTED + "< more\n  01 00000000", "missing: 'more'"),
         (EXPECTED.replace("@1", "@2"), "caused by stimulus 2, which does not exist"),
         (EXPECTED + "! id_error 1\n", "id_error pulsed 0 times, announced: 1"),
@@ -200,7 +200,7 @@ def test_another_answer_than_expected_fails(host: Bench, tmp_path: Path, expecte
 def test_a_surplus_frame_that_comes_late_fails(host: Bench, tmp_path: Path) -> None:
     result = _run(host, tmp_path, FAULT="late_surplus")
     assert result.exit_code != 0
-    assert "frame of id 0: nobody expects it" in result.output
+    assert "frame with id 0: no such frame is expected" in result.output
     assert "FAIL 2/2" in result.output.splitlines()
 
 
@@ -215,21 +215,21 @@ def test_ten_faults_are_printed_and_the_rest_counted(host: Bench, tmp_path: Path
     expected = "< @0 a\n  00 14000000" + "01" * 20
     output = _run(host, tmp_path, stimulus, expected).output
     assert output.count("expected 01, got 00") == 10
-    assert "and 10 faults more" in output
+    assert "and 10 more faults" in output
     assert "FAIL 0/1" in output.splitlines()
 
 
 @pytest.mark.parametrize(
     ("stimulus", "message"),
     [
-        ("", "stimulus.txt:1: the file has no frame"),
+        ("", "stimulus.txt:1: the file contains no frames"),
         ("> a\n", "stimulus.txt:2: the frame before this line has no bytes"),
         ("  00\n", "stimulus.txt:1: expected a label line, which starts with '>'"),
         ("> a\n  00\n< b\n  00\n", "stimulus.txt:3: '< ' is not a byte of two hexadecimal digits"),
         ("> a\n  0g\n", "stimulus.txt:2: '0g' is not a byte of two hexadecimal digits"),
-        ("> a\n  000\n", "stimulus.txt:2: half a byte at the end of the line"),
-        ("> a\n  00 ..\n", "stimulus.txt:2: '..' stands only in an expected frame, behind the id"),
-        (">a\n  00\n", "stimulus.txt:1: a blank is missing behind the first character"),
+        ("> a\n  000\n", "stimulus.txt:2: the line ends with half a byte"),
+        ("> a\n  00 ..\n", "stimulus.txt:2: '..' is legal only in an expected frame, after the id"),
+        (">a\n  00\n", "stimulus.txt:1: a blank is missing after the first character"),
     ],
 )
 def test_an_ill_formed_stimulus_file_is_refused(host: Bench, tmp_path: Path, stimulus: str, message: str) -> None:
@@ -248,7 +248,7 @@ def test_an_ill_formed_stimulus_file_is_refused(host: Bench, tmp_path: Path, sti
         ),
         ("< a\n  00 000000ff\n", "expected.txt:3: the frame before this line announces more than 2 GiB"),
         ("< @x a\n  00 00000000\n", "expected.txt:1: '@' must be followed by the number of a stimulus frame"),
-        ("< a\n  .. 00000000\n", "expected.txt:2: '..' stands only in an expected frame, behind the id"),
+        ("< a\n  .. 00000000\n", "expected.txt:2: '..' is legal only in an expected frame, after the id"),
         ("! id_errors 1\n", "expected.txt:1: expected '! id_error <pulses>' or '! frame_error <pulses>'"),
         ("! id_error -1\n", "expected.txt:1: expected '! id_error <pulses>' or '! frame_error <pulses>'"),
     ],

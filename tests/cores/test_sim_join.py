@@ -75,7 +75,7 @@ def test_a_lost_byte_is_seen(joiner: Bench, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("bursts", "message"),
     [
-        ([b"\x01\x02\0\0\0ab\x01"], "burst of id 1 goes on behind its frame"),
+        ([b"\x01\x02\0\0\0ab\x01"], "burst of id 1 continues after its frame"),
         ([b"\x01\x02\0\0", b"\x01"], "burst of id 1 resumes a frame without a beat of it"),
     ],
 )

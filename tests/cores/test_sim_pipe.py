@@ -124,8 +124,8 @@ def test_pulses_of_errors(bench: PipeBench) -> None:
 @pytest.mark.parametrize(
     ("fault", "message", "needs_x"),
     [
-        ("unstable", "the stream from the system changes before s_axis_tready came", False),
-        ("withdrawn", "s_axis_tvalid falls before s_axis_tready came", False),
+        ("unstable", "the stream from the system changes before s_axis_tready rises", False),
+        ("withdrawn", "s_axis_tvalid falls before s_axis_tready rises", False),
         ("sparse", "s_axis_tkeep is undefined or not contiguous from the lowest lane", False),
         ("partial", "a beat that is neither full nor the last", False),
         ("empty", "a beat without a byte", False),
@@ -193,13 +193,13 @@ def test_what_happened_in_the_cycle_of_a_fault_is_reported(bench: PipeBench) -> 
 @pytest.mark.parametrize(
     ("requests", "message"),
     [
-        (b"X", "there is no request 88; legal: F, R, Q"),
-        (b"\x00", "there is no request 0; legal: F, R, Q"),
-        (b"R\x01\x00", "the requests end within one"),
-        (b"F\x04\x00\x00\x00abc", "the requests end within one"),
-        (b"F\x00\x00\x00\x00", "a frame without a byte is requested"),
-        (b"F\x00\x00\x00\x80", "a request's number is greater than 2147483647"),
-        (b"R\xff\xff\xff\xff", "a request's number is greater than 2147483647"),
+        (b"X", "unknown request 88; legal: F, R, Q"),
+        (b"\x00", "unknown request 0; legal: F, R, Q"),
+        (b"R\x01\x00", "the requests end within a request"),
+        (b"F\x04\x00\x00\x00abc", "the requests end within a request"),
+        (b"F\x00\x00\x00\x00", "the requested frame has no bytes"),
+        (b"F\x00\x00\x00\x80", "a number in a request is greater than 2147483647"),
+        (b"R\xff\xff\xff\xff", "a number in a request is greater than 2147483647"),
     ],
 )
 def test_a_broken_request_ends_it(bench: PipeBench, requests: bytes, message: str) -> None:

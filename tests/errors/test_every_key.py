@@ -136,7 +136,7 @@ def problem(checker: Checker, answer: Answer) -> str:
     lines = answer.text.splitlines()
     for fault in answer.faults:
         if fault.file != str(checker.path) or not 1 <= fault.line <= len(lines):
-            return f"{fault.file}:{fault.line} is no place of the file"
+            return f"{fault.file}:{fault.line} is not a place in the file"
         line = lines[fault.line - 1]
         if fault.excerpt != line or not 1 <= fault.column <= len(line) + 1:
             return f"line {fault.line}, column {fault.column} is shown as '{fault.excerpt}', but it is '{line}'"
@@ -165,7 +165,7 @@ def _names_what_lacks(fault: Fault, site: KeySite) -> bool:
     is_meant = any(f"'{word}'" in fault.words for word in site.parents)
     if site.is_needed:
         first = fault.line in (site.lines[0], *site.parents.values())
-        return first and bool(re.search(rf"needs?\b.*\b{site.name}\b", fault.words))
+        return first and bool(re.search(rf"(needs?\b|required keys:).*\b{site.name}\b", fault.words))
     return (is_near or is_meant) and f"'{site.name}'" in fault.words
 
 

@@ -34,20 +34,20 @@ def test_bytes_by_hand(frame: Frame) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"e": GOOD["e"][:1]}, "'e' takes a list of 2, not [{'flag': True, 'number': -2}]"),
-        ({"e": GOOD["e"][0]}, "'e' takes a list of 2, not {'flag': True, 'number': -2}"),
+        ({"e": GOOD["e"][:1]}, "'e' must be a list of 2, not [{'flag': True, 'number': -2}]"),
+        ({"e": GOOD["e"][0]}, "'e' must be a list of 2, not {'flag': True, 'number': -2}"),
         ({"e": [{"flag": True}, {"flag": True, "number": 1}]}, "no value for 'e.number'"),
         ({"e": [{"flag": True, "number": 1, "x": 2}, GOOD["e"][1]]}, "p/M has no field 'e.x'"),
-        ({"e": [{"flag": "False", "number": 1}, GOOD["e"][1]]}, "'e.flag' takes a bool, not 'False'"),
-        ({"e": [{"flag": 2, "number": 1}, GOOD["e"][1]]}, "'e.flag' takes a bool, not 2"),
-        ({"e": [{"flag": True, "number": 32768}, GOOD["e"][1]]}, "'e.number' takes a int16, not 32768"),
-        ({"f": 1.0}, "'f' takes a list of 2, not 1.0"),
-        ({"f": [1.0, "a"]}, "'f' takes a float32, not 'a'"),
-        ({"f": [1.0, 1e40]}, "'f' takes a float32, not 1e+40"),
-        ({"u": -1}, "'u' takes a uint8, not -1"),
-        ({"u": 1.5}, "'u' takes a uint8, not 1.5"),
-        ({"u": None}, "'u' takes a uint8, not None"),
-        ({"u": {"v": 1}}, "'u' takes a uint8, not {'v': 1}"),
+        ({"e": [{"flag": "False", "number": 1}, GOOD["e"][1]]}, "'e.flag' must be of type bool, not 'False'"),
+        ({"e": [{"flag": 2, "number": 1}, GOOD["e"][1]]}, "'e.flag' must be of type bool, not 2"),
+        ({"e": [{"flag": True, "number": 32768}, GOOD["e"][1]]}, "'e.number' must be of type int16, not 32768"),
+        ({"f": 1.0}, "'f' must be a list of 2, not 1.0"),
+        ({"f": [1.0, "a"]}, "'f' must be of type float32, not 'a'"),
+        ({"f": [1.0, 1e40]}, "'f' must be of type float32, not 1e+40"),
+        ({"u": -1}, "'u' must be of type uint8, not -1"),
+        ({"u": 1.5}, "'u' must be of type uint8, not 1.5"),
+        ({"u": None}, "'u' must be of type uint8, not None"),
+        ({"u": {"v": 1}}, "'u' must be of type uint8, not {'v': 1}"),
         ({"g": 1}, "p/M has no field 'g'"),
     ],
 )
@@ -65,7 +65,7 @@ def test_a_missing_field_is_named(frame: Frame) -> None:
 @pytest.mark.parametrize("extra", [-21, -1, 4])
 def test_other_lengths_are_refused(frame: Frame, extra: int) -> None:
     payload = (encode(frame, GOOD) + bytes(4))[: frame.payload_bytes + extra]
-    with pytest.raises(CodecError, match=rf"^p/M takes 21 bytes, not {21 + extra}$"):
+    with pytest.raises(CodecError, match=rf"^the payload of p/M must have 21 bytes, not {21 + extra}$"):
         decode(frame, payload)
 
 
@@ -80,7 +80,7 @@ def test_only_the_encoding_of_the_header_counts(frame: Frame) -> None:
     payload = encode(frame, GOOD)
     assert decode(frame, payload[:2] + b"\xaa\xbb" + payload[4:]) == GOOD
     for wrong in (b"\0\0", b"\1\1", b"\0\3"):
-        with pytest.raises(CodecError, match=rf"^unknown encoding {wrong.hex()} of p/M$"):
+        with pytest.raises(CodecError, match=rf"^the payload of p/M has the unknown encoding {wrong.hex()}$"):
             decode(frame, wrong + payload[2:])
 
 

@@ -123,7 +123,7 @@ def test_a_library_of_another_version_is_reported(tmp_path: Path, owner: Path, v
     generator = put_generators(tmp_path / "library" / "generators")
     done = call(owner, generator, "input.yml")
     assert (done.stdout, done.returncode) == answer(owner)
-    warning = f"far: warning: the library in {generator.parent} is of version {__version__}, fusesoc-firm in "
+    warning = f"far: warning: the library in {generator.parent} has version {__version__}, but fusesoc-firm in "
     assert done.stderr.startswith(warning) if version != __version__ else done.stderr == ""
     assert "7.8.9\n      = 'firm path' prints the folder" in done.stderr or version == __version__
 
@@ -133,7 +133,7 @@ def test_where_there_is_none_the_message_says_what_to_do(tmp_path: Path, bare: P
     assert (done.stdout, done.returncode) == ("", 1)
     assert done.stderr.startswith("far: error: no Python with the packages fusesoc_firm, chevron, rosbags, yaml was")
     assert f"  {bare}\n" in done.stderr
-    assert "set FUSESOC_FIRM_PYTHON to its python3" in done.stderr
+    assert "set FUSESOC_FIRM_PYTHON to the python3" in done.stderr
 
 
 def test_the_folder_it_is_called_in_does_not_count(tmp_path: Path, bare: Path, monkeypatch: pytest.MonkeyPatch) -> None:

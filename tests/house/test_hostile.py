@@ -419,14 +419,14 @@ def faults(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
 @pytest.mark.parametrize(
     ("value", "fault"),
     [
-        (r'"a\nend"', "holds the character U+000A"),
-        (r'"\x1b[2J"', "holds the character U+001B"),
-        (r'"\x0c"', "holds the character U+000C"),
-        (r'"\N"', "holds the character U+0085"),
-        (r'"\u2028"', "holds the character U+2028"),
-        (r'"\u202e"', "holds the character U+202E"),
-        (r'"\ud800"', "holds the character U+D800"),
-        (r'"\0"', "holds the character U+0000"),
+        (r'"a\nend"', "contains the character U+000A"),
+        (r'"\x1b[2J"', "contains the character U+001B"),
+        (r'"\x0c"', "contains the character U+000C"),
+        (r'"\N"', "contains the character U+0085"),
+        (r'"\u2028"', "contains the character U+2028"),
+        (r'"\u202e"', "contains the character U+202E"),
+        (r'"\ud800"', "contains the character U+D800"),
+        (r'"\0"', "contains the character U+0000"),
         ("x" * 201, "has 201 characters"),
         ("x" * 100_000, "has 100000 characters"),
     ],
@@ -454,7 +454,7 @@ def test_a_source_that_tools_do_not_take(tmp_path: Path, capsys: pytest.CaptureF
     path = tmp_path / "robot.yaml"
     path.write_text(yaml.safe_dump(content, allow_unicode=True, sort_keys=False), encoding="utf-8")
     shown = faults(capsys, "system", "skeleton", path)
-    assert "error: 'sources' cannot be '" in shown and "legal are letters, digits, '_', '.', '+' and '-'" in shown
+    assert "error: 'sources' cannot be '" in shown and "letters, digits, '_', '.', '+' and '-'" in shown
     # The valid one is not named.
     assert shown.count("error:") == 1
 
@@ -467,12 +467,12 @@ def test_a_part_is_a_word_of_tools(tmp_path: Path, key: str) -> None:
         (tmp_path / "board.yaml").write_text(board, encoding="utf-8")
         with pytest.raises(InputError, match=rf"board.yaml:\d+:\d+: error: '{key}' cannot be '") as caught:
             read_board("board.yaml", tmp_path)
-        assert "legal are letters, digits, blanks and" in str(caught.value)
+        assert "legal here: letters, digits, blanks and" in str(caught.value)
 
 
 def test_a_description_of_a_board_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "board.yaml").write_text(json.dumps({"description": "a\nexec touch F", **BOARD}), encoding="utf-8")
-    with pytest.raises(InputError, match=r"board.yaml:1:17: error: 'description' holds the character U\+000A"):
+    with pytest.raises(InputError, match=r"board.yaml:1:17: error: 'description' contains the character U\+000A"):
         read_board("board.yaml", tmp_path)
 
 
@@ -499,7 +499,7 @@ def test_a_file_name_that_no_file_system_takes() -> None:
     request = Request("far", "me:x:y:0", Path(), {})
     for name, is_legal in (("a" * 255, True), ("a" * 256, False), ("b/" + "é" * 128, False), ("é" * 127 + "/c", True)):
         core = GeneratedCore("", {name: GeneratedFile("", "user")})
-        with contextlib.nullcontext() if is_legal else pytest.raises(InputError, match="file systems take 255"):
+        with contextlib.nullcontext() if is_legal else pytest.raises(InputError, match="legal: at most 255"):
             as_files(core, request)
 
 

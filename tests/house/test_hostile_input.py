@@ -98,10 +98,10 @@ def test_messages_of_60_levels_are_generated(tmp_path: Path) -> None:
 
 TOO_LARGE = {
     "ten": (9, "".join(f"X f{number}\n" for number in range(10)), "L4.msg:2:1", "field 'f1' makes 'ten/L4' too large"),
-    "two": (60, "X[] x\nX[] y\n", "L11.msg:2:1", "fields, with those of all messages within"),
+    "two": (60, "X[] x\nX[] y\n", "L11.msg:2:1", "fields, including those of nested messages"),
     "hollow": (60, "X x\nX y\n", "L12.msg:2:1", "8190 fields"),
-    "deep": (MOST_LEVELS + 1, "X x\n", "L1.msg:1:1", "'deep/L64' holds 'deep/L0' 65 levels deep"),
-    "chain": (3000, "X x\n", "L2936.msg:1:1", "'chain/L2999' holds 'chain/L2935' 65 levels deep"),
+    "deep": (MOST_LEVELS + 1, "X x\n", "L1.msg:1:1", "'deep/L64' contains 'deep/L0' 65 levels deep"),
+    "chain": (3000, "X x\n", "L2936.msg:1:1", "'chain/L2999' contains 'chain/L2935' 65 levels deep"),
 }
 
 
@@ -118,7 +118,7 @@ def test_messages_beyond_the_bounds_are_refused(name: str, tmp_path: Path) -> No
     ("text", "words"),
     [
         ("B[65535] b\n", "field 'c' makes 'big/B' too large: 196605 fields"),
-        ("Nothing[4294967295] n\n", "4294967295 fields, with those of every element of its fixed arrays"),
+        ("Nothing[4294967295] n\n", "4294967295 fields, including those of each element in fixed arrays"),
         ("string[4294967295] n\n", "4294967295 fields"),
         ("uint8[4294967295] n\n", "4294967295 bytes of fixed size"),
         ("uint8[65536] n\nuint8 o\n", "65537 bytes"),
@@ -126,8 +126,8 @@ def test_messages_beyond_the_bounds_are_refused(name: str, tmp_path: Path) -> No
         ("".join(f"uint8 F{number}=1\n" for number in range(MOST_FIELDS + 1)), "4097 constants"),
         ("uint8 a\n" * 40000, "larger than 262144 bytes"),
         ("?\n" * 5000, "and 4800 more"),
-        (f"uint8 A={'1' * 5000}\n", "uint8 takes a whole number"),
-        (f"uint8[{'1' * 5000}] a\n", "is not a size"),
+        (f"uint8 A={'1' * 5000}\n", "legal here: whole numbers"),
+        (f"uint8[{'1' * 5000}] a\n", "is not a legal size"),
         ("uint8 a\0b\n", "is not a legal field name"),
     ],
 )

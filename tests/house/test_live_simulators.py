@@ -176,7 +176,7 @@ def test_the_core_beside_it_is_the_one_that_names_it() -> None:
 def test_what_cannot_be_built_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="there is no specification"):
         build_simulator(tmp_path / "none.yaml")
-    with pytest.raises(InputError, match="unknown simulator 'questa' of live systems"):
+    with pytest.raises(InputError, match="unknown simulator 'questa' for live systems"):
         build_simulator(SPECS / "quat2euler" / "quat2euler.yaml", "questa")
     with pytest.raises(InputError, match="is for verilator"):
         build_simulator(SPECS / "multi_type" / "multi_type_verilog.yaml", build_root=tmp_path / "build")
@@ -188,7 +188,7 @@ def test_what_cannot_be_built_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
     with pytest.raises(
-        InputError, match=r"not installed: ghdl make(.|\n)*apt-get install --no-install-recommends ghdl"
+        InputError, match=r"missing programs: ghdl, make(.|\n)*apt-get install --no-install-recommends ghdl"
     ):
         build_simulator(SPECS / "quat2euler" / "quat2euler.yaml")
 

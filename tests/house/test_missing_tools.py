@@ -106,5 +106,5 @@ def test_missing_programs_are_named_with_their_packages(bare: Bare, target: str)
 @pytest.mark.skipif(not (shutil.which("ghdl") and shutil.which("yosys")), reason="ghdl or yosys is not installed")
 def test_nobody_waits_for_synthesis_before_the_last_program_is_missed(bare: Bare) -> None:
     said = bare.run("icebreaker", "ghdl", "yosys", "env")
-    assert "error: not installed: nextpnr-ice40 icepack" in said
+    assert "error: missing programs: nextpnr-ice40, icepack" in said
     assert "yosys -" not in said

@@ -83,7 +83,7 @@ def test_without_root_it_says_what_is_missing(machine: Machine) -> None:
     machine.add_apt("ghdl")
     done = machine.install()
     assert (done.stdout, done.returncode) == ("", 1)
-    assert done.stderr.startswith("Missing: ghdl\nOnly root may install them.")
+    assert done.stderr.startswith("Missing: ghdl\nOnly root can install them.")
     assert "  apt-get install --no-install-recommends ghdl\n" in done.stderr
     assert not machine.log.exists()
 
@@ -91,7 +91,7 @@ def test_without_root_it_says_what_is_missing(machine: Machine) -> None:
 def test_without_apt_it_says_what_is_missing(machine: Machine) -> None:
     done = machine.install()
     assert done.returncode == 1
-    assert done.stderr.startswith("Missing: ghdl g++\nThere is no apt-get")
+    assert done.stderr.startswith("Missing: ghdl g++\napt-get, which installs them, is not")
 
 
 def test_what_apt_did_not_bring_is_said(machine: Machine) -> None:
@@ -187,7 +187,7 @@ def test_make_corpus_verifies_both_versions(tmp_path: Path) -> None:
 
 def test_make_corpus_without_a_corpus_is_one_line(tmp_path: Path) -> None:
     (line,) = make_corpus(tmp_path)
-    assert line.startswith(f"echo \"No corpus: '{tmp_path}' has no folders ros1 and ros2")
+    assert line.startswith(f"echo \"No corpus: '{tmp_path}' does not contain the folders ros1 and ros2")
 
 
 class Checkout:
@@ -254,8 +254,8 @@ def test_why_pip_failed_is_shown(checkout: Checkout) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ("sim TARGET=sim_vcs", ["has no target 'sim_vcs'", "it has: default, sim, sim_icarus, sim_verilator,"]),
-        ("sim TARGET=lint", ["target 'lint' of", "it has: sim, sim_icarus, sim_verilator,"]),
+        ("sim TARGET=sim_vcs", ["has no target 'sim_vcs'", "its targets: default, sim, sim_icarus, sim_verilator,"]),
+        ("sim TARGET=lint", ["target 'lint' of", "its targets: sim, sim_icarus, sim_verilator,"]),
         ("sim SYSTEM=robot:sys:no", ["unknown core 'robot:sys:no'", "cores with sim: ", "robot:sys:quat2euler:"]),
         ("bitstream BOARD=iceberg", ["has no target 'iceberg'", "icebreaker, quartus, tangnano9k, ulx3s"]),
     ],

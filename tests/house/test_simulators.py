@@ -89,5 +89,5 @@ def test_lint_is_clean(system: str, build_root: Path) -> None:
 def test_what_a_simulator_cannot_do_is_said(build_root: Path) -> None:
     done = run("quat2euler_hls", build_root, target="sim_icarus")
     assert done.returncode != 0
-    assert "icarus cannot simulate 'QuaternionToEuler_type' of type HLS" in done.stdout
+    assert "icarus cannot simulate 'QuaternionToEuler_type', which has the type HLS" in done.stdout
     assert "--target=sim" in done.stdout

@@ -96,7 +96,7 @@ def test_definitions_that_differ_are_refused_when_asked_for(tmp_path: Path, kind
     library = MessageLibrary(version(kind), [bag])
     with pytest.raises(InputError) as raised:
         library.get(ODD)
-    assert f"<{bag}>/odd_msgs/Odd:1:1: error: 'odd_msgs/Odd' is defined in several ways" in str(raised.value)
+    assert f"<{bag}>/odd_msgs/Odd:1:1: error: the bag has different definitions of 'odd_msgs/Odd'" in str(raised.value)
 
 
 def test_what_is_no_bag_or_has_no_definitions(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_what_is_no_bag_or_has_no_definitions(tmp_path: Path) -> None:
     assert "drive.bag is not a readable bag" in str(raised.value)
     assert "notes.txt' is neither a folder nor a bag" in str(raised.value)
     empty = record(tmp_path, "mcap", {})
-    with pytest.raises(InputError, match="drive' is a bag without definitions"):
+    with pytest.raises(InputError, match="drive' is a bag without message definitions"):
         MessageLibrary(ROS2, [empty])
 
 
@@ -179,7 +179,7 @@ def test_whoever_reads_the_bag_itself_must_declare_it(
             file.read_bytes()
         return loaded.generate()
 
-    with pytest.raises(InputError, match="was read, but is not an input"):
+    with pytest.raises(InputError, match="was read, but is not listed as an input"):
         obtain(replace(loaded, generate=generate), FIRM, basis)
 
 

@@ -224,7 +224,9 @@ def test_two_files_of_one_service(tmp_path: Path) -> None:
     assert fields(MessageLibrary(ROS1, [tmp_path]).get(request)) == "bool data"
     other.write_text("---\n", encoding="utf-8")
     found = faults(MessageLibrary(ROS1, [tmp_path]), request, tmp_path)
-    assert found == [f"{first.relative_to(tmp_path)}:1:1: error: 'my_msgs/srv/Add' differs from {other}"]
+    assert found == [
+        f"{first.relative_to(tmp_path)}:1:1: error: the definition of 'my_msgs/srv/Add' differs from the one in {other}"
+    ]
 
 
 # --- faults ------------------------------------------------------------------------------------------------------
@@ -249,7 +251,7 @@ def test_a_missing_section(tmp_path: Path) -> None:
     library = MessageLibrary(ROS1, [tmp_path])
     for message in ("AddRequest", "AddResponse"):
         found = faults(library, MessageName("my_msgs", message), tmp_path)
-        assert found == ["my_msgs/Add.srv:1:1: error: 1 of 2 sections found"]
+        assert found == ["my_msgs/Add.srv:1:1: error: the file has 1 of the 2 expected sections"]
 
 
 def test_a_service_is_no_type_of_a_field(tmp_path: Path) -> None:
@@ -260,7 +262,7 @@ def test_a_service_is_no_type_of_a_field(tmp_path: Path) -> None:
     (fault,) = caught.value.diagnostics
     assert str(fault.source).endswith("User.msg:2:1")
     assert fault.message == "unknown message 'my_msgs/Add'"
-    assert fault.hint == "it is a service; its messages are my_msgs/AddRequest, my_msgs/AddResponse"
+    assert fault.hint == "'my_msgs/Add' is a service with the messages my_msgs/AddRequest, my_msgs/AddResponse"
 
 
 def test_a_similar_name_of_a_service(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def test_distributions() -> None:
 def test_an_unknown_distribution() -> None:
     with pytest.raises(InputError) as caught:
         DistributionStore(2, "jazy")
-    assert str(caught.value) == "error: 'jazy' is not a distribution of ROS 2\n      = did you mean 'jazzy'?"
+    assert str(caught.value) == "error: unknown ROS 2 distribution 'jazy'\n      = did you mean 'jazzy'?"
 
 
 def test_a_package_is_named_by_its_manifest(tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_every_bad_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         MessageLibrary(ROS1, [tmp_path / "empty", tmp_path / "missing"])
     assert [diagnostic.message for diagnostic in caught.value.diagnostics] == [
-        f"message path '{tmp_path / 'empty'}' holds no .msg, .srv or .action file",
+        f"message path '{tmp_path / 'empty'}' contains no .msg, .srv or .action file",
         f"message path '{tmp_path / 'missing'}' is neither a folder nor a bag",
     ]
 
@@ -198,7 +198,7 @@ def test_an_unknown_message_is_reported_where_it_is_named() -> None:
     assert str(caught.value).splitlines()[0] == "spec.yaml:3:12: error: unknown message 'geometry_msgs/Quaternoin'"
     assert str(caught.value).splitlines()[-1] == (
         "      = did you mean 'geometry_msgs/Quaternion'? looked in: rosbags ros1_noetic; "
-        "further places: 'paths' of the specification or core, --path"
+        "add places with 'paths' in the specification or core, or with --path"
     )
 
 
@@ -228,7 +228,7 @@ def test_a_closure_reports_every_fault_in_every_file(tmp_path: Path) -> None:
     assert faults == [
         ("A.msg", 2, "unknown message 'my_msgs/Missing'"),
         ("A.msg", 3, "message 'my_msgs/A' contains itself"),
-        ("A.msg", 4, "'0' is not a size"),
+        ("A.msg", 4, "'0' is not a legal size"),
         ("B.msg", 1, "message 'my_msgs/A' contains itself"),
         ("B.msg", 2, "unknown message 'other_msgs/Missing'"),
     ]

@@ -162,7 +162,7 @@ def test_a_missing_program_is_named_with_its_package(tmp_path: Path) -> None:
         (programs / name).symlink_to(shutil.which(name) or "")
     done = Build(tmp_path).run(str(programs))
     assert done.returncode != 0
-    assert "not installed: iverilog" in done.stdout
+    assert "missing programs: iverilog" in done.stdout
     assert "apt-get install --no-install-recommends iverilog" in done.stdout
 
 

@@ -161,7 +161,7 @@ INSTANCE = "u : Inner port map (d => a, Q => q);"
         (entity("process (a, enable) begin if enable = '1' then q <= a; end if; end process;"), "latch"),
         (entity("q <= a and b;"), 'no declaration for "b"'),
         (entity("q <= a;").replace("entity top", "entity other").replace("of top", "of other"), "top"),
-        (entity(INSTANCE, COMPONENT), "'Inner', which is neither an entity of this build's VHDL nor a module"),
+        (entity(INSTANCE, COMPONENT), "'Inner', which is neither an entity in this build's VHDL nor a module"),
         (entity("q(6 downto 0) <= a(6 downto 0);"), "no assignment for"),
     ],
 )

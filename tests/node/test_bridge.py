@@ -51,6 +51,6 @@ def test_closing_ends_a_thread_that_receives() -> None:
 def test_a_python_of_ros_that_cannot_be_started(tmp_path: Path) -> None:
     nothing = str(tmp_path / "python")
     before = len([*Path("/proc/self/fd").iterdir()])
-    with pytest.raises(CarrierError, match=f"the Python of ROS 1, {nothing}, cannot be started: No such file"):
+    with pytest.raises(CarrierError, match=f"{nothing}, the Python for ROS 1, cannot be started: No such file"):
         RosCarrier(1, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=nothing))
     assert len([*Path("/proc/self/fd").iterdir()]) == before

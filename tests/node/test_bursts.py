@@ -105,12 +105,15 @@ def test_garbage_is_told_in_the_same_words(driver: Driver) -> None:
     [
         ([""], "the burst is empty"),
         (["04"], "the id is 4, but the publishers are 0 to 3"),
-        (["0101000000"], "a burst of id 1 ends within a beat: 5 bytes at 4 per beat, and the frame is incomplete"),
-        (["0101000000aabb"], "the frame of id 1 is 1 bytes longer than it announces"),
-        (["01e9030000000000"], "the frame of id 1 announces 1001 bytes of payload; the longest has 1000"),
-        (["01040000", "01000000"], "the burst that resumes the frame of id 1 holds nothing but the id"),
-        (["01040000", "0100000000aabbccddee"], "the frame of id 1 is 1 bytes longer than it announces"),
-        (["01040000", "01000000000aabbc", "close"], "the stream ends within frames: 8 bytes of id 1"),
+        (["0101000000"], "a burst with id 1 ends within a beat: 5 bytes at 4 per beat, and the frame is incomplete"),
+        (["0101000000aabb"], "the frame with id 1 is 1 bytes longer than its header announces"),
+        (
+            ["01e9030000000000"],
+            "the frame with id 1 announces 1001 bytes of payload; the longest payload has 1000 bytes",
+        ),
+        (["01040000", "01000000"], "the burst that resumes the frame with id 1 contains nothing but the id"),
+        (["01040000", "0100000000aabbccddee"], "the frame with id 1 is 1 bytes longer than its header announces"),
+        (["01040000", "01000000000aabbc", "close"], "the stream ends within frames: 8 bytes with id 1"),
     ],
 )
 def test_what_no_manager_sends_is_an_error(driver: Driver, bursts: list[str], message: str) -> None:
@@ -139,7 +142,7 @@ def test_illegal_sizes_are_named(driver: Driver, publishers: int, width: int) ->
 
 @pytest.mark.parametrize("runs", [[0], [-1], [3], [1, 2]])
 def test_a_frame_is_split_only_between_its_beats(runs: list[int]) -> None:
-    with pytest.raises(ValueError, match="legal: 1 and more, fewer than remain"):
+    with pytest.raises(ValueError, match="legal: 1 or more, but fewer than remain"):
         split_frame(pack_frame(1, bytes(7)), 32, runs)
 
 

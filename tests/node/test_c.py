@@ -27,10 +27,10 @@ WORDS = {
     "the burst is empty": "empty",
     "the id is": "bad_id",
     "tid is": "bad_tid",
-    "holds nothing but the id": "only_id",
+    "contains nothing but the id": "only_id",
     "ends within a beat": "within_beat",
-    "longer than it announces": "longer",
-    "the longest has": "too_long",
+    "longer than its header announces": "longer",
+    "the longest payload has": "too_long",
 }
 
 

@@ -35,12 +35,12 @@ def test_frames_go_there_and_back(driver: Driver, count: int, longest: int, buff
     ("fault", "error"),
     [
         ("decode", "the DMA engine's MM2S: DMADecErr (address)"),
-        ("slave", "the DMA engine's S2MM: DMASlvErr (memory's answer)"),
-        ("halt", "the DMA engine's S2MM: it has halted"),
+        ("slave", "the DMA engine's S2MM: DMASlvErr (response from memory)"),
+        ("halt", "the DMA engine's S2MM: the channel has halted"),
         ("stall", "the transport is closed"),
-        ("overrun", "the DMA engine wrote beyond a buffer"),
-        ("simple", "the DMA engine lacks scatter-gather, so it is not from a generated block design"),
-        ("reset", "the DMA engine does not leave its reset: does it have a clock?"),
+        ("overrun", "the DMA engine wrote past the end of a buffer"),
+        ("simple", "the DMA engine does not support scatter-gather, so it is not from a generated block design"),
+        ("reset", "the DMA engine does not leave reset; check the engine's clock"),
         ("start", "the DMA engine does not start"),
     ],
 )
@@ -51,8 +51,8 @@ def test_errors_of_the_engine_are_named(driver: Driver, fault: str, error: str) 
 @pytest.mark.parametrize("size", [63, 100, 1 << 21])
 def test_illegal_buffers_are_named(driver: Driver, size: int) -> None:
     assert play(driver, 1, 1, size) == (
-        f"error: the DMA has 4 buffers of {size} bytes; legal: 2 and more, a multiple of 64, and all within the"
-        " memory's 4194304"
+        f"error: the DMA has 4 buffers of {size} bytes; legal: 2 or more, a multiple of 64, and all within the"
+        " 4194304 bytes of memory"
     )
 
 
@@ -91,6 +91,6 @@ def test_a_device_that_does_not_serve_is_named(driver: Driver, tmp_path: Path) -
     assert far == ["error: udmabuf0 ends beyond the 4 GiB that the DMA engine reaches"]
     size = root / "sys/class/u-dma-buf/udmabuf0/size"
     size.write_text("many\n")
-    assert driver.answers([], "files", str(root)) == [f"error: {size} holds 'many', which is not a number"]
+    assert driver.answers([], "files", str(root)) == [f"error: {size} contains 'many', which is not a number"]
     size.unlink()
-    assert driver.answers([], "files", str(root)) == [f"error: {size} cannot be read: is its driver loaded?"]
+    assert driver.answers([], "files", str(root)) == [f"error: cannot read {size}; check whether the driver is loaded"]

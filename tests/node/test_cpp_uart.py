@@ -134,7 +134,7 @@ def test_a_board_that_is_never_silent_cannot_be_read(node_driver: Driver) -> Non
     thread.join()
     os.close(ours)
     os.close(theirs)
-    assert outcome.said["error"].endswith("the board is never silent, so frames cannot be told apart")
+    assert outcome.said["error"].endswith("the board is never silent, so the start of a frame cannot be found")
 
 
 def test_a_line_that_goes_ends_the_node(node_driver: Driver) -> None:

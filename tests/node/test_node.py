@@ -188,7 +188,7 @@ def test_hardware_that_is_gone_is_started_anew(tmp_path: Path) -> None:
     run.stop()
     assert run.is_complete
     assert [payload for _, payload in run.carrier.published] == POINTS[:2]
-    assert run.reports == ["the simulator was killed; it is restarted, and the messages in it are lost"]
+    assert run.reports == ["the simulator was killed; the hardware is restarted, and the messages in it are lost"]
     assert run.node.statistics.restarts == 1
 
 
@@ -220,7 +220,7 @@ def test_garbage_from_the_hardware_is_reported_and_the_rest_goes_on(tmp_path: Pa
     # A link that is broken for hours does not fill the disk.
     assert len(run.reports) == 21
     assert run.reports[0].startswith("the hardware sent an invalid burst: ")
-    assert run.reports[20] == "further reports of this kind are only counted"
+    assert run.reports[20] == "further reports of this kind are counted, but not printed"
 
 
 def test_a_message_that_the_hardware_refuses_is_counted(tmp_path: Path) -> None:
@@ -235,7 +235,7 @@ def test_a_message_that_the_hardware_refuses_is_counted(tmp_path: Path) -> None:
 
 def test_a_carrier_that_is_gone_ends_the_node(tmp_path: Path) -> None:
     run = Run(describe(pairs(tmp_path)), Bench().open)
-    run.carrier.end(CarrierError("the process of ROS 1 has ended"))
+    run.carrier.end(CarrierError("the process for ROS 1 has ended"))
     run.wait()
     assert isinstance(run.error, CarrierError)
 
@@ -435,10 +435,10 @@ def test_the_steps_of_a_node_in_cpp_become_ways(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("1,received,0,zero,24,,", "steps.csv:2 is not a step of a node"),
-        ("1,received,0", "steps.csv:2 is not a step of a node"),
+        ("1,received,0,zero,24,,", "steps.csv:2 is not a step in a node's trace"),
+        ("1,received,0", "steps.csv:2 is not a step in a node's trace"),
         ("1,lost,0,0,24,,", "steps.csv:2: unknown step 'lost'"),
-        ("1,received,2,0,24,,", "steps.csv:2: 'robot' has no topic of converter 2, received"),
+        ("1,received,2,0,24,,", "steps.csv:2: 'robot' has no topic for converter 2 and step 'received'"),
     ],
 )
 def test_steps_that_are_none_are_told(tmp_path: Path, line: str, message: str) -> None:
@@ -466,11 +466,11 @@ def test_a_trace_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "picture", "message"),
     [
-        ("trace.csv", "ways.gif", "ways.gif: its ending does not name a format"),
+        ("trace.csv", "ways.gif", "ways.gif: the file's ending does not select a format"),
         ("none.csv", "ways.svg", "cannot read "),
-        ("other.csv", "ways.svg", "is not the trace of a node"),
-        ("trace.csv", "ways.svg", "has no message that came back"),
-        ("broken.csv", "ways.svg", "broken.csv:2 is not a row of a trace"),
+        ("other.csv", "ways.svg", "is not a node's trace"),
+        ("trace.csv", "ways.svg", "contains no messages with a response"),
+        ("broken.csv", "ways.svg", "broken.csv:2 is not a valid row of a trace"),
         ("good.csv", "no/ways.svg", "/no/ways.svg: there is no folder "),
     ],
 )
@@ -500,7 +500,7 @@ def test_the_generated_file_has_the_table(tmp_path: Path, kinds: tuple[str, ...]
 
 
 def test_a_generated_file_of_another_version_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="system 'robot' has no topic of ROS 2"):
+    with pytest.raises(InputError, match="system 'robot' has no ROS 2 topics"):
         python_node(pairs(tmp_path), ROS2, tmp_path / "spec.yaml", tmp_path)
 
 
@@ -534,7 +534,7 @@ def test_a_wrong_command_line_is_refused(line: str, capsys: pytest.CaptureFixtur
 
 def test_what_no_version_knows_is_refused(tmp_path: Path) -> None:
     description = describe(pairs(tmp_path))
-    with pytest.raises(InputError, match="has no topic of ROS 2, but of ROS 1"):
+    with pytest.raises(InputError, match="has no ROS 2 topics, only topics of ROS 1"):
         run_options(*parsed(""), description, ros=2)
     with pytest.raises(InputError, match="'--ros-args' is for ROS 2"):
         run_options(*parsed("--ros-args -r a:=b"), description)

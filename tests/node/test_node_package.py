@@ -131,10 +131,10 @@ def test_nested_messages_are_part_of_a_definition() -> None:
         (
             specification(loop("one", "Point", "ROS") + loop("two", "Vector3", "ROS2")),
             None,
-            "the topics of 'robot' are of ROS 1 and ROS 2, but a node in C++ speaks one of them",
+            "the topics of 'robot' use ROS 1 and ROS 2, but a C++ node supports only one ROS version",
         ),
-        (specification(loop("one", "Point", "ROS")), 2, "the topics of 'robot' are of ROS 1, not of ROS 2"),
-        (specification(loop("one", "Point", "ROS2")), 1, "the topics of 'robot' are of ROS 2, not of ROS 1"),
+        (specification(loop("one", "Point", "ROS")), 2, "the topics of 'robot' use ROS 1, not ROS 2"),
+        (specification(loop("one", "Point", "ROS2")), 1, "the topics of 'robot' use ROS 2, not ROS 1"),
     ],
 )
 def test_what_no_node_can_serve_is_refused(tmp_path: Path, text: str, ros: int | None, message: str) -> None:

@@ -238,7 +238,7 @@ def test_a_writer_that_waits_is_told_of_the_end() -> None:
 def test_times_are_kept() -> None:
     queues: SubscriberQueues[int] = SubscriberQueues(1, 1, overflow=Overflow.BLOCK)
     begun = time.monotonic()
-    with pytest.raises(EmptyError, match=r"no frame came in 0.05 s"):
+    with pytest.raises(EmptyError, match=r"no frame arrived in 0.05 s"):
         queues.get(0.05)
     queues.put(0, 1)
     assert not queues.put(0, 2, 0.05)
@@ -246,9 +246,9 @@ def test_times_are_kept() -> None:
 
 
 def test_illegal_numbers_are_named() -> None:
-    with pytest.raises(ValueError, match="subscribers is 0, capacity is 1; legal: 1 and more"):
+    with pytest.raises(ValueError, match="subscribers is 0, capacity is 1; legal: 1 or more"):
         SubscriberQueues(0, 1)
-    with pytest.raises(ValueError, match="subscribers is 1, capacity is 0; legal: 1 and more"):
+    with pytest.raises(ValueError, match="subscribers is 1, capacity is 0; legal: 1 or more"):
         SubscriberQueues(1, 0)
     queues: SubscriberQueues[int] = SubscriberQueues(2, 1)
     with pytest.raises(IndexError, match="subscriber is 2; legal: 0 to 1"):

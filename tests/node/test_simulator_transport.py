@@ -83,7 +83,7 @@ def test_step_by_step(model: list[str]) -> None:
 
 def test_what_cannot_be_requested(model: list[str]) -> None:
     with Simulator(model) as simulator:
-        with pytest.raises(ValueError, match="a frame of 0 bytes"):
+        with pytest.raises(ValueError, match="the frame has 0 bytes"):
             simulator.request(b"")
         with pytest.raises(ValueError, match="2147483648 cycles"):
             simulator.run(2**31)
@@ -93,7 +93,7 @@ def test_what_cannot_be_requested(model: list[str]) -> None:
     ("frame", "message"),
     [
         (b"die", "the simulator ended with status 3; it printed:\nthe model dies"),
-        (b"garbage", "the simulator sent 0x21 where a report begins"),
+        (b"garbage", "the simulator sent 0x21 instead of the start of a report"),
         (b"half", "the simulator was killed by signal 9"),
     ],
 )

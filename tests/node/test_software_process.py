@@ -83,7 +83,7 @@ def test_frames_are_answered(tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
     [
         (b"\0\1", "the input ends within a frame"),
         (b"\0\5\0\0\0abc", "the input ends within a frame"),
-        (b"\2\0\0\0\0", "a frame has id 2, but the software's inputs have the ids 0 to 1"),
+        (b"\2\0\0\0\0", "a frame has the id 2, but the software's inputs have the ids 0 to 1"),
     ],
 )
 def test_a_row_that_is_no_frames_is_refused(tmp_path: Path, row: bytes, error: str) -> None:

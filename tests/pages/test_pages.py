@@ -71,7 +71,7 @@ def test_every_page_says_whom_it_serves_in_its_first_two_lines() -> None:
         lines = page.first_paragraph.splitlines()
         assert len(lines) == 2, page.name
         assert re.match(r"For .+[.,]$", lines[0]), page.name
-        assert re.match(r"After it you can .+\.$", lines[1]), page.name
+        assert re.match(r"After reading it, you can .+\.$", lines[1]), page.name
 
 
 def test_every_page_is_in_the_navigation_and_in_the_index() -> None:

@@ -236,7 +236,7 @@ def test_a_fault_in_a_parameter_is_shown_in_the_core(
 
 def test_one_parameter_stands_in_for_others(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
     assert bench.run(width=8) == 1
-    assert capsys.readouterr().err.endswith("      = or give 'file' instead\n")
+    assert capsys.readouterr().err.endswith("      = alternatively, set 'file'\n")
     assert bench.run(file="spec.yaml", width=16) == 1
     assert "parameter 'width' cannot be combined with 'file'" in capsys.readouterr().err
     assert bench.run(file="spec.yaml") == 0
@@ -297,5 +297,5 @@ def test_a_program_that_is_missing_is_named_with_its_package(
     bench.programs = ["iverilog"]
     assert bench.run(spec="spec.yaml") == 0
     output = capsys.readouterr().out
-    assert "echo: error: not installed: iverilog" in output
+    assert "echo: error: missing programs: iverilog" in output
     assert "apt-get install --no-install-recommends iverilog" in output

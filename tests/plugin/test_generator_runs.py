@@ -225,7 +225,7 @@ def test_a_store_that_may_only_be_read(calls: Calls, right: dict[str, bytes]) ->
         show = [*UNPRIVILEGED, sys.executable, "-m", "fusesoc_firm.cli", "cache", "show"]
         environment = os.environ | {"PYTHONPATH": str(ROOT), "FUSESOC_FIRM_CACHE": str(calls.store)}
         shown = subprocess.run(show, env=environment, capture_output=True, text=True, check=True).stdout
-        assert shown.splitlines()[-1] == "rights   read only: what you generate is not cached"
+        assert shown.splitlines()[-1] == "rights   read-only: new results are not cached"
         assert calls.written("second") == calls.written("third") == right
         assert {path: path.is_file() and path.read_bytes() for path in calls.store.rglob("*")} == before
     finally:

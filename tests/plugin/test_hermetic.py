@@ -263,8 +263,8 @@ def test_an_undeclared_file_is_named(
 
     assert run() == 1
     error = capsys.readouterr().err
-    assert error.startswith(f"error: {table} was read, but is not an input\n")
-    assert "list it under the generator's parameter 'files'" in error
+    assert error.startswith(f"error: {table} was read, but is not listed as an input\n")
+    assert "add the file to the generator's parameter 'files'" in error
     assert not list(work.glob("*.core"))
     assert not list(tmp_path.rglob("*.entry"))
     assert run(files=["table.csv"]) == 0

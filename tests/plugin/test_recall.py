@@ -182,7 +182,7 @@ def test_what_cannot_be_run_is_said_on_every_run(calls: Calls, capsys: pytest.Ca
     with calls.monkeypatch.context() as patch:
         patch.setenv("PATH", "/nowhere")
         assert main("far", arguments) == 0
-        assert "not installed: ghdl" in capsys.readouterr().out
+        assert "missing programs: ghdl" in capsys.readouterr().out
         assert not answer("far", arguments)
 
 

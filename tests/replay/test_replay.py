@@ -90,13 +90,13 @@ def test_the_name_says_the_form(tmp_path: Path, name: str, form: str | None, fil
 
 def test_a_form_against_the_name(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
-    with pytest.raises(InputError, match="is to be sqlite3, but its ending means mcap"):
+    with pytest.raises(InputError, match="--format is sqlite3, but the file's ending means mcap"):
         run(loaded, bag(tmp_path, "mcap", points("mcap", 1)), Target(tmp_path / "o.mcap", Form.SQLITE3), "echo")
 
 
 def test_a_bag_that_cannot_hold_the_answers(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
-    with pytest.raises(InputError, match=r"'p_out' uses ROS 2, but .*o\.bag would be a bag of ROS 1"):
+    with pytest.raises(InputError, match=r"'p_out' uses ROS 2, but .*o\.bag would be a ROS 1 bag"):
         run(loaded, bag(tmp_path, "mcap", points("mcap", 1)), tmp_path / "o.bag", "echo")
 
 
@@ -110,7 +110,7 @@ def test_a_bag_that_is_there_is_replaced_only_by_force(tmp_path: Path) -> None:
     run(loaded, Source(source, limit=1), Target(target, force=True), "echo")
     assert len(read(target)) == 1
     (target / "notes.txt").touch()
-    with pytest.raises(InputError, match=r"is a folder, but not a bag: it holds notes\.txt"):
+    with pytest.raises(InputError, match=r"is not a bag: it contains notes\.txt"):
         run(loaded, source, Target(target, force=True), "echo")
     with pytest.raises(InputError, match="is the bag to replay"):
         run(loaded, source, Target(source, force=True), "echo")
@@ -124,8 +124,8 @@ def test_nothing_is_left_of_a_replay_that_cannot_begin(tmp_path: Path) -> None:
     with pytest.raises(InputError) as raised:
         run(loaded, source, tmp_path / "out", "echo")
     assert str(raised.value) == (
-        f"error: {source} holds no topic that the system takes: /p of geometry_msgs/Point\n"
-        f"      = it holds /s of {STRING}"
+        f"error: {source} contains no topic for the system, which takes /p (geometry_msgs/Point)\n"
+        f"      = the bag contains /s ({STRING})"
     )
     assert sorted(tmp_path.iterdir()) == before
 
@@ -133,8 +133,8 @@ def test_nothing_is_left_of_a_replay_that_cannot_begin(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--map", "/a"], "'/a' is not TOPIC=BLOCK"),
-        (["--map", "=a"], "'=a' is not TOPIC=BLOCK"),
+        (["--map", "/a"], "'/a' does not have the form TOPIC=BLOCK"),
+        (["--map", "=a"], "'=a' does not have the form TOPIC=BLOCK"),
         (["--limit", "0"], "0 is less than 1"),
         (["--start", "-1"], "'-1' is not a number of seconds"),
         (["--duration", "inf"], "'inf' is not a number of seconds"),
@@ -241,7 +241,7 @@ def test_topics_that_the_command_names(tmp_path: Path) -> None:
     with pytest.raises(InputError) as raised:
         run(loaded, source, tmp_path / "p.bag", "echo", "echo", names={"lift": "/b"})
     assert str(raised.value) == (
-        "error: the system has neither a subscriber nor a publisher 'lift'\n      = did you mean 'left'?"
+        "error: the system has no subscriber or publisher 'lift'\n      = did you mean 'left'?"
     )
     with pytest.raises(InputError, match=r"has no topic /bb for 'left'\n.*did you mean '/b'"):
         run(loaded, source, tmp_path / "p.bag", "echo", "echo", names={"left": "/bb", "right": "/a"})
@@ -260,7 +260,7 @@ def test_two_subscribers_of_one_topic_both_get_it(tmp_path: Path) -> None:
 def test_one_subscriber_and_two_topics_of_its_type(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("x", "geometry_msgs/Point", 2)))
     source = bag(tmp_path, "mcap", points("mcap", 1, "/p") + points("mcap", 1, "/q"))
-    with pytest.raises(InputError, match=r"topics /p, /q of .* could go to x"):
+    with pytest.raises(InputError, match=r"several topics in .* could go to x: /p, /q"):
         run(loaded, source, tmp_path / "out", "echo")
 
 
@@ -294,7 +294,7 @@ def test_the_summary(tmp_path: Path, capsys: Captured) -> None:
     assert lines[:3] == [
         "in  p     /p     geometry_msgs/msg/Point 12",
         "out p_out /p_out geometry_msgs/msg/Point 12",
-        f"no subscriber for /s of {STRING}: 1",
+        f"no subscriber for /s ({STRING}): 1",
     ]
     # A message takes 4 + 19 + 4 cycles, and 100 cycles of rest.
     assert lines[3] == f"{tmp_path}/o.bag: 12 in, 12 out, 1 dropped, 0 errors, {12 * 127} cycles"
@@ -321,7 +321,10 @@ def test_a_message_that_cannot_be_decoded(tmp_path: Path, form: str, capsys: Cap
     items[3] = (*items[3][:3], items[3][3][:-9])
     size = 24 if form == "ros1" else 28
     assert replayed(tmp_path, form, items, capsys) == [
-        f"/p, message 3, at 1000000000.030000000: geometry_msgs/Point takes {size} bytes, not {size - 9}"
+        (
+            "/p, message 3, at 1000000000.030000000: the payload of geometry_msgs/Point must have"
+            f" {size} bytes, not {size - 9}"
+        )
     ]
     assert read(tmp_path / ("o.bag" if form == "ros1" else "out")) == renamed([*items[:3], items[4]], "/p_out")
 
@@ -339,7 +342,7 @@ def test_a_message_that_the_hardware_refuses(tmp_path: Path, capsys: Captured) -
 def test_a_topic_of_another_type(tmp_path: Path, form: str, capsys: Captured) -> None:
     wrong = [("/p", STRING, 10**18 + n, payload(form, STRING, "x" * 24)) for n in (1, 2)]
     assert replayed(tmp_path, form, [*points(form, 1), *wrong], capsys) == [
-        f"/p, message {n}, at 1000000000.00000000{n}: it is a std_msgs/String, but 'p' takes geometry_msgs/Point"
+        f"/p, message {n}, at 1000000000.00000000{n}: its type is std_msgs/String, but 'p' takes geometry_msgs/Point"
         for n in (1, 2)
     ]
     assert len(read(tmp_path / ("o.bag" if form == "ros1" else "out"))) == 1
@@ -354,8 +357,8 @@ def test_a_hardware_that_knows_no_id(tmp_path: Path, capsys: Captured) -> None:
 def test_a_message_that_is_never_taken(tmp_path: Path, capsys: Captured) -> None:
     assert replayed(tmp_path, "ros1", points("ros1", 4), capsys, "stuck") == [
         (
-            "/p, message 1, at 1000000000.010000000: the rest of the bag is not replayed: "
-            "the system does not accept it at 'p'"
+            "/p, message 1, at 1000000000.010000000: the rest of the bag was not replayed: "
+            "the system does not accept the message at 'p'"
         )
     ]
     assert read(tmp_path / "o.bag") == []
@@ -369,7 +372,7 @@ def test_a_simulator_that_dies(tmp_path: Path, capsys: Captured) -> None:
 
 def test_a_frame_that_is_not_over(tmp_path: Path, capsys: Captured) -> None:
     assert replayed(tmp_path, "ros1", points("ros1", 1), capsys, "beginning") == [
-        "the system has not sent the rest of a frame of p_out"
+        "the system has not completed a frame of p_out"
     ]
 
 
@@ -398,7 +401,7 @@ def test_a_bag_that_is_damaged_within(tmp_path: Path, capsys: Captured) -> None:
 def test_a_hardware_that_sends_what_it_must_not(tmp_path: Path, capsys: Captured) -> None:
     place = "/p, message 0, at 1000000000.000000000: the hardware sent invalid data: "
     assert replayed(tmp_path, "ros1", points("ros1", 1), capsys, "garbled") == [
-        f"{place}the frame of id 0 is 9 bytes longer than it announces",
+        f"{place}the frame with id 0 is 9 bytes longer than its header announces",
         f"{place}the id is 200, but the publishers are 0 to 0",
     ]
 

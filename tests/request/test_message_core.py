@@ -111,7 +111,7 @@ def test_a_copied_definition_is_of_no_template(project: Project, capsys: pytest.
     project.origins()
     (path,) = (project.root.parent / "build").rglob("generator_cache/me_msgs_base*/base_msgs/msg/Angle.msg")
     assert main(["why", str(path)]) == 1
-    assert "does not come from a template\n      = it is a copy of " in capsys.readouterr().err
+    assert "was not generated from a template\n      = the file is a copy of " in capsys.readouterr().err
 
 
 def test_a_core_that_is_not_depended_on_has_no_messages_here(project: Project) -> None:
@@ -148,7 +148,7 @@ def test_a_core_without_messages_is_a_fault(project: Project) -> None:
     project.write("base/base.core", BASE.replace("[msg]", "[empty]"))
     done = project.set_up()
     assert done.returncode != 0
-    assert "base-messages has no messages" in done.stderr + done.stdout
+    assert "base-messages contains no messages" in done.stderr + done.stdout
 
 
 def test_without_a_run_they_are_found_where_they_lie(
@@ -162,7 +162,7 @@ def test_without_a_run_they_are_found_where_they_lie(
     project.write("top/top.core", TOP.replace("messages: [me:msgs:arm]", "messages: [me:p:top]"))
     capsys.readouterr()
     assert main(["lock", "me:p:top"]) == 1
-    assert "'me:p:top' is not a known core with messages" in capsys.readouterr().err
+    assert "no known core 'me:p:top' provides messages" in capsys.readouterr().err
 
 
 # --- in a specification -------------------------------------------------------------------------------------------
@@ -210,4 +210,4 @@ def test_a_specification_names_cores_for_the_build_and_for_commands(
     spec.write_text(SPECIFICATION.replace("me:msgs:arm", "me:msgs:none"))
     capsys.readouterr()
     assert main(["system", "check", str(spec)]) == 1
-    assert f"{spec}:2:9: error: 'me:msgs:none' is not a known core with messages" in capsys.readouterr().err
+    assert f"{spec}:2:9: error: no known core 'me:msgs:none' provides messages" in capsys.readouterr().err

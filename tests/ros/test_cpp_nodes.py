@@ -368,13 +368,13 @@ def test_help_names_every_option_and_topic(workshop: Workshop) -> None:
         (["--transport", "pipe:true", "--depth", "ten"], "--depth is 'ten'; legal: 1 to 999999999"),
         (["--transport", "pipe:true", "--trace", "/no/such"], "cannot write '/no/such'"),
         (["--transport", "pipe:true", "--overflow", "x"], "--overflow is 'x'; legal: block, drop_newest, drop_oldest"),
-        (["--bogus"], "'--bogus' is no option"),
+        (["--bogus"], "unknown option '--bogus'"),
     ],
 )
 def test_a_wrong_command_line_is_told(workshop: Workshop, arguments: list[str], message: str) -> None:
     done = run(workshop, workshop.program("echo"), *arguments)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"echo_node: {message}; --help says more\n"
+    assert done.stderr == f"echo_node: {message}; see --help\n"
 
 
 def test_an_address_that_is_none_ends_the_node(workshop: Workshop) -> None:
@@ -411,4 +411,4 @@ def test_a_message_that_is_installed_with_another_definition_is_refused(workshop
     workshop.ros.compile(package, program, workshop.header)
     done = run(workshop, program, "--transport", simulator())
     assert done.returncode == 1
-    assert "is installed in another version than the hardware has (RIHS01_beef" in done.stderr
+    assert "is installed in a version that differs from the hardware's (RIHS01_beef" in done.stderr

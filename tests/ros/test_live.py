@@ -374,7 +374,7 @@ def test_ros_kills_or_loses_the_node(place: Place) -> None:
         node.wait_until_ready()
         node.kill_child("bridge.py")
         assert node.wait() == 1
-        assert f"the process of ROS {place.ros.version} ({place.ros.python}) has ended" in node.said()
+        assert f"the process for ROS {place.ros.version} ({place.ros.python}) has ended" in node.said()
 
 
 def test_names_are_those_that_ros_is_told(place: Place) -> None:
@@ -413,4 +413,4 @@ def test_a_version_that_the_system_does_not_speak_is_told(place: Place) -> None:
     other = 3 - place.ros.version
     with place.echo("--ros", str(other)) as node:
         assert node.wait() == 1
-        assert f"error: system 'echo' has no topic of ROS {other}, but of ROS {place.ros.version}" in node.said()
+        assert f"error: system 'echo' has no ROS {other} topics, only topics of ROS {place.ros.version}" in node.said()

@@ -112,9 +112,11 @@ def test_the_cheapest_that_holds_all_deadlines(no_area: None) -> None:
     assert choice.best.policy == "fixed_priority_preemptive"
     holding = [analysis.policy for analysis in choice.analyses if analysis.is_schedulable]
     assert holding == ["fixed_priority_preemptive", "edf_resources", "edf_latency"]
-    assert "All deadlines hold under 3 of 7 policies." in choice.reasons
-    assert "the fewest LUTs of these, 54 (by the dissertation's table 4.1)" in choice.reasons[2]
-    assert choice.reasons[3].startswith("Put the publishers in the order of its priorities: imu, arm, camera.")
+    assert "All deadlines are met with 3 of 7 policies." in choice.reasons
+    assert "the fewest LUTs of these policies, 54 (from the dissertation's table 4.1)" in choice.reasons[2]
+    assert choice.reasons[3].startswith(
+        "List the publishers in the specification in the order of priority: imu, arm, camera."
+    )
 
 
 def test_lst_needs_longer_runs() -> None:
@@ -135,7 +137,7 @@ def test_nobody_may_starve(no_area: None) -> None:
     too_much = (Task("a", 10, 8, 10), Task("b", 20, 15, 20), Task("c", 1_000, 10, 1_000))
     choice = choose(too_much, Criterion.FINISH)
     assert choice.reasons[0] == (
-        "The publishers ask for 156.0 % of the channel. The channel is overloaded: each sends less often than its "
+        "The publishers request 156.0 % of the channel. The channel is overloaded: each sends less often than its "
         "period allows."
     )
     assert choice.best.all_finish
@@ -144,7 +146,7 @@ def test_nobody_may_starve(no_area: None) -> None:
         "fixed_priority",
         "fixed_priority_preemptive",
     }
-    assert choose(too_much).reasons[1] == "No policy is certain to hold all deadlines."
+    assert choose(too_much).reasons[1] == "No policy is guaranteed to meet all deadlines."
 
 
 def test_measured_luts_go_before_the_dissertation(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,7 +169,7 @@ def test_bursts_count_with_a_policy_that_interrupts(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(area, "measured", lambda: areas)
     assert luts("fixed_priority", 3) == 20
     assert luts("fixed_priority_preemptive", 3) == 14 + 23
-    assert "fewest LUTs of these, 37 (measured, with the Manager's bursts)" in choose(ROBOT).reasons[2]
+    assert "fewest LUTs of these policies, 37 (measured, with the Manager's bursts)" in choose(ROBOT).reasons[2]
     for design in (area.MANAGER, area.MANAGER_PREEMPTIVE):
         others = {key: each for key, each in areas.items() if key[0] != design}
         monkeypatch.setattr(area, "measured", lambda others=others: others)
@@ -177,8 +179,8 @@ def test_bursts_count_with_a_policy_that_interrupts(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("make", "fault"),
     [
-        (lambda: choose([]), "there are no tasks"),
-        (lambda: choose([IMU, IMU]), "two tasks have the same name"),
+        (lambda: choose([]), "at least one task is required"),
+        (lambda: choose([IMU, IMU]), "task names must be unique"),
     ],
 )
 def test_bad_tasks(make: Callable[[], Choice], fault: str) -> None:

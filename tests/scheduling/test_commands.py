@@ -81,10 +81,10 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, options: list[str]) 
     [
         (["--policies", "lur"], "unknown policy 'lur'\n      = did you mean 'lru'?"),
         (["--dataset", "cc5"], "unknown data set 'cc5'\n      = did you mean"),
-        (["--requesters", "2,257"], "'257' is not a number of accelerators\n      = legal: 1 to 256"),
-        (["--requesters", "x"], "'x' is not a number of accelerators"),
-        (["--requesters", ""], "'' is not a number of accelerators"),
-        (["--requesters", "0"], "'0' is not a number of accelerators"),
+        (["--requesters", "2,257"], "'257' is not a legal number of accelerators\n      = legal: 1 to 256"),
+        (["--requesters", "x"], "'x' is not a legal number of accelerators"),
+        (["--requesters", ""], "'' is not a legal number of accelerators"),
+        (["--requesters", "0"], "'0' is not a legal number of accelerators"),
         (["--policies", ""], "unknown policy ''\n      = legal here: edf_latency"),
         (["--output", "{file}/below"], "/below: Not a directory"),
         (["--csv", "{file}/values.csv"], "/values.csv: there is no folder "),
@@ -135,14 +135,14 @@ def test_choose_tells_the_policy_and_why(spec: Path, capsys: Captured) -> None:
     assert out.startswith("scheduler: fixed_priority\n")
     # 5 bytes of header and 28 of payload in beats of 4; 100,000 cycles are 1 ms.
     assert "| slow      | 100000 |             9 |   100000 |" in out
-    assert "Put the publishers in the order of its priorities: fast, slow, third." in out
+    assert "List the publishers in the specification in the order of priority: fast, slow, third." in out
 
 
 def test_choose_sees_that_publishers_stand_in_order(spec: Path, capsys: Captured) -> None:
     in_order = SPEC.replace("period: 1 kHz", "period: 100, deadline: 28").replace("deadline: 40", "deadline: 60")
     spec.write_text(with_a_third(in_order))
     assert main(["scheduler", "choose", str(spec)]) == 0
-    assert "Its priorities are the publishers' order in the specification." in capsys.readouterr().out
+    assert "The priorities match the order of the publishers in the specification." in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("form", ["json", "yaml"])

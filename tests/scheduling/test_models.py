@@ -85,7 +85,7 @@ def test_input_is_left_as_it_was() -> None:
 @pytest.mark.parametrize("requesters", [2, 20])
 def test_times_that_do_not_fit_are_named(policy: str, requesters: int) -> None:
     periods = np.full((1, requesters), 32)
-    with pytest.raises(ValueError, match="time_bits is 8; legal: 9 and more for a deadline of 32 cycles"):
+    with pytest.raises(ValueError, match="time_bits is 8; legal: 9 or more for a deadline of 32 cycles"):
         make_model(policy, Generics(periods, periods, time_bits=8))
     with pytest.raises(ValueError, match="time_bits is 32; legal: 8 to 31"):
         make_model(policy, Generics(periods, periods, time_bits=32))
@@ -100,11 +100,14 @@ def test_illegal_generics_are_named() -> None:
     periods = np.full((2, 3), 10)
     with pytest.raises(ValueError, match=r"deadlines has the shape \(2, 2\); legal: \(batch, requesters\)"):
         Generics(periods, deadlines=np.full((2, 2), 10))
-    with pytest.raises(ValueError, match="a time in transfer_times is 0; legal: 1 and more cycles"):
+    with pytest.raises(ValueError, match="a time in transfer_times is 0; legal: 1 or more cycles"):
         Generics(periods, transfer_times=periods * 0)
-    with pytest.raises(ValueError, match="shortest_run is 0; legal: 1 and more beats"):
+    with pytest.raises(ValueError, match="shortest_run is 0; legal: 1 or more beats"):
         Generics(periods, shortest_run=0)
     with pytest.raises(ValueError, match="requesters is 257; legal: 1 to 256"):
         scheduler_of("fixed_priority", 257)
-    with pytest.raises(ValueError, match="2 groups below a scheduler of 3; legal: as many, one batch"):
+    with pytest.raises(
+        ValueError,
+        match="the scheduler has 3 requesters and 2 groups; legal: one group for each",
+    ):
         Combined([scheduler_of("lru"), scheduler_of("lru")], scheduler_of("lru", 3))

@@ -97,5 +97,5 @@ def test_a_preemption_costs_a_resumption() -> None:
 
 @pytest.mark.parametrize("key", ["period", "transfer_time", "deadline"])
 def test_a_time_is_a_cycle_at_least(key: str) -> None:
-    with pytest.raises(ValueError, match=f"{key} of 'x' is 0; legal: 1 and more cycles"):
+    with pytest.raises(ValueError, match=f"{key} of 'x' is 0; legal: 1 or more cycles"):
         Task("x", *(0 if each == key else 1 for each in ("period", "transfer_time", "deadline")))

@@ -115,7 +115,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "def respond(block, m)\n    return []\n",
             (
-                "model.py:1:22: error: the model is not Python: expected ':'\n"
+                "model.py:1:22: error: the model is not valid Python: expected ':'\n"
                 "    1 | def respond(block, m)\n      |                      ^"
             ),
         ),
@@ -131,7 +131,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
             (
                 "model.py:2:1: error: for message 0 to 'sub', 'respond' returned None, which is not a list\n"
                 "    2 | def respond(block, m):\n      | ^\n"
-                "      = it returns a list of (publisher, message), the message a mapping of fields"
+                "      = 'respond' must return a list of (publisher, message), where the message is a mapping of fields"
             ),
         ),
         (
@@ -140,7 +140,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         ),
         (
             "def respond(block, m):\n    return ['left']\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' returned 'left' in its list",
+            "model.py:1:1: error: for message 0 to 'sub', 'respond' returned a list that contains 'left'",
         ),
         (
             "def respond(block, m):\n    return [('lift', m)]\n",
@@ -168,7 +168,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
             "def respond(block, m):\n    return [('left', {'x': 'one', 'y': 0, 'z': 0})]\n",
             (
                 "model.py:1:1: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
-                "'x' takes a float64, not 'one'"
+                "'x' must be of type float64, not 'one'"
             ),
         ),
         (
@@ -196,6 +196,6 @@ def test_a_fault_below_the_model_is_shown_where_the_model_calls(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["nowhere.py", "model.txt"])
 def test_a_model_that_is_not_there(tmp_path: Path, name: str) -> None:
     (tmp_path / "model.txt").write_text("def respond(block, m): return []\n")
-    message = rf"error: there is no model at .*{name}\n.*'respond\(subscriber, message\)'; it returns a list"
+    message = rf"error: there is no model at .*{name}\n.*'respond\(subscriber, message\)'; 'respond' must return a list"
     with pytest.raises(InputError, match=message):
         responses(tmp_path / name, stimuli(1.0), PUBLISHERS)

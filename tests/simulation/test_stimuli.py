@@ -154,20 +154,35 @@ def test_integers_and_booleans(tmp_path: Path, block: str, word: str, expected: 
 @pytest.mark.parametrize(
     ("block", "word", "message", "hint"),
     [
-        ("byte", "256", "'data' is a uint8, not '256'", "legal here: 0 to 255"),
-        ("byte", "-1", "'data' is a uint8, not '-1'", "legal here: 0 to 255"),
-        ("byte", "1.0", "'data' is a uint8, not '1.0'", "legal here: 0 to 255"),
-        ("byte", "017", "'data' is a uint8, not '017'", "legal here: 0 to 255"),
-        ("byte", "true", "'data' is a uint8, not 'true'", "legal here: 0 to 255"),
-        ("byte", "'7'", "'data' is a uint8, not '7'", ""),
-        ("byte", "[7]", "'data' is a uint8, not a list", ""),
-        ("byte", "", "'data' is a uint8, not nothing", ""),
-        ("long", "9223372036854775808", "'data' is a int64", "legal here: -9223372036854775808 to 9223372036854775807"),
-        ("single", "one", "'data' is a float32, not 'one'", "a number such as 1, -0.5, 1e-3, .inf, .nan"),
-        ("single", "1:30", "'data' is a float32, not '1:30'", "a number such as"),
-        ("single", "1e39", "'data' is a float32, not '1e39'", "it is too large; infinity is written .inf"),
-        ("flag", "yes", "'data' is a bool, not 'yes'", "legal here: true, false"),
-        ("flag", "1", "'data' is a bool, not '1'", "legal here: true, false"),
+        ("byte", "256", "'data' must be of type uint8, not '256'", "legal here: 0 to 255"),
+        ("byte", "-1", "'data' must be of type uint8, not '-1'", "legal here: 0 to 255"),
+        ("byte", "1.0", "'data' must be of type uint8, not '1.0'", "legal here: 0 to 255"),
+        ("byte", "017", "'data' must be of type uint8, not '017'", "legal here: 0 to 255"),
+        ("byte", "true", "'data' must be of type uint8, not 'true'", "legal here: 0 to 255"),
+        ("byte", "'7'", "'data' must be of type uint8, not '7'", ""),
+        ("byte", "[7]", "'data' must be of type uint8, not a list", ""),
+        ("byte", "", "'data' must be of type uint8, not nothing", ""),
+        (
+            "long",
+            "9223372036854775808",
+            "'data' must be of type int64",
+            "legal here: -9223372036854775808 to 9223372036854775807",
+        ),
+        (
+            "single",
+            "one",
+            "'data' must be of type float32, not 'one'",
+            "legal here: numbers such as 1, -0.5, 1e-3, .inf, .nan",
+        ),
+        ("single", "1:30", "'data' must be of type float32, not '1:30'", "legal here: numbers such as"),
+        (
+            "single",
+            "1e39",
+            "'data' must be of type float32, not '1e39'",
+            "the number is too large; write infinity as .inf",
+        ),
+        ("flag", "yes", "'data' must be of type bool, not 'yes'", "legal here: true, false"),
+        ("flag", "1", "'data' must be of type bool, not '1'", "legal here: true, false"),
     ],
 )
 def test_a_value_that_does_not_fit(tmp_path: Path, block: str, word: str, message: str, hint: str) -> None:
@@ -178,7 +193,7 @@ def test_a_value_that_does_not_fit(tmp_path: Path, block: str, word: str, messag
 
 
 def test_a_float64_that_is_too_large(tmp_path: Path) -> None:
-    assert "it is too large" in faults(tmp_path, "- point: {x: 1e400, y: 0, z: 0}\n")
+    assert "the number is too large" in faults(tmp_path, "- point: {x: 1e400, y: 0, z: 0}\n")
 
 
 def test_nested_values_and_arrays(tmp_path: Path) -> None:
@@ -214,15 +229,15 @@ def test_every_fault_of_a_file_is_shown_where_it_is(tmp_path: Path) -> None:
     assert [line for line in text.splitlines() if ": error: " in line] == [
         "stimuli.yaml:1:3: error: 'pont' is not a subscriber",
         "stimuli.yaml:2:17: error: a geometry_msgs/Point has no field 'Y'",
-        "stimuli.yaml:2:29: error: 'z' is a float64, not 'one'",
-        "stimuli.yaml:4:22: error: 'pose.position' is a mapping of its fields, not a list",
+        "stimuli.yaml:2:29: error: 'z' must be of type float64, not 'one'",
+        "stimuli.yaml:4:22: error: 'pose.position' must be a mapping of fields, not a list",
         "stimuli.yaml:4:39: error: 'pose.orientation' needs a value for z, w",
         "stimuli.yaml:4:52: error: 'pose.orientation' has no field 'v'",
-        "stimuli.yaml:5:17: error: 'covariance' is a list of 36, not of 2",
-        "stimuli.yaml:6:10: error: a geometry_msgs/Point is a mapping of its fields, not '5'",
-        "stimuli.yaml:7:3: error: a stimulus is one block with its message: '- <subscriber>: {...}'",
+        "stimuli.yaml:5:17: error: 'covariance' must be a list of 36, not of 2",
+        "stimuli.yaml:6:10: error: a geometry_msgs/Point must be a mapping of fields, not '5'",
+        "stimuli.yaml:7:3: error: a stimulus must be one subscriber with its message: '- <subscriber>: {...}'",
         "stimuli.yaml:8:17: error: key 'x' is given twice",
-        "stimuli.yaml:9:3: error: a stimulus is one block with its message: '- <subscriber>: {...}'",
+        "stimuli.yaml:9:3: error: a stimulus must be one subscriber with its message: '- <subscriber>: {...}'",
         "stimuli.yaml:10:3: error: a list is not a subscriber",
     ]
     assert "did you mean 'point'?" in text
@@ -232,15 +247,15 @@ def test_every_fault_of_a_file_is_shown_where_it_is(tmp_path: Path) -> None:
 def test_faults_of_form_and_of_content_come_together(tmp_path: Path) -> None:
     text = faults(tmp_path, "- pint: {x: 0}\n- point: {x: 0\n- byte: {data: 0}\n")
     assert "stimuli.yaml:1:3: error: 'pint' is not a subscriber" in text
-    assert "stimuli.yaml:3:7: error: this is not YAML: expected ',' or '}', but got ':'" in text
+    assert "stimuli.yaml:3:7: error: invalid YAML: expected ',' or '}', but got ':'" in text
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "error: stimuli.yaml holds no message for point, byte"),
-        ("[]", "error: stimuli.yaml holds no message for point, byte"),
-        ("point: {x: 0}", "stimuli.yaml:1:1: error: stimuli are a list, not a mapping"),
+        ("", "error: stimuli.yaml contains no message for point, byte"),
+        ("[]", "error: stimuli.yaml contains no message for point, byte"),
+        ("point: {x: 0}", "stimuli.yaml:1:1: error: stimuli must be a list, not a mapping"),
         ("- &x {point: *x}", "stimuli.yaml:1:6: error: 'x' is a"),
     ],
 )
@@ -250,7 +265,7 @@ def test_no_list_of_messages(tmp_path: Path, text: str, message: str) -> None:
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    message = r"error: there are no stimuli at .*nowhere\.yaml\n.*list of messages: '- \w+: \{<field>"
+    message = r"error: the stimuli .*nowhere\.yaml do not exist\n.*list of messages: '- \w+: \{<field>"
     with pytest.raises(InputError, match=message):
         read_stimuli(tmp_path / "nowhere.yaml", SUBSCRIBERS)
 
@@ -306,10 +321,10 @@ def test_what_does_not_fit_a_message_of_variable_size(tmp_path: Path) -> None:
             "- text: {}\n",
         )
     assert [(fault.source.line if fault.source else 0, fault.message) for fault in raised.value.diagnostics] == [
-        (1, "'data' is a string, not nothing"),
-        (2, "'data' is a string, not a list"),
-        (3, "'values' is a list, not a mapping"),
+        (1, "'data' must be of type string, not nothing"),
+        (2, "'data' must be of type string, not a list"),
+        (3, "'values' must be a list, not a mapping"),
         (4, "'values[0]' has no field 'valeu'"),
-        (5, "'dimensions' holds at most 3, not 4"),
+        (5, "the length of 'dimensions' must be at most 3, not 4"),
         (6, "a std_msgs/String needs a value for data"),
     ]

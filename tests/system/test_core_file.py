@@ -89,7 +89,9 @@ def test_a_core_that_depends_on_the_generators_of_converters_alone_is_refused(tm
     core = tmp_path / "robot.core"
     text = new_core(system(tmp_path), "robot.yaml", CoreOptions())
     core.write_text(text.replace("robot:firm:firm_system", "robot:firm:generators"), encoding="utf-8")
-    with pytest.raises(InputError, match="does not depend on 'robot:firm:firm_system', which has the generator 'far'"):
+    with pytest.raises(
+        InputError, match="does not depend on 'robot:firm:firm_system', which provides the generator 'far'"
+    ):
         updated_core(system(tmp_path), core)
 
 
@@ -151,5 +153,5 @@ def test_without_a_simulation_there_is_no_target_for_it(tmp_path: Path) -> None:
 def test_another_core_is_left_alone(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robot.core"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"robot\.core( is not a core| has no inst|:\d+:\d+: error: this is not YAML)"):
+    with pytest.raises(InputError, match=r"robot\.core( has no section| has no inst|:\d+:\d+: error: invalid YAML)"):
         updated_core(system(tmp_path), path)

@@ -97,7 +97,7 @@ blocks:
 def test_a_file_that_is_cut_lacks_nothing_and_is_not_sound(tmp_path: Path) -> None:
     specification, faults = read(tmp_path, "project:\n  fpgaPart: part\nblocks:\n  - {name: a\n")
     (fault,) = faults.found
-    assert fault.message.startswith("this is not YAML")
+    assert fault.message.startswith("invalid YAML")
     assert specification.is_cut
     assert not specification.project.is_sound
 
@@ -145,7 +145,10 @@ ACCELERATORS = "project: {name: a}\naccelerators: [{name: b, type: TYPE, interfa
         (
             "VHDL",
             "",
-            "an item of 'accelerators' needs the key 'sources': its source files, relative to the specification",
+            (
+                "an item of 'accelerators' needs the key 'sources': the accelerator's source files, relative to the"
+                " specification"
+            ),
         ),
         ("VHDL", ", sources: ", "'sources' must be a word, not nothing"),
         ("ROS-SW", "", ""),

@@ -57,15 +57,15 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             "",
             {
                 "length": "computed",
-                "because": "the lengths at the output's ports determine it",
-                "payloadBytes": "44 and more",
+                "because": "the lengths at the output's ports determine the payload's length",
+                "payloadBytes": "44 or more",
             },
         ),
         (
             IMAGE,
             ", length: given",
             "",
-            {"length": "given", "because": "the specification says so", "payloadBytes": "44 and more"},
+            {"length": "given", "because": "the specification selects this source", "payloadBytes": "44 or more"},
         ),
         (
             IMAGE,
@@ -73,9 +73,9 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             ", buffer: 5000",
             {
                 "length": "buffered",
-                "because": "the specification says so",
+                "because": "the specification selects this source",
                 "buffer": 5000,
-                "payloadBytes": "44 and more",
+                "payloadBytes": "44 or more",
             },
         ),
         (
@@ -84,9 +84,9 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             ", buffer: 9000",
             {
                 "length": "buffered",
-                "because": "each element of 'fields' has a length of its own, 'fields.name'",
+                "because": "each element of 'fields' has a separate length, 'fields.name'",
                 "buffer": 9000,
-                "payloadBytes": "49 and more",
+                "payloadBytes": "49 or more",
             },
         ),
         ("geometry_msgs/Point", "", "", {"payloadBytes": 28}),
@@ -103,7 +103,7 @@ def test_a_subscriber_has_the_length(tmp_path: Path) -> None:
     system = derived(tmp_path, specification(blocks))
     assert described(system) == {
         "length": "given",
-        "because": "the subscriber has it",
+        "because": "the subscriber has the length",
         "payloadBytes": described(system)["payloadBytes"],
     }
 
@@ -167,7 +167,7 @@ def test_no_accelerator_is_called_like_a_length_entity(tmp_path: Path) -> None:
     with pytest.raises(InputError) as raised:
         derived(tmp_path, specification(blocks, accelerator("sensor_msgs_image_length", IMAGE, IMAGE)))
     (message,) = messages(raised.value)
-    assert message.endswith("but so does the unit that computes the length of sensor_msgs/Image")
+    assert "and the unit that computes the length of sensor_msgs/Image both need the entity" in message
 
 
 FORKS = (

@@ -87,10 +87,10 @@ def test_the_bench_connects_every_pin_to_the_environment(tmp_path: Path) -> None
     ("names", "message"),
     [
         (["missing.vhd"], "there is no file"),
-        (["switches.v"], "'switches.v' is not the name of a VHDL entity's file"),
-        (["entity.vhd"], "'entity.vhd' is not the name"),
-        (["Panel.vhd"], "the system has an entity 'Panel' already"),
-        (["robot_system_tb.vhd"], "the system has an entity 'robot_system_tb' already"),
+        (["switches.v"], "'switches.v' is not a legal file name for a VHDL entity"),
+        (["entity.vhd"], "'entity.vhd' is not a legal file name"),
+        (["Panel.vhd"], "the system already has an entity 'Panel'"),
+        (["robot_system_tb.vhd"], "the system already has an entity 'robot_system_tb'"),
     ],
 )
 def test_an_environment_that_cannot_be(tmp_path: Path, names: list[str], message: str) -> None:

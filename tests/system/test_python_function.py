@@ -69,9 +69,12 @@ def test_a_function_that_will_do(tmp_path: Path, code: str) -> None:
         ("def mix(a, b, *, c): ...", "'mix' cannot be called with 2 messages"),
         ("def mix(a, b): ...\ndef mix(a): ...", "'mix' cannot be called with 2 messages"),
         ("async def mix(a, b): ...", "'node.py' has no function 'mix'"),
-        ("def mix(a, b)\n", "this is not Python: expected ':'"),
-        ("def mix(a, b):\n", "this is not Python: expected an indented block after function definition on line 1"),
-        ("x = '\0'", "this is not Python: source code string cannot contain null bytes"),
+        ("def mix(a, b)\n", "the file is not valid Python: expected ':'"),
+        (
+            "def mix(a, b):\n",
+            "the file is not valid Python: expected an indented block after function definition on line 1",
+        ),
+        ("x = '\0'", "the file is not valid Python: source code string cannot contain null bytes"),
     ],
 )
 def test_a_function_that_will_not_do(tmp_path: Path, code: str, message: str) -> None:

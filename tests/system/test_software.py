@@ -354,7 +354,7 @@ def test_faults_of_connections_are_those_of_hardware(tmp_path: Path) -> None:
             derived(tmp_path, specification(blocks + converter("pub", "publisher", "Point"), kind))
         assert [message.partition(" (")[0] for message in messages(raised.value)] == [
             "input 'in_' of 's'",
-            "'pub' already gets this message",
+            "'pub' already receives this message",
         ]
 
 

@@ -116,7 +116,7 @@ def test_the_paths_of_messages_decide_what_can_be_named(tmp_path: Path) -> None:
     assert "paths:" in (tmp_path / "robot.yaml").read_text()
     assert asked[0] == ["msg", "me:msgs:arm"]
     wrong = ["robot", *[""] * 7, "mgs"]
-    with pytest.raises(InputError, match="answer 9: 'mgs' is neither a folder, a bag nor a core"):
+    with pytest.raises(InputError, match="answer 9: 'mgs' is not a folder, a bag or a core"):
         extend_specification(tmp_path / "other.yaml", PipeAsker(wrong, io.StringIO()), names)
 
 
@@ -205,8 +205,8 @@ def test_answers_read_well(tmp_path: Path) -> None:
         'name: "0x10" # the system\'s name; the top level is <name>_system',
         'fpgaPart: "007" # the FPGA\'s part number',
         "clock: 100 MHz # frequency",
-        "width: 16 # bits",
-        "sources: [rtl/turn.vhd, rtl/two.vhd, rtl/three.vhd] # its source files",
+        "width: 16 # width in bits",
+        "sources: [rtl/turn.vhd, rtl/two.vhd, rtl/three.vhd] # the accelerator's source files",
         'include: [x, "no"] # fields to include',
         "include: y\n",
         '- name: "on"\n',
@@ -252,7 +252,7 @@ blocks:
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
         (["robot", *[""] * 8, "no", "a", "b"], "answer 12: 'type' cannot be 'b'"),
-        (["robot", *[""] * 8, "no", "a", "", "ROS", "subscriber", ""], "answer 15: 'message' is needed"),
+        (["robot", *[""] * 8, "no", "a", "", "ROS", "subscriber", ""], "answer 15: 'message' is required"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:

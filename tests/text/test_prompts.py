@@ -35,7 +35,7 @@ def test_answers_from_a_pipe_are_shown_with_their_questions() -> None:
     ("question", "answers", "message"),
     [
         (COLOUR, ["gren"], "answer 1: 'colour' cannot be 'gren'; did you mean 'green'?"),
-        (NAME, [""], "answer 1: 'name' is needed: what it is called"),
+        (NAME, [""], "answer 1: 'name' is required: what it is called"),
         (NAME, ["Barbara"], "answer 1: too long"),
         (NAME, [], "the answers end before 'name': what it is called"),
     ],

@@ -96,7 +96,7 @@ def test_a_partial_within_a_line_is_not_indented(expand: Expand) -> None:
         ("{{#l}}{{.}}{{/l}}", {"l": [[1]]}, "'l[0]' is of type list; only a string or an integer can be printed"),
         ("{{#x}}a{{/x}}", {"x": "text"}, "'x' is of type str; a section takes a bool, a list, a mapping or None"),
         ("{{#x}}a{{/x}}", {"x": 0}, "'x' is of type int; a section takes a bool, a list, a mapping or None"),
-        ("{{x-1}}", {"x": "8"}, "'x' is of type str; only to an integer can -1 be added"),
+        ("{{x-1}}", {"x": "8"}, "'x' is of type str; -1 can be added only to an integer"),
         ("{{#on}}{{../x}}{{/on}}", {"on": True, "x": 1}, "no scope encloses the context for '../x'"),
         ("{{#m}}{{../x}}{{/m}}", {"m": {"x": 1}}, "no 'x' in the context; it has m"),
         ("{{@last}}", {"x": 1}, "no '@last' in the context; it has x"),

@@ -74,18 +74,18 @@ def test_items_come_once() -> None:
 @pytest.mark.parametrize(
     ("text", "faults"),
     [
-        ("a: b\n\tc: d\n", ["a.yaml:2:1: error: this is not YAML: found character '\\t' that cannot start any token"]),
-        ("a: [b, c\n", ["a.yaml:1:4: error: this is not YAML: expected ',' or ']', but got '<stream end>'"]),
-        ("a: 'b\nc: d\n", ["a.yaml:1:4: error: this is not YAML: found unexpected end of stream"]),
-        ("a: b\nc d\ne: f\n", ["a.yaml:2:1: error: this is not YAML: could not find expected ':'"]),
-        ("a: *b\n", ["a.yaml:1:4: error: this is not YAML: found undefined alias 'b'"]),
-        ("a: b\n---\nc: d\n", ["a.yaml:2:1: error: this is not YAML: but found another document"]),
-        ("a: @b", ["a.yaml:1:4: error: this is not YAML: found character '@' that cannot start any token"]),
+        ("a: b\n\tc: d\n", ["a.yaml:2:1: error: invalid YAML: found character '\\t' that cannot start any token"]),
+        ("a: [b, c\n", ["a.yaml:1:4: error: invalid YAML: expected ',' or ']', but got '<stream end>'"]),
+        ("a: 'b\nc: d\n", ["a.yaml:1:4: error: invalid YAML: found unexpected end of stream"]),
+        ("a: b\nc d\ne: f\n", ["a.yaml:2:1: error: invalid YAML: could not find expected ':'"]),
+        ("a: *b\n", ["a.yaml:1:4: error: invalid YAML: found undefined alias 'b'"]),
+        ("a: b\n---\nc: d\n", ["a.yaml:2:1: error: invalid YAML: but found another document"]),
+        ("a: @b", ["a.yaml:1:4: error: invalid YAML: found character '@' that cannot start any token"]),
         (
             "a: b\x01\nc: \x00[\n",
             [
-                "a.yaml:1:5: error: this is not YAML: it holds the control character 0x01",
-                "a.yaml:2:4: error: this is not YAML: it holds the control character 0x00",
+                "a.yaml:1:5: error: invalid YAML: it contains the control character 0x01",
+                "a.yaml:2:4: error: invalid YAML: it contains the control character 0x00",
             ],
         ),
     ],
@@ -113,7 +113,8 @@ def test_how_far_a_line_may_be_indented_is_said(text: str, legal: str) -> None:
     _, fault = parse(text)
     indent = len(text.splitlines()[-1]) - len(text.splitlines()[-1].lstrip())
     assert (
-        fault.splitlines()[-1] == f"      = the line is indented by {indent}, but the open blocks above it by {legal}"
+        fault.splitlines()[-1]
+        == f"      = the line is indented by {indent}, but the open blocks above are indented by {legal}"
     )
 
 
@@ -152,7 +153,7 @@ def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
     [
         (None, "error: cannot read a.yaml: No such file or directory"),
         (b"a: \xff\n", "a.yaml:1:4: error: byte 0xff is not UTF-8"),
-        (b"a: [\n", "a.yaml:1:4: error: this is not YAML"),
+        (b"a: [\n", "a.yaml:1:4: error: invalid YAML"),
     ],
 )
 def test_a_file_that_cannot_be_read(tmp_path: Path, content: bytes | None, message: str) -> None:

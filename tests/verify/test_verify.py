@@ -174,7 +174,7 @@ def test_a_message_that_is_withdrawn_fails(monkeypatch: pytest.MonkeyPatch) -> N
     signals = "signal x_r : std_logic_vector(63 downto 0);\nsignal valid_r : std_logic := '0';"
     other_text(monkeypatch, "subscriber_files", architecture(signals, blink))
     found = result()
-    assert found.detail.startswith("firm_sim_gates: valid(0) falls before ready came")
+    assert found.detail.startswith("firm_sim_gates: valid(0) falls before ready rises")
 
 
 def test_an_error_that_is_told_fails(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,7 +209,7 @@ def test_gates_stall_and_withdraw_nothing(gates: Library, seed: int, percent: in
 def test_a_source_that_withdraws_is_found(gates: Library) -> None:
     found = gates.run("firm_sim_gates_tb", {"WITHDRAWS": True})
     assert found.exit_code != 0
-    assert "firm_sim_gates: valid(1) falls before ready came" in found.output
+    assert "firm_sim_gates: valid(1) falls before ready rises" in found.output
 
 
 # --- the command -------------------------------------------------------------------------------------------------
@@ -235,7 +235,7 @@ def test_the_command_reports(tmp_path: Path, capsys: Captured) -> None:
     [
         (["geometry_msgs/Piont"], "unknown message 'geometry_msgs/Piont'"),
         (["nowhere/*"], "no message matches 'nowhere/*'"),
-        (["std_msgs/Bool", "--width", "7"], "a converter cannot have a stream of 7 bits"),
+        (["std_msgs/Bool", "--width", "7"], "converters do not support 7-bit streams"),
         (["std_msgs/Bool", "--cluster", "tcp://127.0.0.1:1"], "no Dask scheduler answers|the package 'distributed'"),
     ],
 )

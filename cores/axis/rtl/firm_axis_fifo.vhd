@@ -63,7 +63,7 @@ begin
     report "firm_axis_fifo: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
   assert DEPTH >= 2
-    report "firm_axis_fifo: DEPTH is " & integer'image(DEPTH) & "; legal: 2 and more"
+    report "firm_axis_fifo: DEPTH is " & integer'image(DEPTH) & "; legal: 2 or more"
     severity failure;
 
   write_beat <= s_axis_tvalid and ready_r;

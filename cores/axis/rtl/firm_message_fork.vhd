@@ -38,10 +38,10 @@ architecture rtl of firm_message_fork is
 begin
 
   assert SINKS >= 1
-    report "firm_message_fork: SINKS is " & integer'image(SINKS) & "; legal: 1 and more"
+    report "firm_message_fork: SINKS is " & integer'image(SINKS) & "; legal: 1 or more"
     severity failure;
   assert SEGMENTS >= 1
-    report "firm_message_fork: SEGMENTS is " & integer'image(SEGMENTS) & "; legal: 1 and more"
+    report "firm_message_fork: SEGMENTS is " & integer'image(SEGMENTS) & "; legal: 1 or more"
     severity failure;
 
   offer : for sink in 0 to SINKS-1 generate

@@ -91,10 +91,10 @@ begin
     report "firm_link_streams: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
   assert DEPTH >= 16
-    report "firm_link_streams: DEPTH is " & integer'image(DEPTH) & "; legal: 16 and more"
+    report "firm_link_streams: DEPTH is " & integer'image(DEPTH) & "; legal: 16 or more"
     severity failure;
   assert TIMEOUT >= 0
-    report "firm_link_streams: TIMEOUT is " & integer'image(TIMEOUT) & "; legal: 0 and more"
+    report "firm_link_streams: TIMEOUT is " & integer'image(TIMEOUT) & "; legal: 0 or more"
     severity failure;
 
   -- ------------------------------------------------------------------ from the host

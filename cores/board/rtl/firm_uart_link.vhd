@@ -81,7 +81,7 @@ begin
            & ", it is off by more than 2.5 %"
     severity failure;
   assert DEPTH >= 2*RESERVE
-    report "firm_uart_link: DEPTH is " & integer'image(DEPTH) & "; legal: 64 and more"
+    report "firm_uart_link: DEPTH is " & integer'image(DEPTH) & "; legal: 64 or more"
     severity failure;
   assert TIMEOUT_MS >= 1 and TIMEOUT_MS <= 4000
     report "firm_uart_link: TIMEOUT_MS is " & integer'image(TIMEOUT_MS) & "; legal: 1 to 4000"

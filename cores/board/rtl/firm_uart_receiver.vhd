@@ -38,7 +38,7 @@ architecture rtl of firm_uart_receiver is
 begin
 
   assert DIVISOR >= 4
-    report "firm_uart_receiver: DIVISOR is " & integer'image(DIVISOR) & "; legal: 4 and more"
+    report "firm_uart_receiver: DIVISOR is " & integer'image(DIVISOR) & "; legal: 4 or more"
     severity failure;
 
   receive : process (clk)

@@ -36,7 +36,7 @@ architecture rtl of firm_uart_transmitter is
 begin
 
   assert DIVISOR >= 4
-    report "firm_uart_transmitter: DIVISOR is " & integer'image(DIVISOR) & "; legal: 4 and more"
+    report "firm_uart_transmitter: DIVISOR is " & integer'image(DIVISOR) & "; legal: 4 or more"
     severity failure;
 
   done      <= '1' when count_r = 0 and left_r = 0 else '0';

@@ -85,13 +85,13 @@ architecture rtl of firm_cdc_message is
 begin
 
   assert SEGMENTS >= 1
-    report "firm_cdc_message: SEGMENTS is " & integer'image(SEGMENTS) & "; legal: 1 and more"
+    report "firm_cdc_message: SEGMENTS is " & integer'image(SEGMENTS) & "; legal: 1 or more"
     severity failure;
   assert FIELD_BITS >= 1
-    report "firm_cdc_message: FIELD_BITS is " & integer'image(FIELD_BITS) & "; legal: 1 and more"
+    report "firm_cdc_message: FIELD_BITS is " & integer'image(FIELD_BITS) & "; legal: 1 or more"
     severity failure;
   assert PARTS >= 1
-    report "firm_cdc_message: PARTS is " & integer'image(PARTS) & "; legal: 1 and more"
+    report "firm_cdc_message: PARTS is " & integer'image(PARTS) & "; legal: 1 or more"
     severity failure;
 
   -- The source's domain

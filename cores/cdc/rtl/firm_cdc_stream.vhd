@@ -107,7 +107,7 @@ begin
            & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
   assert DEPTH >= 4 and 2**clog2(DEPTH) = DEPTH
-    report "firm_cdc_stream: DEPTH is " & integer'image(DEPTH) & "; legal: powers of two, 4 and more"
+    report "firm_cdc_stream: DEPTH is " & integer'image(DEPTH) & "; legal: powers of two, 4 or more"
     severity failure;
 
   -- The source's domain

@@ -229,7 +229,7 @@ package body firm_sched_pkg is
   function fault_of_run(shortest_run : integer) return string is
   begin
     if shortest_run < 1 then
-      return "SHORTEST_RUN is " & integer'image(shortest_run) & "; legal: 1 and more beats";
+      return "SHORTEST_RUN is " & integer'image(shortest_run) & "; legal: 1 or more beats";
     end if;
     return "";
   end function fault_of_run;
@@ -253,7 +253,7 @@ package body firm_sched_pkg is
     for requester in natural range 0 to times'length-1 loop
       if time_of(requester, times) < 1 then
         return "the " & kind & " of requester " & integer'image(requester) & " is " &
-          integer'image(time_of(requester, times)) & "; legal: 1 and more cycles";
+          integer'image(time_of(requester, times)) & "; legal: 1 or more cycles";
       elsif time_of(requester, times) >= horizon(time_bits) then
         return "TIME_BITS is " & integer'image(time_bits) & "; the " & kind & " " &
           integer'image(time_of(requester, times)) & " of requester " & integer'image(requester) & " needs " &
@@ -291,7 +291,7 @@ package body firm_sched_pkg is
   begin
     if sizes'length = 0 or sizes'length /= policies'length then
       return "SIZES has " & integer'image(sizes'length) & " groups and POLICIES " & integer'image(policies'length) &
-        "; legal: 1 and more, as many in both";
+        "; legal: 1 or more, as many in both";
     elsif has_deadlines(top_policy) then
       return "TOP_POLICY is " & policy_t'image(top_policy) & "; legal: a policy without deadlines";
     end if;

@@ -44,10 +44,10 @@ architecture simulation of firm_cdc_sync is
 begin
 
   assert BITS >= 1
-    report "firm_cdc_sync: BITS is " & integer'image(BITS) & "; legal: 1 and more"
+    report "firm_cdc_sync: BITS is " & integer'image(BITS) & "; legal: 1 or more"
     severity failure;
   assert STAGES >= 2
-    report "firm_cdc_sync: STAGES is " & integer'image(STAGES) & "; legal: 2 and more"
+    report "firm_cdc_sync: STAGES is " & integer'image(STAGES) & "; legal: 2 or more"
     severity failure;
 
   pass_on : process (clk, level)

@@ -29,10 +29,10 @@ architecture simulation of firm_sim_clock is
 begin
 
   assert PERIOD_PS >= 2
-    report "firm_sim_clock: PERIOD_PS is " & integer'image(PERIOD_PS) & "; legal: 2 and more"
+    report "firm_sim_clock: PERIOD_PS is " & integer'image(PERIOD_PS) & "; legal: 2 or more"
     severity failure;
   assert SEED >= 1
-    report "firm_sim_clock: SEED is " & integer'image(SEED) & "; legal: 1 and more"
+    report "firm_sim_clock: SEED is " & integer'image(SEED) & "; legal: 1 or more"
     severity failure;
 
   tick : process

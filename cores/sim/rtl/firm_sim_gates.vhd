@@ -35,7 +35,7 @@ architecture simulation of firm_sim_gates is
 begin
 
   assert SEED >= 1
-    report "firm_sim_gates: SEED is " & integer'image(SEED) & "; legal: 1 and more"
+    report "firm_sim_gates: SEED is " & integer'image(SEED) & "; legal: 1 or more"
     severity failure;
   assert STALL_PERCENT >= 0 and STALL_PERCENT <= 99
     report "firm_sim_gates: STALL_PERCENT is " & integer'image(STALL_PERCENT) & "; legal: 0 to 99"
@@ -55,7 +55,7 @@ begin
             report "firm_sim_gates: valid(" & integer'image(gate) & ") is " & std_logic'image(valid(gate))
             severity failure;
           assert is_waiting(gate) = '0' or valid(gate) = '1'
-            report "firm_sim_gates: valid(" & integer'image(gate) & ") falls before ready came"
+            report "firm_sim_gates: valid(" & integer'image(gate) & ") falls before ready rises"
             severity failure;
           is_waiting(gate) := valid(gate) and not (is_open_r(gate) and ready(gate));
         end if;

@@ -141,7 +141,7 @@ module firm_sim_host #(
 
   task fail_form;
     begin
-      $fatal(1, "firm_sim_host: ill-formed file of frames");
+      $fatal(1, "firm_sim_host: invalid frame file");
     end
   endtask
 
@@ -186,7 +186,7 @@ module firm_sim_host #(
     begin
       if (frame_count == FRAMES) begin
         begin_form_fault;
-        $display("more than FRAMES, %0d, frames", FRAMES);
+        $display("the file has more than FRAMES (%0d) frames", FRAMES);
         fail_form;
       end
       frame        = base + frame_count;
@@ -198,7 +198,7 @@ module firm_sim_host #(
       header_masks       = 0;
       if (char >= 0 && char != BLANK && char != NEWLINE && char != RETURN) begin
         begin_form_fault;
-        $display("a blank is missing behind the first character");
+        $display("a blank is missing after the first character");
         fail_form;
       end
       label_at[frame] = $ftell(file);
@@ -261,13 +261,13 @@ module firm_sim_host #(
       char  = $fgetc(file);
       if (char < 0 || char == NEWLINE || char == RETURN) begin
         begin_form_fault;
-        $display("half a byte at the end of the line");
+        $display("the line ends with half a byte");
         value = ILL_FORMED;
       end else if (first == "." && char == ".") begin
         value = ANY;
         if (mark != "<" || size[frame] == 0) begin
           begin_form_fault;
-          $display("'..' stands only in an expected frame, behind the id");
+          $display("'..' is legal only in an expected frame, after the id");
           value = ILL_FORMED;
         end
       end else if (digit_value(first) < 0 || digit_value(char) < 0) begin
@@ -383,7 +383,7 @@ module firm_sim_host #(
       close_frame;
       if (mark == ">" && frame_count == 0) begin
         begin_form_fault;
-        $display("the file has no frame");
+        $display("the file contains no frames");
         fail_form;
       end
     end
@@ -437,7 +437,7 @@ module firm_sim_host #(
       is_frame_right = 0;
       begin_fault;
       if (is_shown && receiving == NONE)
-        $write("frame of id %0d: ", received_id);
+        $write("frame with id %0d: ", received_id);
       else if (is_shown)
         begin_of_label(receiving, expected_file);
     end
@@ -607,7 +607,7 @@ module firm_sim_host #(
         if (receiving == NONE) begin
           begin_frame_fault;
           if (is_shown)
-            $display("nobody expects it");
+            $display("no such frame is expected");
         end else begin
           first_of_id[id]        = next_of_id[receiving];
           is_received[receiving] = 1;
@@ -639,7 +639,7 @@ module firm_sim_host #(
         end else if (bytes_received == size[receiving]) begin
           begin_frame_fault;
           if (is_shown)
-            $display("goes on behind its %0d bytes", size[receiving]);
+            $display("continues after its %0d bytes", size[receiving]);
         end
       end
       bytes_received = bytes_received + 1;
@@ -723,11 +723,11 @@ module firm_sim_host #(
     if (tvalid !== 1'b1) begin
       begin_fault;
       if (is_shown)
-        $display("s_axis_tvalid falls before s_axis_tready came");
+        $display("s_axis_tvalid falls before s_axis_tready rises");
     end else if (tdata !== held_tdata || tkeep !== held_tkeep || tid !== held_tid || tlast !== held_tlast) begin
       begin_fault;
       if (is_shown)
-        $display("the stream from the system changes before s_axis_tready came");
+        $display("the stream from the system changes before s_axis_tready rises");
     end
   endtask
 
@@ -848,7 +848,7 @@ module firm_sim_host #(
   task report_verdict;
     begin
       if (faults > FAULTS_SHOWN)
-        $display("and %0d faults more", faults - FAULTS_SHOWN);
+        $display("and %0d more faults", faults - FAULTS_SHOWN);
       $display("%0s %0d/%0d", faults == 0 ? "PASS" : "FAIL", frames_right, expectations);
       if (received_file != 0)
         $fclose(received_file);
@@ -896,17 +896,17 @@ module firm_sim_host #(
       if (WIDTH != 8 && WIDTH != 16 && WIDTH != 32 && WIDTH != 64 && WIDTH != 128 && WIDTH != 256 && WIDTH != 512)
         $fatal(1, "firm_sim_host: WIDTH is %0d; legal: 8, 16, 32, 64, 128, 256, 512", WIDTH);
       if (ERRORS < 1)
-        $fatal(1, "firm_sim_host: ERRORS is %0d; legal: 1 and more", ERRORS);
+        $fatal(1, "firm_sim_host: ERRORS is %0d; legal: 1 or more", ERRORS);
       if (seed < 1 || seed > HIGHEST_SEED)
         $fatal(1, "firm_sim_host: SEED is %0d; legal: 1 to 2147483562", seed);
       if (stall_percent < 0 || stall_percent > 99)
         $fatal(1, "firm_sim_host: STALL_PERCENT is %0d; legal: 0 to 99", stall_percent);
       if (shown < 0)
-        $fatal(1, "firm_sim_host: SHOWN is %0d; legal: 0 and more", shown);
+        $fatal(1, "firm_sim_host: SHOWN is %0d; legal: 0 or more", shown);
       if (watchdog < 1)
-        $fatal(1, "firm_sim_host: WATCHDOG is %0d; legal: 1 and more", watchdog);
+        $fatal(1, "firm_sim_host: WATCHDOG is %0d; legal: 1 or more", watchdog);
       if (quiet < 1)
-        $fatal(1, "firm_sim_host: QUIET is %0d; legal: 1 and more", quiet);
+        $fatal(1, "firm_sim_host: QUIET is %0d; legal: 1 or more", quiet);
     end
   endtask
 

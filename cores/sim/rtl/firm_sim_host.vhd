@@ -76,7 +76,7 @@ begin
     report "firm_sim_host: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
   assert ERRORS >= 1
-    report "firm_sim_host: ERRORS is " & integer'image(ERRORS) & "; legal: 1 and more"
+    report "firm_sim_host: ERRORS is " & integer'image(ERRORS) & "; legal: 1 or more"
     severity failure;
   assert SEED >= 1 and SEED <= HIGHEST_SEED
     report "firm_sim_host: SEED is " & integer'image(SEED) & "; legal: 1 to 2147483562"
@@ -85,13 +85,13 @@ begin
     report "firm_sim_host: STALL_PERCENT is " & integer'image(STALL_PERCENT) & "; legal: 0 to 99"
     severity failure;
   assert SHOWN >= 0
-    report "firm_sim_host: SHOWN is " & integer'image(SHOWN) & "; legal: 0 and more"
+    report "firm_sim_host: SHOWN is " & integer'image(SHOWN) & "; legal: 0 or more"
     severity failure;
   assert WATCHDOG >= 1
-    report "firm_sim_host: WATCHDOG is " & integer'image(WATCHDOG) & "; legal: 1 and more"
+    report "firm_sim_host: WATCHDOG is " & integer'image(WATCHDOG) & "; legal: 1 or more"
     severity failure;
   assert QUIET >= 1
-    report "firm_sim_host: QUIET is " & integer'image(QUIET) & "; legal: 1 and more"
+    report "firm_sim_host: QUIET is " & integer'image(QUIET) & "; legal: 1 or more"
     severity failure;
 
   host : process
@@ -153,7 +153,7 @@ begin
     begin
       is_frame_right := false;
       if receiving = null then
-        fault("frame of id " & integer'image(received_id) & ": " & what);
+        fault("frame with id " & integer'image(received_id) & ": " & what);
       else
         fault("'" & receiving.label_text.all & "': " & what);
       end if;
@@ -303,7 +303,7 @@ begin
       received_id := to_integer(unsigned(id));
       receiving   := expected.first_of_id(received_id);
       if receiving = null then
-        frame_fault("nobody expects it");
+        frame_fault("no such frame is expected");
       else
         expected.first_of_id(received_id) := receiving.next_of_id;
         receiving.is_received             := true;
@@ -334,7 +334,7 @@ begin
           idle_cycles := 0;
           compare_byte(value);
         elsif bytes_received = receiving.size then
-          frame_fault("goes on behind its " & integer'image(receiving.size) & " bytes");
+          frame_fault("continues after its " & integer'image(receiving.size) & " bytes");
         end if;
       end if;
       bytes_received := bytes_received + 1;
@@ -406,10 +406,10 @@ begin
     procedure check_held is
     begin
       if s_axis_tvalid /= '1' then
-        fault("s_axis_tvalid falls before s_axis_tready came");
+        fault("s_axis_tvalid falls before s_axis_tready rises");
       elsif s_axis_tdata /= held_tdata or s_axis_tkeep /= held_tkeep
             or s_axis_tid /= held_tid or s_axis_tlast /= held_tlast then
-        fault("the stream from the system changes before s_axis_tready came");
+        fault("the stream from the system changes before s_axis_tready rises");
       end if;
     end procedure check_held;
 
@@ -531,7 +531,7 @@ begin
       constant SCORE : string := verdict & " " & integer'image(frames_right) & "/" & integer'image(expected.frames);
     begin
       if faults > FAULTS_SHOWN then
-        print("and " & integer'image(faults - FAULTS_SHOWN) & " faults more");
+        print("and " & integer'image(faults - FAULTS_SHOWN) & " more faults");
       end if;
       print(SCORE);
       assert faults = 0 report SCORE severity failure;

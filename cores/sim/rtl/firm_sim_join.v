@@ -138,7 +138,7 @@ module firm_sim_join #(
         count_bytes;
         if (bytes[id] >= HEADER_BYTES && bytes[id] - HEADER_BYTES >= bits[39:8]) begin
           if (s_axis_tlast !== 1'b1)
-            $fatal(1, "burst of id %0d goes on behind its frame", id);
+            $fatal(1, "burst of id %0d continues after its frame", id);
           pass_on;
         end
       end

@@ -139,7 +139,7 @@ begin
         count_bytes(frames(ID));
         if is_whole(ID) then
           if s_axis_tlast /= '1' then
-            fault(ID, "goes on behind its frame");
+            fault(ID, "continues after its frame");
           end if;
           pass_on(ID);
         end if;

@@ -132,7 +132,7 @@ module firm_sim_pipe #(
     begin
       char = $fgetc(requests);
       if (char < 0) begin
-        $display("firm_sim_pipe: the requests end within one");
+        $display("firm_sim_pipe: the requests end within a request");
         fail;
       end
       value = char[7:0];
@@ -146,7 +146,7 @@ module firm_sim_pipe #(
       for (place = 0; place < 4; place = place + 1)
         read_byte(sum[8*place +: 8]);
       if (sum[31]) begin
-        $display("firm_sim_pipe: a request's number is greater than 2147483647");
+        $display("firm_sim_pipe: a number in a request is greater than 2147483647");
         fail;
       end
       number = sum;
@@ -159,7 +159,7 @@ module firm_sim_pipe #(
     begin
       read_number(size);
       if (size == 0) begin
-        $display("firm_sim_pipe: a frame without a byte is requested");
+        $display("firm_sim_pipe: the requested frame has no bytes");
         fail;
       end
       for (place = 0; place < size; place = place + 1) begin
@@ -346,10 +346,10 @@ module firm_sim_pipe #(
 
   task check_held;
     if (tvalid !== 1'b1) begin
-      $write("firm_sim_pipe: s_axis_tvalid falls before s_axis_tready came");
+      $write("firm_sim_pipe: s_axis_tvalid falls before s_axis_tready rises");
       fail_in_cycle;
     end else if (tdata !== held_tdata || tkeep !== held_tkeep || tid !== held_tid || tlast !== held_tlast) begin
-      $write("firm_sim_pipe: the stream from the system changes before s_axis_tready came");
+      $write("firm_sim_pipe: the stream from the system changes before s_axis_tready rises");
       fail_in_cycle;
     end
   endtask
@@ -502,7 +502,7 @@ module firm_sim_pipe #(
       else if (request == "Q")
         report_stand;
       else begin
-        $display("firm_sim_pipe: there is no request %0d; legal: F, R, Q", request);
+        $display("firm_sim_pipe: unknown request %0d; legal: F, R, Q", request);
         fail;
       end
       request = request == "Q" ? -1 : $fgetc(requests);

@@ -67,7 +67,7 @@ architecture simulation of firm_sim_pipe is
   procedure flush_all_files(zero : in integer) is
   begin
     assert false
-      report "firm_sim_pipe: this simulator has no VHPIDIRECT, so it cannot flush a file" severity failure;
+      report "firm_sim_pipe: this simulator does not support VHPIDIRECT, so it cannot flush files" severity failure;
   end procedure flush_all_files;
 
   attribute foreign : string;
@@ -184,7 +184,7 @@ begin
     procedure read_byte(value : out character) is
     begin
       if endfile(requests) then
-        fail("the requests end within one");
+        fail("the requests end within a request");
       end if;
       read(requests, value);
     end procedure read_byte;
@@ -196,7 +196,7 @@ begin
       for place in 0 to 3 loop
         read_byte(byte);
         if place = 3 and byte >= character'val(128) then
-          fail("a request's number is greater than 2147483647");
+          fail("a number in a request is greater than 2147483647");
         end if;
         sum := sum + character'pos(byte) * 2**(8*place);
       end loop;
@@ -209,7 +209,7 @@ begin
     begin
       read_number(size);
       if size = 0 then
-        fail("a frame without a byte is requested");
+        fail("the requested frame has no bytes");
       end if;
       frame       := new frame_t;
       frame.bytes := new string(1 to size);
@@ -409,10 +409,10 @@ begin
     procedure check_held is
     begin
       if s_axis_tvalid /= '1' then
-        fail_in_cycle("s_axis_tvalid falls before s_axis_tready came");
+        fail_in_cycle("s_axis_tvalid falls before s_axis_tready rises");
       elsif s_axis_tdata /= held_tdata or s_axis_tkeep /= held_tkeep
             or s_axis_tid /= held_tid or s_axis_tlast /= held_tlast then
-        fail_in_cycle("the stream from the system changes before s_axis_tready came");
+        fail_in_cycle("the stream from the system changes before s_axis_tready rises");
       end if;
     end procedure check_held;
 
@@ -517,7 +517,7 @@ begin
         when 'F'    => read_frame;
         when 'R'    => run;
         when 'Q'    => report_stand;
-        when others => fail("there is no request " & integer'image(character'pos(request)) & "; legal: F, R, Q");
+        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, R, Q");
       end case;
     end loop;
     wait;

@@ -159,7 +159,7 @@ package body firm_sim_pkg is
         report path & " has fewer lines than there are results" severity failure;
       readline(expected, wanted);
       assert row /= null and row.all = wanted.all
-        report "another result than in " & path & ": " & wanted.all severity failure;
+        report "the result differs from " & path & ": " & wanted.all severity failure;
       deallocate(wanted);
     end if;
     writeline(results, row);
@@ -168,7 +168,7 @@ package body firm_sim_pkg is
   procedure fail_at(path : in string; line_number : in natural; what : in string) is
   begin
     print(path & ":" & integer'image(line_number) & ": " & what);
-    assert false report "firm_sim_host: ill-formed file of frames" severity failure;
+    assert false report "firm_sim_host: invalid frame file" severity failure;
   end procedure fail_at;
 
   -- The value of a hexadecimal digit, or -1.
@@ -254,7 +254,7 @@ package body firm_sim_pkg is
   begin
     if text'length >= 2 then
       if text(2) /= ' ' then
-        fail_at(path, line_number, "a blank is missing behind the first character");
+        fail_at(path, line_number, "a blank is missing after the first character");
       end if;
     end if;
     if text'length >= 3 and text(1) = '<' then
@@ -288,10 +288,10 @@ package body firm_sim_pkg is
       if text(place) = ' ' or text(place) = HT then
         place := place + 1;
       elsif place = text'high then
-        fail_at(path, line_number, "half a byte at the end of the line");
+        fail_at(path, line_number, "the line ends with half a byte");
       elsif text(place to place+1) = ".." then
         if not is_mask_legal or frame.size = 0 then
-          fail_at(path, line_number, "'..' stands only in an expected frame, behind the id");
+          fail_at(path, line_number, "'..' is legal only in an expected frame, after the id");
         end if;
         append_byte(frame, 0, true);
         place := place + 2;
@@ -415,7 +415,7 @@ package body firm_sim_pkg is
     deallocate(line_text);
     close_frame(path, line_number + 1, mark, content);
     if mark = '>' and content.frames = 0 then
-      fail_at(path, line_number + 1, "the file has no frame");
+      fail_at(path, line_number + 1, "the file contains no frames");
     end if;
   end procedure read_frame_file;
 

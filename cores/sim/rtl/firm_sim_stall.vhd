@@ -38,7 +38,7 @@ architecture simulation of firm_sim_stall is
 begin
 
   assert SEED >= 1
-    report "firm_sim_stall: SEED is " & integer'image(SEED) & "; legal: 1 and more"
+    report "firm_sim_stall: SEED is " & integer'image(SEED) & "; legal: 1 or more"
     severity failure;
 
   open_and_close : process (clk)

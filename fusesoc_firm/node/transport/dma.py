@@ -1,7 +1,7 @@
 """AXI DMA between memory and the system's streams, for the block design of a board with a processor.
 
 The engine supports scatter-gather, 26-bit lengths and 32-bit addresses, but not realignment
-(docs/how-to/build-for-a-board.md). Each direction has a ring of descriptors with a buffer each. Frames are copied into
+(docs/how-to/build-for-a-board.md). Each direction has a ring of descriptors, each with a buffer. Frames are copied into
 free buffers, and bursts fill the next free buffers. A frame or burst that is longer than a buffer continues in the next
 buffer. PG021 (AXI DMA) describes registers and descriptors.
 
@@ -21,14 +21,14 @@ from types import TracebackType
 from fusesoc_firm.node.transport.dma_device import DmaDevice
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 
-# The first registers of the channels to and from the system; other registers are at offsets from these.
+# The addresses of the first registers of the channels to and from the system; other registers are at offsets from them.
 TO_SYSTEM, FROM_SYSTEM = 0x00, 0x30
 CONTROL, STATUS, FIRST_DESCRIPTOR, LAST_DESCRIPTOR = 0x00, 0x04, 0x08, 0x10
 _NAMES = {TO_SYSTEM: "MM2S", FROM_SYSTEM: "S2MM"}
 
 
 class Control(IntFlag):
-    """Bits of a channel's control register."""
+    """The bits of a channel's control register."""
 
     RUN = 1 << 0
     RESET = 1 << 2
@@ -38,7 +38,7 @@ class Control(IntFlag):
 
 
 class Status(IntFlag):
-    """Bits of a channel's status register."""
+    """The bits of a channel's status register."""
 
     HALTED = 1 << 0
     HAS_SCATTER_GATHER = 1 << 3
@@ -47,14 +47,14 @@ class Status(IntFlag):
 
 _FAULTS = {
     1 << 4: "DMAIntErr (internal)",
-    1 << 5: "DMASlvErr (memory's answer)",
+    1 << 5: "DMASlvErr (response from memory)",
     1 << 6: "DMADecErr (address)",
     1 << 8: "SGIntErr (descriptor)",
-    1 << 9: "SGSlvErr (memory's answer)",
+    1 << 9: "SGSlvErr (response from memory)",
     1 << 10: "SGDecErr (address)",
 }
 
-# Words of a descriptor, and the bits of its control and status.
+# The words of a descriptor, and the bits in the descriptor's control and status words.
 DESCRIPTOR_BYTES = 64
 NEXT, BUFFER, DESCRIPTOR_CONTROL, DESCRIPTOR_STATUS = 0, 2, 6, 7
 LENGTH, END_OF_FRAME, START_OF_FRAME, COMPLETE = (1 << 26) - 1, 1 << 26, 1 << 27, 1 << 31
@@ -66,7 +66,7 @@ _SHORTEST_PAUSE, _LONGEST_PAUSE = 5e-6, 500e-6
 
 @dataclass(frozen=True)
 class DmaBuffers:
-    """The number of buffers per direction, and the bytes in each: a multiple of 64, or 0 for the most that fit."""
+    """The number of buffers per direction, and the size of each in bytes: a multiple of 64, or 0 for the maximum."""
 
     send: int = 16
     receive: int = 16
@@ -77,7 +77,10 @@ class _Ring:
     """The descriptors and buffers of one direction, used in turn."""
 
     def __init__(self, device: DmaDevice, channel: int, count: int, places: tuple[int, int, int]) -> None:
-        """`places` are the offsets of descriptors and buffers in the memory, and the size of each buffer in bytes."""
+        """Create a ring.
+
+        `places` are the memory offsets of descriptors and buffers, and the size of each buffer in bytes.
+        """
         self._device, self._channel, self._count = device, channel, count
         self._descriptors, self._buffers, self.size = places
         self._words = device.memory.cast("I")
@@ -88,12 +91,12 @@ class _Ring:
             self._set(index, BUFFER, device.address + self._buffers + index * self.size)
 
     def start(self, interrupts: int) -> None:
-        """Start the channel; it waits for descriptors."""
+        """Start the channel, which then waits for descriptors."""
         self._device.write(self._channel + FIRST_DESCRIPTOR, self._address(0))
         self._device.write(self._channel + CONTROL, Control.RUN | Control.ONE_FRAME_AN_INTERRUPT | interrupts)
 
     def next(self, index: int) -> int:
-        """Return the index of the next descriptor."""
+        """Return the index of the descriptor after `index`."""
         return (index + 1) % self._count
 
     def buffer(self, index: int) -> memoryview:
@@ -108,7 +111,7 @@ class _Ring:
         self._device.write(self._channel + LAST_DESCRIPTOR, self._address(index))
 
     def done(self, index: int) -> int | None:
-        """Return the engine's status of a descriptor, or None while it is not done."""
+        """Return the status word of a descriptor, or None until the engine has completed the descriptor."""
         status = self._words[self._place(index) + DESCRIPTOR_STATUS]
         return status if status & COMPLETE else None
 
@@ -126,7 +129,10 @@ class DmaTransport:
     """A transport over AXI DMA."""
 
     def __init__(self, device: DmaDevice, buffers: DmaBuffers | None = None, longest: int = 2**26) -> None:
-        """Reset the engine and thereby the system. No burst has more than `longest` bytes. Raises `TransportError`."""
+        """Reset the engine and thereby the system.
+
+        No burst has more than `longest` bytes. May raise `TransportError`.
+        """
         self._device = device
         self._longest = longest
         self._buffers = buffers or DmaBuffers()
@@ -142,14 +148,15 @@ class DmaTransport:
             self._buffers.receive,
             (self._buffers.send * DESCRIPTOR_BYTES, first_buffer + self._buffers.send * size, size),
         )
-        # Sender: the next descriptor, the first descriptor that the engine owns, and the number of such descriptors.
+        # Sender: the next descriptor, the first descriptor that the engine owns, and the number of descriptors that it
+        # owns.
         self._next_sent, self._first_sent, self._handed_over = 0, 0, 0
-        # Receiver: the descriptor that is filled next, and the bytes of the current burst.
+        # Receiver: the descriptor whose buffer is filled next, and the bytes of the current burst.
         self._next_received, self._burst = 0, bytearray()
         self._start()
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; wait while all buffers are in use. Raises `TransportError`."""
+        """Send a whole frame; wait while all buffers are in use. May raise `TransportError`."""
         with self._sending:
             rest, mark = memoryview(frame), START_OF_FRAME
             while rest:
@@ -183,7 +190,7 @@ class DmaTransport:
         return None
 
     def is_at_rest(self) -> None:
-        """Return None: the hardware behind the engine may be working."""
+        """Return None, because the engine cannot tell whether the hardware is working."""
 
     def close(self) -> None:
         """Stop the engine, so that it does not write to memory that has been released. A second call does nothing."""
@@ -203,23 +210,28 @@ class DmaTransport:
         self.close()
 
     def _buffer_bytes(self) -> int:
-        """Return the size of each buffer. Raises `TransportError` if it, or the number of buffers, is illegal."""
+        """Return the size of each buffer in bytes.
+
+        Raise `TransportError` if the size or number of buffers is illegal.
+        """
         count, size = self._buffers.send + self._buffers.receive, self._buffers.size
         room = len(self._device.memory) - count * DESCRIPTOR_BYTES
         most = min(max(0, room) // max(1, count), LENGTH) // _ALIGNMENT * _ALIGNMENT
         size = size or most
         if min(self._buffers.send, self._buffers.receive) < 2 or size % _ALIGNMENT or not 0 < size <= most:
             raise TransportError(
-                f"the DMA has {self._buffers.send} and {self._buffers.receive} buffers of {size} bytes; legal: 2 and"
-                f" more, a multiple of {_ALIGNMENT}, and all within the memory's {len(self._device.memory)}"
+                f"the DMA has {self._buffers.send} and {self._buffers.receive} buffers of {size} bytes; legal: 2 or"
+                f" more, a multiple of {_ALIGNMENT}, and all within the {len(self._device.memory)} bytes of memory"
             )
         return size
 
     def _start(self) -> None:
         if not self._reset():
-            raise TransportError("the DMA engine does not leave its reset: does it have a clock?")
+            raise TransportError("the DMA engine does not leave reset; check the engine's clock")
         if not self._device.read(TO_SYSTEM + STATUS) & Status.HAS_SCATTER_GATHER:
-            raise TransportError("the DMA engine lacks scatter-gather, so it is not from a generated block design")
+            raise TransportError(
+                "the DMA engine does not support scatter-gather, so it is not from a generated block design"
+            )
         self._to_system.start(Control.INTERRUPT_ON_ERROR)
         self._from_system.start(Control.INTERRUPT_ON_COMPLETE | Control.INTERRUPT_ON_ERROR)
         if not all(_soon(self._runs(channel)) for channel in (TO_SYSTEM, FROM_SYSTEM)):
@@ -231,7 +243,7 @@ class DmaTransport:
         return lambda: not self._device.read(channel + STATUS) & Status.HALTED
 
     def _reset(self) -> bool:
-        """Reset both channels, which one reset does; return whether the reset has finished."""
+        """Reset both channels with a single reset; return whether the reset has finished."""
         self._device.write(TO_SYSTEM + CONTROL, Control.RESET)
         return _soon(lambda: not self._device.read(TO_SYSTEM + CONTROL) & Control.RESET)
 
@@ -254,7 +266,7 @@ class DmaTransport:
         """Append the content of a buffer; return whether the burst is complete."""
         size = status & LENGTH
         if size > self._from_system.size:
-            raise TransportError("the DMA engine wrote beyond a buffer")
+            raise TransportError("the DMA engine wrote past the end of a buffer")
         if status & START_OF_FRAME:
             self._burst.clear()
         self._burst += self._from_system.buffer(self._next_received)[:size]
@@ -268,13 +280,13 @@ class DmaTransport:
         status = self._device.read(channel + STATUS)
         found = [text for bit, text in _FAULTS.items() if status & bit]
         if status & Status.HALTED and not found:
-            found = ["it has halted"]
+            found = ["the channel has halted"]
         if found and not self._closing.is_set():
             raise TransportError(f"the DMA engine's {_NAMES[channel]}: {', '.join(found)}")
 
 
 def _soon(condition: Callable[[], bool]) -> bool:
-    """Return whether a condition holds now or within a short time."""
+    """Return whether a condition becomes true within a short time."""
     end = time.monotonic() + _RESET_SECONDS
     while not condition():
         if time.monotonic() > end:

@@ -1,6 +1,6 @@
-"""AXI DMA for a driver in user space under Linux: registers, an interrupt, and memory shared with the engine.
+"""Access to AXI DMA from user space under Linux: registers, an interrupt, and memory shared with the engine.
 
-UIO provides registers and interrupt, u-dma-buf (https://github.com/ikwzm/udmabuf) the memory.
+UIO provides the registers and the interrupt, and u-dma-buf (https://github.com/ikwzm/udmabuf) provides the memory.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from fusesoc_firm.node.transport.transport import TransportError
 _WORD_BYTES = 4
 _POLL_SECONDS = 50e-6
 _REACH = 2**32
-# A mode of u-dma-buf: neither cached nor mapped as device memory, which allows only aligned accesses.
+# The mode of u-dma-buf that is neither cached nor mapped as device memory; device memory allows only aligned accesses.
 _WRITE_COMBINE = "2"
 
 
 class DmaDevice(Protocol):
-    """The engine as its driver sees it; a test may provide its own."""
+    """The driver's interface to the engine, which tests may also implement."""
 
     @property
     def memory(self) -> memoryview:
@@ -30,16 +30,16 @@ class DmaDevice(Protocol):
 
     @property
     def address(self) -> int:
-        """The address of its first byte as the engine sees it."""
+        """The address of the memory's first byte, as the engine sees it."""
 
     def read(self, offset: int) -> int:
-        """Read a register, by its offset in bytes."""
+        """Return the value of the register at `offset` (in bytes)."""
 
     def write(self, offset: int, value: int) -> None:
-        """Set a register."""
+        """Set the register at `offset` (in bytes)."""
 
     def wait(self, timeout: float | None) -> None:
-        """Sleep until an unacknowledged interrupt, until the timeout, or until `end`."""
+        """Wait for an unacknowledged interrupt, the timeout (in seconds) or a call of `end`."""
 
     def end(self) -> None:
         """Wake all threads that wait, now and later."""
@@ -49,15 +49,15 @@ class LinuxDmaDevice:
     """The engine of a board that runs Linux."""
 
     def __init__(self, uio: str, buffer: str, *, has_interrupt: bool, root: Path = Path("/")) -> None:
-        """`uio` is a device such as /dev/uio0, whose first map holds the registers; `buffer` a name such as udmabuf0.
+        """Open the engine; `uio` is a device such as /dev/uio0, `buffer` a name such as udmabuf0.
 
-        Without an interrupt, the registers are polled every 50 us. All paths begin with `root`. Raises
-        `TransportError`.
+        The first map of `uio` holds the registers. Without an interrupt, the registers are polled every 50 us. All
+        paths begin with `root`. May raise `TransportError`.
         """
         self._has_interrupt = has_interrupt
         about = root / "sys/class/u-dma-buf" / buffer
         if not about.is_dir():
-            # The path in older releases.
+            # The path that older releases of u-dma-buf use.
             about = root / "sys/class/udmabuf" / buffer
         self._address, size = _number(about / "phys_addr"), _number(about / "size")
         if self._address + size > _REACH:
@@ -74,7 +74,7 @@ class LinuxDmaDevice:
             finally:
                 os.close(shared)
         except (OSError, ValueError) as error:
-            raise TransportError(f"the DMA devices {uio} and {buffer} cannot be used: {error}") from None
+            raise TransportError(f"cannot use the DMA devices {uio} and {buffer}: {error}") from None
         self._wake, self._woken = os.pipe()
 
     @property
@@ -84,19 +84,19 @@ class LinuxDmaDevice:
 
     @property
     def address(self) -> int:
-        """The address of its first byte as the engine sees it."""
+        """The address of the memory's first byte, as the engine sees it."""
         return self._address
 
     def read(self, offset: int) -> int:
-        """Read a register, by its offset in bytes."""
+        """Return the value of the register at `offset` (in bytes)."""
         return self._registers[offset // _WORD_BYTES]
 
     def write(self, offset: int, value: int) -> None:
-        """Set a register."""
+        """Set the register at `offset` (in bytes)."""
         self._registers[offset // _WORD_BYTES] = value
 
     def wait(self, timeout: float | None) -> None:
-        """Sleep until an unacknowledged interrupt, until the timeout, or until `end`."""
+        """Wait for an unacknowledged interrupt, the timeout (in seconds) or a call of `end`."""
         if not self._has_interrupt:
             time.sleep(_POLL_SECONDS)
             return
@@ -106,7 +106,7 @@ class LinuxDmaDevice:
             if self._interrupt in select.select([self._interrupt, self._wake], [], [], timeout)[0]:
                 os.read(self._interrupt, _WORD_BYTES)
         except OSError as error:
-            raise TransportError(f"the DMA engine's interrupt: {error.strerror}") from None
+            raise TransportError(f"cannot wait for the DMA engine's interrupt: {error.strerror}") from None
 
     def end(self) -> None:
         """Wake all threads that wait, now and later."""
@@ -114,11 +114,11 @@ class LinuxDmaDevice:
 
 
 def _number(path: Path) -> int:
-    """Return the number in a device's one-line file."""
+    """Return the number in a device's single-line file."""
     try:
         text = path.read_text(encoding="ascii").strip()
         return int(text, 0)
     except OSError:
-        raise TransportError(f"{path} cannot be read: is its driver loaded?") from None
+        raise TransportError(f"cannot read {path}; check whether the driver is loaded") from None
     except ValueError:
-        raise TransportError(f"{path} holds '{text}', which is not a number") from None
+        raise TransportError(f"{path} contains '{text}', which is not a number") from None

@@ -1,4 +1,4 @@
-"""Opens a transport by its address, as given on a command line or in a launch file (docs/reference/transports.md).
+"""Open a transport by its address, as given on a command line or in a launch file (docs/reference/transports.md).
 
 pipe:COMMAND                      a simulator
 uart:DEVICE:BAUD[:rtscts]         a serial line, with flow control by wires
@@ -20,9 +20,9 @@ LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts], dma:UIO:BUFFER[:poll]"
 
 
 def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Event], None] | None = None) -> Transport:
-    """Open the transport with an address; `pace` and `observe` are for a simulator. Raises `TransportError`.
+    """Open the transport at an address; `pace` and `observe` are for a simulator. May raise `TransportError`.
 
-    A simulator's command is split into words as by a shell, with quotes but no other special characters.
+    A simulator's command is split into words as in a shell, where only quotes are special characters.
     """
     kind, _, rest = address.partition(":")
     if kind == "pipe" and rest.strip():
@@ -47,7 +47,7 @@ def _words(address: str, command: str) -> list[str]:
 
 
 def _device(text: str, option: str) -> tuple[str, str, bool]:
-    """Split `FIRST:SECOND` and an optional `option`, from the end: device names may hold colons."""
+    """Split `FIRST:SECOND` and an optional `:option` from the end, since device names may contain colons."""
     has_option = text.endswith(option)
     first, _, second = text.removesuffix(option).rpartition(":")
     return first, second, has_option

@@ -1,6 +1,6 @@
 """A simulated system at the end of a pipe (docs/reference/transports.md, 'A simulator's pipe').
 
-    with Simulator(command, folder) as simulator:               # step by step: the same requests, the same reports
+    with Simulator(command, folder) as simulator:               # step by step: equal requests give equal reports
         simulator.request(pack_frame(0, payload))
         for event in simulator.run(1000):
             ...
@@ -29,24 +29,24 @@ from typing import NoReturn
 from fusesoc_firm.node.transport.transport import Burst, TransportError, TransportResetError
 
 MOST_CYCLES = 2**31 - 1
-"""The limit of the cycles of one run, and of the bytes of a frame."""
+"""The maximum number of cycles in one run, and of bytes in a frame."""
 
-# Put the pipes at the descriptors that a simulator expects. A shell cannot copy two-digit descriptors, but can open
-# them by name.
+# Connect the pipes to the descriptors that a simulator expects. A shell cannot copy two-digit descriptors, but it can
+# open them by name.
 _SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
 _ID_ERROR = 65535
 _SHOWN_LINES = 20
-# A simulator normally ends at once when it is asked to, or when its pipes close.
+# A simulator normally ends immediately on request, or when its pipes close.
 _END_SECONDS = 10.0
 
-# A thread runs the simulator for this time before looking for frames again, within the limits on cycles.
+# The thread runs the simulator for this time before it checks for new frames, within the limits on cycles.
 _STEP_SECONDS = 0.001
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
 
 
 @dataclass(frozen=True)
 class Taken:
-    """The system took a frame: the cycles of its first and its last beat."""
+    """The event that the system took a frame: the cycles of the frame's first and last beat."""
 
     first_cycle: int
     last_cycle: int
@@ -54,7 +54,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class ErrorPulse:
-    """A pulse of a converter's bit of `frame_error`, or of `id_error` if the converter is None."""
+    """A pulse of a converter's bit in `frame_error`, or of `id_error` if the converter is None."""
 
     converter: int | None
     cycle: int
@@ -64,13 +64,13 @@ Event = Taken | Burst | ErrorPulse
 
 
 class Simulator:
-    """A simulator in lock-step: it runs only on request. One thread uses it.
+    """A simulator in lock-step, which runs only on request and may be used by only one thread.
 
-    `cycle` is the number of cycles run so far; the last `quiet` of them had no beat in either direction.
+    `cycle` is the number of cycles run so far; the last `quiet` of these cycles had no beat in either direction.
     """
 
     def __init__(self, command: Sequence[str], folder: Path | None = None) -> None:
-        """Start `command` in `folder`. Raises `TransportError`."""
+        """Start `command` in `folder`. May raise `TransportError`."""
         self.cycle = 0
         self.quiet = 0
         self._printed = tempfile.TemporaryFile()  # noqa: SIM115
@@ -86,7 +86,7 @@ class Simulator:
                 stdout=self._printed,
                 stderr=subprocess.STDOUT,
                 pass_fds=(from_us, to_us),
-                # Ctrl-C reaches only this process; the simulator ends with its requests.
+                # Ctrl-C reaches only this process; the simulator ends when the pipe of requests closes.
                 start_new_session=True,
             )
         except OSError as error:
@@ -102,20 +102,20 @@ class Simulator:
         return self._process.pid
 
     def request(self, frame: bytes) -> None:
-        """Append a frame to the frames to send to the system. Raises `TransportError`."""
+        """Append a frame to the frames that wait to be sent to the system. May raise `TransportError`."""
         if not 1 <= len(frame) <= MOST_CYCLES:
-            raise ValueError(f"a frame of {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
+            raise ValueError(f"the frame has {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
         self._write(b"F" + len(frame).to_bytes(4, "little"), frame)
 
     def run(self, cycles: int) -> list[Event]:
-        """Run for `cycles`, or until the end of the first cycle with an event. Raises `TransportError`."""
+        """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""
         if not 0 <= cycles <= MOST_CYCLES:
-            raise ValueError(f"{cycles} cycles; legal: 0 to {MOST_CYCLES}")
+            raise ValueError(f"cycles is {cycles}; legal: 0 to {MOST_CYCLES}")
         self._write(b"R" + cycles.to_bytes(4, "little"))
         return self._events()
 
     def quit(self) -> None:
-        """End the simulation. Raises `TransportError` if it does not end normally."""
+        """End the simulation. Raise `TransportError` if it does not end normally."""
         self._write(b"Q")
         self._events()
         status = self._wait()
@@ -124,7 +124,10 @@ class Simulator:
         self.close()
 
     def kill(self) -> None:
-        """Kill the simulator at once. Any thread may do so; the simulator's thread gets a `TransportError`."""
+        """Kill the simulator immediately; any thread may call this method.
+
+        The thread that uses the simulator gets a `TransportError`.
+        """
         self._process.kill()
 
     def close(self) -> None:
@@ -142,7 +145,7 @@ class Simulator:
                 continue
 
     def printed(self) -> str:
-        """Return the last lines that the simulator printed."""
+        """Return the last lines of the simulator's output."""
         if self._printed.closed:
             return ""
         text = os.pread(self._printed.fileno(), os.fstat(self._printed.fileno()).st_size, 0)
@@ -174,7 +177,7 @@ class Simulator:
         return int.from_bytes(self._read(size), "little")
 
     def _events(self) -> list[Event]:
-        """Return all reports up to the report at which the simulation stops."""
+        """Return all events up to the report at which the simulation stops."""
         events: list[Event] = []
         while (kind := self._read(1)) != b"S":
             events.append(self._event(kind))
@@ -191,10 +194,10 @@ class Simulator:
         if kind == b"E":
             converter = self._number(2)
             return ErrorPulse(None if converter == _ID_ERROR else converter, self._number(8))
-        return self._fail(f"the simulator sent 0x{kind.hex()} where a report begins")
+        return self._fail(f"the simulator sent 0x{kind.hex()} instead of the start of a report")
 
     def _wait(self) -> int | None:
-        """Return the exit status of the simulator; None if it does not end."""
+        """Return the simulator's exit status, or None if the simulator does not end."""
         try:
             return self._process.wait(_END_SECONDS)
         except subprocess.TimeoutExpired:
@@ -216,12 +219,12 @@ class Simulator:
 
 @dataclass(frozen=True)
 class Pace:
-    """How a `SimulatorTransport` runs its simulator.
+    """The settings with which a `SimulatorTransport` runs its simulator.
 
-    `send` waits while the system has not yet taken `most_frames` earlier frames. The simulator rests after
-    `rest_cycles` without a beat. At rest it still runs a little every `idle_seconds`, for accelerators that send
-    spontaneously (None: it does not). Like hardware that is not read, it stops while unreceived bursts hold
-    `most_bytes`. If it ends unexpectedly, another simulator is started, up to `restarts` times.
+    `send` waits while `most_frames` earlier frames have not yet been taken by the system. The simulator rests after
+    `rest_cycles` without a beat. At rest, the simulator still runs briefly every `idle_seconds`, for accelerators that
+    send spontaneously (None: never). Like hardware whose output is not read, the simulator stops while unreceived
+    bursts contain `most_bytes`. If the simulator ends unexpectedly, another one is started, up to `restarts` times.
     """
 
     most_frames: int = 2
@@ -232,7 +235,7 @@ class Pace:
 
 
 class SimulatorTransport:
-    """A transport to a simulator, which a thread of the transport runs."""
+    """A transport to a simulator that runs in a thread of the transport."""
 
     def __init__(
         self,
@@ -240,9 +243,9 @@ class SimulatorTransport:
         pace: Pace | None = None,
         observe: Callable[[Event], None] | None = None,
     ) -> None:
-        """`start` creates the simulator; the thread calls `observe`, which must not raise, with every event.
+        """Start the simulator with `start`; the thread passes every event to `observe`, which must not raise.
 
-        Raises `TransportError` if the simulator cannot be started.
+        Raise `TransportError` if the simulator cannot be started.
         """
         self._start = start
         self._pace = pace or Pace()
@@ -261,7 +264,7 @@ class SimulatorTransport:
         self._thread.start()
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; wait while the system is not ready. Raises `TransportError`."""
+        """Send a whole frame; wait while the system is not ready. May raise `TransportError`."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_over or self._frames < self._pace.most_frames)
             if self._is_closed:
@@ -273,7 +276,7 @@ class SimulatorTransport:
             self._changed.notify_all()
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """Return the next burst, as `Transport.receive` does; bursts that arrived before an error come first."""
+        """Return the next burst, as `Transport.receive` does; all bursts that arrived before an error precede it."""
         with self._changed:
             self._changed.wait_for(lambda: self._received or self._is_over, timeout)
             if not self._received:
@@ -288,13 +291,13 @@ class SimulatorTransport:
             return item
 
     def is_at_rest(self) -> bool:
-        """Return whether the system has taken all frames, and then had no beat for `rest_cycles`."""
+        """Return whether the system has taken all frames and has had no beat for `rest_cycles` since then."""
         with self._changed:
             is_busy = self._frames or self._received
             return not is_busy and self._simulator.quiet >= self._pace.rest_cycles
 
     def close(self) -> None:
-        """Stop, and kill the simulator. A second call does nothing."""
+        """Close the transport and kill the simulator. A second call does nothing."""
         with self._changed:
             self._is_closed = True
             self._simulator.kill()
@@ -311,7 +314,7 @@ class SimulatorTransport:
 
     @property
     def waiting_bytes(self) -> int:
-        """The number of bytes in bursts that wait to be received."""
+        """The number of bytes in the bursts that wait to be received."""
         return self._bytes
 
     @property
@@ -319,7 +322,7 @@ class SimulatorTransport:
         return self._is_closed or self._error is not None
 
     def _serve(self) -> None:
-        """Run the simulator in the thread; start another one when it ends and a restart is left."""
+        """Run the simulator in the thread; if it ends and restarts remain, start another one."""
         try:
             while not self._is_over:
                 try:
@@ -355,7 +358,7 @@ class SimulatorTransport:
             self._changed.notify_all()
 
     def _adapt(self, cycles: int, seconds: float) -> None:
-        """Adapt the cycles of a step to the simulator's speed."""
+        """Adapt the number of cycles in a step to the simulator's speed."""
         if cycles == self._step and seconds < _STEP_SECONDS / 2:
             self._step = min(2 * self._step, _MOST_CYCLES)
         elif seconds > 2 * _STEP_SECONDS:
@@ -369,7 +372,7 @@ class SimulatorTransport:
             self._bytes += len(event.data)
 
     def _recover(self, error: TransportError) -> None:
-        """Restart with the frames not yet passed to the simulator, or end."""
+        """Start another simulator with the frames that were not passed on; without remaining restarts, end."""
         if self._is_closed or not self._restarts:
             self._end(error)
             return

@@ -1,8 +1,8 @@
-"""The only interface to the hardware: it sends frames and receives bursts.
+"""The single interface to the hardware, which sends frames and receives bursts.
 
     with transport:
         transport.send(pack_frame(0, payload))          # waits while the hardware is not ready
-        burst = transport.receive(timeout=1.0)          # None if none arrived in time
+        burst = transport.receive(timeout=1.0)          # None if no burst arrived in time
 
 A simulator's pipe, a UART and AXI DMA implement this interface. `../cpp/firm/transport.hpp` is the C++ version.
 """
@@ -15,7 +15,7 @@ from typing import Protocol
 
 
 class TransportError(Exception):
-    """The hardware, or the path to it, has gone or violates the protocol; the transport is unusable."""
+    """The hardware or the path to it is lost or violates the protocol; the transport is unusable."""
 
 
 class TransportResetError(TransportError):
@@ -24,10 +24,10 @@ class TransportResetError(TransportError):
 
 @dataclass(frozen=True)
 class Burst:
-    """The bytes of the system's stream up to a `tlast` that `tkeep` marks as valid: a frame or a part of one.
+    """The valid bytes (by `tkeep`) of the system's stream up to a `tlast`: a frame or a part of a frame.
 
-    `tid` is the stream's `tid`, if the transport carries it. For simulated hardware, the cycles of clk in which the
-    first and the last beat were taken are known.
+    `tid` is the stream's `tid`, if the transport carries it. For simulated hardware, the burst also contains the clk
+    cycles in which the first and the last beat were taken.
     """
 
     data: bytes
@@ -37,27 +37,27 @@ class Burst:
 
 
 class Transport(Protocol):
-    """One thread may send while another receives; closing ends both."""
+    """A path to the hardware. One thread may send while another receives; closing the transport ends both calls."""
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; return when the hardware, or a bounded buffer, has it. Raises `TransportError`."""
+        """Send a whole frame; return when the hardware, or a bounded buffer, has it. May raise `TransportError`."""
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """Return the next burst; None after `timeout` seconds (None: no limit), or when the transport is closed.
+        """Return the next burst, or None after `timeout` seconds (None: no limit) or when the transport is closed.
 
-        Raises `TransportError`, in particular `TransportResetError` if incomplete frames must be dropped.
+        May raise `TransportError`, in particular `TransportResetError` if incomplete frames must be dropped.
         """
 
     def is_at_rest(self) -> bool | None:
-        """Return whether all frames sent have had their effect, and all responses were received; None if unknown."""
+        """Return whether all sent frames are processed and all responses are received, or None if this is unknown."""
 
     def close(self) -> None:
-        """Stop; sent frames may be lost. A second call does nothing."""
+        """Close the transport; sent frames may be lost. A second call does nothing."""
 
     def __enter__(self) -> Transport:
-        """Return the transport, which has been open since its creation."""
+        """Return the transport, which was opened at its creation."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close it."""
+        """Close the transport."""

@@ -1,12 +1,12 @@
-"""Hardware at a serial line (cores/board, robot:board:firm_link): raw frames, 8 bits, no parity, 1 stop bit.
+"""Hardware on a serial line (cores/board, robot:board:firm_link): raw frames, 8 bits, no parity, 1 stop bit.
 
     with UartTransport("/dev/ttyUSB1") as transport:
         transport.send(pack_frame(0, payload))
         burst = transport.receive(timeout=1.0)          # a whole frame, since a link carries no parts of frames
 
-A byte stream has no markers. The board accepts a break as a marker: the next byte begins a frame. From the board, only
-silence is a marker. The transport uses both markers when it is opened, and again when received bytes cannot form a
-frame: after an illegal length, or a pause in the middle of a frame.
+A byte stream does not mark the start of a frame. To the board, a break marks it: the next byte begins a frame. From the
+board, only silence marks it. The transport uses both markers when it is opened, and again when received bytes cannot
+form a frame: after an illegal length, or after a pause in the middle of a frame.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ DEFAULT_BAUD = 1_000_000
 
 _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 _CHUNK_BYTES = 65536
-# The silence that separates frames after bytes were lost; a USB adapter holds bytes back for milliseconds.
+# The silence that separates frames after bytes were lost; a USB adapter may delay bytes by milliseconds.
 _SILENT_SECONDS = 0.05
 # After this time without silence, the transport gives up on the board.
 _MOST_SILENCE_SECONDS = 2.0
-# In the middle of a frame from the board.
+# The longest pause in the middle of a frame from the board.
 _LONGEST_PAUSE_SECONDS = 0.2
 
 
@@ -40,9 +40,9 @@ class UartTransport:
     def __init__(
         self, device: str, baud: int = DEFAULT_BAUD, *, has_flow_control: bool = False, longest: int = 2**26
     ) -> None:
-        """Open `device`, with flow control by RTS and CTS if it `has_flow_control`, else at the line's full rate.
+        """Open `device`, with flow control by RTS and CTS if `has_flow_control` is set, else at the line's full rate.
 
-        No payload has more than `longest` bytes. Raises `TransportError`.
+        No payload has more than `longest` bytes. May raise `TransportError`.
         """
         self._device = device
         self._longest = longest
@@ -55,14 +55,12 @@ class UartTransport:
         self._is_closed = False
         speed = getattr(termios, f"B{baud}", None)
         if not speed:
-            raise TransportError(
-                f"{baud} is not a legal baud rate; legal are 115200, 1000000 and 2000000, among others"
-            )
+            raise TransportError(f"{baud} is not a legal baud rate; legal: 115200, 1000000, 2000000 and others")
         try:
             self._line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as error:
             raise TransportError(f"cannot open the serial line {device}: {error.strerror}") from None
-        # Closing wakes waiting threads.
+        # `close` writes to this pipe to wake waiting threads.
         self._wake, self._woken = os.pipe()
         try:
             _configure(self._line, speed, has_flow_control=has_flow_control)
@@ -72,9 +70,9 @@ class UartTransport:
             raise TransportError(f"{device} is not a serial line: {error.args[-1]}") from None
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; wait while the line is busy or held. Raises `TransportError`.
+        """Send a whole frame; wait while the line is busy or held. May raise `TransportError`.
 
-        Raises `TransportResetError` if a break ends the frame.
+        Raise `TransportResetError` if a break ends the frame.
         """
         rest = memoryview(frame)
         with self._sending:
@@ -82,7 +80,7 @@ class UartTransport:
             while rest:
                 if self._is_closed:
                     raise TransportError("the transport is closed")
-                # Check a held line again, because a break may have come.
+                # While flow control holds the line, check repeatedly for a break from the board.
                 select.select([self._wake], [self._line], [], _LONGEST_PAUSE_SECONDS)
                 with self._writing:
                     if self._cuts != cuts:
@@ -90,20 +88,20 @@ class UartTransport:
                     rest = rest[self._write(rest) :]
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """Return the next frame as a burst. Raises `TransportError`, `TransportResetError` for illegal bytes."""
+        """Return the next frame as a burst. May raise `TransportError`, or `TransportResetError` for illegal bytes."""
         with self._receiving:
             return self._receive(timeout)
 
     def is_at_rest(self) -> None:
-        """Return None: the hardware at the other end of a line may be working."""
+        """Return None, because the line cannot tell whether the hardware is working."""
 
     def close(self) -> None:
-        """Stop. A second call does nothing."""
+        """Close the line. A second call does nothing."""
         if self._is_closed:
             return
         self._is_closed = True
         os.close(self._woken)
-        # While a thread still uses a descriptor, do not close it: another file could get its number.
+        # Do not close a descriptor that a thread still uses, since another file could then receive the same number.
         with self._receiving, self._sending:
             os.close(self._line)
             os.close(self._wake)
@@ -133,7 +131,7 @@ class UartTransport:
         return None
 
     def _cut(self) -> None:
-        """Send a break, and drop all bytes received before the break and all bytes that are waiting to be sent."""
+        """Send a break; drop all bytes received before the break and all bytes that wait to be sent."""
         with self._writing:
             self._cuts += 1
             termios.tcflush(self._line, termios.TCOFLUSH)
@@ -142,7 +140,7 @@ class UartTransport:
         while self._is_readable(_SILENT_SECONDS):
             self._read()
             if time.monotonic() > end:
-                raise TransportError(f"{self._device} is never silent, so frames cannot be told apart")
+                raise TransportError(f"{self._device} is never silent, so the start of a frame cannot be found")
         self._begun.clear()
 
     def _begin_anew(self, why: str) -> None:
@@ -155,7 +153,7 @@ class UartTransport:
         return self._line in select.select([self._line, self._wake], [], [], seconds)[0]
 
     def _next_frame(self) -> bytes | None:
-        """Return a complete frame; None while there is none."""
+        """Return the next complete frame, or None while it is incomplete."""
         if len(self._begun) < _HEADER_BYTES:
             return None
         length = int.from_bytes(self._begun[ID_BYTES:_HEADER_BYTES], "little")
@@ -176,7 +174,7 @@ class UartTransport:
         except OSError as error:
             raise self._gone(error.strerror) from None
         if not data:
-            raise self._gone("it hung up")
+            raise self._gone("the device hung up")
         return data
 
     def _write(self, data: memoryview) -> int:
@@ -192,15 +190,15 @@ class UartTransport:
 
 
 def _configure(line: int, speed: int, *, has_flow_control: bool) -> None:
-    """Configure a line for raw bytes at a speed."""
+    """Configure a line for raw bytes at a speed, given as a constant of termios."""
     control = termios.CS8 | termios.CREAD | termios.CLOCAL
     if has_flow_control:
         control |= termios.CRTSCTS
     special = termios.tcgetattr(line)[6]
-    # Ignore received breaks; no echo, no waiting for lines.
+    # Ignore received breaks, do not echo, and do not wait for complete lines of text.
     termios.tcsetattr(line, termios.TCSANOW, [termios.IGNBRK, 0, control, 0, speed, speed, special])
 
 
 def _least(*seconds: float | None) -> float | None:
-    """Return the shortest of several times; None means no limit."""
+    """Return the shortest of several time limits; None means no limit."""
     return min((max(0.0, item) for item in seconds if item is not None), default=None)

@@ -1,4 +1,4 @@
-"""`firm scheduler bench`: reproduces section 4.3, with a progress bar, as Markdown, CSV and pictures."""
+"""`firm scheduler bench`: reproduce section 4.3 as Markdown, CSV and pictures, with a progress bar."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from fusesoc_firm.tools.workers import Workers, cluster_workers, local_workers
 
 REPORT = "evaluation.md"
 
-# The metrics of each evaluation that the terminal shows.
+# The metrics that the terminal shows for each evaluation.
 _SHOWN = ("granted", "finished", "preemptions", "response_avg", "lateness_avg", "lateness_max", "utilisation")
 
 
 @dataclass(frozen=True)
 class Selection:
-    """The selection to evaluate: all combinations of these values."""
+    """The evaluations to run: all combinations of these values."""
 
     data_sets: Sequence[str]
     policies: Sequence[str]
@@ -58,9 +58,9 @@ class Places:
 
 
 def bench(selection: Selection, places: Places) -> None:
-    """Evaluate, print a summary, and write the outputs that `places` requests.
+    """Run the evaluations, print a summary, and write the outputs that `places` requests.
 
-    Raises `InputError` before any evaluation if a place cannot be written.
+    Raise `InputError` before the first evaluation if an output cannot be written.
     """
     _check(places)
     settings = selection.settings
@@ -106,14 +106,17 @@ def write(evaluation: chapter.Evaluation, selection: Selection, folder: Path) ->
         for timeline in lines:
             pictures.draw_timeline(timeline, folder)
     else:
-        print("No pictures: they need matplotlib (pip install 'fusesoc-firm[plots]')", file=sys.stderr)
+        print(
+            "No pictures are drawn, because matplotlib is not installed: pip install 'fusesoc-firm[plots]'",
+            file=sys.stderr,
+        )
     path = folder / REPORT
     path.write_text(_report(selection, tables, figures, lines), encoding="utf-8")
     return path
 
 
 def _check(places: Places) -> None:
-    """Make the folder, and check that the file can be written, since an evaluation should not fail only at its end."""
+    """Create the folder, and check that the file can be written, so that a long evaluation does not fail at its end."""
     if places.output:
         make_folder(places.output)
     if places.csv:
@@ -131,7 +134,7 @@ def _workers(places: Places) -> AbstractContextManager[Workers]:
 def _report(selection: Selection, tables: Sequence[Table], figures: Sequence[Figure], lines: Sequence[Timeline]) -> str:
     settings = selection.settings
     data_sets = "\n".join(f"* {_heading(name, settings)}" for name in selection.data_sets)
-    intro = f"""The dissertation's section 4.3 again, by `firm scheduler bench`: {_of_all(settings)}.
+    intro = f"""The dissertation's section 4.3, reproduced with `firm scheduler bench`: {_of_all(settings)}.
 Times are in clock cycles; docs/explanation/scheduler-evaluation.md defines the metrics.
 
 {data_sets}
@@ -156,12 +159,12 @@ Times are in clock cycles; docs/explanation/scheduler-evaluation.md defines the 
 
 
 def _of_all(settings: Settings) -> str:
-    """The settings that all evaluations share, if they differ from section 4.3."""
+    """Return a text with the shared settings that differ from section 4.3."""
     found = f"seed {settings.seed}, {settings.distribution} distribution"
     if settings.shortest_run > 1:
         found += f", a shortest run of {settings.shortest_run} beats"
     if settings.resume_beats:
-        found += f", {settings.resume_beats} more beats in each resumed run"
+        found += f", {settings.resume_beats} additional beats in each resumed run"
     return found
 
 
@@ -181,7 +184,7 @@ def _summary(evaluation: chapter.Evaluation, data_set: str) -> str:
 
 
 def _all_values(evaluation: chapter.Evaluation) -> str:
-    """A row for each evaluation and a column for each metric; NaN becomes an empty cell."""
+    """Return CSV text with a row for each evaluation and a column for each metric; NaN becomes an empty cell."""
     lines = [",".join(("data_set", "policy", "requesters", *METRICS))]
     for key, means in evaluation.means.items():
         values = ("" if means[name] != means[name] else f"{means[name]:.6g}" for name in METRICS)
@@ -190,7 +193,7 @@ def _all_values(evaluation: chapter.Evaluation) -> str:
 
 
 def names_of(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
-    """The names in a comma-separated list; raises `InputError` for an unknown name."""
+    """Return the names in a comma-separated list; raise `InputError` for an unknown name."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in legal:
@@ -199,10 +202,10 @@ def names_of(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
 
 
 def numbers_of(text: str, most: int = 256) -> tuple[int, ...]:
-    """The numbers of accelerators in a comma-separated list, sorted; raises `InputError` for an illegal number."""
+    """Return the sorted numbers of accelerators in a comma-separated list; raise `InputError` for an illegal one."""
     found = set()
     for word in text.split(","):
         if not word.strip().isdecimal() or not 1 <= int(word) <= most:
-            fail(f"'{word.strip()}' is not a number of accelerators", hint=f"legal: 1 to {most}, such as 2,8,256")
+            fail(f"'{word.strip()}' is not a legal number of accelerators", hint=f"legal: 1 to {most}, such as 2,8,256")
         found.add(int(word))
     return tuple(sorted(found))

@@ -19,33 +19,33 @@ CORNER_CASES = tuple(name for name in DATA_SETS if name != LARGE)
 
 _NOT_MEASURED = "Our LUTs and FFs are not measured here; `make bench` measures them."
 _MEASURED = "Ours are Yosys', the dissertation's Vivado's; a dash is not measured."
-# Values with equal text are equally good.
+# Values whose text is equal are ranked as equal.
 _EQUAL = 0.005
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The means of all metrics over the sets of a data set, by key, with the known areas."""
+    """The mean of each metric over the sets of a data set, by key, with the known areas."""
 
     means: Mapping[Key, Mapping[str, float]]
     areas: Areas
 
     def value(self, data_set: str, policy: str, requesters: int, metric: str) -> float:
-        """The mean of a metric; NaN if the metric was not evaluated."""
+        """Return the mean of a metric, or NaN if the metric was not evaluated."""
         return self.means.get(Key(data_set, policy, requesters), {}).get(metric, math.nan)
 
     def requesters(self, data_set: str) -> tuple[int, ...]:
-        """The evaluated numbers of accelerators."""
+        """Return the evaluated numbers of accelerators."""
         return tuple(sorted({key.requesters for key in self.means if key.data_set == data_set}))
 
     def policies(self, data_set: str) -> tuple[str, ...]:
-        """The evaluated policies, in the order of the tables."""
+        """Return the evaluated policies, in the order of the tables."""
         found = {key.policy for key in self.means if key.data_set == data_set}
         return tuple(name for name in TABLE_ORDER if name in found)
 
 
 def tables(evaluation: Evaluation) -> Iterator[Table]:
-    """Tables 4.1 to 4.6; the tables of the data set are included only if it was evaluated."""
+    """Yield tables 4.1 to 4.6; the tables of a data set are included only if the data set was evaluated."""
     yield _area_table(evaluation.areas)
     yield _ratio_table(evaluation.areas)
     if evaluation.requesters(LARGE):
@@ -57,7 +57,7 @@ def tables(evaluation: Evaluation) -> Iterator[Table]:
 
 
 def figures(evaluation: Evaluation) -> Iterator[Figure]:
-    """Figures 4.5 to 4.7 and 4.10 to 4.18, with all evaluated values."""
+    """Yield figures 4.5 to 4.7 and 4.10 to 4.18 with all evaluated values."""
     yield _area_figure(evaluation.areas)
     if numbers := evaluation.requesters(LARGE):
         yield from _large_figures(evaluation, numbers)
@@ -101,7 +101,7 @@ def _ratio_table(areas: Areas) -> Table:
 def _spread_table(
     evaluation: Evaluation, number: str, title: str, metric: str, theirs: Mapping[str, Mapping[int, Sequence[float]]]
 ) -> Table:
-    """Minimum, average and maximum for each policy and number of accelerators, next to the dissertation's values."""
+    """Return a table of minima, averages and maxima by policy and number of accelerators, ours beside `theirs`."""
     parts = ("min", "avg", "max")
     rows = []
     for policy in evaluation.policies(LARGE):
@@ -115,7 +115,7 @@ def _spread_table(
 
 
 def _verdict(ours: float, theirs: float) -> str:
-    """The comparison of our value with the dissertation's value, for metrics where smaller is better."""
+    """Return a word that compares our value with the dissertation's, for metrics where smaller is better."""
     if math.isnan(ours) or math.isnan(theirs):
         return UNKNOWN
     if abs(ours - theirs) <= _EQUAL:
@@ -140,7 +140,7 @@ def _comparison_table(evaluation: Evaluation) -> Table:
     rows = []
     for number in evaluation.requesters(LARGE):
         for criterion, title, score in _criteria(evaluation, number):
-            # Non-preemptive policies are left out, as in the dissertation.
+            # Non-preemptive policies are omitted, as in the dissertation.
             taking_part = [name for name in policies if criterion != "preemptions" or POLICIES[name].is_preemptive]
             best = _best({name: score(name) for name in taking_part})
             theirs = dissertation().comparison.get(number, {}).get(criterion, [])
@@ -150,7 +150,7 @@ def _comparison_table(evaluation: Evaluation) -> Table:
 
 
 def _criteria(evaluation: Evaluation, number: int) -> Iterator[tuple[str, str, Callable[[str], float]]]:
-    """The key, title and score of each criterion; the smallest score is the best."""
+    """Yield the key, title and score of each criterion; the smallest score is the best."""
 
     def area(policy: str, part: str) -> float:
         found = evaluation.areas.get((policy, number))
@@ -169,7 +169,7 @@ def _criteria(evaluation: Evaluation, number: int) -> Iterator[tuple[str, str, C
 
 
 def _best(scores: Mapping[str, float]) -> list[str]:
-    """All policies with the best score; empty if a score is unknown."""
+    """Return all policies with the best score, or an empty list if a score is unknown."""
     if not scores or any(math.isnan(score) for score in scores.values()):
         return []
     least = min(scores.values())

@@ -13,7 +13,7 @@ COMBINED_REQUESTERS = 256
 """The accelerators of figure 4.18 and of table 4.5."""
 
 BASELINES: Mapping[str, str] = MappingProxyType({"LOEDF256": "edf_latency", "LST256": "lst"})
-"""What they are compared with: the name in table 4.5, and the policy."""
+"""The schedulers for comparison: the name in table 4.5, and the policy."""
 
 COMBINATIONS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
@@ -23,14 +23,14 @@ COMBINATIONS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "(LST128+LOEDF128)+LRU2": ("lst", "edf_latency"),
     }
 )
-"""The policies of the lower and of the upper half of the accelerators, by the name in table 4.5."""
+"""The policies for the lower and the upper half of the accelerators, by the combination's name in table 4.5."""
 
 TOP = "lru"
-"""The policy that chooses between the halves."""
+"""The policy that chooses between the two halves."""
 
 
 def combined(policies: tuple[str, str], generics: Generics) -> Combined:
-    """The model of a combination whose two halves have the requesters in their original order."""
+    """Return the model of a combination; its two halves contain the requesters in their original order."""
     half = generics.requesters // 2
     parts = (slice(0, half), slice(half, None))
     groups = [make_model(policy, generics.part(part)) for policy, part in zip(policies, parts, strict=True)]

@@ -1,4 +1,4 @@
-"""The evaluation of section 4.3 as jobs; each has a data set, a number of accelerators and a scheduler."""
+"""The evaluation of section 4.3 as jobs, each with a data set, a number of accelerators and a scheduler."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from fusesoc_firm.tools.workers import Workers
 class Settings:
     """The settings of all jobs; if `sets` or `cycles` is None, the value of the data set applies.
 
-    `shortest_run` and `resume_beats` apply to preemptive policies. The former is the number of beats before a run may
-    be interrupted. The latter is the number of additional cycles for each run of a task except its first. They are 1
-    and 0 in section 4.3; the Manager's bursts cost one cycle.
+    Both `shortest_run` and `resume_beats` apply to preemptive policies. `shortest_run` is the number of beats before a
+    run may be interrupted, 1 in section 4.3. `resume_beats` is the number of additional cycles for each run of a task
+    except the first run: 0 in section 4.3, 1 with the Manager's bursts.
     """
 
     seed: int = 1
@@ -31,11 +31,11 @@ class Settings:
     resume_beats: int = 0
 
     def sets_of(self, data_set: str) -> int:
-        """The number of sets of a data set that are simulated."""
+        """Return the number of simulated sets of a data set."""
         return self.sets or DATA_SETS[data_set].sets
 
     def cycles_of(self, data_set: str) -> int:
-        """The number of cycles of each set's simulation."""
+        """Return the number of simulated cycles for each set."""
         return self.cycles or DATA_SETS[data_set].cycles
 
 
@@ -58,7 +58,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The metrics of each set, with the duration in seconds."""
+    """The metrics of a job's sets, with the duration of the job in seconds."""
 
     key: Key
     metrics: Metrics
@@ -66,9 +66,9 @@ class Outcome:
 
 
 def model_of(policy: str, workload: Workload, shortest_run: int = 1) -> SchedulerModel:
-    """The model of a policy or a combination for a workload.
+    """Return the model of a policy or a combination for a workload.
 
-    The period of a requester is the least time between its requests, which is its implicit deadline.
+    The period of a requester is the minimum time between requests, which is also the implicit deadline.
     """
     generics = Generics(workload.deadlines, workload.transfer_times, shortest_run=shortest_run)
     if policy in COMBINATIONS:
@@ -77,7 +77,7 @@ def model_of(policy: str, workload: Workload, shortest_run: int = 1) -> Schedule
 
 
 def evaluate(job: Job) -> Outcome:
-    """Simulate and measure; all schedulers get the same workload (section 4.3)."""
+    """Run a job and return its outcome; all schedulers get the same workload (section 4.3)."""
     started = time.perf_counter()
     key, settings = job.key, job.settings
     workload = draw(
@@ -89,9 +89,9 @@ def evaluate(job: Job) -> Outcome:
 
 
 def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence[int], settings: Settings) -> list[Job]:
-    """A job for each combination, longest jobs first, so that no worker finishes long after the others.
+    """Return a job for each combination, the longest first, so that no worker finishes long after the others.
 
-    The combined schedulers of figure 4.18 are included if all their components are.
+    The combined schedulers of figure 4.18 are included if all their component policies are.
     """
     data_sets = list(data_sets)
     keys = [Key(data_set, policy, number) for data_set in data_sets for policy in policies for number in requesters]
@@ -106,5 +106,5 @@ def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence
 
 
 def run(to_do: Iterable[Job], workers: Workers) -> Iterator[Outcome]:
-    """The outcome of each job, in the order of completion."""
+    """Return an iterator over the outcomes of the jobs, in the order of completion."""
     return (outcome for _, outcome in workers.run(evaluate, to_do))

@@ -1,8 +1,8 @@
 """The metrics of section 4.3, for each set and averaged over the sets of a data set.
 
-The dissertation defines each metric but not its aggregation. Here the minimum, average and maximum are taken over the
-tasks of a set, then averaged over the sets. This explains why all three columns of tables 4.3 and 4.4 have fractions,
-and the models of the fixed priorities and of LRU reproduce their values.
+The dissertation defines the metrics but not their aggregation. Here the minimum, average and maximum are computed over
+the tasks of a set, then averaged over the sets. This aggregation explains why all three columns of tables 4.3 and 4.4
+contain fractions, and with it the models of fixed priority and LRU reproduce the tables' values.
 
 The response time covers every granted task, although equation 4.4 refers to completed transactions. The maxima of
 table 4.3 are only reproduced if tasks that the end of the simulation cut short are included
@@ -26,35 +26,37 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Metrics:
-    """All metrics of section 4.3, one element for each set, shape (B,); NaN if a set has no task to measure.
+    """All metrics of section 4.3 as arrays of shape (B,), one element for each set.
+
+    An element is NaN if its set has no task to measure.
 
     Times are in cycles.
     """
 
     granted: Values
-    """Accelerators that got the grant at least once (figure 4.6)."""
+    """The number of accelerators that got the grant at least once (figure 4.6)."""
     finished: Values
-    """Accelerators that completed at least one transaction (figure 4.6)."""
+    """The number of accelerators that completed at least one transaction (figure 4.6)."""
     completed: Values
-    """Tasks that were completed."""
+    """The number of completed tasks."""
     preemptions: Values
-    """Preemptions an accelerator for each of its completed transactions, averaged over the accelerators that completed
-    one (figure 4.7)."""
+    """Preemptions per completed transaction of an accelerator, averaged over the accelerators that completed a
+    transaction (figure 4.7)."""
     response_min: Values
     response_avg: Values
     response_max: Values
-    """Response time g - a (equation 4.3) of granted tasks, completed or not (table 4.3)."""
+    """The response time g - a (equation 4.3) of all granted tasks, completed or not (table 4.3)."""
     lateness_min: Values
     lateness_avg: Values
     lateness_max: Values
-    """Lateness f - d of completed transactions (equation 4.5; table 4.4); the deadline is implicit."""
+    """The lateness f - d of completed transactions (equation 4.5, table 4.4) with implicit deadlines."""
     utilisation: Values
-    """Channel utilisation (equation 4.6): cycles with a beat, of all cycles, in percent."""
+    """Channel utilisation (equation 4.6): the percentage of all cycles in which a beat was accepted."""
     utilisation_requested: Values
-    """The same of the cycles in which somebody asked, in percent."""
+    """The percentage of the cycles with a request in which a beat was accepted."""
 
     def means(self) -> dict[str, float]:
-        """The mean of each metric over the sets with a value; NaN if no set has a value."""
+        """Return the mean of each metric over the sets with a value, or NaN if no set has a value."""
         return {each.name: _mean(getattr(self, each.name)) for each in fields(self)}
 
 
@@ -62,7 +64,7 @@ METRICS = tuple(each.name for each in fields(Metrics))
 
 
 def measure(trace: Trace) -> Metrics:
-    """The metrics of a simulation."""
+    """Return the metrics of a simulation."""
     tasks, sets, requesters = trace.tasks, trace.workload.sets, trace.workload.requesters
     done = tasks.is_finished
     of_set, of_requester = tasks.set[done], tasks.requester[done]
@@ -87,7 +89,7 @@ def measure(trace: Trace) -> Metrics:
 
 
 class _Spread:
-    """Minimum, average and maximum of the values of each set."""
+    """The minimum, average and maximum of the values in each set."""
 
     def __init__(self, of_set: Times, values: Times, sets: int) -> None:
         counts = np.bincount(of_set, minlength=sets)
@@ -101,16 +103,16 @@ class _Spread:
 
 
 def _distinct(of_set: Times, of_requester: Times, sets: int, requesters: int) -> Values:
-    """The number of distinct requesters in each set."""
+    """Return the number of distinct requesters in each set, shape (B,)."""
     found = np.zeros((sets, requesters), np.bool_)
     found[of_set, of_requester] = True
     return np.asarray(found.sum(axis=1), float)
 
 
 def _preemptions(trace: Trace, completed: Times) -> Values:
-    """The preemptions per completed task, averaged over the accelerators that completed a task.
+    """Return the preemptions per completed task, averaged over the accelerators that completed a task.
 
-    Preemptions of unfinished tasks count too.
+    Preemptions of unfinished tasks are also counted.
     """
     tasks = trace.tasks
     found = np.zeros(completed.shape)
@@ -120,7 +122,7 @@ def _preemptions(trace: Trace, completed: Times) -> Values:
 
 
 def _ratio(numerator: Any, denominator: Any) -> Values:
-    """The element-wise quotient; NaN for a zero denominator."""
+    """Return the element-wise quotient, with NaN for a zero denominator."""
     ratio: Values = np.where(denominator > 0, numerator / np.maximum(denominator, 1), np.nan)
     return ratio
 

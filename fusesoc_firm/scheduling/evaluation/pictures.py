@@ -1,4 +1,4 @@
-"""Draws figures with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
+"""Draw figures with matplotlib, an extra dependency: `pip install 'fusesoc-firm[plots]'`."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ SUFFIXES = ("png", "svg")
 _PANEL_INCHES = (6.0, 4.0)
 _TIMELINE_INCHES = (9.0, 3.0)
 _MARKERS = "osv^DPX"
-# Without the date and random names that matplotlib writes into files, equal values give equal bytes.
+# Without the date and the random names that matplotlib writes, equal values result in equal bytes.
 _SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
 _METADATA = {"png": {"Software": None}, "svg": {"Date": None}}
 
 
 def are_possible() -> bool:
-    """Whether matplotlib is installed."""
+    """Return whether matplotlib is installed."""
     return find_spec("matplotlib") is not None
 
 
 def draw_figure(figure: Figure, folder: Path) -> None:
-    """Draw a figure, with solid lines for our values and dashed lines for the dissertation's."""
+    """Draw a figure with solid lines for our values and dashed lines for the dissertation's values."""
     plots = _plots()
     columns = min(2, len(figure.panels))
     rows = -(-len(figure.panels) // columns)
@@ -65,7 +65,7 @@ def _plots() -> Any:
 
 
 def _draw_bars(axis: Any, figure: Figure, panel: Panel) -> None:
-    """Draw a bar for each scheduler, for a single number of accelerators."""
+    """Draw a bar for each scheduler, for a figure with a single number of accelerators."""
     heights = [values[0] for values in panel.series.values()]
     axis.barh(list(panel.series), heights)
     axis.invert_yaxis()

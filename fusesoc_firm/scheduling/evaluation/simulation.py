@@ -1,7 +1,7 @@
-"""Requesters and a sink around the model of a scheduler, cycle by cycle, for all sets of a data set at once.
+"""Simulate requesters and a sink around a scheduler's model, cycle by cycle, for all sets of a data set at once.
 
-A requester follows section 4.3: it raises its request, holds it until all its beats are accepted (AXI-Stream), pauses
-for its frequency, and requests again. The sink accepts a beat in every cycle.
+A requester follows section 4.3: it asserts its request, holds the request until all beats are accepted (AXI-Stream),
+pauses for the number of cycles called its frequency, and requests again. The sink accepts a beat in every cycle.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ Flags = NDArray[np.bool_]
 
 
 class SchedulerModel(Protocol):
-    """The two registers of a scheduler, for B sets, and its clock."""
+    """The interface to a scheduler's model: the two output registers for B sets, and the clock edge."""
 
     @property
     def grant_valid(self) -> Flags:
-        """Whether a grant was given since the reset, (B,)."""
+        """Whether a requester has been granted since reset, shape (B,)."""
 
     @property
     def grant_select(self) -> Times:
-        """The granted requester, (B,)."""
+        """The granted requester, shape (B,)."""
 
     def step(self, request: Flags, beat: Flags, last: Flags) -> None:
         """Simulate a rising edge; `request` has the shape (B, N), `beat` and `last` have the shape (B,)."""
@@ -34,26 +34,26 @@ class SchedulerModel(Protocol):
 
 @dataclass(frozen=True)
 class Tasks:
-    """All granted tasks, one in each element, in the order of their ends; unfinished tasks come last.
+    """All granted tasks as arrays with one element per task, in the order of completion; unfinished tasks are last.
 
-    Times are clock edges: an event in cycle k begins at k and ends at k + 1. `finish` is -1 for a task that the end of
-    the simulation cut short.
+    Times are clock edges: an event in cycle k begins at k and ends at k + 1. For a task that the end of the simulation
+    cut short, `finish` is -1.
     """
 
     set: Times
     requester: Times
     arrival: Times
-    """The request is seen for the first time (a_i of equation 4.3)."""
+    """The time at which the request is first seen (a_i in equation 4.3)."""
     grant: Times
-    """The request and the grant are seen together for the first time (g_i): with this sink, the first beat begins."""
+    """The time at which request and grant are first seen together (g_i); with this sink, the first beat then begins."""
     finish: Times
-    """The last beat is over (f_i of equation 4.5)."""
+    """The time at which the last beat ends (f_i in equation 4.5)."""
     preemptions: Times
-    """How often another requester was granted between the task's beats."""
+    """The number of times that another requester was granted between the task's beats."""
 
     @property
     def is_finished(self) -> Flags:
-        """Whether the last beat was accepted."""
+        """Whether the last beat of each task was accepted."""
         return np.asarray(self.finish >= 0)
 
 
@@ -65,9 +65,9 @@ class Trace:
     cycles: int
     tasks: Tasks
     busy: Times
-    """Cycles in which a beat was taken."""
+    """The number of cycles in which a beat was accepted."""
     requested: Times
-    """Cycles in which somebody asked."""
+    """The number of cycles in which at least one requester requested."""
 
 
 def simulate(
@@ -77,13 +77,13 @@ def simulate(
     first_requests: Times | None = None,
     resume_beats: int = 0,
 ) -> Trace:
-    """Run a model for a number of cycles after its reset.
+    """Simulate a model for a number of cycles after its reset, and return the trace.
 
-    `first_requests` (B, N) are the cycles of the first requests. If it is None, each requester makes its first request
-    after its usual pause. Section 4.3 leaves this open; this choice explains the maxima of table 4.3 for two
-    accelerators, while simultaneous first requests would give a quarter more. Each run of a task except its first
-    begins with `resume_beats` additional cycles, which the Manager needs to resume a burst; the scheduler sees no beat
-    in these cycles.
+    `first_requests` (B, N) are the cycles of the first requests. If `first_requests` is None, each requester makes its
+    first request after its usual pause. Section 4.3 does not define the times of the first requests. This choice
+    explains the maxima of table 4.3 for two accelerators; simultaneous first requests would result in maxima that are a
+    quarter larger. Each run of a task except the first run begins with `resume_beats` additional cycles, which the
+    Manager needs to resume a burst; the scheduler sees no beat in these cycles.
     """
     first = workload.frequencies if first_requests is None else first_requests
     environment = _Environment(workload, first, resume_beats)
@@ -104,7 +104,7 @@ class _Environment:
         periods = np.zeros_like(workload.frequencies) if workload.periods is None else workload.periods
         self.periods = periods.ravel()
         self.base = np.arange(shape[0]) * shape[1]
-        # 32 bits, since these are compared with the time in every cycle.
+        # 32 bits for speed, since these values are compared with the time in every cycle.
         self.next_request = first_requests.astype(np.int32)
         self.request = np.zeros(shape, np.bool_)
         count = self.lengths.size
@@ -112,7 +112,7 @@ class _Environment:
         self.arrival = np.zeros(count, np.int64)
         self.grant = np.full(count, -1, np.int64)
         self.preemptions = np.zeros(count, np.int64)
-        # The current run: its task, and the remaining beats of its resumption.
+        # The current run: its task, and the remaining cycles of its resumption.
         self.running = self.base.copy()
         self.owed = np.zeros(shape[0], np.int64)
         self.busy = np.zeros(shape[0], np.int64)
@@ -146,12 +146,12 @@ class _Environment:
         self.requested += self.request.any(axis=1)
 
     def _begin_runs(self, granted: Times, served: Flags, cycle: int) -> None:
-        """Where the served task changes, note its first grant or its resumption, and the interrupted task."""
+        """Where the served task changes, record the new task's first grant or resumption, and the interrupted task."""
         begins = served & ((granted != self.running) | (self.grant[granted] < 0))
         if not begins.any():
             return
         new, old = granted[begins], self.running[begins]
-        # The interrupted task has begun and is unfinished, unless it is the beginning task.
+        # The interrupted task has begun and is unfinished, unless it is itself the task that begins.
         interrupted = old[(self.grant[old] >= 0) & (old != new)]
         self.preemptions[interrupted] += 1
         is_first = self.grant[new] < 0
@@ -169,7 +169,7 @@ class _Environment:
         self.preemptions[done] = 0
 
     def trace(self, cycles: int) -> Trace:
-        """The tasks noted so far, including unfinished tasks that have begun."""
+        """Return the tasks recorded so far, including unfinished tasks that have begun."""
         cut = np.flatnonzero(self.grant >= 0)
         cut_short = (cut, self.arrival[cut], self.grant[cut], np.full(cut.size, -1), self.preemptions[cut])
         columns = [np.concatenate(column) for column in zip(*self.finished, cut_short, strict=True)]

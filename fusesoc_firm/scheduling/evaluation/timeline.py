@@ -12,16 +12,16 @@ from fusesoc_firm.scheduling.evaluation.workloads import Times, Workload
 
 
 class Recorder:
-    """A scheduler that records its ports in every cycle."""
+    """A wrapper that records a scheduler's ports in every cycle."""
 
     def __init__(self, model: SchedulerModel) -> None:
         self._model = model
         self.request: list[Flags] = []
-        """(B, N) in each cycle."""
+        """The requests in each cycle, shape (B, N)."""
         self.beat: list[Flags] = []
         self.last: list[Flags] = []
         self.granted: list[Times] = []
-        """Who is granted, (B,) in each cycle; -1 before the first grant."""
+        """The granted requester in each cycle, shape (B,); -1 before the first grant."""
 
     @property
     def grant_valid(self) -> Flags:
@@ -44,7 +44,7 @@ class Recorder:
 
 @dataclass(frozen=True)
 class Timeline:
-    """The requests of each accelerator and the granted accelerator (-1: none yet) in each cycle."""
+    """The requests of the accelerators, and the granted accelerator (-1: none yet), in each cycle."""
 
     number: str
     title: str
@@ -57,7 +57,7 @@ class Timeline:
         return f"figure_{self.number.replace('.', '_')}"
 
     def csv(self) -> str:
-        """The timeline as CSV, with a row for each cycle."""
+        """Return the timeline as CSV, with a row for each cycle."""
         names = [f"request_{index}" for index in range(len(self.requests))]
         lines = [",".join(["cycle", *names, "granted"])]
         for cycle, granted in enumerate(self.granted):
@@ -67,7 +67,7 @@ class Timeline:
 
 
 def timelines() -> tuple[Timeline, Timeline]:
-    """Figure 4.8, LRU with four accelerators, and figure 4.9, a request that waits for its grant."""
+    """Return figure 4.8, LRU with four accelerators, and figure 4.9, a request that waits for the grant."""
     four = Workload(np.array([[9, 5, 7, 4]]), np.array([[6, 9, 5, 12]]))
     two = Workload(np.array([[12, 8]]), np.array([[40, 4]]))
     return (
@@ -77,7 +77,10 @@ def timelines() -> tuple[Timeline, Timeline]:
 
 
 def record(policy: str, workload: Workload, cycles: int) -> tuple[tuple[tuple[bool, ...], ...], tuple[int, ...]]:
-    """The requests and grants of the workload's first set; all accelerators request in cycle 1."""
+    """Return the requests and the grant of the workload's first set in each cycle.
+
+    All accelerators request in cycle 1.
+    """
     recorder = Recorder(model_of(policy, workload))
     simulate(recorder, workload, cycles, np.ones_like(workload.frequencies))
     requests = np.array(recorder.request)[:, 0, :].T

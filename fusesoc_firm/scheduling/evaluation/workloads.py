@@ -15,9 +15,6 @@ Times = NDArray[np.int64]
 REQUESTERS = (2, 4, 8, 16, 32, 64, 128, 256)
 """The numbers of accelerators in the dissertation's tables."""
 
-NANOSECONDS_PER_CYCLE = 10
-"""At the 100 MHz of section 4.3."""
-
 
 class Distribution(StrEnum):
     """The distribution of times around a data set's centre."""
@@ -28,10 +25,10 @@ class Distribution(StrEnum):
 
 @dataclass(frozen=True)
 class DataSet:
-    """The centre and spread of a data set, and the extent of its simulation; all times in cycles.
+    """The centre and spread of a data set, and the extent of its simulation. All times are in cycles.
 
     An accelerator is a pair S = {T, F} (section 4.3): it sends `transfer_time` beats, and has new data `frequency`
-    cycles after its last beat.
+    cycles after the last beat.
     """
 
     name: str
@@ -64,10 +61,10 @@ DATA_SETS: Mapping[str, DataSet] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Workload:
-    """Accelerators of B sets of N each; the arrays have the shape (B, N) and count cycles.
+    """The accelerators of B sets, N in each set; the arrays have the shape (B, N) and contain cycles.
 
-    A request comes at least `frequencies` after the last transmission and `periods` after the last request. If
-    `periods` is None, only `frequencies` apply.
+    A request occurs at least `frequencies` after the last transmission and `periods` after the last request. If
+    `periods` is None, only `frequencies` applies.
     """
 
     transfer_times: Times
@@ -102,7 +99,7 @@ def draw(
     sets: int | None = None,
     distribution: Distribution = Distribution.NORMAL,
 ) -> Workload:
-    """Draw a workload of a data set; equal arguments give equal workloads on every machine.
+    """Draw a workload from a data set; equal arguments result in equal workloads on every machine.
 
     Each set has a separate random generator, so a larger number of `sets` leaves the first sets unchanged.
     """
@@ -112,12 +109,12 @@ def draw(
 
 
 def _pairs(data_set: DataSet, requesters: int, seed: list[int], distribution: Distribution) -> Times:
-    """Transfer times and frequencies of a set, shape (2, N)."""
+    """Return the transfer times and frequencies of a set, shape (2, N)."""
     generator = np.random.default_rng(seed)
     centre = np.array([[data_set.transfer_time], [data_set.frequency]], dtype=float)
     if distribution is Distribution.NORMAL:
         drawn = generator.normal(centre, data_set.sigma, (2, requesters))
     else:
         drawn = generator.uniform(centre - data_set.sigma, centre + data_set.sigma, (2, requesters))
-    # This cuts off 2 % of a normal distribution whose centre is two sigma above 0.
+    # This limit cuts off 2 % of a normal distribution whose centre is two sigma above 0.
     return np.maximum(np.rint(drawn), 1).astype(np.int64)

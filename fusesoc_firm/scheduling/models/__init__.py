@@ -13,7 +13,7 @@ __all__ = ["Combined", "Generics", "Scheduler", "make_model"]
 
 
 def make_model(policy: str, generics: Generics) -> Scheduler:
-    """The model of a policy just after reset; raises `ValueError` for generics that the entity refuses."""
+    """Return the model of a policy just after reset; raise `ValueError` for generics that the entity rejects."""
     module = import_module(f"{__name__}.{POLICIES[policy].model_file}")
     make: Callable[[Generics], Scheduler] = getattr(module, policy)
     return make(generics)

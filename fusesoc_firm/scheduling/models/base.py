@@ -1,4 +1,4 @@
-"""The common parts of all models of schedulers.
+"""The common parts of all scheduler models.
 
 A model behaves like its entity in cores/sched, cycle by cycle, for a batch of B schedulers with N requesters each. The
 ports are arrays; `step` is a rising edge of the clock.
@@ -23,11 +23,11 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Generics:
-    """The generics of the entities; each policy uses those that it needs.
+    """The generics of all schedulers' entities; each policy uses the generics that it needs.
 
-    Times are in clock cycles, (B, N). If `deadlines` is None, deadlines are implicit (section 4.1). If `time_bits` is
-    None, time never wraps around. Raises `ValueError` for arrays of different shapes and for values that the entities
-    reject.
+    Times are in clock cycles, shape (B, N). If `deadlines` is None, deadlines are implicit (section 4.1). If
+    `time_bits` is None, time never wraps around. Raises `ValueError` for arrays of different shapes and for values that
+    the entities reject.
     """
 
     periods: Ints
@@ -42,11 +42,13 @@ class Generics:
             if times is None:
                 continue
             if times.shape != self.periods.shape or times.ndim != 2:
-                raise ValueError(f"{name} has the shape {times.shape}; legal: (batch, requesters) as the periods")
+                raise ValueError(
+                    f"{name} has the shape {times.shape}; legal: (batch, requesters), the shape of the periods"
+                )
             if times.min() < 1:
-                raise ValueError(f"a time in {name} is {times.min()}; legal: 1 and more cycles")
+                raise ValueError(f"a time in {name} is {times.min()}; legal: 1 or more cycles")
         if self.shortest_run < 1:
-            raise ValueError(f"shortest_run is {self.shortest_run}; legal: 1 and more beats")
+            raise ValueError(f"shortest_run is {self.shortest_run}; legal: 1 or more beats")
 
     @property
     def batch(self) -> int:
@@ -60,11 +62,11 @@ class Generics:
 
     @property
     def relative_deadlines(self) -> Ints:
-        """The time from a request to its deadline, (B, N)."""
+        """The time from a request to its deadline, shape (B, N)."""
         return self.periods if self.deadlines is None else self.deadlines
 
     def part(self, requesters: slice) -> Generics:
-        """The generics for a subset of the requesters."""
+        """Return the generics for a subset of the requesters."""
         deadlines, transfer_times = (
             None if times is None else times[:, requesters] for times in (self.deadlines, self.transfer_times)
         )
@@ -75,7 +77,7 @@ class Generics:
 class Scheduler(ABC):
     """A batch of schedulers of one policy, just after reset.
 
-    `grant_valid` and `grant_select`, both (B,), are the registers of the same names in the current cycle.
+    `grant_valid` and `grant_select`, both of shape (B,), are the registers with the same names in the current cycle.
     """
 
     MAX_REQUESTERS = 256
@@ -91,23 +93,23 @@ class Scheduler(ABC):
 
     @abstractmethod
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
-        """Simulate a rising edge; `request` (B, N), `beat` and `last` (B,) are the inputs in the ending cycle.
+        """Simulate a rising edge; `request` (B, N), `beat` (B,) and `last` (B,) are the inputs in the cycle that ends.
 
-        No argument is changed. `beat` may be true only where the grant is valid and its requester requests. `last`
-        matters only where `beat` is true.
+        No argument is changed. `beat` may be true only where the grant is valid and the granted requester requests.
+        `last` is ignored where `beat` is false.
         """
 
     def _without_granted(self, request: Bools, without: Bools) -> Bools:
-        """A copy of `request` (B, N) without the granted requester's request where `without` (B,) is true."""
+        """Return a copy of `request` (B, N) without the granted requester's request where `without` (B,) is true."""
         eligible = request.copy()
         eligible[self._members, self.grant_select] &= ~without
         return eligible
 
     def _of_granted(self, request: Bools) -> Bools:
-        """Whether the granted requester requests, (B,)."""
+        """Return whether the granted requester requests, shape (B,)."""
         return request[self._members, self.grant_select]
 
     def _grant(self, choice: Ints, where: Bools) -> None:
-        """Give the grant to `choice` (B,) where `where` (B,) is true."""
+        """Grant the requesters `choice` (B,) where `where` (B,) is true."""
         self.grant_valid = self.grant_valid | where
         self.grant_select = np.where(where, choice, self.grant_select)

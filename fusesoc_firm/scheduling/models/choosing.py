@@ -10,22 +10,28 @@ from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
 
 class ChoosingScheduler(Scheduler):
-    """A scheduler that chooses in each cycle without a task in progress.
+    """A scheduler that chooses a requester in each cycle without a task in progress.
 
-    It also chooses in the cycle of a task's last beat; that task's requester is then excluded.
+    The scheduler also chooses in the cycle of a task's last beat, when it excludes the requester of that task.
     """
 
     def __init__(self, batch: int, requesters: int) -> None:
         super().__init__(batch, requesters)
-        # The granted task has had a beat and needs more.
+        # Whether the granted task has had a beat and needs further beats.
         self._started: Bools = np.zeros(batch, np.bool_)
 
     @abstractmethod
     def _choose(self, eligible: Bools) -> Ints:
-        """The chosen requester, (B,), among those in `eligible` (B, N); arbitrary where none is eligible."""
+        """Return the chosen requester (B,) among the `eligible` (B, N).
+
+        The choice is arbitrary where none is eligible.
+        """
 
     def _note_completed(self, finished: Bools) -> None:
-        """Note a completed task of the granted requester where `finished` (B,) is true; runs before the choice."""
+        """Record that the granted requester completed a task where `finished` (B,) is true.
+
+        `step` calls this method before the choice.
+        """
 
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
         """See `Scheduler`."""

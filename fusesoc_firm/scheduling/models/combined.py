@@ -10,17 +10,20 @@ from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
 
 class Combined(Scheduler):
-    """A combined scheduler; a group requests if its granted requester does, and only the chosen group sees beats.
+    """A combined scheduler: a group requests if its granted requester does, and only the chosen group sees beats.
 
-    The requesters of the first of `groups` have the lowest indices. `top` has a requester for each group. Raises
-    `ValueError` if the number of groups or the sizes of the batches do not match.
+    The requesters of the first group in `groups` have the lowest indices. `top` has one requester for each group.
+    Raises `ValueError` if the number of groups or the sizes of the batches do not match.
     """
 
     def __init__(self, groups: Sequence[Scheduler], top: Scheduler) -> None:
         sizes = [group.requesters for group in groups]
         super().__init__(top.batch, sum(sizes))
         if top.requesters != len(groups) or any(group.batch != top.batch for group in groups):
-            raise ValueError(f"{len(groups)} groups below a scheduler of {top.requesters}; legal: as many, one batch")
+            raise ValueError(
+                f"the scheduler has {top.requesters} requesters and {len(groups)} groups; legal: one group for each"
+                " requester, and the same batch size in all groups"
+            )
         self._groups = groups
         self._top = top
         self._first = np.cumsum([0, *sizes[:-1]])

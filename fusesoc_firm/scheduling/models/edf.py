@@ -8,13 +8,13 @@ from fusesoc_firm.scheduling.models.parallel import Parallel
 
 
 def edf_resources(generics: Generics) -> Scheduler:
-    """The variant with few LUTs: the tasks wait in a heap."""
+    """Return the variant with few LUTs, in which tasks wait in a heap."""
     check_times("deadline", generics.relative_deadlines, generics.time_bits)
     return _engine(generics, Heap(generics.batch, generics.requesters))
 
 
 def edf_latency(generics: Generics) -> Scheduler:
-    """The variant with few cycles: compares few requesters in parallel; with more, tasks wait in a sorted queue."""
+    """Return the low-latency variant, which compares few requesters in parallel and keeps more in a sorted queue."""
     check_times("deadline", generics.relative_deadlines, generics.time_bits)
     if generics.requesters <= Parallel.MAX_REQUESTERS:
         return Parallel(generics.relative_deadlines, generics.time_bits, shortest_run=generics.shortest_run)

@@ -1,7 +1,7 @@
 """The model of firm_sched_engine and its parts, for the policies that keep their tasks in a priority queue.
 
-Keys and times are numbers that never wrap around. State that exists once in a scheduler is an array (B,). A cycle costs
-some dozens of operations on such arrays, and one on the requests (B, N).
+Keys and times are numbers that never wrap around. State that exists once per scheduler is an array of shape (B,). The
+simulation of a cycle costs some dozens of operations on such arrays, and one operation on the requests (B, N).
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ _SHORTEST_TIME, _LONGEST_TIME = 8, 31  # bits
 
 
 def index_bits(requesters: int) -> int:
-    """The bits of an index, at least 1, as computed by the function of the same name in firm_axis_pkg."""
+    """Return the number of bits in an index, at least 1, like the function with this name in firm_axis_pkg."""
     return max(1, (requesters - 1).bit_length())
 
 
 def rows_and_columns(requesters: int) -> tuple[int, int]:
-    """The numbers of rows and columns of requesters, as computed by the functions in firm_sched_queue_pkg."""
+    """Return the numbers of rows and columns of requesters, like the functions in firm_sched_queue_pkg."""
     bits = index_bits(requesters)
     column_bits = max(1, bits // 2)
     rows: int = 2 ** max(1, bits - column_bits)
@@ -31,13 +31,13 @@ def rows_and_columns(requesters: int) -> tuple[int, int]:
 
 
 class Arrivals:
-    """The model of firm_sched_arrivals: accepts tasks row by row; `valid` and `first` (B,) describe the next one."""
+    """The model of firm_sched_arrivals, which accepts tasks row by row; `valid` and `first` describe the next task."""
 
     def __init__(self, batch: int, requesters: int) -> None:
         self._rows, self._columns = rows_and_columns(requesters)
         self._requesters = requesters
         self._members = np.arange(batch)
-        # The bits of a row's columns, the first column lowest.
+        # The bit of each column in a row, the first column lowest.
         self._known: Ints = np.zeros((batch, self._rows), np.int64)
         self._accepted: Ints = np.zeros(batch, np.int64)
         self._row: Ints = np.full(batch, self._rows - 1, np.int64)
@@ -48,18 +48,18 @@ class Arrivals:
 
     @property
     def valid(self) -> Bools:
-        """Whether an accepted task waits to leave."""
+        """Whether an accepted task waits to leave, shape (B,)."""
         valid: Bools = self._accepted != 0
         return valid
 
     @property
     def first(self) -> Ints:
-        """The requester of the next task; arbitrary if `valid` is false."""
+        """The requester of the next task, shape (B,); arbitrary where `valid` is false."""
         first: Ints = np.where(self.valid, self._row * self._columns + self._lowest[self._accepted], 0)
         return first
 
     def step(self, request: Bools, leaves: Bools, finished: Bools, finished_id: Ints) -> None:
-        """Simulate a rising edge; where `finished` is true, the task of `finished_id` is no longer known."""
+        """Simulate a rising edge; where `finished` is true, forget the task of requester `finished_id`."""
         finished_row = finished_id // self._columns
         finished_bit = np.where(finished, 1 << (finished_id % self._columns), 0)
         of_row = np.where(self._row == finished_row, finished_bit, 0)
@@ -78,12 +78,12 @@ class Arrivals:
         by_row: Bools = self._padded.reshape((len(request), self._rows, self._columns))
         asks: Bools = np.logical_or.reduce(by_row, axis=2)
         where = where & asks.any(axis=1)
-        # The rows in cyclic order, starting after the last one.
+        # The rows in cyclic order, starting after the last accepted row.
         order = (self._row[:, np.newaxis] + 1 + np.arange(self._rows)) % self._rows
         row = order[self._members, np.take_along_axis(asks, order, axis=1).argmax(axis=1)]
         new = by_row[self._members, row] @ self._weights
         new &= ~self._known[self._members, row]
-        # The request of a finishing requester belongs to its last beat.
+        # The request of a requester that finishes belongs to the task's last beat.
         new &= ~np.where(row == finished_row, finished_bit, 0)
         self._known[self._members, row] |= np.where(where, new, 0)
         self._row = np.where(where, row, self._row)
@@ -93,10 +93,10 @@ class Arrivals:
 class Queue(ABC):
     """A priority queue of items with distinct indices; `root_*` and `ready` apply to the current cycle.
 
-    While the root is still on its way, `root_id` and `root_key` already describe the next root, like the core's
-    first_id and first_key, and `pop` removes it.
+    While the next root is not yet available, `root_id` and `root_key` already describe it, like first_id and first_key
+    of the core, and `pop` removes it.
 
-    Entries are ranks, key * size + index: the smallest rank has the smallest key and, among equal keys, the lowest
+    An entry is a rank, key * size + index: the smallest rank has the smallest key and, among equal keys, the lowest
     index.
     """
 
@@ -120,7 +120,7 @@ class Queue(ABC):
     @property
     @abstractmethod
     def first_valid(self) -> Bools:
-        """Whether an item can be popped: a root, or the item that becomes the root in this cycle."""
+        """Whether an item can be popped: the root, or the item that becomes the root in this cycle."""
 
     @property
     @abstractmethod
@@ -139,7 +139,7 @@ class Queue(ABC):
 
     @abstractmethod
     def ready(self, pop: Bools) -> Bools:
-        """Whether an item can enter in this cycle."""
+        """Return whether an item can enter in this cycle."""
 
     @abstractmethod
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
@@ -157,12 +157,12 @@ class Queue(ABC):
 
 
 class Heap(Queue):
-    """The model of firm_sched_heap: it replaces the root one cycle after a pop, or two after two consecutive pops."""
+    """The model of firm_sched_heap, which replaces the root one cycle after a pop, or two after consecutive pops."""
 
     def __init__(self, batch: int, items: int) -> None:
         super().__init__(batch, items)
         self._filling: Bools = np.zeros(batch, np.bool_)
-        # The item that would have replaced the root was popped in the last cycle.
+        # Whether the item that would have replaced the root was popped in the last cycle.
         self._owing: Bools = np.zeros(batch, np.bool_)
         self._clearing: int = 2 ** (index_bits(items) - 1)
 
@@ -203,7 +203,7 @@ class Heap(Queue):
 
 
 class SortedQueue(Queue):
-    """The model of firm_sched_sorted_queue: the new root is present in the next cycle."""
+    """The model of firm_sched_sorted_queue, whose new root is available in the next cycle."""
 
     @property
     def first_valid(self) -> Bools:
@@ -241,11 +241,11 @@ class Keys(ABC):
 
     @abstractmethod
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
-        """The keys of tasks that leave the arrivals in this cycle, and where these keys are valid."""
+        """Return the keys of the tasks that leave the arrivals in this cycle, and whether each key is valid."""
 
     @abstractmethod
     def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
-        """Whether time advances; `oldest` are pairs of the keys that must not become too old and their valid bits."""
+        """Return whether time advances; `oldest` are (valid, key) pairs of the keys that must not become too old."""
 
     @abstractmethod
     def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
@@ -253,7 +253,7 @@ class Keys(ABC):
 
 
 def check_times(name: str, times: Ints, time_bits: int | None) -> None:
-    """Raise `ValueError` if a time does not fit into the bits; `name` is what `times` are, such as "deadline"."""
+    """Raise `ValueError` if a time does not fit into the bits; `name` describes the times, such as "deadline"."""
     if time_bits is None:
         return
     if not _SHORTEST_TIME <= time_bits <= _LONGEST_TIME:
@@ -261,11 +261,11 @@ def check_times(name: str, times: Ints, time_bits: int | None) -> None:
     longest = int(times.max())
     if longest >= 2 ** (time_bits - 3):
         needed = longest.bit_length() + 3
-        raise ValueError(f"time_bits is {time_bits}; legal: {needed} and more for a {name} of {longest} cycles")
+        raise ValueError(f"time_bits is {time_bits}; legal: {needed} or more for a {name} of {longest} cycles")
 
 
 class Times(Keys):
-    """Keys that are the time at which a task leaves the arrivals, plus an offset (B, N) of its requester."""
+    """Keys that are the time at which a task leaves the arrivals plus its requester's offset; offsets are (B, N)."""
 
     def __init__(self, offsets: Ints, time_bits: int | None) -> None:
         self._offsets = offsets
@@ -291,21 +291,21 @@ class Times(Keys):
 
 
 def is_overdue(key: Ints, now: Ints, eighth: int) -> Bools:
-    """Whether keys are two eighths of the range before `now`, each truncated to whole eighths of 2**`eighth` cycles."""
+    """Return whether keys are two eighths of the range before `now`, both truncated to multiples of 2**`eighth`."""
     overdue: Bools = (now >> eighth) - (key >> eighth) >= 2
     return overdue
 
 
 @dataclass(frozen=True)
 class Preemption:
-    """Settings of preemption, and whether each beat increases the key of the task that is being sent by one."""
+    """The settings of preemption, including whether each beat adds one to the key of the task being sent."""
 
     shortest_run: int = 1
     sends_own_time: bool = False
 
 
 class Engine(Scheduler):
-    """The model of firm_sched_engine, with a policy's queue and keys; without `preemption`, it is non-preemptive."""
+    """The model of firm_sched_engine with a policy's queue and keys; non-preemptive if `preemption` is None."""
 
     def __init__(
         self, batch: int, requesters: int, queue: Queue, keys: Keys, preemption: Preemption | None = None
@@ -333,7 +333,7 @@ class Engine(Scheduler):
         advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
 
         choose = finished | ~(self._running | beat)
-        # If the task can be preempted after a beat, it need not wait for a root that is not yet available.
+        # If the task can be preempted after a beat, the grant need not wait for a root that is not yet available.
         gives_way = ~queue.first_valid if self._is_preemptive and self._rules.shortest_run == 1 else empty
         take_root = choose & queue.first_valid
         take_b = choose & gives_way & self._b_valid
@@ -367,7 +367,7 @@ class Engine(Scheduler):
         self._beats = np.where(choose | preempt, 0, np.minimum(self._beats + beat, self._rules.shortest_run))
 
     def _preempt(self, request: Bools, beat: Bools, finished: Bools, root_valid: Bools, root_key: Ints) -> Bools:
-        """Where the root takes the grant from an unfinished task."""
+        """Return where the root preempts an unfinished task, shape (B,)."""
         if not self._is_preemptive:
             return np.zeros(self.batch, np.bool_)
         preempt = self._running & self._keyed & root_valid & (root_key < self._key) & ~finished

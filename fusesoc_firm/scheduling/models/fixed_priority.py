@@ -9,7 +9,7 @@ from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
 
 
 class FixedPriority(ChoosingScheduler):
-    """The non-preemptive scheduler: a task that has begun is never interrupted."""
+    """The non-preemptive scheduler, which never interrupts a task that has begun."""
 
     def _choose(self, eligible: Bools) -> Ints:
         choice: Ints = eligible.argmax(axis=1)
@@ -17,16 +17,16 @@ class FixedPriority(ChoosingScheduler):
 
 
 class PreemptiveFixedPriority(Scheduler):
-    """The preemptive scheduler: chooses in every cycle.
+    """The preemptive scheduler, which chooses in every cycle.
 
-    A run is a sequence of consecutive beats of a requester. It lasts for `shortest_run` beats, until the task's end or
-    until its requester pauses, whichever comes first.
+    A run is a sequence of consecutive beats from one requester. A run cannot be interrupted until it has had
+    `shortest_run` beats, the task ends, or the requester pauses.
     """
 
     def __init__(self, batch: int, requesters: int, shortest_run: int = 1) -> None:
         super().__init__(batch, requesters)
         self._shortest_run = shortest_run
-        # Beats of the current run, saturating at the shortest run.
+        # The number of beats in the current run, saturating at the shortest run.
         self._beats: Ints = np.zeros(batch, np.int64)
 
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
@@ -41,10 +41,10 @@ class PreemptiveFixedPriority(Scheduler):
 
 
 def fixed_priority(generics: Generics) -> Scheduler:
-    """The non-preemptive scheduler."""
+    """Return the model of the non-preemptive scheduler."""
     return FixedPriority(generics.batch, generics.requesters)
 
 
 def fixed_priority_preemptive(generics: Generics) -> Scheduler:
-    """The preemptive scheduler."""
+    """Return the model of the preemptive scheduler."""
     return PreemptiveFixedPriority(generics.batch, generics.requesters, generics.shortest_run)

@@ -1,4 +1,4 @@
-"""Least recently used (section 4.2.1): serves the requester whose last completed task is the oldest."""
+"""Least recently used (section 4.2.1): serve the requester whose last completed task is the oldest."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Stamps(Keys):
         self._members = np.arange(batch)
         self._stamps: Ints = np.tile(np.arange(self._size), (batch, 1))
         self._count: Ints = np.full(batch, self._size)
-        # The sweep's requester, its stamp, and whether the stamp has been read.
+        # The requester that the sweep has reached, its stamp, and whether the stamp has been read.
         self._sweep: Ints = np.zeros(batch, np.int64)
         self._swept: Ints = np.zeros(batch, np.int64)
         self._known: Bools = np.zeros(batch, np.bool_)
@@ -84,7 +84,7 @@ class Stamps(Keys):
 
 
 def lru(generics: Generics) -> Scheduler:
-    """Compares few requesters in parallel; with more requesters, tasks wait in a heap."""
+    """Return a scheduler that compares few requesters in parallel; with more requesters, tasks wait in a heap."""
     batch, requesters = generics.batch, generics.requesters
     if requesters <= ImmediateLru.MAX_REQUESTERS:
         return ImmediateLru(batch, requesters)

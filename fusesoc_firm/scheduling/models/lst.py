@@ -8,9 +8,9 @@ from fusesoc_firm.scheduling.models.parallel import Parallel
 
 
 def lst(generics: Generics) -> Scheduler:
-    """Compares few requesters in parallel; with more requesters, tasks wait in a heap.
+    """Return a scheduler that compares few requesters in parallel; with more requesters, tasks wait in a heap.
 
-    Raises `ValueError` without transfer times.
+    Raise `ValueError` if the transfer times are missing.
     """
     if generics.transfer_times is None:
         raise ValueError("transfer_times is None; legal: the beats of each requester's tasks")

@@ -1,4 +1,4 @@
-"""The model of firm_sched_parallel: a policy with deadlines that compares few requesters in every cycle."""
+"""The model of firm_sched_parallel, for policies with deadlines that compare few requesters in every cycle."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _NOBODY = np.iinfo(np.int64).min
 class Parallel(Scheduler):
     """A scheduler that grants the most urgent task.
 
-    Urgency (B, N) is -`offsets` (B, N) when a task arrives, and grows by one in each cycle. It pauses while any
-    requester's urgency is at least an eighth of the range of `time_bits`.
+    A task's urgency (B, N) is -`offsets` (B, N) when the task arrives, and grows by one in each cycle. All urgencies
+    stop growing while any requester's urgency is at least an eighth of the range of `time_bits`.
     """
 
     MAX_REQUESTERS = 8
@@ -37,7 +37,7 @@ class Parallel(Scheduler):
         eligible = self._without_granted(self._known, finished)
         beats = np.minimum(self._beats + beat, self._shortest_run)
         kept = (beats > 0) & (beats < self._shortest_run) & self._of_granted(request) & ~finished
-        # Twice the urgency, so that the granted task precedes tasks of equal urgency.
+        # The urgencies are doubled, so that the granted task can precede tasks of equal urgency.
         ranks = np.where(eligible, 2 * self._urgency, _NOBODY)
         ranks[self._members, granted] += eligible[self._members, granted]
         first: Ints = ranks.argmax(axis=1)

@@ -1,4 +1,4 @@
-"""Round robin: grants the next index, cyclically, after the requester that completed a task last."""
+"""Round robin: grant the next index, cyclically, after the requester that completed a task last."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
 
 
 class RoundRobin(ChoosingScheduler):
-    """The non-preemptive scheduler; after reset, index 0 comes first."""
+    """The non-preemptive scheduler, which begins with index 0 after reset."""
 
     def __init__(self, batch: int, requesters: int) -> None:
         super().__init__(batch, requesters)
@@ -26,5 +26,5 @@ class RoundRobin(ChoosingScheduler):
 
 
 def round_robin(generics: Generics) -> Scheduler:
-    """A scheduler with as many turns as requesters."""
+    """Return a scheduler with as many turns as requesters."""
     return RoundRobin(generics.batch, generics.requesters)

@@ -36,7 +36,7 @@ _CLOCK_PINS = (
 
 
 def block_design_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Context:
-    """The configuration of the block design; `clock` is the frequency of clk in Hz."""
+    """Return the configuration of the block design; `clock` is the frequency of clk in Hz."""
     processor = PROCESSORS[str(board.processor)]
     preset = f'apply_board_preset "{1 if board.board_part else 0}"'
     return {
@@ -77,7 +77,7 @@ def _processor_properties(processor: Processor, system: DerivedSystem, clock: Fr
 
 
 def _cells(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, str, str, Sequence[tuple[str, object]]]]:
-    """All IP cells except the processor."""
+    """Yield all IP cells except the processor."""
     data_width = max(processor.memory_width, system.width)
     yield (
         "dma",
@@ -115,7 +115,7 @@ def _interfaces(processor: Processor) -> Iterator[tuple[str, str]]:
 
 
 def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """The connections of single pins, each with its driver and sink."""
+    """Yield the connections of single pins, each with its driver and sink."""
     clock = f"processor/{processor.clock.format(0)}"
     processor_clocks = (f"processor/{processor.control_clock}", f"processor/{processor.memory_clock}")
     yield "The clock", [(clock, pin) for pin in (*processor_clocks, *_CLOCK_PINS)]
@@ -156,7 +156,7 @@ def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, li
 
 
 def _pins(system: DerivedSystem) -> list[Context]:
-    """The accelerators' pins as ports of the design."""
+    """Return the accelerators' pins as ports of the design."""
     return [
         {"name": port["name"], "direction": "I" if port["direction"] == "in" else "O", "bits": port["bits"]}
         for group in pin_groups(Names(system), system)
@@ -167,7 +167,10 @@ def _pins(system: DerivedSystem) -> list[Context]:
 def package_configuration(
     type_: AcceleratorType, sources: Sequence[str], system: DerivedSystem, board: Board, clock: Fraction
 ) -> Context:
-    """The configuration of the Vitis HLS script that makes an IP from a C++ function in `sources` next to it."""
+    """Return the configuration of the Vitis HLS script that packages a C++ function as an IP.
+
+    `sources` are next to the script.
+    """
     clocks = {item.name: item.frequency for item in system.clocks}
     fastest = max(clocks.get(block.clock, clock) for block in system.accelerators if block.type is type_)
     return {

@@ -29,7 +29,7 @@ BOARD_TEMPLATE = "vhdl/board.vhd"
 
 # Edalize's flows for boards with pins, each with the template and FuseSoC file type of the constraints.
 FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
-# Tools that implement the system with streams as ports: Vivado next to a processor, Quartus without changes.
+# Tools for systems whose streams are ports: Vivado places the system next to a processor, Quartus uses it unchanged.
 VIVADO, QUARTUS = "vivado", "quartus"
 # The keys of a board that each tool requires.
 _NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
@@ -48,27 +48,27 @@ _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.,:+/()-]*")
 
 
 def word_fault(text: str) -> tuple[str, str] | None:
-    """The reason why `text` is not a legal name of an FPGA, a family or a pin; None if it is."""
+    """Return the reason why `text` is not a legal name of an FPGA, a family or a pin, or None if the name is legal."""
     if fault := text_fault(text):
         return fault
-    legal = "legal are letters, digits, blanks and '_.,:+/()-', a letter or digit first"
+    legal = "legal here: letters, digits, blanks and '_.,:+/()-', starting with a letter or digit"
     return None if _WORD.fullmatch(text) else (f"cannot be '{text}'", legal)
 
 
 @dataclass(frozen=True)
 class BoardPin(Section):
-    """A pin of the FPGA that the top level uses."""
+    """An FPGA pin that the top level uses."""
 
     port: Text = key(
-        "the connected port of the top level: a standard one, or a pin of an accelerator", is_required=True
+        "the connected port of the top level: a standard port, or a pin of an accelerator", is_required=True
     )
-    site: Text = key("the pin's name by the FPGA's manufacturer", is_required=True, rule=word_fault)
-    standard: Text | None = key("its electrical standard, if it is not the board's", rule=word_fault)
+    site: Text = key("the FPGA manufacturer's name for the pin", is_required=True, rule=word_fault)
+    standard: Text | None = key("the pin's electrical standard, if different from the board's", rule=word_fault)
 
 
 @dataclass(frozen=True)
 class Board(Section):
-    """The board file."""
+    """The contents of a board file."""
 
     description: Text = key("maker, board and FPGA", is_required=True)
     flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=(*FLOWS, *_NEEDED))
@@ -91,13 +91,13 @@ class Board(Section):
 
     @property
     def is_linked(self) -> bool:
-        """Whether a byte link connects the host."""
+        """Whether a byte link connects the host to the system."""
         return self.flow in FLOWS
 
 
 @dataclass(frozen=True)
 class _Port:
-    """A pin of an accelerator at the top level: the pin's bits, None for a scalar, and the pin's name in messages."""
+    """An accelerator's pin at the top level; `width` is None for a scalar, and `what` is the pin's name in messages."""
 
     name: str
     direction: str
@@ -106,25 +106,25 @@ class _Port:
     source: SourceRef | None
 
     def bits(self) -> list[str]:
-        """All bits; each bit has a separate place on the board."""
+        """Return the names of all bits; the board assigns an FPGA pin to each bit."""
         return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
 
 
 def boards() -> tuple[str, ...]:
-    """The names of the package's boards."""
+    """Return the names of the package's boards."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 
 
 def board_path(name: str, folder: Path) -> Path:
-    """The file of the package's board of this name, or a file below `folder`."""
+    """Return the path of the package's board with this name; the name of a YAML file is relative to `folder`."""
     return folder / name if name.endswith((".yaml", ".yml")) else FOLDER / f"{name}.yaml"
 
 
 def read_board(name: str, folder: Path = Path()) -> Board:
-    """Read the board file that `board_path` identifies; raises `InputError`."""
+    """Read the board file that `board_path` identifies; may raise `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
-        fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
+        fail(f"unknown board '{name}'", hint=nearest(name, boards()) + "; the path of a YAML file is legal, too")
     faults = Diagnostics()
     text = read_yaml(path, name if path.parent != FOLDER else path.name, faults)
     if text.root is None or is_null(text.root):
@@ -141,7 +141,11 @@ def read_board(name: str, folder: Path = Path()) -> Board:
 
 def _check_pins(board: Board, faults: Diagnostics) -> None:
     if board.interconnect not in LINKS:
-        faults.error(f"flow '{board.flow}' has no processor for streams", board.interconnect.source, nearest("", LINKS))
+        faults.error(
+            f"boards with flow '{board.flow}' have no processor for streams",
+            board.interconnect.source,
+            nearest("", LINKS),
+        )
         return
     seen: dict[str, Text] = {}
     for pin in board.pins:
@@ -151,7 +155,9 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
     source = board.pins[-1].source if board.pins else board.source
     needed = {_CLOCK, *(name for name, _, _ in LINK_PINS[LinkKind(board.interconnect)])} - _OPTIONAL
     for port in sorted(needed - seen.keys()):
-        faults.error(f"the board has no pin for '{port}'", source, f"'{board.interconnect}' needs it")
+        faults.error(
+            f"the board has no pin for '{port}'", source, f"interconnect '{board.interconnect}' needs this pin"
+        )
 
 
 def _check_streams(board: Board, faults: Diagnostics) -> None:
@@ -163,16 +169,18 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
     }
     for name in _NEEDED[board.flow]:
         if given[name] is None:
-            faults.error(f"a board of flow '{board.flow}' needs the key '{name}'", board.source)
+            faults.error(f"a board with flow '{board.flow}' needs the key '{name}'", board.source)
     if board.interconnect != AXI_STREAM:
-        faults.error(f"flow '{board.flow}' takes streams", board.interconnect.source, f"legal here: {AXI_STREAM}")
+        faults.error(
+            f"flow '{board.flow}' supports only streams", board.interconnect.source, f"legal here: {AXI_STREAM}"
+        )
     if board.pins:
-        message = f"flow '{board.flow}' takes no pins"
-        faults.error(message, board.place("pins"), "put your own constraints into a fileset of the core")
+        message = f"flow '{board.flow}' does not support pins"
+        faults.error(message, board.place("pins"), "add constraints to a fileset of the core")
 
 
 def on_board(specification: Specification, board: Board) -> Specification:
-    """The specification of the system on the board, with the board's interconnect.
+    """Return the specification of the system on the board, with the board's interconnect.
 
     On a board without a processor, the clock pin determines the frequency of clk. On other boards, a PLL provides the
     frequency that the specification requests.
@@ -182,7 +190,7 @@ def on_board(specification: Specification, board: Board) -> Specification:
 
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
-    """Raise `InputError` for features of a system that a board's file cannot describe."""
+    """Raise `InputError` if the clocks or pins of a system and of its board do not match."""
     clocks = 1 + len(system.clocks)
     if board.processor and clocks > MOST_CLOCKS:
         fail(f"board '{board.name}' has at most {MOST_CLOCKS} clocks, including clk; the system has {clocks}")
@@ -190,19 +198,19 @@ def check_fits(system: DerivedSystem, board: Board) -> None:
         return
     faults = Diagnostics()
     for clock in system.clocks:
-        faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="a board has one clock, clk")
+        faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="this board has only the clock clk")
     _check_places(_accelerator_pins(system), board, faults)
     faults.raise_if_any()
 
 
 def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> None:
-    """Note every accelerator pin without a place on the board, and every place without a pin."""
+    """Note every accelerator pin without a site on the board, and every port of the board file without a pin."""
     places = {pin.port.lower() for pin in board.pins}
     for pin in pins:
         if pin.name in _PORTS:
             faults.error(f"{pin.what} has the name '{pin.name}', which is reserved for boards", pin.source)
         elif missing := next((bit for bit in pin.bits() if bit not in places), None):
-            hint = f"add '{{port: {missing}, site: ...}}' to a board file of your own"
+            hint = f"add '{{port: {missing}, site: ...}}' to your own board file"
             faults.error(f"{pin.what} has no site on board '{board.name}'", pin.source, hint)
     known = (*_PORTS, *(bit for pin in pins for bit in pin.bits()))
     for place in board.pins:
@@ -212,12 +220,12 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
 
 
 def board_entity(system: DerivedSystem, board: Board) -> str:
-    """The top-level entity of a system on a board; next to a processor, the name of the block design."""
+    """Return the name of a system's top-level entity on a board or, next to a processor, of the block design."""
     return system.entity if board.flow == QUARTUS else f"{system.name}_{board.name}"
 
 
 def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
-    """The configuration of the top level and of its constraints."""
+    """Return the configuration of the top level and of its constraints."""
     assert system.link is not None
     clock_hz = system.link.clock_hz
     ports = {pin.port.lower() for pin in board.pins}
@@ -255,7 +263,7 @@ def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
 
 
 def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
-    """The accelerators' pins with their names and bits at the top level."""
+    """Return the accelerators' pins as ports of the top level."""
     names = top_level_pins(system)
     return [
         _Port(

@@ -13,12 +13,12 @@ MOST_CLOCKS = 4
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor in an FPGA; `{}` in a name is the number of a clock: 0, 1, ...
+    """A processor in an FPGA; in names, `{}` is a placeholder for the number of a clock, counted from 0.
 
     `clock` is a clock's pin and `timing_clock` the clock's name in timing constraints. `frequency` and `clock_switch`
     are properties of the clock. `control` is the master for registers; `base` is the address of the DMA engine's
-    registers. `memory` is the slave that leads to the processor's memory and has `memory_width` bits. Master and slave
-    are listed with the pins of their clocks.
+    registers. `memory` is the `memory_width`-bit slave through which the engine accesses the processor's memory. Master
+    and slave are listed with their clock pins.
     """
 
     ip: str

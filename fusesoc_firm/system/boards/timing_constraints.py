@@ -1,6 +1,6 @@
 """Derived System -> template configuration: constraints on clocks and on the paths between clocks.
 
-docs/how-to/use-several-clocks.md lists them.
+docs/how-to/use-several-clocks.md lists the constraints.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fusesoc_firm.text.render import Context
 
 
 def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Context:
-    """The configuration; `clock` is the frequency of clk in Hz, and a processor names its clocks itself."""
+    """Return the configuration, with the processor's names for its clocks; `clock` is the frequency of clk in Hz."""
     clocks = [("clk", clock), *((item.port, item.frequency) for item in system.clocks)]
     if board.processor:
         name = PROCESSORS[str(board.processor)].timing_clock
@@ -37,5 +37,5 @@ def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -
 
 
 def period(frequency: Fraction) -> str:
-    """The period in ns of a frequency in Hz."""
+    """Return the period in ns for a frequency in Hz, with three decimal places."""
     return f"{float(10**9 / frequency):.3f}"

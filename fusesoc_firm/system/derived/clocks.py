@@ -13,7 +13,7 @@ from fusesoc_firm.text.naming import identifier
 
 
 def clocks_of(specification: Specification, own: Fraction | None, faults: Diagnostics) -> tuple[Clock, ...]:
-    """The clocks of the specification other than clk, in the order of the specification; faults are noted.
+    """Return all clocks except clk, in the order of the specification, and note their faults.
 
     `own` is the frequency of clk in Hz, if it is known.
     """
@@ -25,7 +25,7 @@ def clocks_of(specification: Specification, own: Fraction | None, faults: Diagno
     if project.clock is None:
         if project.is_sound:
             message = "'clocks' needs the frequency of clk, which is missing"
-            hint = "add 'clock' to the project, such as 'clock: 100 MHz'"
+            hint = "add 'clock' to 'project', such as 'clock: 100 MHz'"
             faults.error(message, project.clocks[0].source, hint)
         return ()
     found = []
@@ -43,7 +43,7 @@ def _check_names(specification: Specification, faults: Diagnostics) -> None:
             continue
         twin = seen.setdefault(clock.name.lower(), clock)
         if identifier(clock.name) != clock.name:
-            hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+            hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
             faults.error(f"'{clock.name}' is not a legal clock name", clock.name.source, hint)
         elif twin is not clock:
             hint = "VHDL ignores case" if twin.name != clock.name else ""
@@ -55,7 +55,7 @@ def _check_names(specification: Specification, faults: Diagnostics) -> None:
 
 
 def _pin_called(specification: Specification, port: str) -> str:
-    """The pin whose port at the top level has this name; empty if there is no such pin."""
+    """Return the pin whose port at the top level has this name, or an empty string if there is no such pin."""
     pins = {str(item.name): item.pins for item in specification.accelerators}
     for block in specification.blocks:
         for pin in pins.get(str(block.type), ()):
@@ -71,21 +71,21 @@ def _check_uses(specification: Specification, faults: Diagnostics) -> None:
     software = {item.name for item in specification.accelerators if item.is_software}
     for item in specification.accelerators:
         if item.is_software and item.width is not None:
-            message = f"'width' belongs to hardware, but '{item.name}' is of type {item.type}"
-            faults.error(message, item.place("width"), "software exchanges whole messages")
+            message = f"'width' is legal only for hardware, but '{item.name}' has the type {item.type}"
+            faults.error(message, item.place("width"), "remove the key: software exchanges whole messages")
     used = set()
     for block in blocks:
         if block.clock is None:
             continue
         used.add(block.clock.lower())
         if block.type is None and block.mode is not None:
-            message = f"'clock' belongs to an accelerator, but '{block.name}' is a {block.mode}"
+            message = f"'clock' is legal only for accelerators, but '{block.name}' is a {block.mode}"
             faults.error(message, block.clock.source)
         elif block.type in software:
-            message = f"'clock' belongs to hardware, but '{block.name}' runs on the host"
+            message = f"'clock' is legal only for hardware, but '{block.name}' runs on the host"
             faults.error(message, block.clock.source)
         elif all(names) and project.is_sound and block.clock not in names:
-            hint = nearest(block.clock, names) if names else "add 'clocks' to the project"
+            hint = nearest(block.clock, names) if names else "add 'clocks' to 'project'"
             faults.error(f"unknown clock '{block.clock}'", block.clock.source, hint)
     are_known = not specification.is_cut and all(block.is_sound for block in blocks)
     for clock in project.clocks:

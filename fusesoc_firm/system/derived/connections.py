@@ -31,9 +31,10 @@ _NO_FIELD: Names = ()
 class Wiring:
     """The connections between named `blocks` whose message sides (`inputs`, `outputs`) are known.
 
-    The other attributes limit follow-up errors in faulty specifications. `has_more_blocks` is set if names of blocks
-    could not be read, `has_more_messages` if messages of connections are unknown. `strays` are messages of connections
-    that could not be read. `ambiguous` are names that several blocks share; the tables contain the first such block.
+    The other attributes prevent follow-up errors in faulty specifications. `has_more_blocks` is set if the names of
+    some blocks could not be read, `has_more_messages` if the messages of some connections are unknown. `strays` are the
+    messages of connections that could not be read. `ambiguous` are names that several blocks share; the tables contain
+    the first such block.
     """
 
     blocks: Mapping[str, Block]
@@ -44,7 +45,7 @@ class Wiring:
     has_more_messages: bool = False
     strays: set[tuple[MessageName, Middleware]] = field(default_factory=set)
     ambiguous: set[str] = field(default_factory=set)
-    # The fields that go from each source to each of its sinks, and the connection that drives each field of a sink.
+    # The fields carried from each source to each of its sinks, and the connection that drives each field of a sink.
     sinks: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)
     frames: dict[End, Frame] = field(default_factory=dict)
     driven: dict[End, dict[Names, Outgoing]] = field(default_factory=dict)
@@ -71,7 +72,7 @@ class Wiring:
         )
 
     def _connect(self, block: Block, outgoing: Outgoing) -> bool:
-        """Make one connection; False if it is impossible, with the fault noted."""
+        """Make one connection; if it is impossible, note the fault and return False."""
         if not self._are_known(block, outgoing):
             return False
         pairs = self._pairs(block, outgoing)
@@ -83,8 +84,8 @@ class Wiring:
             if outgoing.name not in self.ambiguous and rival:
                 name, first = rival
                 what = f"'{dotted(name)}'" if outgoing.include or outgoing.exclude else "this message"
-                hint = f"a field comes from one block; this one is named at {first.name.source}"
-                self.faults.error(f"'{outgoing.name}' already gets {what}", outgoing.name.source, hint)
+                hint = f"a field can come from only one block; the first connection is at {first.name.source}"
+                self.faults.error(f"'{outgoing.name}' already receives {what}", outgoing.name.source, hint)
             return False
         pair = self._chosen(block, free)
         source, sink = self._source(block, pair), self._sink(outgoing, pair)
@@ -105,22 +106,22 @@ class Wiring:
             return False
         target = self.blocks[name]
         if block.type is None and block.mode == "publisher":
-            message = f"'{block.name}' is a publisher; its message goes to the host"
-            self.faults.error(message, name.source, "'outgoing' belongs to subscribers and accelerators")
+            message = f"'{block.name}' is a publisher, whose message goes to the host"
+            self.faults.error(message, name.source, "'outgoing' is legal only in subscribers and accelerators")
             return False
         if target.type is None and target.mode == "subscriber":
-            message = f"'{name}' is a subscriber; its message comes from the host"
-            self.faults.error(message, name.source, "'outgoing' names accelerators and publishers")
+            message = f"'{name}' is a subscriber, whose message comes from the host"
+            self.faults.error(message, name.source, "'outgoing' can name only accelerators and publishers")
             return False
         return block.name in self.outputs and name in self.inputs
 
     def _pairs(self, block: Block, outgoing: Outgoing) -> dict[Pair, frozenset[Names]]:
-        """The pairs of sides with the same message, each with the fields that this connection carries."""
+        """Return the pairs of sides with the same message, each with the fields that this connection carries."""
         gives, takes = self.outputs[block.name], self.inputs[outgoing.name]
         alike = [(given, taken) for given in gives for taken in takes if given.kind == taken.kind]
         if not alike:
             self.faults.error(
-                f"'{block.name}' gives {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
+                f"'{block.name}' outputs {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
                 outgoing.name.source,
                 _what_lacks(block, gives, "output")
                 or _what_lacks(self.blocks[outgoing.name], takes, "input")
@@ -135,19 +136,19 @@ class Wiring:
         pairs = {pair: names for pair, names in pairs.items() if names}
         if not pairs:
             self.faults.error(
-                f"no field goes from '{block.name}' to '{outgoing.name}'",
+                f"the connection from '{block.name}' to '{outgoing.name}' carries no field",
                 outgoing.name.source,
-                "a connection carries the fields of both ends that 'include' and 'exclude' leave",
+                "a connection carries the fields that both ends have and that 'include' and 'exclude' select",
             )
         return pairs
 
     def _rivals(self, outgoing: Outgoing, pair: Pair, names: Iterable[Names]) -> tuple[Names, Outgoing] | None:
-        """A field that another connection already drives, with that connection."""
+        """Return a field that another connection already drives, with that connection, or None."""
         driven = self.driven.get(self._sink(outgoing, pair), {})
         return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
 
     def _chosen(self, block: Block, free: Sequence[Pair]) -> Pair:
-        """The first pair whose output is unused; otherwise the last pair, whose output gets another sink."""
+        """Return the first pair whose output is unused; otherwise the last pair, whose output gets another sink."""
         unused = [pair for pair in free if self._source(block, pair) not in self.sinks]
         last = free[-1][0]
         return unused[0] if unused else next(pair for pair in free if pair[0] == last)
@@ -174,13 +175,14 @@ class Wiring:
             self.faults.error(
                 f"{_words('input', side)} of '{block.name}' ({side.frame.message}) has no source",
                 block.name.source,
-                f"name '{block.name}' as 'outgoing' of a block that gives {side.frame.message}",
+                f"add '{block.name}' to 'outgoing' of a block that outputs {side.frame.message}",
             )
         elif missing and block.type is not None:
             self.faults.error(
-                f"{_words('input', side)} of '{block.name}' ({side.frame.message}) lacks {', '.join(missing)}",
+                f"{_words('input', side)} of '{block.name}' ({side.frame.message}) has no source for"
+                f" {', '.join(missing)}",
                 block.name.source,
-                "include it in a connection, or exclude it in the accelerator's interface",
+                "include each field in a connection, or exclude the field in the accelerator's interface",
             )
 
     def _check_sources(self) -> None:
@@ -191,7 +193,7 @@ class Wiring:
                     self.faults.error(
                         f"{_words('output', side)} of '{block.name}' ({side.frame.message}) has no destination",
                         block.name.source,
-                        f"name a block that takes {side.frame.message} as 'outgoing' of '{block.name}'",
+                        f"add a block that takes {side.frame.message} to 'outgoing' of '{block.name}'",
                     )
 
     def _check_cycles(self) -> None:
@@ -211,7 +213,7 @@ class Wiring:
 
 
 def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
-    """The blocks of a cycle in the direction of the messages, each once; empty if there is no cycle."""
+    """Return the blocks of a cycle, each once, in the direction of the messages; without a cycle, an empty list."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -221,13 +223,13 @@ def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
 
 
 def _fields(outgoing: Outgoing, given: MessageSide, taken: MessageSide) -> frozenset[Names]:
-    """The fields that go from one side to another; raises `InputError` for an unknown path."""
+    """Return the fields carried from one side to another; raise `InputError` for an unknown path."""
     chosen = select(given.frame, *(places(paths) for paths in (outgoing.include, outgoing.exclude)))
     return _names(given.frame) & _names(taken.frame) & _names(chosen)
 
 
 def places(paths: Iterable[Text]) -> Paths:
-    """The paths of `include` or `exclude`, in the form that `select` expects."""
+    """Return the paths of `include` or `exclude`, in the form that `select` expects."""
     return {path: path.source for path in paths}
 
 
@@ -240,7 +242,7 @@ def _messages(sides: Sequence[MessageSide]) -> str:
 
 
 def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
-    """The key that is missing from an accelerator without a message at this side; empty if there is a message."""
+    """Return the fault in an accelerator's interface without messages under `key`, or an empty string."""
     return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
 
 

@@ -1,4 +1,4 @@
-"""Accelerators written as a C++ function for high-level synthesis.
+"""Accelerators written as C++ functions for high-level synthesis.
 
 An accelerator of this type consists of a kernel with the `ap_ctrl_hs` handshake, which HLS tools generate for a
 function, and a wrapper with the message sides of an accelerator. In synthesis, the kernel is the output of the HLS
@@ -24,9 +24,9 @@ from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
 AP_PORTS = ("ap_clk", "ap_rst", "ap_start", "ap_done", "ap_idle", "ap_ready")
-"""The ports of the handshake `ap_ctrl_hs`."""
+"""The ports of the `ap_ctrl_hs` handshake."""
 WORD_BITS = 32
-"""Bits of a word between the function and its kernel."""
+"""The width in bits of a word that the function and its kernel exchange."""
 _CPP_TYPES = {
     "bool": "bool",
     "float32": "float",
@@ -50,7 +50,7 @@ class Argument:
 
     @property
     def bits(self) -> int:
-        """The width of the kernel's port."""
+        """The width of the kernel's port in bits."""
         return self.field.width or 1
 
     @property
@@ -60,25 +60,26 @@ class Argument:
 
 
 def function_name(accelerator: AcceleratorType) -> str:
-    """The C++ function's name, which is the name of the first source file without suffix."""
+    """Return the C++ function's name: the name of the first source file without its suffix."""
     return PurePosixPath(accelerator.accelerator.sources[0]).stem
 
 
 def kernel_entity(accelerator: AcceleratorType) -> str:
-    """The name of the entity around the function: an IP or, in simulation, an entity that calls the C++ function.
+    """Return the name of the entity around the function: an IP or, in simulation, a unit that calls the function.
 
-    The wrapper instantiates this entity. The entity cannot have the function's name, which a module in the IP has.
+    The wrapper instantiates this entity. The entity cannot have the function's name, because a module in the IP already
+    has this name.
     """
     return f"{function_name(accelerator)}_kernel"
 
 
 def library_name(accelerator: AcceleratorType) -> str:
-    """The file name of the shared library that the simulation loads from its work folder."""
+    """Return the file name of the shared library that the simulation loads from its work folder."""
     return f"lib{function_name(accelerator)}.so"
 
 
 def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:
-    """The function's inputs and outputs; the accelerator must have passed `check_kernel`."""
+    """Return the function's inputs and outputs; the accelerator must have passed `check_kernel`."""
     inputs = [(side, field) for side in accelerator.inputs for field in field_ports(side.frame)]
     outputs = [(side, field) for side in accelerator.outputs for field in field_ports(side.frame)]
     # `in_` becomes `x_in`, and `in1_` becomes `x_in1`.
@@ -95,7 +96,7 @@ def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[
 
 
 def prototype(accelerator: AcceleratorType) -> str:
-    """The required declaration of the function."""
+    """Return the required declaration of the function."""
     inputs, outputs = arguments(accelerator)
     parameters = [f"{cpp_type(item)} {item.port}" for item in inputs]
     parameters += [f"{cpp_type(item)} *{item.port}" for item in outputs]
@@ -107,24 +108,24 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
     name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
     function = function_name(accelerator)
     if identifier(function) != function:
-        hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
-        message = f"the function has the name of its file, but '{function}' is not a legal name"
+        hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
+        message = f"the function is named after its file, but '{function}' is not a legal name"
         faults.error(message, sources[0].source, hint)
     if not accelerator.inputs or not accelerator.outputs:
         lacking = "output" if accelerator.inputs else "input"
-        message = f"'{name}' is of type HLS, which needs at least one input and one output"
-        faults.error(message, name.source, f"its interface has no '{lacking}'")
+        message = f"'{name}' has the type HLS, which needs at least one input and one output"
+        faults.error(message, name.source, f"the accelerator's interface has no '{lacking}'")
     interface = accelerator.accelerator.interface
     for side, item in zip(
         (*accelerator.inputs, *accelerator.outputs), (*interface.input, *interface.output), strict=True
     ):
         for problem in _problems(side.frame):
-            message = f"'{name}' is of type HLS, which takes {problem}"
+            message = f"'{name}' has the type HLS, which supports only {problem}"
             faults.error(message, item.message.source, "write this accelerator in VHDL")
 
 
 def _problems(frame: Frame) -> list[str]:
-    """The parts of a message that parameters cannot carry."""
+    """Return the parts of a message that parameters cannot carry."""
     try:
         check_fixed_size(frame)
     except InputError as error:
@@ -133,5 +134,5 @@ def _problems(frame: Frame) -> list[str]:
 
 
 def cpp_type(argument: Argument) -> str:
-    """The C++ type of an argument."""
+    """Return the C++ type of an argument."""
     return _CPP_TYPES[argument.field.field.type.name]

@@ -1,8 +1,8 @@
 """Specification -> derived System: data types and data flow.
 
-This module resolves every message, assigns ids, and uses `connections` to find the port and block to which each
-connection refers. Faults are reported at their places in the specification; as many checks as possible run before an
-error is raised.
+This module resolves every message, assigns ids, and uses `connections` to find the block and port at each end of every
+connection. Faults are reported at their places in the specification; as many checks as possible run before an error is
+raised.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ from fusesoc_firm.text.yaml_sections import keys_only_of
 from fusesoc_firm.text.yaml_text import Text
 
 Libraries = Mapping[Middleware, MessageLibrary]
-_KINDS_OF_BLOCKS = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
+_KINDS_OF_BLOCKS = "a block is either an accelerator with 'type' or a converter with 'middleware', 'mode' and 'message'"
 
 
 def derive(
@@ -74,7 +74,7 @@ def derive(
 ) -> DerivedSystem:
     """Derive the system of a specification in `folder`; unless `needs_sources` is set, source files may be missing.
 
-    Raises `InputError` with the faults found here and the faults already in `faults`.
+    Raise `InputError` with the faults found here and the faults already in `faults`.
     """
     analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
     analysis.check_names()
@@ -118,7 +118,7 @@ def derive(
 
 
 def source_files(specification: Specification, folder: Path) -> list[Path]:
-    """The source files of all accelerators, in the order of the specification."""
+    """Return the source files of all accelerators, in the order of the specification."""
     return [folder / source for accelerator in specification.accelerators for source in accelerator.sources]
 
 
@@ -188,10 +188,10 @@ class _Analysis:
                 self.faults.error(f"there is no source file '{source}'", source.source, hint)
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
                 hint = f"legal here: {', '.join(legal)}"
-                self.faults.error(f"'{source}' is not a source of type {accelerator.type}", source.source, hint)
+                self.faults.error(f"'{source}' is not a source file for type {accelerator.type}", source.source, hint)
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
-        """The message sides of an interface, numbered if there are several sides; None if a message has a fault."""
+        """Return an interface's message sides, numbered if there are several, or None if a message has a fault."""
         frames = [self._frame(item.middleware, item.message, item.include, item.exclude) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
         sides = [
@@ -205,7 +205,7 @@ class _Analysis:
         return output_length(item, frame, self.faults) if isinstance(item, OutputType) else None
 
     def _frame(self, middleware: Text, message: Text, include: Sequence[Text], exclude: Sequence[Text]) -> Frame | None:
-        """The frame of a message's fields; None if a fault was noted, at the message's name in the specification."""
+        """Return the frame of a message's fields; if it has a fault, note it at the message's name and return None."""
         if not middleware or not message:
             return None
         library = self.libraries[MIDDLEWARES[middleware]]
@@ -239,15 +239,15 @@ class _Analysis:
     def _resolve_accelerator_block(self, block: Block) -> None:
         assert block.type is not None
         names = [accelerator.name for accelerator in self.specification.accelerators]
-        # A block may refer to an accelerator that could not be read.
+        # The block's accelerator may be one that could not be read.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
-            hint = nearest(block.type, names) or "add it to 'accelerators'"
+            hint = nearest(block.type, names) or "add this accelerator to 'accelerators'"
             self.faults.error(f"unknown accelerator '{block.type}'", block.type.source, hint)
         for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
-                message = f"'{key}' belongs to a converter, but '{block.name}' has a type"
+                message = f"'{key}' is legal only for converters, but '{block.name}' has a 'type'"
                 self.faults.error(message, source, _KINDS_OF_BLOCKS)
         if not any(item.is_software for item in self.specification.accelerators if item.name == block.type):
             self._check_no_publisher_keys(block)
@@ -277,7 +277,7 @@ class _Analysis:
     def _check_no_publisher_keys(self, block: Block) -> None:
         for key in keys_only_of(Block, PUBLISHER):
             if getattr(block, key) is not None:
-                message = f"'{key}' belongs to a publisher, but '{block.name}' is not one"
+                message = f"'{key}' is legal only for publishers, but '{block.name}' is not a publisher"
                 self.faults.error(message, block.place(key), "a publisher is a block with 'mode: publisher'")
 
     def _check_count(self, mode: str) -> None:
@@ -285,7 +285,7 @@ class _Analysis:
         found = [block for block in blocks if block.type is None and block.mode == mode]
         are_known = blocks and all(block.is_sound and (block.type or block.mode) for block in blocks)
         if not found and are_known:
-            message = f"the system has no {mode}; it needs at least one"
+            message = f"the system has no {mode}, but needs at least one"
             self.faults.error(message, blocks[0].name.source, f"a {mode} is a block with 'mode: {mode}'")
         elif len(found) > MOST_CONVERTERS:
             self.faults.error(
@@ -294,7 +294,7 @@ class _Analysis:
             )
 
     def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
-        """The topics of all converters and of software in other programs; `names` are its messages' names."""
+        """Yield the topics of all converters and of software in other programs; `names` are from `message_names`."""
         for name, block in self.blocks.items():
             is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
             if block.type is not None and not is_elsewhere:
@@ -306,7 +306,7 @@ class _Analysis:
                     yield TopicUse(topic, is_published, block.topic.source if block.topic else block.name.source)
 
     def wiring(self) -> Wiring:
-        """The wiring of the resolved blocks."""
+        """Return the wiring of the resolved blocks."""
         blocks = self.specification.blocks
         lost = [block for block in blocks if self.blocks.get(block.name) is not block]
         unsound = [block for block in self.blocks.values() if not block.is_sound]
@@ -324,12 +324,12 @@ class _Analysis:
         )
 
     def parts(self, connections: Sequence[Connection], names: Mapping[End, str]) -> Parts:
-        """The system in hardware and software."""
+        """Return the system, partitioned into hardware and software."""
         software = self.instances(is_software=True)
         return Parting(self.blocks, software, self.inputs, self.outputs, connections, names).parts()
 
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
-        """The accelerators' blocks with known types, in hardware or in software."""
+        """Return the accelerators' blocks with known types, in hardware or in software."""
         found = [
             AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
             for block in self.blocks.values()
@@ -339,7 +339,7 @@ class _Analysis:
 
 
 def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
-    """The converters with the fields that connections carry; unconnected fields need no ports."""
+    """Return the converters with the fields that connections carry; unconnected fields need no ports."""
     names: dict[str, set[Names]] = {}
     for connection in connections:
         for sink, frame in zip(connection.sinks, connection.frames, strict=True):
@@ -351,7 +351,7 @@ def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> t
     for number, name in enumerate(parts.of_mode(mode)):
         whole = select(sides[name][0].frame)
         frame = with_names_in_use(whole, names[name])
-        # Blocks with the same fields share the first one's entity.
+        # Converters with the same fields share the entity of the first one.
         suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(name).lower()}")
         given_name = str(parts.blocks[name].topic or "")
         software = parts.crossings.get(name)

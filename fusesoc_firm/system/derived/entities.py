@@ -1,4 +1,4 @@
-"""The design units of a system; their names must be unique, since a tool keeps one unit of each name."""
+"""The design units of a system; their names must be unique, since a tool keeps only one unit of each name."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from fusesoc_firm.text.naming import identifier
 
 
 def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
-    """Note every block and accelerator whose message, name or sources require an entity with a conflicting name."""
+    """Note every block and accelerator that needs a design unit whose name conflicts with another unit's name."""
     owners = {
         system.entity: "the system",
         f"{system.entity}_tb": "the system's test bench",
-        f"{system.entity}_live": "the system's test bench at the end of a pipe",
+        f"{system.entity}_live": "the system's live test bench",
         f"{system.entity}_in_environment": "the system's test bench",
     }
     frames: dict[str, Frame] = {}
@@ -29,13 +29,13 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     for entity, block, frame in _converters(system):
         if frames.setdefault(entity, frame) != frame:
             message = f"'{block}' and {owners[entity]} need the entity '{entity}' for different messages"
-            hint = f"a system can have a message in only one ROS version: here {frames[entity].ros.title}"
+            hint = f"a system can use a message in only one ROS version, here {frames[entity].ros.title}"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(entity, f"converter '{block}'")
         package = constants_package(frame.message)
         if packages.setdefault(package, frame.message) != frame.message:
             message = f"'{block}' and {owners[package]} need the package '{package}' for different messages"
-            hint = "a package's name is the package and name of its message, joined with '_', in lower case"
+            hint = "a package's name consists of the message's package and name in lower case, joined by '_'"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(package, f"converter '{block}'")
     for frame, suffix in system.computed_lengths.items():
@@ -43,19 +43,19 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     for accelerator in system.accelerator_types:
         name = accelerator.accelerator.name
         if accelerator.accelerator.type != "HLS" and identifier(name) != name:
-            hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+            hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
             faults.error(
                 f"'{name}' is not a legal {'module' if accelerator.is_component else 'entity'} name", name.source, hint
             )
         for entity in _entities(accelerator):
             if owner := owners.get(entity.lower()):
                 hint = "the names of a system's entities must differ in more than case"
-                faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source, hint)
+                faults.error(f"'{name}' and {owner} both need the entity '{entity}'", name.source, hint)
             owners[entity.lower()] = f"accelerator '{name}'"
 
 
 def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
-    """The entity of each converter, with its block and its frame."""
+    """Yield the entity of each converter, with its block and its frame."""
     for converter in system.subscribers:
         yield subscriber_entity(converter.frame, converter.suffix), converter.block, converter.frame
     for converter in system.publishers:

@@ -1,4 +1,4 @@
-"""The sources of each payload's length, and the publishers that store whole frames.
+"""Determine the source of each payload's length, and the publishers that must store whole frames.
 
 A payload's length must be known before the payload is sent. The length is computed from the lengths of the parts,
 provided by the accelerator, or counted in a buffer after the publisher. Publishers that share a source stream also have
@@ -21,7 +21,7 @@ from fusesoc_firm.text.naming import identifier
 
 # More than the on-chip memory of any FPGA.
 _LARGEST_BUFFER = 2**24
-_ADD_BUFFER = "add 'buffer: <bytes of its longest payload>'"
+_ADD_BUFFER = "add 'buffer: <bytes of the longest payload>'"
 
 
 def with_lengths(
@@ -30,7 +30,7 @@ def with_lengths(
     blocks: Mapping[str, Block],
     faults: Diagnostics,
 ) -> tuple[Connection, ...]:
-    """The connections, with the sources of their payloads' lengths."""
+    """Return the connections, each with the source of its payload's length; note faults."""
     found: list[Connection] = []
     suffixes: dict[Frame, str] = {}
     for connection in connections:
@@ -43,7 +43,7 @@ def with_lengths(
         is_sent = any(blocks[sink.block].type is None for sink in connection.sinks)
         length = side.length or _subscriber_length(connection.frame, is_sent=is_sent)
         if connection.frame != select(connection.frame):
-            # Outputs with the same parts share the first one's entity.
+            # Outputs with the same parts share the entity of the first one.
             suffix = suffixes.setdefault(connection.frame, f"_{identifier(source.block).lower()}")
             length = replace(length, suffix=suffix)
         found.append(replace(connection, length=length))
@@ -57,7 +57,7 @@ def _check_whole(
     blocks: Mapping[str, Block],
     faults: Diagnostics,
 ) -> None:
-    """Note a message of variable size that is split, since the segment boundaries depend on the fields."""
+    """Note a fault if a message of variable size is split, since its segment boundaries depend on the fields."""
     names = [names_in_use(frame) for frame in connection.frames]
     whole = names[0] if blocks[connection.source.block].type is None else names_in_use(side.frame)
     message = connection.frame.message
@@ -70,32 +70,32 @@ def _check_whole(
             )
             faults.error(text, place, "all blocks that take a message of variable size must take the same fields")
         if sum(end in other.sinks for other in connections) > 1:
-            text = f"'{end.block}' gets {message} from several blocks"
+            text = f"'{end.block}' receives {message} from several blocks"
             faults.error(text, place, "a message of variable size must come from one block")
 
 
 def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
-    """The source of the length of a subscriber's output, which is the length of the whole message.
+    """Return the source of the length of a subscriber's output. The received length is that of the whole message.
 
-    If some parts of the message are missing, a forwarded message (`is_sent`) has a different length; at an
-    accelerator, the received length is valid.
+    If a forwarded message (`is_sent`) lacks some parts, its length differs from the received length. An accelerator can
+    always use the received length.
     """
     unused = [node for node in all_nodes(frame.nodes) if isinstance(node, Data | Loop) and not node.is_used]
     if not unused or not is_sent:
-        return PayloadLength(LengthSource.GIVEN, "the subscriber has it")
+        return PayloadLength(LengthSource.GIVEN, "the subscriber has the length")
     length = sent_length_of(frame)
     if length.minimum == length.maximum:
-        return PayloadLength(LengthSource.COMPUTED, "it is constant without the unused parts")
+        return PayloadLength(LengthSource.COMPUTED, "the length is constant without the unused parts")
     names = ", ".join(dict.fromkeys(f"'{dotted(node.names)}'" for node in unused))
     return PayloadLength(LengthSource.BUFFERED, f"the subscriber's length includes {names}, which no block uses")
 
 
 def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> PayloadLength | None:
-    """The source of the length of an accelerator's output; None if the length is constant or if a fault was noted."""
+    """Return the source for the length of an accelerator's output, or None if it is constant or faulty."""
     if frame.is_fixed_size:
         if item.length is not None:
-            message = f"'length' is given for {frame.message}, which is of fixed size"
-            faults.error(message, item.length.source, "leave it out: the length is always the same")
+            message = f"'length' is set for {frame.message}, which has a fixed size"
+            faults.error(message, item.length.source, "remove the key: the length is constant")
         return None
     length = sent_length_of(frame)
     if item.length == LengthSource.COMPUTED.value and not length.is_computed:
@@ -103,16 +103,16 @@ def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> Payloa
         faults.error(message, item.length.source, "legal here: given, buffered")
         return None
     if item.length is not None:
-        return PayloadLength(LengthSource(item.length), "the specification says so")
+        return PayloadLength(LengthSource(item.length), "the specification selects this source")
     if length.is_computed:
-        return PayloadLength(LengthSource.COMPUTED, "the lengths at the output's ports determine it")
+        return PayloadLength(LengthSource.COMPUTED, "the lengths at the output's ports determine the payload's length")
     return PayloadLength(LengthSource.BUFFERED, _doubt(length))
 
 
 def publisher_buffers(
     connections: Sequence[Connection], publishers: Mapping[str, Block], faults: Diagnostics
 ) -> dict[str, int]:
-    """The longest payload in bytes of each publisher that stores whole frames."""
+    """Return the buffer size, in bytes of payload, of each publisher that stores whole frames."""
     needs = _needs(connections, publishers)
     buffers: dict[str, int] = {}
     for connection in connections:
@@ -134,11 +134,11 @@ class _Need:
 
 
 def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics) -> int | None:
-    """The size of a publisher's buffer; None if it has no buffer or if a fault was noted."""
+    """Return the size of a publisher's buffer in bytes, or None without a buffer; note faults."""
     if frame.is_fixed_size:
         if block.buffer is not None:
-            message = f"'{block.name}' has a 'buffer', but {frame.message} is of fixed size"
-            faults.error(message, block.place("buffer"), "leave it out: only messages of variable size are stored")
+            message = f"'{block.name}' has a 'buffer', but {frame.message} has a fixed size"
+            faults.error(message, block.place("buffer"), "remove the key: only messages of variable size are stored")
         return None
     length = sent_length_of(frame)
     size = block.buffer
@@ -153,7 +153,7 @@ def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics)
 
 
 def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -> dict[str, _Need]:
-    """The publishers that must store their frames."""
+    """Return the publishers that must store their frames, each with the reason."""
     needs: dict[str, _Need] = {}
     for connection in connections:
         if connection.length is None:
@@ -167,14 +167,14 @@ def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -
         if connection.length.source is LengthSource.BUFFERED:
             source = connection.source.block
             reason = f"the length of the message from '{source}' must be counted, because {connection.length.reason}"
-            hint = f"{_ADD_BUFFER}, or 'length: given' to the output of '{source}' if a port has the length"
+            hint = f"{_ADD_BUFFER}, or add 'length: given' to the output of '{source}' if a port provides the length"
             counted = (end.block for end in connection.sinks if end.block in publishers)
             needs |= dict.fromkeys(counted, _Need(reason, hint))
     return needs
 
 
 def _blocks_behind(ends: Iterable[End], connections: Sequence[Connection]) -> set[str]:
-    """All blocks that messages of variable size reach from `ends`, including `ends`."""
+    """Return all blocks that messages of variable size reach from `ends`, including `ends`."""
     found: set[str] = set()
     for end in ends:
         found.add(end.block)
@@ -185,8 +185,8 @@ def _blocks_behind(ends: Iterable[End], connections: Sequence[Connection]) -> se
 
 
 def _doubt(length: Length) -> str:
-    """The reason why the lengths at the ports do not determine the payload's length."""
+    """Return the reason why the lengths at the ports do not determine the payload's length."""
     outer = next(term for term in length.terms if isinstance(term, Repeat) and term.stride is None)
     inner = next(term for term in outer.body if isinstance(term, Repeat))
     name = "" if inner.part.path == outer.part.path else f", '{dotted(inner.part.names)}'"
-    return f"each element of '{dotted(outer.part.names)}' has a length of its own{name}"
+    return f"each element of '{dotted(outer.part.names)}' has a separate length{name}"

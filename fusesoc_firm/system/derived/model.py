@@ -19,13 +19,13 @@ from fusesoc_firm.text.naming import identifier
 
 
 def absolute_name(topic: str) -> str:
-    """The name of a topic in the root namespace."""
+    """Return the absolute name of a topic; a relative name is resolved in the root namespace."""
     return topic if topic.startswith("/") else f"/{topic}"
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A message between the system and other programs; without a `given_name`, the topic has the block's name."""
+    """A topic that connects the system to other programs; without a `given_name`, the topic has the block's name."""
 
     block: str
     frame: Frame
@@ -44,7 +44,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class End:
-    """One end of a connection: a block, and the prefix of the message's ports at the block (empty at a converter)."""
+    """One end of a connection: a block, and the prefix of the block's ports for the message (empty at a converter)."""
 
     block: str
     prefix: str = ""
@@ -70,7 +70,7 @@ class LengthSource(Enum):
 
 @dataclass(frozen=True)
 class PayloadLength:
-    """The source from which a publisher learns the length of a payload, with the reason.
+    """The source of a payload's length for a publisher, with the reason for the choice.
 
     `suffix` is the suffix of the entity that computes the length.
     """
@@ -82,7 +82,7 @@ class PayloadLength:
 
 @dataclass(frozen=True)
 class MessageSide:
-    """A message at a block, where the names of its ports begin with `prefix` (`in_`, `out1_`, empty at a converter)."""
+    """A message at a block; the message's port names begin with `prefix` (`in_`, `out1_`, empty at a converter)."""
 
     prefix: str
     frame: Frame
@@ -90,13 +90,13 @@ class MessageSide:
 
     @property
     def kind(self) -> tuple[MessageName, Middleware]:
-        """The key by which two sides match: the message, regardless of the used fields."""
+        """The key that matching sides share: the message, regardless of the used fields."""
         return self.frame.message, self.frame.ros
 
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with resolved messages and `width`-bit streams; `has_width` tells whether WIDTH sets the width."""
+    """An accelerator with resolved messages and `width`-bit streams; with `has_width`, WIDTH sets the width."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
@@ -134,8 +134,8 @@ class AcceleratorBlock:
 class Connection:
     """The route of a message from its source to all its sinks, in the order of the specification.
 
-    `frames` has the message for each sink, where the used fields are the fields that this connection carries to the
-    sink. A message of variable size is the same for all sinks, and has a `length`.
+    `frames` contains the message for each sink; its used fields are those that this connection carries to the sink. A
+    message of variable size is the same for all sinks and has a `length`.
     """
 
     source: End
@@ -151,9 +151,9 @@ class Connection:
 
 @dataclass(frozen=True)
 class PublisherTimes:
-    """The known times of a publisher, in cycles.
+    """The times of a publisher, in cycles; an unknown time is None.
 
-    These are the time between messages, the time to send a frame, and the time from a request to its deadline.
+    The times are the period between messages, the time to send a frame, and the time from a request to its deadline.
     """
 
     period: int | None
@@ -165,8 +165,8 @@ class PublisherTimes:
 class Scheduling:
     """The scheduler that chooses the next frame to the host: its policy, with the publishers' times by id.
 
-    A preemptive policy interrupts a frame after `shortest_run` beats at the earliest. The times have `time_bits` bits.
-    If the policy was chosen automatically, `reasons` explain the choice.
+    A preemptive policy interrupts a frame after `shortest_run` beats at the earliest. The scheduler counts time in
+    `time_bits` bits. If the policy was chosen automatically, `reasons` explains the choice.
     """
 
     policy: str
@@ -186,7 +186,7 @@ class LinkKind(Enum):
 
 @dataclass(frozen=True)
 class Link:
-    """The link between the host and the system, and the frequency of clk if the frequency is needed or known."""
+    """The link between the host and the system; `clock_hz` is the frequency of clk, or 0 if it is unknown."""
 
     kind: LinkKind
     clock_hz: int
@@ -198,7 +198,7 @@ class Software:
 
     The source of a connection is one of the `subscribers`, a block, or the hardware's publisher that represents a
     block's input. The sinks of a connection are blocks, the `publishers`, or the hardware's subscribers that represent
-    blocks' outputs. One of the `subscribers` may be in hardware as well; the `publishers` are in software only.
+    blocks' outputs. A subscriber may be in hardware as well; the `publishers` are in software only.
     """
 
     blocks: tuple[AcceleratorBlock, ...] = ()
@@ -214,7 +214,7 @@ class Software:
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock other than the system's: its `frequency` in Hz, and the `ratio` of its edges to clk's edges."""
+    """A clock other than clk: its `frequency` in Hz, and the `ratio` of its frequency to that of clk."""
 
     name: str
     frequency: Fraction
@@ -238,7 +238,7 @@ class DerivedSystem:
     `clock` is the frequency of clk in Hz, if it is given.
 
     Without a `link`, the streams are ports of the system. Converters, accelerators and connections in software are not
-    included. `names` are the names of the accelerators' messages outside of the accelerators: `<block>_in`,
+    included. `names` maps each accelerator's message sides to their names outside the accelerator: `<block>_in`,
     `<block>_out1` and so on.
     """
 
@@ -257,12 +257,12 @@ class DerivedSystem:
     clocks: tuple[Clock, ...] = ()
 
     def clock_of(self, block: str) -> Clock | None:
-        """The clock of a block; None for the system's clock."""
+        """Return the clock of a block, or None for the system's clock."""
         name = self._accelerators[block].clock if block in self._accelerators else ""
         return next((clock for clock in self.clocks if clock.name == name), None)
 
     def width_of(self, block: str) -> int:
-        """The width of a block's streams in bits."""
+        """Return the width of a block's streams in bits."""
         return self._accelerators[block].type.width if block in self._accelerators else self.width
 
     @cached_property
@@ -276,7 +276,7 @@ class DerivedSystem:
 
     @property
     def error_blocks(self) -> tuple[str, ...]:
-        """The converters that report errors, in the order of `frame_error`: publishers of variable size come last."""
+        """The converters that report errors, in the order of `frame_error`: publishers of variable size are last."""
         publishers = (item.block for item in self.publishers if not item.frame.is_fixed_size)
         return (*(item.block for item in self.subscribers), *publishers)
 
@@ -290,7 +290,7 @@ class DerivedSystem:
         }
 
     def length_to(self, publisher: Converter) -> PayloadLength | None:
-        """The source from which a publisher learns the length of a payload; None if the length is constant."""
+        """Return the source of a payload's length for a publisher, or None if the length is constant."""
         return next(item.length for item in self.connections if End(publisher.block) in item.sinks)
 
     @property

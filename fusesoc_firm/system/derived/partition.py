@@ -1,9 +1,9 @@
 """The partition of a system into software and hardware, and the messages between the two.
 
 A specification defines the connections; the type of an accelerator decides between hardware and software. A message
-from hardware to a block in software leaves through an added publisher. A message from such a block to hardware enters
-through an added subscriber. All other messages of software stay on the host. A subscriber that feeds only software, or
-a publisher that only software feeds, is therefore not a converter.
+from hardware to a block in software leaves the hardware through an added publisher. A message from a block in software
+to hardware enters the hardware through an added subscriber. All other messages of software stay on the host. A
+subscriber that feeds only software, or a publisher that only software feeds, is therefore not a converter.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ MOST_CONVERTERS = 256
 
 @dataclass(frozen=True)
 class Parts:
-    """A partitioned system: `software`, and the hardware's blocks by name, message sides and connections.
+    """A partitioned system: the `software`, and the hardware as blocks by name, message sides and connections.
 
-    `crossings` are the added converters among these blocks, each with the message side in software that the converter
-    represents. Added converters come last, in the order of the specification's blocks.
+    `crossings` maps the name of each added converter to the message side in software that the converter represents.
+    Added converters come last, in the order of the specification's blocks.
     """
 
     blocks: Mapping[str, Block]
@@ -43,21 +43,21 @@ class Parts:
     software: Software
 
     def of_mode(self, mode: str) -> dict[str, Block]:
-        """The hardware's subscribers or publishers."""
+        """Return the hardware's subscribers or publishers."""
         return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == mode}
 
     def check(self, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
         """Note the faults in the hardware of a specification with these `blocks`."""
         first = next(iter(blocks.values())).name.source
         if not self.blocks:
-            hint = "an accelerator, or a message that goes from a subscriber to a publisher, must stay there"
+            hint = "the hardware needs an accelerator, or a message that goes from a subscriber to a publisher"
             faults.error("all accelerators are software, so nothing is left for hardware", first, hint)
             return
         for mode in (SUBSCRIBER, PUBLISHER):
             found = [*self.of_mode(mode).values()]
             if not found:
                 hint = f"a {mode} is a block with 'mode: {mode}', or a message between hardware and software"
-                faults.error(f"the hardware has no {mode}; it needs at least one", first, hint)
+                faults.error(f"the hardware has no {mode}, but needs at least one", first, hint)
             elif len(found) > MOST_CONVERTERS:
                 message = f"the hardware has {len(found)} {mode}s; ids have one byte, so the limit is {MOST_CONVERTERS}"
                 faults.error(message, found[MOST_CONVERTERS].name.source)
@@ -68,7 +68,7 @@ class Parts:
 
 
 def message_names(blocks: Mapping[str, Block], inputs: Sides, outputs: Sides) -> dict[End, str]:
-    """A name for each message side of each accelerator, `<block>_in`, that differs from all names of blocks."""
+    """Return a name for each message side of each accelerator, `<block>_in`, that differs from all names of blocks."""
     ends = [
         End(name, side.prefix)
         for name, block in blocks.items()
@@ -91,7 +91,7 @@ class Parting:
     names: Mapping[End, str]
 
     def parts(self) -> Parts:
-        """The hardware and the software, each with its connections."""
+        """Return the hardware and the software, each with its connections."""
         hardware = tuple(self._hardware_connections())
         host = tuple(self._host_connections())
         ends = {end.block for connection in hardware for end in (connection.source, *connection.sinks)}
@@ -107,7 +107,7 @@ class Parting:
         )
 
     def _software(self, connections: tuple[Connection, ...]) -> Software:
-        """The host's part of the system; its publishers have only the driven fields."""
+        """Return the host's part of the system, whose publishers use only the driven fields."""
         sources = {connection.source.block for connection in connections}
         subscribers = [
             self._topic(name, self.outputs[name][0].frame) for name in self._converters(SUBSCRIBER) if name in sources
@@ -125,7 +125,7 @@ class Parting:
         return Software(tuple(self.software), tuple(subscribers), tuple(publishers), connections)
 
     def _topic(self, name: str, frame: Frame) -> Topic:
-        """The topic of one of the specification's converters."""
+        """Return the topic of the converter with this name in the specification."""
         return Topic(name, frame, given_name=str(self.blocks[name].topic or ""))
 
     # --- where a message is ----------------------------------------------------------------------------------------
@@ -135,7 +135,7 @@ class Parting:
         return frozenset(block.block for block in self.software)
 
     def _is_hardware(self, name: str) -> bool:
-        """Whether a block is an accelerator in hardware."""
+        """Return whether a block is an accelerator in hardware."""
         return self.blocks[name].type is not None and name not in self._in_software
 
     def _converters(self, mode: str) -> Iterator[str]:
@@ -143,7 +143,7 @@ class Parting:
 
     @cached_property
     def _hardware_sinks(self) -> frozenset[End]:
-        """The ends whose whole message is in hardware, even if part of the message comes from the host.
+        """The ends whose whole message is in hardware, even if the host sends part of the message.
 
         These ends are the accelerators in hardware, all sinks of accelerators in hardware, and the publishers that
         subscribers drive.
@@ -158,12 +158,12 @@ class Parting:
         )
 
     def _entering(self) -> Iterator[tuple[End, MessageSide]]:
-        """The outputs in software that feed hardware."""
+        """Return the outputs in software that feed hardware."""
         sources = {connection.source for connection in self.connections if any(self._in_hardware(connection))}
         return self._sides(self.outputs, sources)
 
     def _leaving(self) -> Iterator[tuple[End, MessageSide]]:
-        """The inputs in software that are driven by hardware."""
+        """Return the inputs in software that are driven by hardware."""
         return self._sides(self.inputs, self._hardware_sinks)
 
     def _sides(self, sides: Sides, wanted: Iterable[End]) -> Iterator[tuple[End, MessageSide]]:
@@ -176,7 +176,7 @@ class Parting:
     # --- connections -----------------------------------------------------------------------------------------------
 
     def _in_hardware(self, connection: Connection) -> Iterator[tuple[End, Frame]]:
-        """The sinks in hardware, with their messages."""
+        """Return the sinks in hardware, with their messages."""
         return (pair for pair in _pairs(connection) if pair[0] in self._hardware_sinks)
 
     def _hardware_connections(self) -> Iterator[Connection]:
@@ -197,11 +197,11 @@ class Parting:
                 yield _connection(connection.source, pairs)
 
     def _crossing(self, end: End) -> End:
-        """The end in hardware that represents an end in software; any other end is returned unchanged."""
+        """Return the end in hardware that represents an end in software; any other end is returned unchanged."""
         return End(self.names[end]) if end.block in self._in_software else end
 
     def _converter(self, end: End, side: MessageSide) -> Block:
-        """The block of the converter that represents a side; a publisher gets the block's publisher keys."""
+        """Return the block of the converter that represents a side; copy the block's publisher keys to a publisher."""
         block = self.blocks[end.block]
         made = Block(name=Text(self.names[end], block.name.source), source=block.source, places=block.places)
         if side in self.outputs[end.block]:
@@ -209,7 +209,7 @@ class Parting:
         keys = {key: getattr(block, key) for key in keys_only_of(Block, PUBLISHER)}
         leaving = [side.frame for other, side in self._leaving() if other.block == end.block]
         if side.frame.is_fixed_size and not all(frame.is_fixed_size for frame in leaving):
-            # The buffer belongs to the inputs of variable size.
+            # Only a message of variable size uses the buffer.
             del keys["buffer"]
         return replace(made, mode=Text(PUBLISHER), **keys)
 
@@ -217,13 +217,13 @@ class Parting:
 def _check_no_publisher_keys(block: Block, faults: Diagnostics) -> None:
     for key in keys_only_of(Block, PUBLISHER):
         if getattr(block, key) is not None:
-            message = f"'{key}' belongs to a publisher, but no message leaves hardware for '{block.name}'"
-            hint = "the key is for a message that a block in software takes from hardware"
+            message = f"'{key}' is legal only for publishers, but no message goes from hardware to '{block.name}'"
+            hint = "the key describes a message from hardware to a block in software"
             faults.error(message, block.place(key), hint)
 
 
 def _bare(side: MessageSide) -> MessageSide:
-    """The side without a prefix, as at a converter."""
+    """Return the side without a prefix, as at a converter."""
     return MessageSide("", side.frame)
 
 
@@ -236,6 +236,6 @@ def _connection(source: End, pairs: Sequence[tuple[End, Frame]]) -> Connection:
 
 
 def _joined(frames: Sequence[Frame]) -> Frame:
-    """A message with all fields that at least one of several frames uses."""
+    """Return a message with all fields that at least one of several frames uses."""
     names = reduce(frozenset.union, (names_in_use(frame) for frame in frames))
     return with_names_in_use(frames[0], names)

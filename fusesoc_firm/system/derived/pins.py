@@ -8,18 +8,20 @@ from fusesoc_firm.system.written.specification import SOFTWARE, Pin
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import identifier
 
-# The width of the largest array that fits a message's port.
+# The width of the largest port that a message can have.
 _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
 # The kinds of ports that are missing in accelerators of some types.
-_WITHOUT_PINS = {"HLS": "ports but those of its messages", SOFTWARE: "ports"}
+_WITHOUT_PINS = {"HLS": "ports except for messages", SOFTWARE: "ports"}
 
 
 def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:
     """Note every pin that cannot be a port of its accelerator."""
     accelerator = type_.accelerator
     if accelerator.type in _WITHOUT_PINS and accelerator.pins:
-        message = f"'{accelerator.name}' is of type {accelerator.type}, which has no {_WITHOUT_PINS[accelerator.type]}"
+        message = (
+            f"'{accelerator.name}' has the type {accelerator.type}, which cannot have {_WITHOUT_PINS[accelerator.type]}"
+        )
         faults.error(message, accelerator.pins[0].source, "write this accelerator in VHDL")
         return
     taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")
@@ -35,7 +37,7 @@ def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
     if not pin.name:
         return
     if identifier(pin.name) != pin.name:
-        hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+        hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
         faults.error(f"'{pin.name}' is not a legal port name", pin.name.source, hint)
     elif owner := taken.get(pin.name.lower()):
         hint = "the names of an entity's ports must differ in more than case"

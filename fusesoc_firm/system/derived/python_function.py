@@ -1,4 +1,4 @@
-"""An accelerator in software: a Python function that takes its messages and returns its responses.
+"""An accelerator in software: a Python function that receives messages and returns responses.
 
     def mix(message0, message1):
         return {"x": message0["x"] + message1["x"], "y": 0.0, "z": 0.0}
@@ -25,18 +25,18 @@ _KEYWORDS = frozenset(word.lower() for word in keyword.kwlist)
 
 
 def function_name(type_: AcceleratorType) -> str:
-    """The function's name, which is the name of the accelerator."""
+    """Return the function's name, which is the name of the accelerator."""
     return identifier(type_.accelerator.name, avoid=_KEYWORDS, suffix="function")
 
 
 def parameter_names(type_: AcceleratorType) -> list[str]:
-    """Suggested names for the function's parameters, one for each input, in order."""
+    """Return suggested names for the function's parameters, one for each input, in order."""
     count = len(type_.inputs)
     return ["message"] if count == 1 else [f"message{number}" for number in range(count)]
 
 
 def prototype(type_: AcceleratorType) -> str:
-    """The required declaration of the function."""
+    """Return the required declaration of the function."""
     return f"def {function_name(type_)}({', '.join(parameter_names(type_))})"
 
 
@@ -44,8 +44,8 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
     """Note faults in the function, whose file at `path` is the first source; the file may be missing."""
     accelerator = type_.accelerator
     if not type_.inputs:
-        message = f"'{accelerator.name}' takes no message, so nothing would call its function"
-        hint = "without 'sources' it represents external software, which can send at any time"
+        message = f"'{accelerator.name}' takes no messages, so its function would never be called"
+        hint = "without 'sources', the accelerator represents external software, which can send at any time"
         faults.error(message, accelerator.name.source, hint)
         return
     if not is_file(path) or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:
@@ -57,7 +57,9 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
         found = _definition(ast.parse(file.text), function_name(type_))
     except (SyntaxError, ValueError) as error:
         line, column = (error.lineno, error.offset) if isinstance(error, SyntaxError) else (1, 1)
-        faults.error(f"this is not Python: {getattr(error, 'msg', error)}", file.place(line or 1, column or 1))
+        faults.error(
+            f"the file is not valid Python: {getattr(error, 'msg', error)}", file.place(line or 1, column or 1)
+        )
         return
     if found is None:
         faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, hint)
@@ -68,7 +70,7 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
 
 
 def _shown(source: Text) -> str:
-    """The path of a source, relative to the specification."""
+    """Return the path of a source, relative to the specification."""
     return str(Path(source.source.file).parent / source) if source.source else str(source)
 
 
@@ -80,18 +82,18 @@ class _File:
     text: str
 
     def place(self, line: int, column: int) -> SourceRef:
-        """A place in the file."""
+        """Return a place in the file."""
         lines = self.text.split("\n")
         return SourceRef(self.name, line, column, lines[line - 1] if line <= len(lines) else "")
 
 
 def _definition(module: ast.Module, name: str) -> ast.stmt | None:
-    """The last statement of a module that binds a name, since this statement determines the name's value."""
+    """Return the last statement of a module that binds a name, since this statement determines the name's value."""
     return next((found for found in reversed([*_statements(module.body)]) if name in _bound(found)), None)
 
 
 def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
-    """All statements in a module's scope, including conditional statements."""
+    """Yield all statements in a module's scope, including conditional statements."""
     for statement in body:
         yield statement
         for block in ("body", "orelse", "finalbody"):
@@ -100,7 +102,7 @@ def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _bound(statement: ast.stmt) -> set[str]:
-    """The names that a statement binds to a possibly callable object."""
+    """Return the names that a statement binds to a possibly callable object."""
     match statement:
         case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
             return {name}
@@ -114,7 +116,7 @@ def _bound(statement: ast.stmt) -> set[str]:
 
 
 def _takes(arguments: ast.arguments, count: int) -> bool:
-    """Whether a function can be called with this number of positional arguments."""
+    """Return whether a function can be called with this number of positional arguments."""
     positional = len(arguments.posonlyargs) + len(arguments.args)
     fewest = positional - len(arguments.defaults)
     needs_keywords = None in arguments.kw_defaults

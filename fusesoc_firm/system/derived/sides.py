@@ -1,4 +1,4 @@
-"""The message side of a block as ports, and the handshakes on it."""
+"""The ports and handshakes of a block's message side."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Handshake:
 
 
 def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> list[SidePort]:
-    """The ports of a message side; `gives` tells whether its block is the source of the message.
+    """Return the ports of a message side; `gives` tells whether the side's block is the source of the message.
 
-    With `has_valid`, the sink of a converter also learns from `msg_valid` that the message is complete. For messages of
-    variable size, every sink has `msg_valid`.
+    With `has_valid`, the side of a message of fixed size includes `msg_valid`, which signals a complete message. The
+    side of a message of variable size always includes `msg_valid`.
     """
     ports = [
         SidePort(port.name, port.width, gives is not port.is_reverse, port.comment)
@@ -60,7 +60,7 @@ def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> lis
 
 
 def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]]:
-    """All ports of an accelerator's message sides, with prefixes, in the order of the interface.
+    """Return all ports of an accelerator's message sides, with prefixes, in the order of the interface.
 
     An output's length is a port only if the accelerator provides it.
     """
@@ -79,7 +79,7 @@ def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]
 
 
 def handshakes(frame: Frame) -> Iterator[Handshake]:
-    """All handshakes of a message of variable size."""
+    """Yield all handshakes of a message of variable size."""
     side = message_side(frame)
     yield Handshake("", "msg_valid", "msg_ready", "segment_valid", side.segments)
     for part in side.parts:

@@ -1,7 +1,7 @@
 """The publishers' times that the scheduler needs, in cycles of `clk`.
 
 A time in the specification is a number of cycles, or a number with a unit, which is converted to cycles with the
-project's `clock`. The time to send a frame (its WCET in the dissertation's section 6.3.2) follows from the frame's
+project's `clock`. The time to send a frame (called WCET in section 6.3.2 of the dissertation) follows from the frame's
 size, if the size is known.
 """
 
@@ -37,12 +37,12 @@ _HERTZ = {"Hz": 1, "kHz": 1000, "MHz": 10**6, "GHz": 10**9}
 _QUANTITY = re.compile(r"(\d{1,20}(?:\.\d{1,20})?)\s*([A-Za-z]*)", re.ASCII)
 # In Hz: the legal range of an FPGA's clock.
 _SLOWEST, _FASTEST = 1, 10**10
-# VHDL's largest integer is the limit of the scheduler's counters.
+# The scheduler's counters are limited to VHDL's largest integer.
 _LONGEST_RUN = 2**31 - 1
 
 # The hint for a publisher that lacks a time.
-_PERIOD = "add 'period: <cycles, a time, or a rate>', such as 'period: 100 Hz'"
-_WCET = "add 'wcet: <cycles or a time>', or 'buffer: <bytes of its longest payload>'"
+_PERIOD = "add 'period: <cycles, time or rate>', such as 'period: 100 Hz'"
+_WCET = "add 'wcet: <cycles or time>', or 'buffer: <bytes of the longest payload>'"
 
 Rounding = Callable[[Fraction], int]
 
@@ -54,7 +54,7 @@ def scheduling_of(
     publishers: Sequence[Converter],
     faults: Diagnostics,
 ) -> Scheduling:
-    """The scheduler of a system with these publishers; their `blocks` define the times, and faults are noted.
+    """Return the scheduler of a system with these publishers, whose `blocks` define the times; note faults.
 
     `clock` is the frequency of clk in Hz, if it is given.
     """
@@ -69,29 +69,29 @@ def scheduling_of(
 
 
 def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
-    """The publishers' tasks, in the order of the publishers' ids; raises `InputError` with all unknown times."""
+    """Return the publishers' tasks, in the order of the publishers' ids; raise `InputError` with all unknown times."""
     faults = Diagnostics()
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
-            hint = "the least time between its messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
+            hint = "add the minimum time between messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
             faults.error(f"publisher '{publisher.block}' needs a 'period'", hint=hint)
         if times.transfer_time is None:
-            hint = "the cycles that its longest frame takes to be sent"
-            message = f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound"
+            hint = "add the number of cycles that the longest frame takes"
+            message = f"publisher '{publisher.block}' needs a 'wcet', because its message has no size limit"
             faults.error(message, hint=hint)
     faults.raise_if_any()
     return _tasks(system.publishers, system.scheduling.times)
 
 
 def channel_of(system: DerivedSystem) -> Channel:
-    """The channel that the publishers share."""
+    """Return the channel that the publishers share, for the analysis."""
     from fusesoc_firm.scheduling.analysis import Channel
 
     return Channel(system.width // 8, system.scheduling.shortest_run)
 
 
 def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
-    """The bounds for each publisher under the system's scheduler, in the order of the publishers' ids.
+    """Return the bounds for each publisher under the system's scheduler, in the order of the publishers' ids.
 
     The result is empty unless all times of all publishers are known.
     """
@@ -104,7 +104,7 @@ def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
 
 
 def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> tuple[Task, ...]:
-    """The tasks of the publishers whose times are all known."""
+    """Return the tasks of the publishers whose times are all known."""
     return tuple(
         Task(publisher.block, item.period, item.transfer_time, item.deadline or item.period)
         for publisher, item in zip(publishers, times, strict=True)
@@ -115,7 +115,7 @@ def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> 
 def _chosen(
     project: Project, publishers: Sequence[Converter], times: Sequence[PublisherTimes]
 ) -> tuple[str, tuple[str, ...]]:
-    """The smallest scheduler that meets all deadlines, as far as times are known, with the reasons for the choice."""
+    """Return the smallest scheduler that meets all known deadlines, with the reasons for the choice."""
     # Imported here, since loading NumPy takes longer than generating most systems.
     from fusesoc_firm.scheduling.analysis import Channel, Criterion, choose
 
@@ -129,27 +129,27 @@ def _chosen(
 
 
 def frame_beats(payload_bytes: int, width: int) -> int:
-    """The beats of a frame on a stream of `width` bits."""
+    """Return the number of beats in a frame on a stream of `width` bits."""
     return -(-(_HEADER_BYTES + payload_bytes) * 8 // width)
 
 
 def _time_bits(times: Iterable[PublisherTimes]) -> int:
-    """The width of the scheduler's time: enough for all deadlines with a frame of every other publisher in between."""
+    """Return the scheduler's time width in bits, enough for any deadline plus a frame of each other publisher."""
     reach = max((item.deadline or 0 for item in times), default=0) + sum(item.transfer_time or 0 for item in times)
     return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
 
 
 def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
-    """The clock's frequency in Hz; None if it is missing or if a fault was noted."""
+    """Return the clock's frequency in Hz, or None if it is missing or faulty; note the fault."""
     return None if project.clock is None else frequency("clock", project.clock, faults)
 
 
 def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
-    """A frequency in Hz; if the value of `key` is not a frequency, None, with the fault noted."""
+    """Return the value of `key` as a frequency in Hz; if it is not a frequency, note the fault and return None."""
     found = _QUANTITY.fullmatch(text)
     hertz = Fraction(found[1]) * _HERTZ[found[2]] if found and found[2] in _HERTZ else Fraction(0)
     if not _SLOWEST <= hertz <= _FASTEST:
-        hint = "a frequency from 1 Hz to 10 GHz, such as 100 MHz or 12.5 MHz"
+        hint = "legal here: frequencies from 1 Hz to 10 GHz, such as 100 MHz or 12.5 MHz"
         faults.error(f"'{key}' cannot be '{text}'", text.source, hint)
         return None
     return hertz
@@ -162,7 +162,7 @@ def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
 
 
 def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
-    """Note the missing times of a publisher that a policy requires."""
+    """Note every time that a policy requires and a publisher lacks."""
     is_auto = policy == AUTO_SCHEDULER
     has_deadlines = not is_auto and POLICIES[policy].has_deadlines
     has_transfer_times = is_auto or POLICIES[policy].has_transfer_times
@@ -171,22 +171,25 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
         if is_auto and item.period is None and block.period is None:
             faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
         if has_deadlines and item.deadline is None and block.period is None and block.deadline is None:
-            message = f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'"
+            message = f"scheduler '{policy}' needs a 'period' or a 'deadline' for '{block.name}'"
             faults.error(message, block.name.source, _PERIOD)
         if has_transfer_times and item.transfer_time is None and block.wcet is None:
-            message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound"
+            message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose message has no size limit"
             faults.error(message, block.name.source, _WCET)
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads times; `clock` is in Hz, if it is given."""
+    """A reader of times; `clock` is the frequency of clk in Hz, if it is given."""
 
     clock: Fraction | None
     faults: Diagnostics
 
     def times(self, block: Block, publisher: Converter, width: int) -> PublisherTimes:
-        """A publisher's times; early times are rounded down, late times up, so rounding never hides a late frame."""
+        """Return a publisher's times.
+
+        Periods and deadlines are rounded down, frame times up, so that rounding hides no late frame.
+        """
         period = self._cycles(block.period, "period", floor)
         transfer_time = self._cycles(block.wcet, "wcet", ceil)
         if block.wcet is None:
@@ -195,18 +198,18 @@ class _Reader:
         return PublisherTimes(period, transfer_time, deadline)
 
     def _cycles(self, time: Text | None, key: str, rounded: Rounding) -> int | None:
-        """A time in cycles; None if it is missing or if a fault was noted."""
+        """Return a time in cycles, or None if it is missing or faulty; note the fault."""
         if time is None:
             return None
         found = _QUANTITY.fullmatch(time)
         units = (*_SECONDS, *_HERTZ) if key == "period" else tuple(_SECONDS)
         if not found or found[2] not in ("", *units) or (not found[2] and "." in found[1]):
-            hint = f"a number of cycles, or a number with one of {', '.join(units)}"
+            hint = f"legal here: a number of cycles, or a number with one of the units {', '.join(units)}"
             self.faults.error(f"'{key}' cannot be '{time}'", time.source, hint)
             return None
         number, unit = Fraction(found[1]), found[2]
         if unit and self.clock is None:
-            message = f"'{key}' is '{time}', but the clock's frequency is not given"
+            message = f"'{key}' is '{time}', but the clock's frequency is missing"
             self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
             return None
         cycles = number if not unit else self._of_unit(number, unit)
@@ -224,6 +227,6 @@ class _Reader:
 
 
 def _beats_at_most(publisher: Converter, width: int) -> int | None:
-    """The beats of a publisher's longest frame; None if its size is unbounded."""
+    """Return the number of beats in a publisher's longest frame, or None if its size is unbounded."""
     longest = publisher.buffer or length_of(publisher.frame).maximum
     return None if longest is None else frame_beats(longest, width)

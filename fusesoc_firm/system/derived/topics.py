@@ -13,7 +13,7 @@ from fusesoc_firm.text.yaml_text import Text
 # The names that both ROS 1 and ROS 2 accept.
 _WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
 _NAME = re.compile(rf"/?{_WORD}(?:/{_WORD})*")
-_LEGAL = "legal here: /arm/left, or arm/left, which is relative to the node's namespace; letters, digits and single '_'"
+_LEGAL = "legal here: letters, digits and single '_', as in /arm/left, or in arm/left relative to the node's namespace"
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class TopicUse:
 
 
 def check_topic_name(name: Text, faults: Diagnostics) -> None:
-    """Note a private name, and a name that ROS 1 or ROS 2 does not accept."""
+    """Note a fault if a name is private, or if ROS 1 or ROS 2 does not accept it."""
     if name.startswith("~"):
         message = f"topic '{name}' depends on the node's name, which is unknown before the node starts"
         faults.error(message, name.source, _LEGAL)
@@ -51,12 +51,12 @@ def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
 def _check_type(name: str, first: TopicUse, other: TopicUse, faults: Diagnostics) -> None:
     one, two = (use.topic.frame.message for use in (first, other))
     if one != two:
-        message = f"topic {name} of '{other.topic.block}' has the type {two}, but that of '{first.topic.block}' {one}"
-        faults.error(message, other.source, f"a topic has one type; '{first.topic.block}' is at {first.source}")
+        message = f"topic {name} has the type {two} at '{other.topic.block}', but {one} at '{first.topic.block}'"
+        faults.error(message, other.source, f"a topic has only one type; '{first.topic.block}' is at {first.source}")
 
 
 def _check_loop(name: str, uses: Iterable[TopicUse], faults: Diagnostics) -> None:
-    """Warn of a message that returns to the system."""
+    """Warn if the system both publishes and subscribes to a topic, since the system then receives its own messages."""
     uses = tuple(uses)
     taking = next((use for use in uses if not use.is_published), None)
     giving = next((use for use in uses if use.is_published), None)

@@ -32,7 +32,7 @@ TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
 
 
 def system_configuration(system: DerivedSystem) -> Context:
-    """The configuration of the top level."""
+    """Return the configuration of the top level."""
     names = Names(system)
     return {
         **dimensions(system),
@@ -57,17 +57,17 @@ def system_configuration(system: DerivedSystem) -> Context:
 
 
 def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
-    """The test bench that compares frames with files, or the live test bench that is controlled through a pipe."""
+    """Return the name of the test bench that compares frames with files, or of the live test bench with a pipe."""
     return f"{system.entity}_live" if is_live else f"{system.entity}_tb"
 
 
 def test_bench_configuration(
     system: DerivedSystem, seed: int, stall_percent: int, environment: str | None, *, is_live: bool
 ) -> Context:
-    """The configuration of the test bench: the system with the simulated host, and the `environment` at its pins.
+    """Return the configuration of the test bench: the system, the simulated host, and the `environment` at the pins.
 
-    The environment is an entity with `clk`, `rst_n` and the pins in the opposite directions. If `is_live` is set, the
-    host is at the other end of a pipe, and the test bench does not join bursts.
+    The environment is an entity with the ports `clk` and `rst_n`, and with the pins in the opposite directions. If
+    `is_live` is set, the host is at the other end of a pipe, and the test bench does not join bursts.
     """
     pins = pin_groups(Names(system), system)
     formals = [
@@ -102,7 +102,7 @@ def test_bench_configuration(
 
 
 def _clocks(system: DerivedSystem) -> list[Context]:
-    """All clocks other than clk, as ports of the top level."""
+    """Return all clocks other than clk, as ports of the top level."""
     return [
         {
             "port": clock.port,
@@ -114,7 +114,10 @@ def _clocks(system: DerivedSystem) -> list[Context]:
 
 
 def _resets(system: DerivedSystem) -> Context | None:
-    """The resets of the other clocks: all domains, including clk's, enter reset in turn, then all are released."""
+    """Return the resets of all domains if there are clocks besides clk.
+
+    The domains are reset in turn and released together.
+    """
     if not system.clocks:
         return None
     before = ""
@@ -133,7 +136,7 @@ def _reset(clock: str, release: str, reset: str) -> Context:
 
 
 def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
-    """The top level's names for the pins of blocks, by block and name."""
+    """Return the top level's name for each accelerator pin, by block and pin name."""
     names = Names(system)
     return {
         (block.block, pin.name): names.port(block.block, pin.name)
@@ -143,7 +146,7 @@ def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
 
 
 def pin_groups(names: Names, system: DerivedSystem) -> list[Context]:
-    """The pins of each block with pins, as ports of the top level."""
+    """Return the pins of each block that has pins, as ports of the top level."""
     return [
         {
             "block": block.block,
@@ -163,7 +166,7 @@ def pin_groups(names: Names, system: DerivedSystem) -> list[Context]:
 
 
 def dimensions(system: DerivedSystem) -> Context:
-    """The sizes of the top level's ports and signals."""
+    """Return the sizes of the top level's ports and signals."""
     publishers = len(system.publishers)
     return {
         "entity": system.entity,

@@ -15,7 +15,7 @@ from fusesoc_firm.system.hardware.names import AXIS, RELEASED, Names
 class SourceSide:
     """The signals that a connection offers to one of its sinks.
 
-    `ports` are the signals by port of the message side. `begun` has, for each part, the signal that tells whether a
+    `ports` maps each port of the message side to a signal. `begun` maps each part to the signal that tells whether a
     message or an element is present.
     """
 
@@ -24,7 +24,7 @@ class SourceSide:
 
 
 def crossing_configuration(names: Names, crossing: Crossing, source: SourceSide) -> dict[str, Any]:
-    """The comment, the signals and the instances of a crossing."""
+    """Return the comment, the signals and the instances of a crossing."""
     ends = f"{crossing.source.block} to {crossing.sink.block}"
     return {
         "ends": ends,
@@ -38,7 +38,7 @@ def crossing_configuration(names: Names, crossing: Crossing, source: SourceSide)
 
 
 def field_pairs(names: Names, crossing: Crossing, source: SourceSide) -> Iterator[tuple[str, str]]:
-    """The assignments between the fields of a message of variable size and the registers that hold the fields."""
+    """Yield the assignments between the fields of a message of variable size and the registers that hold them."""
     for scope in crossing.scopes:
         given, taken = (names.crossing(crossing, word(scope.handshake.part, name)) for name in ("given", "taken"))
         low = 0
@@ -53,7 +53,7 @@ def _part(vector: str, low: int, width: int | None) -> str:
 
 
 def _notes(crossing: Crossing) -> list[str]:
-    """Comments on the paths that an implementation must constrain."""
+    """Return comments on the paths that an implementation must constrain."""
     if not crossing.is_clocked:
         return []
     fields = "every field" if crossing.frame.is_fixed_size else "fields_r"
@@ -68,7 +68,7 @@ def _notes(crossing: Crossing) -> list[str]:
 
 
 def _instances(names: Names, crossing: Crossing, source: SourceSide) -> Iterator[dict[str, Any]]:
-    """The instances of a crossing, for messages and streams: between two clocks, or between two widths."""
+    """Yield the instances of a crossing, for messages and streams: between two clocks, or between two widths."""
     kinds = ("message", "stream", "resize")
     for scope in crossing.scopes:
         found = [("message", _message(names, crossing, scope, source))] if crossing.is_clocked else []
@@ -79,7 +79,7 @@ def _instances(names: Names, crossing: Crossing, source: SourceSide) -> Iterator
 
 
 def _message(names: Names, crossing: Crossing, scope: Scope, source: SourceSide) -> dict[str, Any]:
-    """The instance for the handshake and the fields of a scope."""
+    """Return the instance for the handshake and the fields of a scope."""
     inner = parts_of(scope, crossing.scopes)
     generics = [] if scope.handshake.segments < 2 else [("SEGMENTS", scope.handshake.segments)]
     generics += [] if crossing.frame.is_fixed_size else [("FIELD_BITS", scope.bits)]
@@ -95,7 +95,7 @@ def _message(names: Names, crossing: Crossing, scope: Scope, source: SourceSide)
 
 
 def _fixed_sides(names: Names, crossing: Crossing, _: Scope, source: SourceSide) -> dict[str, Any]:
-    """The sides of a message of fixed size: the fields are stable at the source, and the message crosses as a whole."""
+    """Return the sides of a message of fixed size, which crosses as a whole; its fields are stable at the source."""
     valid = source.ports["segment_valid"]
     return {
         "is_one_segment": True,
@@ -118,7 +118,10 @@ def _fixed_sides(names: Names, crossing: Crossing, _: Scope, source: SourceSide)
 
 
 def _variable_sides(names: Names, crossing: Crossing, scope: Scope, source: SourceSide) -> dict[str, Any]:
-    """The sides of a message or element of variable size: the fields are held until all nested parts have crossed."""
+    """Return the sides of a message or element of variable size.
+
+    Registers hold its fields until all nested parts have crossed.
+    """
     handshake, parent, sink = scope.handshake, scope.parent, crossing.sink
     has_inner = bool(parts_of(scope, crossing.scopes))
     own = {name: names.crossing(crossing, word(handshake.part, name)) for name in ("given", "taken")}
@@ -145,7 +148,7 @@ def _variable_sides(names: Names, crossing: Crossing, scope: Scope, source: Sour
 
 
 def _stream(names: Names, crossing: Crossing, scope: Scope, stream: str, source: SourceSide) -> dict[str, Any]:
-    """The instance for a stream of a scope."""
+    """Return the instance for a stream within a scope."""
     part, sink = scope.handshake.part, crossing.sink
     found = {
         "label": names.crossing_label(crossing, word(f"{stream}_axis", "crossing")),
@@ -164,7 +167,7 @@ def _stream(names: Names, crossing: Crossing, scope: Scope, stream: str, source:
 
 
 def _domains(crossing: Crossing) -> dict[str, str]:
-    """Clock and reset of each side; logic on the system's clock waits until all domains have been reset."""
+    """Return the clock and reset of each side; logic on the system's clock waits until all domains have been reset."""
     found = {}
     for side, clock in (("s", crossing.source_clock), ("m", crossing.sink_clock)):
         found[f"{side}_clock"] = port_of(clock)

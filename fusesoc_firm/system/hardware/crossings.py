@@ -40,7 +40,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Two different ends of a connection; the system's clock is represented as None."""
+    """A connection between two ends whose clocks or stream widths differ; None represents the system's clock."""
 
     source: End
     sink: End
@@ -62,18 +62,18 @@ class Crossing:
 
     @property
     def clocks(self) -> str:
-        """The ports of both clocks, as words; empty if they are equal."""
+        """The ports of both clocks, as text; empty if the clocks are equal."""
         return f"{port_of(self.source_clock)} to {port_of(self.sink_clock)}" if self.is_clocked else ""
 
     @property
     def widths(self) -> str:
-        """The stream widths at both ends, as words; empty if they are equal or there is no stream."""
+        """The stream widths at both ends, as text; empty if the widths are equal or there is no stream."""
         has_streams = any(scope.streams for scope in self.scopes)
         is_resized = has_streams and self.source_width != self.sink_width
         return f"{self.source_width} to {self.sink_width} bits" if is_resized else ""
 
     def signals(self) -> Iterator[tuple[str, int | None]]:
-        """The declared signals: the word and the width of each signal."""
+        """Yield the word and the width of each signal to declare."""
         if not self.is_clocked:
             return
         if self.frame.is_fixed_size:
@@ -90,7 +90,7 @@ class Crossing:
             yield from ((word(f"{stream}_axis", "idle"), None) for stream in scope.streams)
 
     def instances(self) -> Iterator[str]:
-        """The word in each instance's label."""
+        """Yield the word in each instance's label."""
         for scope in self.scopes:
             if self.is_clocked:
                 yield word(scope.handshake.part, "crossing")
@@ -99,28 +99,28 @@ class Crossing:
 
 
 def port_of(clock: Clock | None) -> str:
-    """The top level's port for the clock."""
+    """Return the top level's port for the clock."""
     return clock.port if clock else "clk"
 
 
 def word(part: str, name: str) -> str:
-    """A part's name joined with the name of a signal or label."""
+    """Return a part's name joined with the name of a signal or label."""
     return f"{part}_{name}" if part else name
 
 
 def parts_of(scope: Scope, scopes: Sequence[Scope]) -> list[str]:
-    """The words of the signals that tell whether a stream or an element within a scope is idle."""
+    """Return the words for the signals that tell whether the streams and elements within a scope are idle."""
     streams = [word(f"{stream}_axis", "idle") for stream in scope.streams]
     return streams + [word(item.handshake.part, "idle") for item in scopes if item.parent == scope.handshake]
 
 
 def crossings(system: DerivedSystem, connection: Connection) -> list[Crossing | None]:
-    """The crossing before each sink of a connection; None if both ends are alike."""
+    """Return the crossing before each sink of a connection, or None if both ends are alike."""
     return [_crossing(system, connection, sink) for sink in connection.sinks]
 
 
 def all_crossings(system: DerivedSystem) -> list[Crossing]:
-    """All crossings of a system, in the order of its connections."""
+    """Return all crossings of a system, in the order of its connections."""
     return [found for item in system.connections for found in crossings(system, item) if found]
 
 
@@ -149,7 +149,7 @@ def _scopes(frame: Frame) -> list[Scope]:
 
 
 def _collect(side: MessageSide, nodes: Sequence[Node], scope: Scope) -> Iterator[Scope]:
-    """Put fields and streams into their scope, and add the nested scopes."""
+    """Add fields and streams to a scope, and yield the nested scopes."""
     for node in nodes:
         match node:
             case Fixed():

@@ -25,7 +25,7 @@ SHIM_TEMPLATE = "hls/kernel.cpp"
 
 
 def wrapper_configuration(accelerator: AcceleratorType) -> Context:
-    """The configuration of the wrapper, which adds an accelerator's message sides to the kernel."""
+    """Return the configuration of the wrapper, which adds an accelerator's message sides to the kernel."""
     inputs, outputs = arguments(accelerator)
     return {
         "entity": accelerator.entity,
@@ -49,13 +49,13 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Context:
 
 
 def _kernel_port(argument: Argument) -> Context:
-    """A port of the kernel, where a single bit is a vector."""
+    """Return a port of the kernel, in which a single bit is also a vector."""
     is_bit = argument.field.width is None
     return {"port": argument.port, "signal": argument.signal, "bits": argument.bits, "is_bit": is_bit}
 
 
 def kernel_configuration(accelerator: AcceleratorType) -> Context:
-    """The configuration of the simulated kernel, and of the shim between it and the C++ function."""
+    """Return the configuration of the simulated kernel, and of the shim between it and the C++ function."""
     inputs, outputs = arguments(accelerator)
     column = max(len(name) for name in [*AP_PORTS, *(f"{argument.port}_ap_vld" for argument in [*inputs, *outputs])])
     return {

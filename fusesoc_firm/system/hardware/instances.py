@@ -16,7 +16,7 @@ ERROR_CODE_BITS = 4
 
 
 def subscriber_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """The instance of a subscriber, from the Manager to its message side."""
+    """Return the instance of a subscriber, from the Manager to its message side."""
     ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
     return {
         **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
@@ -28,7 +28,7 @@ def subscriber_instance(names: Names, converter: Converter, system: DerivedSyste
 
 
 def publisher_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """The instance of a publisher, followed by its buffer if it stores whole frames."""
+    """Return the instance of a publisher, followed by its buffer if it stores whole frames."""
     ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
     has_errors = not converter.frame.is_fixed_size and not converter.buffer
     return {
@@ -42,7 +42,7 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
 
 
 def _part_of_manager(converter: Converter, width: int) -> dict[str, int]:
-    """The part of the Manager's inputs that takes a publisher's frames."""
+    """Return the slice of the Manager's inputs that receives a publisher's frames."""
     number, lanes = converter.id, width // 8
     return {
         "id": number,
@@ -54,13 +54,13 @@ def _part_of_manager(converter: Converter, width: int) -> dict[str, int]:
 
 
 def _error(converter: Converter, system: DerivedSystem) -> dict[str, int]:
-    """The part of the system's error outputs that reports a converter's errors."""
+    """Return the slice of the system's error outputs that reports a converter's errors."""
     bit = system.error_blocks.index(converter.block)
     return {"bit": bit, "high": ERROR_CODE_BITS * (bit + 1) - 1, "low": ERROR_CODE_BITS * bit}
 
 
 def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """The buffer after a publisher, with the signals between publisher and buffer."""
+    """Return the buffer after a publisher, with the signals between publisher and buffer."""
     block, lanes = converter.block, system.width // 8
     return {
         "block": block,
@@ -75,7 +75,7 @@ def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[s
 
 
 def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedSystem) -> dict[str, Any]:
-    """The instance of an accelerator, with its message sides and pins."""
+    """Return the instance of an accelerator, with its message sides and pins."""
     clock = system.clock_of(block.block)
     differences = [clock.port] if clock else []
     differences += [f"{block.type.width} bits"] if block.type.width != system.width else []
@@ -94,7 +94,7 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedS
 
 
 def component(type_: AcceleratorType) -> dict[str, Any]:
-    """The component declaration of an accelerator that is not an entity."""
+    """Return the component declaration of an accelerator that is not an entity."""
     ports = [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_)]
     ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
     return {

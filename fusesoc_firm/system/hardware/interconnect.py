@@ -1,4 +1,4 @@
-"""The top level's host side as plain data: streams as ports, or the link at which the streams end."""
+"""The top level's host side as plain data: streams as ports, or the link that the streams connect to."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
 
-# A link's pins at the top level, with the names in the link's core; a board may omit pins that have a default.
+# A link's pins at the top level, with their names in the link's core; a board may omit pins that have a default.
 LINK_PINS = {
     LinkKind.UART: (
         ("uart_rxd", "in", "std_logic"),
@@ -25,7 +25,7 @@ LINK_PINS = {
 
 
 def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """The streams as ports of the top level, or the link at which they end."""
+    """Return the streams as ports of the top level, or the link that they connect to."""
     if system.link is None:
         return {"has_streams": True, "link": None}
     return {

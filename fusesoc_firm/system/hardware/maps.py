@@ -7,5 +7,5 @@ from typing import Any
 
 
 def port_map(pairs: Iterable[tuple[str, str]]) -> list[dict[str, Any]]:
-    """The formal and the actual of each port."""
+    """Return the formal and the actual of each port."""
     return [{"formal": formal, "actual": actual} for formal, actual in pairs]

@@ -18,7 +18,7 @@ from fusesoc_firm.system.derived.sides import (
 from fusesoc_firm.system.hardware.crossings import Crossing, all_crossings
 from fusesoc_firm.text.naming import distinct_identifiers
 
-# Names in the top level and its test bench, which signals of blocks and pins must not have.
+# Names that the top level and its test bench use, which signals of blocks and pins must not have.
 _TAKEN = """
     clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
     s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
@@ -82,45 +82,45 @@ class Names:
         )
 
     def label(self, *words: str) -> str:
-        """The label of a block, or of an instance identified by further words."""
+        """Return the label of a block, or of an instance identified by further words."""
         return self._labels["u", *words]
 
     def port(self, block: str, port: str) -> str:
-        """The signal of a block's port, or the top level's port for a pin."""
+        """Return the signal of a block's port, or the top level's port for a pin."""
         return self._signals[block, port]
 
     def at(self, end: End, port: str) -> str:
-        """The signal of a port of the message at an end of a connection."""
+        """Return the signal of a message's port at one end of a connection."""
         return self._signals[end.block, f"{end.prefix}{port}"]
 
     def fork(self, end: End, fork: Handshake) -> str:
-        """The label of the fork after an output."""
+        """Return the label of the fork after an output."""
         return self._labels["u", *_fork_key(end, fork, "fork")]
 
     def forked(self, end: End, fork: Handshake, word: str) -> str:
-        """The signal with the `valid`, `ready` or `segment_valid` of all sinks of a fork."""
+        """Return the signal that combines `valid`, `ready` or `segment_valid` of all sinks of a fork."""
         return self._signals[_fork_key(end, fork, f"fork_{word}")]
 
     def length(self, connection: Connection) -> str:
-        """The signal with the length of a connection's payloads."""
+        """Return the signal with the length of a connection's payloads."""
         source = connection.source
         return self._signals[_length_key(source)] if is_found_out(connection) else self.at(source, PAYLOAD_LENGTH)
 
     def crossing(self, crossing: Crossing, word: str) -> str:
-        """A signal of a crossing."""
+        """Return a signal of a crossing."""
         return self._signals[_crossing_key(crossing, word)]
 
     def crossing_label(self, crossing: Crossing, word: str) -> str:
-        """The label of an instance of a crossing."""
+        """Return the label of an instance of a crossing."""
         return self._labels["u", *_crossing_key(crossing, word)]
 
     def frame(self, block: str, signal: str) -> str:
-        """A signal between a publisher and its buffer."""
+        """Return a signal between a publisher and its buffer."""
         return self._signals[block, "", f"frame_{signal}"]
 
 
 def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]]:
-    """Each block with all signals of its message sides and their prefixes, in the order of the data flow."""
+    """Return each block with the ports of its message sides and their prefixes, in the order of the data flow."""
     blocks = []
     for converter in system.subscribers:
         ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
@@ -134,7 +134,7 @@ def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]
 
 
 def forked(connection: Connection) -> Iterator[Handshake]:
-    """The handshakes of a connection that need a fork."""
+    """Yield the handshakes of a connection that need a fork."""
     if len(connection.sinks) > 1 and connection.frame.is_fixed_size:
         yield Handshake("", "segment_valid", "msg_ready")
     elif len(connection.sinks) > 1:
@@ -142,12 +142,12 @@ def forked(connection: Connection) -> Iterator[Handshake]:
 
 
 def is_found_out(connection: Connection) -> bool:
-    """Whether the length of a connection's payloads comes from a separate instance instead of its source."""
+    """Return whether the length of a connection's payloads comes from a separate instance instead of its source."""
     return connection.length is not None and connection.length.source is not LengthSource.GIVEN
 
 
 def clock_names(system: DerivedSystem) -> list[str]:
-    """The names for further clocks: ports, resets, and the labels of the instances that make the resets."""
+    """Return the names needed for clocks besides clk: ports, resets, and the labels of the reset instances."""
     if not system.clocks:
         return []
     resets = [RELEASED, *(name for clock in system.clocks for name in (clock.reset, seen_reset(clock)))]
@@ -155,12 +155,12 @@ def clock_names(system: DerivedSystem) -> list[str]:
 
 
 def reset_label(reset: str) -> str:
-    """The label of the instance that makes a reset."""
+    """Return the label of the instance that generates a reset."""
     return f"u_{reset.removesuffix('_n')}"
 
 
 def seen_reset(clock: Clock) -> str:
-    """The signal that is low until a clock domain, and all domains before it, have been reset."""
+    """Return the signal that is low until a clock domain, and all domains before it, have been reset."""
     return f"seen_{clock.name}_n"
 
 

@@ -11,7 +11,7 @@ from fusesoc_firm.system.hardware.maps import port_map
 
 
 def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """The scheduler's entity and generics, with the constants for publishers' times that the generics use."""
+    """Return the scheduler's entity and generics, with the constants for publishers' times that the generics use."""
     scheduling = system.scheduling
     policy = POLICIES[scheduling.policy]
     times = {
@@ -36,7 +36,7 @@ def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
 
 
 def _times(name: str, cycles: Sequence[int | None], system: DerivedSystem) -> dict[str, Any]:
-    """A constant with a time for each publisher."""
+    """Return a constant with a time for each publisher."""
     return {
         "name": name,
         "values": [

@@ -18,16 +18,17 @@ _LEAST_FRAMES = 65536
 
 
 def translated_unit(system: DerivedSystem, *, has_environment: bool) -> str:
-    """The entity that is translated to the test bench's netlist."""
+    """Return the entity that is translated to the test bench's netlist."""
     return f"{system.entity}_in_environment" if has_environment else system.entity
 
 
 def verilog_bench_configuration(
     bench: Context, system: DerivedSystem, frames: int = 0, beats: int = 0, *, has_environment: bool
 ) -> Context:
-    """The configuration of the test bench, which includes the configuration `bench` of the VHDL test bench.
+    """Return the configuration of the test bench, which includes the configuration `bench` of the VHDL test bench.
 
-    Each file has space for `frames`; `beats` limits the number of beats that wait for the end of their frame.
+    `frames` is the maximum number of frames in a file; `beats` is the maximum number of beats that wait for the end of
+    their frame.
     """
     return {
         **bench,
@@ -39,7 +40,7 @@ def verilog_bench_configuration(
 
 
 def _open_pins(system: DerivedSystem) -> list[Context]:
-    """The pins of a system without an environment, with all inputs low."""
+    """Return the pins of a system without an environment, with all inputs low."""
     names = top_level_pins(system)
     return [
         {"name": names[block.block, pin.name], "is_input": pin.direction == "in", "bits": pin.bits or 1}

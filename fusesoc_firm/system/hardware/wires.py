@@ -23,7 +23,10 @@ _LONGEST = 'x"FFFFFFFF"'
 
 
 def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
-    """The assignments of all connections; a sink with several sources takes all parts of the message together."""
+    """Return the assignments of all connections.
+
+    A sink with several sources accepts all message parts in one handshake.
+    """
     waiting: dict[End, list[str]] = {}
     for connection in system.connections:
         if connection.frame.is_fixed_size:
@@ -35,9 +38,10 @@ def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
 def _connection(
     names: Names, connection: Connection, system: DerivedSystem, waiting: Mapping[End, list[str]]
 ) -> dict[str, Any]:
-    """The assignments of a connection; forks let each of several sinks take the message independently.
+    """Return the assignments of a connection; a fork lets each of several sinks accept the message independently.
 
-    `waiting` has the `valid` signals of each sink's sources; the sink's `valid` is assigned with the last source.
+    `waiting` maps each sink to the `valid` signals of the sources so far; the sink's `valid` is assigned with the last
+    source.
     """
     length = connection.length
     pairs: list[tuple[str, str]] = []
@@ -69,7 +73,7 @@ def _connection(
 def _fixed_pairs(
     names: Names, system: DerivedSystem, connection: Connection, waiting: Mapping[End, list[str]]
 ) -> Iterator[tuple[str, str]]:
-    """The assignments of a message of fixed size."""
+    """Yield the assignments of a message of fixed size."""
     source = connection.source
     arriving = _arriving(names, system, connection)
     for sink, frame, (valid, ready) in zip(connection.sinks, connection.frames, arriving, strict=True):
@@ -84,7 +88,7 @@ def _fixed_pairs(
 
 
 def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> list[tuple[str, str]]:
-    """The source of `valid` and the target of `ready` for each sink of a message of fixed size."""
+    """Return the source of `valid` and the target of `ready` for each sink of a message of fixed size."""
     return [
         (names.crossing(crossing, "valid"), names.crossing(crossing, "ready")) if crossing else handshake
         for crossing, handshake in zip(crossings(system, connection), _handshakes(names, connection), strict=True)
@@ -92,7 +96,7 @@ def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> li
 
 
 def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
-    """The `valid` to each sink of a message of fixed size, and the `ready` from the sink, as seen by the source."""
+    """Return the `valid` to and the `ready` from each sink of a message of fixed size, as seen by the source."""
     source = connection.source
     for fork in forked(connection):
         valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
@@ -103,7 +107,7 @@ def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
 def _pairs(
     names: Names, connection: Connection, number: int, system: DerivedSystem, crossing: Crossing | None
 ) -> list[tuple[str, str]]:
-    """The assignments of a message of variable size between source and sink, unless an instance connects both."""
+    """Return the assignments of a message of variable size from source to sink, except those that instances replace."""
     sink, source = connection.sinks[number], _source_side(names, connection, number, system)
     if crossing and crossing.is_clocked:
         return list(field_pairs(names, crossing, source))
@@ -117,7 +121,7 @@ def _pairs(
 
 
 def _source_side(names: Names, connection: Connection, number: int, system: DerivedSystem) -> SourceSide:
-    """The source's signals for a sink; forked handshakes use the signals of the fork."""
+    """Return the source's signals for a sink; forked handshakes use the signals of the fork."""
     source = connection.source
     if connection.frame.is_fixed_size:
         valid, ready = _handshakes(names, connection)[number]
@@ -141,7 +145,7 @@ def _source_side(names: Names, connection: Connection, number: int, system: Deri
 
 
 def _length(names: Names, connection: Connection) -> dict[str, Any]:
-    """The instance that computes the length of an accelerator's payloads."""
+    """Return the instance that computes the length of an accelerator's payloads."""
     source = connection.source
     inputs = ((formal, names.at(source, formal)) for formal in length_ports(connection.frame))
     return {

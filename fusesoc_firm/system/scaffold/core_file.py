@@ -1,7 +1,7 @@
 """The `.core` file of a system, with all targets that the system supports.
 
 The upper part of the file is generated once; after that, the author maintains it. The targets are regenerated from a
-template, so that every system gets new targets. Targets that the author added under other names are kept.
+template, so that existing systems also receive new targets. Targets that the author added under other names are kept.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FAMILIES = [
     {"name": "ice40", "description": "Lattice iCE40 UltraPlus", "options": "[-abc9, -device, u, -dsp]"},
     {"name": "gowin", "description": "Gowin", "options": "[]"},
 ]
-# The instances of the generator that targets use.
+# The generator instances that the targets use.
 _SYSTEM, _SIMULATION = "system", "simulation"
 # The core with the generator `far`, and the core that had this generator before version 0.2.0.
 _SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
@@ -57,9 +57,9 @@ class CoreOptions:
 
 
 def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
-    """The text of the `.core` at `path` for a specification's system; the targets of an existing core are updated.
+    """Return the text of the `.core` at `path`: a new core for a specification, or an existing core with new targets.
 
-    The `paths` of `options` are relative to the current folder. Raises `InputError`.
+    The `paths` of `options` are relative to the current folder. May raise `InputError`.
     """
     if path.exists():
         return updated_core(loaded.system, path)
@@ -73,7 +73,7 @@ def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
-    """The text of a new `.core` for the specification `spec` next to it; raises `InputError`."""
+    """Return the text of a new `.core` for `spec`, a specification in the same folder; may raise `InputError`."""
     if fault := text_fault(options.description):
         fail(f"--description {fault[0]}", hint=fault[1])
     further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
@@ -94,15 +94,23 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
 
 
 def updated_core(system: DerivedSystem, path: Path) -> str:
-    """The text of the `.core` at `path` with current targets; raises `InputError` if it is not the core of a system."""
+    """Return the text of the `.core` at `path` with current targets.
+
+    Raise `InputError` if it is not a system's core.
+    """
     core = read_core(path)
     if not isinstance(core.data.get("generate"), dict):
-        fail(f"{path} is not a core with a section 'generate'")
+        fail(f"the core {path} has no section 'generate'")
     instances, text = core.section("generate"), path.read_text(encoding="utf-8")
     if _GENERATORS in text and _SYSTEM_CORE not in text:
-        fail(f"{path} does not depend on '{_SYSTEM_CORE}', which has the generator 'far'", hint=f"{_GENERATORS} had it")
+        fail(
+            f"{path} does not depend on '{_SYSTEM_CORE}', which provides the generator 'far'",
+            hint=f"{_GENERATORS} provided it earlier",
+        )
     if _SYSTEM not in instances:
-        fail(f"{path} has no instance '{_SYSTEM}' under 'generate'; remove the file, and this command writes a new one")
+        fail(
+            f"{path} has no instance '{_SYSTEM}' under 'generate'", hint="remove the file, then run this command again"
+        )
     is_simulated = _SIMULATION in instances
     has_environment = is_simulated and bool(core.parameters(_SIMULATION).get("environment"))
     targets = _targets(system, is_simulated=is_simulated, has_environment=has_environment)
@@ -135,9 +143,9 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
 
 
 def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator[dict[str, object]]:
-    """The targets of simulations or live simulations; the first simulator's target has the name without a suffix.
+    """Yield the targets of simulations or live simulations; the first simulator's target has the name without a suffix.
 
-    For simulators that do not read VHDL, the design unit `unit` with all subunits is translated.
+    For simulators that do not read VHDL, the targets translate the design unit `unit` with all subunits.
     """
     has_verilog = any(item.is_component for item in system.accelerator_types)
     sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
@@ -147,7 +155,7 @@ def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator
     for name, item in known.items():
         is_first, is_default = item is next(iter(known.values())), name == default_simulator()
         parameters = ["product: live"] * is_live + [f"simulator: {name}"] * (not is_default)
-        # If the default simulator does not support a system, the first target gets both names.
+        # If the default simulator does not support the system, the first target is listed under both names.
         anchor = (kind if is_live else name) if is_first and not is_default else ""
         yield {
             "target": kind if is_first else f"{kind}_{name}",
@@ -180,7 +188,7 @@ def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
 
 
 def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
-    """A board's target; None if the system has kernels and the board does not support them."""
+    """Return a board's target, or None if the system has HLS kernels and the board does not support them."""
     board = read_board(name)
     if has_kernels and board.flow != VIVADO:
         return None
@@ -209,10 +217,10 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
 
 
 def _value(value: str | Sequence[str]) -> str:
-    """A word or a list of words in YAML."""
+    """Return a word or a list of words in YAML."""
     return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
 
 
 def _paths(items: Sequence[str | Path]) -> str:
-    """A list on one line; an empty list gives an empty text."""
+    """Return a list on one line, or an empty string for an empty list."""
     return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

@@ -17,7 +17,7 @@ from fusesoc_firm.text.render import Context
 
 
 def python_skeleton(type_: AcceleratorType) -> Context:
-    """The configuration of the function's first version."""
+    """Return the template configuration of the function's first version."""
     parameters = parameter_names(type_)
     count = len(type_.outputs)
     answers = ["answer"] if count == 1 else [f"answer{number}" for number in range(count)]
@@ -34,7 +34,7 @@ def python_skeleton(type_: AcceleratorType) -> Context:
 
 
 def _described(name: str, frame: Frame) -> Context:
-    """A message, and the used fields with their types."""
+    """Return a message with its used fields and their types."""
     fields = dict(_fields(frame.nodes, "", 0))
     return {
         "name": name,
@@ -44,7 +44,7 @@ def _described(name: str, frame: Frame) -> Context:
 
 
 def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str, str]]:
-    """The leaves of nodes below `above`, an element at the end of a path of `depth` names."""
+    """Yield the path and type of each used leaf; a path is `above` and the leaf's names after the first `depth`."""
     for node in nodes:
         match node:
             case Fixed(fields=leaves):
@@ -60,7 +60,7 @@ def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str
 
 
 def _shown(path: Path) -> str:
-    """A path in the notation for users, without the size of its last array."""
+    """Return a path in the notation for users, without the size of its last array."""
     above = [f"{step.name}[{step.count}]" if step.count is not None else step.name for step in path[:-1]]
     return ".".join([*above, path[-1].name])
 
@@ -70,13 +70,13 @@ def _size(path: Path) -> str:
 
 
 def _values(frame: Frame) -> list[Context]:
-    """The defaults of all used fields."""
+    """Return the default of each used field."""
     message = decode(frame, encode_used(with_names_in_use(frame, ()), {}))
     return [{"field": name, "value": _literal(value)} for name, value in used_part(message, frame).items()]
 
 
 def _literal(value: Any) -> str:
-    """A value as a Python literal."""
+    """Return a value as a Python literal."""
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{python_string(name)}: {_literal(inner)}' for name, inner in value.items())}}}"
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):

@@ -23,7 +23,7 @@ _FUNCTION_TEMPLATE = "hls/skeleton.cpp"
 _SOFTWARE_TEMPLATE = "python/skeleton.py"
 
 
-# Names that the architecture or module declares; a pin may have such a name.
+# Names that the architecture or module declares, and that a pin may also have.
 _SIGNALS = ("is_there", "is_sent", "sent_r", "done")
 
 
@@ -59,7 +59,7 @@ _LANGUAGES = {
 
 
 def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
-    """The text of a first source for each accelerator that has no source file in `folder`."""
+    """Return the path and text of a first source for each accelerator whose source file is missing in `folder`."""
     texts = {}
     for type_ in (*system.accelerator_types, *system.software.types):
         paths = [folder / source for source in type_.accelerator.sources]
@@ -70,7 +70,7 @@ def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
 
 
 def skeleton(type_: AcceleratorType) -> str:
-    """The text of an accelerator's source."""
+    """Return the text of an accelerator's source."""
     if language := _LANGUAGES.get(type_.accelerator.type):
         template, configuration = language.template, _entity(type_, language)
     elif type_.accelerator.type == SOFTWARE:
@@ -123,7 +123,7 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
 def _declarations(
     type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin], language: _Language
 ) -> list[Context]:
-    """The port declarations of all sides and pins for the entity or module."""
+    """Return the port declarations of all sides and pins for the entity or module."""
     groups = [
         (
             f"{side.frame.message}",
@@ -156,7 +156,7 @@ def _declarations(
 
 
 def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Context:
-    """The assignments of an output: its handshake, the length of a message of zeros, and zeros elsewhere."""
+    """Return the assignments of an output: the handshake, the length of an all-zero message, and zeros elsewhere."""
     counts = _counts(side, number)
     by_name = {f"{side.prefix}{port.name}": port for port in ports}
     length = f"{side.prefix}{PAYLOAD_LENGTH}"
@@ -179,13 +179,13 @@ def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Context
 
 
 def _length(port: str, side: MessageSide) -> Context:
-    """The length of a message of zeros."""
+    """Return the length of an all-zero message."""
     value = sent_length_of(side.frame).minimum
     return {"port": port, "value": value, "digits": f"{value:08x}"}
 
 
 def _counts(side: MessageSide, number: int) -> list[Context]:
-    """The arrays of fixed size in output `number`; elements are counted to mark the last element."""
+    """Return the arrays of fixed size in output `number`, whose elements are counted to mark the last one."""
     if side.frame.is_fixed_size:
         return []
     ports = message_side(side.frame)
@@ -208,7 +208,7 @@ def _counts(side: MessageSide, number: int) -> list[Context]:
 
 
 def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
-    """The arrays of fixed size in a message of zeros; arrays of variable size are empty and need no search."""
+    """Yield the arrays of fixed size in an all-zero message; arrays of variable size are empty and are skipped."""
     for node in nodes:
         if isinstance(node, Loop) and node.is_used and node.count and has_bytes(node):
             yield node
@@ -216,7 +216,7 @@ def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
 
 
 def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> list[str]:
-    """The streams and elements of inputs, which must be read to their ends."""
+    """Return the streams and elements of inputs, which must be read to the end."""
     return [
         f"{side.prefix}{port.name}"
         for side in inputs

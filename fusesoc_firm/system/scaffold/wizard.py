@@ -1,4 +1,4 @@
-"""`firm system new`: builds a specification from the user's answers to questions that follow the grammar.
+"""`firm system new`: build a specification from the user's answers to questions that follow the grammar.
 
 All keys, with their meanings and legal values, come from `specification`. An existing file is extended and keeps its
 comments. In a new file, a comment explains each key at its first use.
@@ -55,7 +55,10 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
 
 
 def _style(text: str) -> YAML:
-    """A YAML writer in the style of `text`: its quotes and the indentation of its lists; new files have no quotes."""
+    """Return a YAML writer with the quotes and the list indentation of `text`.
+
+    In new files, plain words have no quotes.
+    """
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.brace_single_entry_mapping_in_flow_sequence = True
@@ -67,9 +70,9 @@ def _style(text: str) -> YAML:
 
 
 def _word(answer: str) -> Any:
-    """An answer as a scalar, in quotes if YAML would otherwise misread the answer, alone or in a list."""
+    """Return an answer as a scalar, in quotes if YAML would otherwise misread it, alone or in a list."""
     if answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer:
-        # A number is also accepted as a word, and reads better without quotes.
+        # A number is also accepted as a word, and is easier to read without quotes.
         return int(answer)
     try:
         is_plain = pyyaml.safe_load(f"[{answer}]") == [answer]
@@ -79,7 +82,7 @@ def _word(answer: str) -> Any:
 
 
 def _words(answers: Sequence[str]) -> Any:
-    """One line of answers: a word, or a list in brackets."""
+    """Return one line of answers as a scalar or as a list in brackets."""
     if len(answers) < 2:
         return _word(answers[0]) if answers else []
     words = CommentedSeq(map(_word, answers))
@@ -111,7 +114,7 @@ class _Wizard:
             self._connect_blocks()
 
     def _ask_paths(self) -> None:
-        """Ask for the folders and cores of a new specification's messages; the messages also serve as completions."""
+        """Ask for the folders and cores of a new specification's messages, which also become completions."""
         entry = _key(Specification, "paths")
         question = Question("paths", entry.meaning, check=self._fault_of_path)
         if found := self._texts(question):
@@ -120,12 +123,12 @@ class _Wizard:
 
     def _fault_of_path(self, answer: str) -> str | None:
         is_there = is_core(answer) or (self.folder / answer).exists()
-        return None if is_there else f"'{answer}' is neither a folder, a bag nor a core"
+        return None if is_there else f"'{answer}' is not a folder, a bag or a core"
 
     def _connect_blocks(self) -> None:
         """Ask for further connections from existing blocks of the file."""
         blocks = {str(block["name"]): block for block in self.content.get("blocks", [])}
-        question = Question("block", "a block to which further connections are added", [*blocks], is_choice=True)
+        question = Question("block", "the block to which connections are added", [*blocks], is_choice=True)
         while name := self.asker.ask(question):
             if added := self._sections("outgoing", _key(Block, "outgoing"), name):
                 blocks[name].setdefault("outgoing", []).extend(added)
@@ -152,13 +155,13 @@ class _Wizard:
         return draft.made
 
     def _explain(self, made: CommentedMap, name: str, entry: Key) -> None:
-        """Explain a key at its first use; a section's name needs no explanation."""
+        """Add a comment that explains a key at its first use; a section's name needs no explanation."""
         if self.is_new and entry.section is None and name not in self.explained:
             self.explained.add(name)
             made.yaml_add_eol_comment(entry.meaning, name, column=0)
 
     def _value(self, draft: _Draft, name: str, field_name: str, entry: Key) -> Any:
-        """Ask for a key's value; empty if the key is left out."""
+        """Ask for a key's value; return an empty value if the user omits the key."""
         if entry.form == "sections":
             return self._sections(name, entry, str(draft.made.get("name", "")))
         if entry.form == "section":
@@ -192,7 +195,7 @@ class _Wizard:
     # --- answers ---------------------------------------------------------------------------------------------------
 
     def _words(self, section: type[Section], name: str, entry: Key) -> Sequence[str]:
-        """The completions of an answer."""
+        """Return the completions for an answer."""
         if entry.choices:
             return [str(choice) for choice in entry.choices]
         if name == "message":
@@ -211,7 +214,7 @@ class _Wizard:
         return [str(item["name"]) for item in self.content.get(name, [])]
 
     def _fault(self, draft: _Draft, name: str, entry: Key, answer: str) -> str | None:
-        """The fault in an answer that the grammar's choices do not exclude."""
+        """Return the fault in an answer that the grammar's choices do not exclude."""
         if answer and (fault := entry.rule(answer)):
             return f"'{name}' {fault[0]}; {fault[1]}"
         if entry.form == "integer" and not answer.isdecimal():
@@ -232,7 +235,7 @@ class _Draft:
     made: CommentedMap = field(default_factory=CommentedMap)
 
     def has(self, entry: Key) -> bool:
-        """Whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
+        """Return whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
         if self.section is not Block or not entry.only_of:
             return True
         if entry.only_of == PUBLISHER:
@@ -240,7 +243,7 @@ class _Draft:
         return ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, name: str, entry: Key) -> bool:
-        """Whether a key is mandatory; the keys of a converter are optional in a block's grammar."""
+        """Return whether a key is mandatory; the keys of a converter are optional in a block's grammar."""
         return entry.is_needed(self.made) or (self.section is Block and name in CONVERTER_KEYS)
 
 

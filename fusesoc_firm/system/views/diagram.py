@@ -25,11 +25,11 @@ _CROSSING = {"style": "dashed"}
 
 
 def diagram(system: DerivedSystem) -> str:
-    """The system in Graphviz's language DOT; raises `InputError` if the package graphviz is missing."""
+    """Return the system in Graphviz's language DOT; raise `InputError` if the package graphviz is missing."""
     try:
         import graphviz
     except ModuleNotFoundError:
-        fail("pictures need the Python package graphviz", hint="pip install 'fusesoc-firm[diagram]'")
+        fail("pictures require the Python package graphviz", hint="pip install 'fusesoc-firm[diagram]'")
     graph = graphviz.Digraph(system.name, node_attr={"fontname": "sans-serif"}, edge_attr={"fontname": "sans-serif"})
     graph.attr(rankdir="LR", label=f"{system.name}: streams of {system.width} bits", fontname="sans-serif")
     with graph.subgraph(**_FPGA) as fpga:
@@ -70,7 +70,7 @@ def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
 
 
 def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
-    """Draw the blocks on the host, and their messages from and to the Manager, topics, and each other."""
+    """Draw the blocks on the host, and their messages to and from the Manager, the topics and each other."""
     blocks = {block.block for block in system.software.blocks}
     for block in system.software.blocks:
         graph.node(_node(block.block), _accelerator(block), **_SOFTWARE)
@@ -86,7 +86,7 @@ def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
 
 
 def _differences(system: DerivedSystem, block: AcceleratorBlock) -> str:
-    """The differences between a block and its system, one on each line."""
+    """Return the differences between a block and its system, one on each line."""
     clock = system.clock_of(block.block)
     at_clock = f"\n{clock.port}: {float(clock.frequency / 10**6):g} MHz" if clock else ""
     return at_clock + (f"\n{block.type.width} bits" if block.type.width != system.width else "")
@@ -113,5 +113,5 @@ def _with(streams: Iterable[str]) -> str:
 
 
 def _node(block: str) -> str:
-    """The node name of a block, distinct from host and Manager, and without a colon, which marks a port in DOT."""
+    """Return a block's node name: distinct from host and Manager, and without a colon, which marks a port in DOT."""
     return f"block {quote(block, safe=' ')}"

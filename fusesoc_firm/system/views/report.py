@@ -13,10 +13,10 @@ from fusesoc_firm.system.system_core import LoadedSystem, Part, artifacts
 
 @dataclass(frozen=True)
 class Report:
-    """The number of lines of code of a system, hand-written and generated.
+    """The numbers of hand-written and generated lines of code in a system.
 
-    Empty lines and comment lines do not count. `software` counts functions in software that could be hardware, and
-    `configuration` counts the templates' data as YAML.
+    Empty lines and comment lines do not count. `software` is the size of functions that could also be hardware;
+    `configuration` is the size of the templates' data in YAML.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Report:
 
 
 def report(specification: Path, loaded: LoadedSystem) -> Report:
-    """Count the lines of a system and of the specification; raises `InputError`."""
+    """Count the lines of a system and of its specification; may raise `InputError`."""
     lines: Counter[Part] = Counter()
     configuration = 0
     for item in artifacts(loaded):
@@ -73,7 +73,7 @@ def report(specification: Path, loaded: LoadedSystem) -> Report:
 
 
 def _software(loaded: LoadedSystem) -> list[Path]:
-    """The sources of software, each once."""
+    """Return the source files of software, each once."""
     sources = (source for type_ in loaded.system.software.types for source in type_.accelerator.sources)
     return [*dict.fromkeys((loaded.folder / source).resolve() for source in sources)]
 

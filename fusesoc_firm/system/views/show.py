@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
-    """Converters, accelerators and all connections between two ports, as `block/port`."""
+    """Return the converters, accelerators and all connections as plain data, with ports written as `block/port`."""
     pins = top_level_pins(system)
     return {
         "System": {
@@ -74,7 +74,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
 
 
 def counts(system: DerivedSystem) -> str:
-    """The number of blocks of each kind in a system, in words."""
+    """Return a phrase with the number of blocks of each kind in a system."""
     found = [
         (len(system.subscribers), "subscriber"),
         (len(system.accelerators), "accelerator"),
@@ -87,20 +87,20 @@ def counts(system: DerivedSystem) -> str:
 
 
 def _clocks(system: DerivedSystem) -> dict[str, Any]:
-    """All clocks other than clk, with port and frequency in Hz."""
+    """Return all clocks other than clk, with port and frequency in Hz."""
     clocks = [{"name": item.name, "port": item.port, "hertz": float(item.frequency)} for item in system.clocks]
     return {"clocks": clocks} if clocks else {}
 
 
 def _domain(system: DerivedSystem, block: AcceleratorBlock) -> dict[str, Any]:
-    """The differences between a block and the system: the block's clock and stream width."""
+    """Return the differences between a block and the system: the block's clock and stream width."""
     clock = system.clock_of(block.block)
     shown: dict[str, Any] = {"clock": clock.port} if clock else {}
     return shown | ({"width": block.type.width} if block.type.width != system.width else {})
 
 
 def _crossings(system: DerivedSystem) -> dict[str, Any]:
-    """The differences between the ends of a connection."""
+    """Return the differences in clock and width between the two ends of each crossing."""
     found = []
     for item in all_crossings(system):
         ends = {"from": _side(item.source), "to": _side(item.sink)}
@@ -113,7 +113,7 @@ def _side(end: End) -> str:
 
 
 def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict[str, Any]:
-    """The pins of a block, with the corresponding ports of the top level."""
+    """Return the pins of a block, with the corresponding ports of the top level."""
     pins = [
         {
             "name": str(pin.name),
@@ -127,7 +127,7 @@ def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict
 
 
 def _software(system: DerivedSystem) -> dict[str, Any]:
-    """The blocks in software, with the routes of their messages on the host."""
+    """Return the blocks in software, with the routes of their messages on the host."""
     blocks = [
         {
             "name": block.block,
@@ -147,13 +147,13 @@ def _function(block: AcceleratorBlock) -> dict[str, Any]:
 
 
 def _taken(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
-    """A message that software receives, with its source."""
+    """Return a message that software receives, with its source."""
     sources = [item.source for item in system.software.connections if end in item.sinks]
     return {**_message(end, side, system), "from": [_place(source, system.publishers, system) for source in sources]}
 
 
 def _given(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
-    """A message that software sends, with its sinks."""
+    """Return a message that software sends, with its sinks."""
     sinks = [sink for item in system.software.connections if item.source == end for sink in item.sinks]
     return {**_message(end, side, system), "to": [_place(sink, system.subscribers, system) for sink in sinks]}
 
@@ -163,7 +163,7 @@ def _message(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, An
 
 
 def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> dict[str, Any]:
-    """The other end of a message to or from software: another block, a hardware converter, or a topic."""
+    """Return the other end of a message to or from software: another block, a hardware converter, or a topic."""
     if end.prefix:
         return {"block": end.block, "message": system.names[end]}
     crossing = [item for item in converters if item.block == end.block]
@@ -185,12 +185,12 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
 def _payload_bytes(frame: Frame) -> int | str:
     length = length_of(frame)
     if length.maximum is None:
-        return f"{length.minimum} and more"
+        return f"{length.minimum} or more"
     return length.minimum if frame.is_fixed_size else f"{length.minimum} to {length.maximum}"
 
 
 def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any]:
-    """The source from which a publisher learns the length of a payload, with the reason, and the size of the buffer."""
+    """Return the source of a payload's length for a publisher, with the reason for the choice, and the buffer size."""
     if length is None:
         return {}
     buffer = {"buffer": publisher.buffer} if publisher.buffer else {}
@@ -205,13 +205,13 @@ def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
 
 
 def _times(times: PublisherTimes) -> dict[str, int]:
-    """The known times of a publisher, in cycles."""
+    """Return the known times of a publisher, in cycles."""
     found = {"periodCycles": times.period, "wcetCycles": times.transfer_time, "deadlineCycles": times.deadline}
     return {name: cycles for name, cycles in found.items() if cycles is not None}
 
 
 def _bound(bound: Bound | None) -> dict[str, int | str]:
-    """The bounds on a publisher's frames, and the bytes that its accelerator may have to store if a frame is late."""
+    """Return the bounds for a publisher's frames, and the number of bytes that its accelerator may have to store."""
     if bound is None:
         return {}
     if bound.response is None or bound.lateness is None or bound.buffer is None:

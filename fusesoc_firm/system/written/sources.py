@@ -14,9 +14,10 @@ from fusesoc_firm.text.naming import identifier
 
 @dataclass(frozen=True)
 class _Language:
-    """The syntax of a language for comments, a unit's parameters, and a parameter named WIDTH.
+    """A language's syntax for comments, a unit's parameters, and a parameter named WIDTH.
 
-    `parameters` has a placeholder for the unit's name, and a group for the text between that name and the ports.
+    `parameters` is a pattern with a placeholder for the unit's name and a group for the text between the name and the
+    ports.
     """
 
     comment: re.Pattern[str]
@@ -33,7 +34,7 @@ _LANGUAGES = {
         re.compile(r"(?:^|[;,])\s*(?:constant\s+)?width\s*[:,]", re.IGNORECASE),
         re.IGNORECASE | re.DOTALL,
     ),
-    # In the header, or within the module as in Verilog before 2001.
+    # In the header or, as in Verilog before 2001, within the module.
     "Verilog": _Language(
         re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL),
         r"\bmodule\s+{unit}\b(.*?)\bendmodule\b",
@@ -44,7 +45,7 @@ _LANGUAGES = {
 
 
 def declares_width(accelerator: Accelerator, sources: Iterable[Path]) -> bool:
-    """Whether the accelerator is an entity with a generic WIDTH, or a module with a parameter WIDTH.
+    """Return whether the accelerator is an entity with a generic WIDTH, or a module with a parameter WIDTH.
 
     WIDTH is the width of the streams in bits. Analysis, not this module, reports unreadable sources.
     """

@@ -20,7 +20,7 @@ from fusesoc_firm.text.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
 from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 
-# The type of an accelerator that is a function on the host.
+# The type of an accelerator that is a function in software.
 SOFTWARE = "ROS-SW"
 # The types of accelerators, with the suffixes of their source files.
 SOURCE_SUFFIXES = {
@@ -50,17 +50,17 @@ _SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][
 
 
 def source_fault(text: str) -> tuple[str, str] | None:
-    """The reason why `text` is not a legal name of a source file; None if it is."""
+    """Return the reason why `text` is not a legal name of a source file, or None if the name is legal."""
     if fault := text_fault(text, LONGEST_PATH):
         return fault
-    legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
-    return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not take as a file", legal)
+    legal = "legal here: names of up to 200 letters, digits, '_', '.', '+' and '-', not starting with '-'"
+    return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not accept as a file", legal)
 
 
 _FIELDS: dict[str, Any] = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
 _INCLUDE: dict[str, Any] = {
     **_FIELDS,
-    "meaning": "fields to include, such as pose.position, each with all fields below it",
+    "meaning": "fields to include, such as pose.position, each with all nested fields",
 }
 _EXCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "fields to exclude"}
 _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
@@ -71,19 +71,21 @@ class ClockDomain(Section):
     """A clock other than the system's."""
 
     name: Text = key("the clock's name; its port at the top level is clk_<name>", is_required=True)
-    frequency: Text = key("its frequency, such as 150 MHz", is_required=True)
+    frequency: Text = key("the clock's frequency, such as 150 MHz", is_required=True)
 
 
 @dataclass(frozen=True)
 class Project(Section):
-    """Settings of the whole system."""
+    """The settings of the whole system."""
 
     name: Text = key("the system's name; the top level is <name>_system", is_required=True)
     # The dissertation's listings 6.1, 6.6 and 5.1 use three spellings.
     fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
-    width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
+    width: int = key(
+        "width in bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8
+    )
     scheduler: Text = key(
-        "the policy that selects the publisher that sends next",
+        "the policy that selects the next publisher to send",
         choices=(*POLICIES, AUTO_SCHEDULER),
         default=Text(DEFAULT),
     )
@@ -99,7 +101,7 @@ class Project(Section):
         default=Text(AXI_STREAM),
     )
     clock: Text | None = key("frequency of clk, such as 100 MHz; required for times with a unit and for clocks")
-    clocks: tuple[ClockDomain, ...] = key("further clocks, for accelerators", form="sections", section=ClockDomain)
+    clocks: tuple[ClockDomain, ...] = key("additional clocks for accelerators", form="sections", section=ClockDomain)
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ class InterfaceType(Section):
 class OutputType(InterfaceType):
     """A message that an accelerator sends."""
 
-    length: Text | None = key("source of the length of a payload of variable size", choices=LENGTHS)
+    length: Text | None = key("source of the payload's length, if the size is variable", choices=LENGTHS)
 
 
 @dataclass(frozen=True)
@@ -131,26 +133,28 @@ class Interface(Section):
 class Pin(Section):
     """An accelerator's port that is not part of a message; the top level exports the port."""
 
-    name: Text = key("the port's name; at the top level it is <block>_<name>", is_required=True)
+    name: Text = key("the port's name, which becomes <block>_<name> at the top level", is_required=True)
     direction: Text = key("direction of the port at the accelerator", is_required=True, choices=DIRECTIONS)
-    bits: int | None = key("bits of a std_logic_vector; default a std_logic", form="integer")
+    bits: int | None = key("width in bits of a std_logic_vector (default: a std_logic)", form="integer")
 
 
 @dataclass(frozen=True)
 class Accelerator(Section):
     """A type of accelerator; blocks are its instances."""
 
-    name: Text = key("the type's name, which is also that of the VHDL entity or Verilog module", is_required=True)
+    name: Text = key("the type's name, which is also the name of the VHDL entity or Verilog module", is_required=True)
     type: Text = key("the accelerator's language, or ROS-SW for software", is_required=True, choices=ACCELERATOR_TYPES)
     sources: tuple[Text, ...] = key(
-        "its source files, relative to the specification",
+        "the accelerator's source files, relative to the specification",
         form="texts",
         is_required=True,
         unless=("type", SOFTWARE),
         rule=source_fault,
     )
-    interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
-    width: int | None = key("bits of its streams; default the project's width", form="integer", choices=WIDTHS)
+    interface: Interface = key("the accelerator's messages", form="section", section=Interface, is_required=True)
+    width: int | None = key(
+        "width in bits of the accelerator's streams (default: the project's width)", form="integer", choices=WIDTHS
+    )
     pins: tuple[Pin, ...] = key("ports that become ports of the system", form="sections", section=Pin)
 
     @property
@@ -161,7 +165,7 @@ class Accelerator(Section):
 
 @dataclass(frozen=True)
 class Outgoing(Section):
-    """A connection from the block that contains it."""
+    """A connection from the block whose section contains it."""
 
     name: Text = key("the block that receives the message", is_required=True)
     include: tuple[Text, ...] = key(**_INCLUDE)
@@ -173,15 +177,15 @@ class Block(Section):
     """An instance of an accelerator (with a type) or of a converter (with middleware, mode and message)."""
 
     name: Text = key("the block's name", is_required=True)
-    type: Text | None = key("the type of an accelerator; not for a converter")
-    clock: Text | None = key("clock of an accelerator, from the project's clocks; default clk", only_of=ACCELERATOR)
+    type: Text | None = key("the type of an accelerator; not legal for a converter")
+    clock: Text | None = key("clock of an accelerator: one of the project's clocks (default: clk)", only_of=ACCELERATOR)
     middleware: Text | None = key(
         "the middleware of a converter's message", choices=tuple(MIDDLEWARES), only_of=CONVERTER
     )
     mode: Text | None = key("direction of a converter", choices=MODES, only_of=CONVERTER)
     message: Text | None = key("a converter's message", only_of=CONVERTER)
     topic: Text | None = key(
-        "the topic of a converter's messages, such as /arm/left or left; default the block's name",
+        "the topic of a converter's messages, such as /arm/left or left (default: the block's name)",
         only_of=CONVERTER,
     )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
@@ -190,32 +194,32 @@ class Block(Section):
         "bytes of the longest payload, for a publisher that stores frames", form="integer", only_of=PUBLISHER
     )
     period: Text | None = key(
-        "time between two messages of a publisher, in cycles or such as 10 ms, or a rate such as 100 Hz",
+        "time between a publisher's messages: cycles, a time such as 10 ms, or a rate such as 100 Hz",
         only_of=PUBLISHER,
     )
     wcet: Text | None = key(
-        "longest transfer time of a publisher's frame; optional if the size has a bound", only_of=PUBLISHER
+        "longest transfer time of a publisher's frame; optional if the size is limited", only_of=PUBLISHER
     )
     deadline: Text | None = key(
-        "time from a publisher's request to the end of its frame; default its period", only_of=PUBLISHER
+        "time from a publisher's request to the end of the frame (default: the publisher's period)", only_of=PUBLISHER
     )
     outgoing: tuple[Outgoing, ...] = key(
-        "connections to the blocks that receive its message", form="sections", section=Outgoing
+        "connections to the blocks that receive the block's message", form="sections", section=Outgoing
     )
 
 
 @dataclass(frozen=True)
 class Specification(Section):
-    """The whole file."""
+    """The contents of a specification file."""
 
     project: Project = key("settings of the whole system", form="section", section=Project, is_required=True)
     paths: tuple[Text, ...] = key(
-        "folders, bags and cores with message definitions, relative to the file, searched before all others",
+        "folders, bags and cores with message definitions, relative to the file; searched before all others",
         form="texts",
     )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
-    # From some place on, the file is invalid YAML, so any section may have more items.
+    # The file is invalid YAML from some line on, so any section may have further items.
     is_cut: bool = False
 
     @property
@@ -225,21 +229,21 @@ class Specification(Section):
 
     @property
     def middlewares(self) -> set[str]:
-        """The middlewares of the specification, by the words that the specification uses."""
+        """The names of the middlewares that the specification uses, as written there."""
         sides = [side for item in self.accelerators for side in (*item.interface.input, *item.interface.output)]
         words = [*(block.middleware for block in self.blocks), *(side.middleware for side in sides)]
         return {str(word) for word in words if word}
 
 
 def is_core(path: str) -> bool:
-    """Whether an item of `paths` is the name of a core."""
+    """Return whether an item of `paths` is the name of a core."""
     return _CORE.fullmatch(path) is not None
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
     """Read the specification in a file, which messages call `file`, and note all faults.
 
-    Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
+    Raise `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
     text = read_yaml(path, file, faults)
     if text.root is None or is_null(text.root):

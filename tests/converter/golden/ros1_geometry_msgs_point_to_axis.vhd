@@ -47,7 +47,7 @@ architecture rtl of geometry_msgs_point_to_axis is
 begin
 
   assert ID <= 255
-    report "geometry_msgs_point_to_axis: ID is " & integer'image(ID) & "; legal are 0 to 255"
+    report "geometry_msgs_point_to_axis: ID is " & integer'image(ID) & "; legal: 0 to 255"
     severity failure;
 
   frame(23 downto 0)    <= x"000000";

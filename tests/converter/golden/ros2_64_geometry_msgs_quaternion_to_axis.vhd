@@ -48,7 +48,7 @@ architecture rtl of geometry_msgs_quaternion_to_axis is
 begin
 
   assert ID <= 255
-    report "geometry_msgs_quaternion_to_axis: ID is " & integer'image(ID) & "; legal are 0 to 255"
+    report "geometry_msgs_quaternion_to_axis: ID is " & integer'image(ID) & "; legal: 0 to 255"
     severity failure;
 
   frame(7 downto 0)     <= std_logic_vector(to_unsigned(ID, 8));

@@ -52,7 +52,7 @@ architecture rtl of awkward_msgs_gaps_to_axis is
 begin
 
   assert ID <= 255
-    report "awkward_msgs_gaps_to_axis: ID is " & integer'image(ID) & "; legal are 0 to 255"
+    report "awkward_msgs_gaps_to_axis: ID is " & integer'image(ID) & "; legal: 0 to 255"
     severity failure;
 
   frame(23 downto 0)    <= x"000000";

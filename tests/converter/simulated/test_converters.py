@@ -213,4 +213,4 @@ def test_an_illegal_id_is_named(bench: ConverterBench) -> None:
     pair = bench.pair(ROS1, "std_msgs/Bool")
     result = pair.library.run("std_msgs_bool_to_axis", {"ID": 256})
     assert result.exit_code != 0
-    assert "std_msgs_bool_to_axis: ID is 256; legal are 0 to 255" in result.output
+    assert "std_msgs_bool_to_axis: ID is 256; legal: 0 to 255" in result.output

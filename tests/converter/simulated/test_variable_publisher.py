@@ -306,4 +306,4 @@ def test_an_illegal_id_is_named(bench: PublisherBench) -> None:
     publisher: Publisher = bench.publisher(ROS1, "std_msgs/String")
     result = publisher.library.run(publisher.entity, {"ID": 256})
     assert result.exit_code != 0
-    assert "std_msgs_string_to_axis: ID is 256; legal are 0 to 255" in result.output
+    assert "std_msgs_string_to_axis: ID is 256; legal: 0 to 255" in result.output

@@ -105,7 +105,7 @@ begin
       & integer'image(FRACTION) & ")"
     severity failure;
   assert WIDTH >= 4
-    report "firm_cordic_vectoring: WIDTH is " & integer'image(WIDTH) & ", legal: 4 and more"
+    report "firm_cordic_vectoring: WIDTH is " & integer'image(WIDTH) & ", legal: 4 or more"
     severity failure;
 
   multiples : for k in quarter_pi'range generate

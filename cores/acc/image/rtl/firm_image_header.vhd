@@ -204,7 +204,7 @@ begin
     report "firm_image_header: MAX_COLUMNS is " & integer'image(MAX_COLUMNS) & "; legal: 1 to 65535/OUT_BYTES"
     severity failure;
   assert FRAME_ID_BYTES >= 2*LANES and FRAME_ID_BYTES mod LANES = 0
-    report "firm_image_header: FRAME_ID_BYTES is " & integer'image(FRAME_ID_BYTES) & "; legal: two full beats and more"
+    report "firm_image_header: FRAME_ID_BYTES is " & integer'image(FRAME_ID_BYTES) & "; legal: two full beats or more"
     severity failure;
   assert COLUMNS_OUT >= 1 and COLUMNS_OUT <= COLUMNS_IN and COLUMNS_IN <= 65535
     report "firm_image_header: COLUMNS_OUT is " & integer'image(COLUMNS_OUT) & "; legal: 1 to COLUMNS_IN, 65535 at most"

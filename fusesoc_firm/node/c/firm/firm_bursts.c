@@ -8,7 +8,7 @@
 
 void firm_joiner_init(firm_joiner_t *joiner) { memset(joiner->filled, 0, sizeof joiner->filled); }
 
-/* Judge a frame by the `size` bytes received so far, as many as its buffer holds at most. */
+/* Check a frame by the `size` bytes received so far, which do not exceed its buffer. */
 static firm_status_t judged(const uint8_t *frame, size_t size) {
     uint32_t length;
     if (size < FIRM_HEADER_BYTES) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Joins the bursts of a preemptive Manager to frames (docs/reference/manager.md, "Bursts"), as
+/* Joins the bursts of a preemptive Manager into frames (docs/reference/manager.md, "Bursts"), as
  * fusesoc_firm/node/bursts.py does, with a buffer for each publisher. Both are tested with the same bursts. */
 #ifndef FIRM_BURSTS_H
 #define FIRM_BURSTS_H
@@ -14,7 +14,7 @@ typedef struct {
 
 void firm_joiner_init(firm_joiner_t *joiner);
 
-/* Take a burst. After FIRM_FRAME, `frame` holds a whole frame of `frame_bytes` until the next push of its id. `tid` is
+/* Add a burst. After FIRM_FRAME, `frame` holds a whole frame of `frame_bytes` until the next push of its id. `tid` is
  * the stream's, or negative if the transport has none. After an error, the part of the frame received so far is
  * dropped. */
 firm_status_t firm_joiner_push(firm_joiner_t *joiner, const uint8_t *burst, size_t size, int tid, const uint8_t **frame,

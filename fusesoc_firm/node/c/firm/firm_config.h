@@ -34,7 +34,7 @@
 #define FIRM_DMA_BUFFER_BYTES 2048 /* a multiple of 64; a longer frame takes several */
 #endif
 
-/* An illegal size stops the compiler at a line that names the rule. */
+/* For an illegal size, the compiler stops at a line that names the rule. */
 typedef char firm_width_is_8_to_512[(FIRM_WIDTH >= 8 && FIRM_WIDTH <= 512 && (FIRM_WIDTH & (FIRM_WIDTH - 1)) == 0) ? 1 : -1];
 typedef char firm_ids_are_one_byte[(FIRM_SUBSCRIBERS >= 1 && FIRM_SUBSCRIBERS <= 256 && FIRM_PUBLISHERS >= 1 &&
                                     FIRM_PUBLISHERS <= 256)

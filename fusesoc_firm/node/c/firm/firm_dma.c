@@ -52,7 +52,7 @@ static uint32_t status_of(volatile firm_descriptor_t *descriptor) {
     return descriptor->status;
 }
 
-/* Return whether bits of a register are 0, or become 0 soon. */
+/* Return whether bits of a register become 0 within a short time. */
 static int is_cleared(uintptr_t address, uint32_t bits) {
     const uint32_t begun = firm_milliseconds();
     while ((firm_read(address) & bits) != 0) {

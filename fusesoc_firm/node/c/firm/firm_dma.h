@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* AXI DMA between memory and the system's streams, for the block design of a board with a processor
- * (docs/how-to/build-for-a-board.md): scatter and gather, 26 bits of length, 32 bits of address, no realignment. PG021
+ * (docs/how-to/build-for-a-board.md): scatter-gather, 26-bit lengths, 32-bit addresses, no realignment. PG021
  * describes registers and descriptors. This is firm/dma_transport.hpp in C, with static memory and cache maintenance.
  * */
 #ifndef FIRM_DMA_H
@@ -42,10 +42,10 @@ typedef struct {
     size_t received; /* bytes of the current burst */
 } firm_dma_t;
 
-/* Reset the engine, and with it the system, and start it. Returns FIRM_DMA_OK or the reason for failure. */
+/* Reset the engine and thereby the system, then start the engine. Returns FIRM_DMA_OK or the reason for failure. */
 firm_dma_status_t firm_dma_open(firm_dma_t *dma, uintptr_t base, firm_dma_memory_t *memory);
 
-/* Send a frame; wait while the engine's buffers are full. Returns FIRM_DMA_OK when they hold it. One task only. */
+/* Send a frame; wait while the engine's buffers are full. Returns FIRM_DMA_OK. Only one task may call this function. */
 firm_dma_status_t firm_dma_send(firm_dma_t *dma, const uint8_t *frame, size_t size);
 
 /* Append received bytes to `burst`, which has room for `room` bytes. Returns FIRM_DMA_BURST when the burst is complete,

@@ -8,7 +8,7 @@
 
 #define FIRM_HEADER_BYTES 5u
 
-/* The result of taking bytes. */
+/* The result of reading bytes. */
 typedef enum {
     FIRM_MORE,         /* no complete frame yet */
     FIRM_FRAME,        /* a complete frame */
@@ -38,10 +38,10 @@ typedef struct {
     size_t filled;
 } firm_decoder_t;
 
-/* Prepare a decoder; `room` must suffice for a header at least. */
+/* Prepare a decoder; `room` must be sufficient at least for a header. */
 void firm_decoder_init(firm_decoder_t *decoder, uint8_t *buffer, size_t room, unsigned publishers);
 
-/* Take bytes until a frame is complete or none are left; `taken` is their number. After FIRM_FRAME, `buffer` holds
+/* Read bytes until a frame is complete or no bytes are left; `taken` is their number. After FIRM_FRAME, `buffer` holds
  * `filled` bytes until the next push. After an error, the beginnings of frames are unknown: drop all bytes up to the
  * next marker. */
 firm_status_t firm_decoder_push(firm_decoder_t *decoder, const uint8_t *bytes, size_t size, size_t *taken);

@@ -25,7 +25,7 @@ uint32_t firm_bus_address(const volatile void *memory);
 void firm_lock(firm_lock_t *lock);
 void firm_unlock(firm_lock_t *lock);
 
-/* A clock that wraps, and a wait of about a millisecond in which other tasks may run. */
+/* A clock that wraps around, and a wait of about a millisecond in which other tasks may run. */
 uint32_t firm_milliseconds(void);
 void firm_pause(void);
 

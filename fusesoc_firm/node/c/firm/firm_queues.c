@@ -59,7 +59,7 @@ bool firm_queues_put(firm_queues_t *queues, unsigned subscriber, const uint8_t *
     return true;
 }
 
-/* Find the least recently served subscriber with frames; among equals, the lowest index. */
+/* Find the least recently served subscriber with frames; among equal ones, the lowest index. */
 static bool find_next(const firm_queues_t *queues, unsigned *next) {
     bool is_found = false;
     unsigned subscriber;

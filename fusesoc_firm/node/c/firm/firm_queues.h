@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Frames to the hardware: a queue for each subscriber; the least recently used queue is served next (the dissertation's
- * section 6.3.3; docs/reference/host-queues.md). fusesoc_firm/node/queues.py does this by default; here the memory is
+ * section 6.3.3; docs/reference/host-queues.md), like the default of fusesoc_firm/node/queues.py; here the memory is
  * static.
  *
  * A payload is copied once, outside the lock, into a slot that belongs to its frame until the frame is sent. */
@@ -13,7 +13,7 @@
 #include "firm_frame.h"
 #include "firm_port.h"
 
-/* Slots for all waiting frames, for each frame that is being written, and for the one that is being sent. */
+/* Slots for all waiting frames, for each frame that is being written, and for the frame that is being sent. */
 #define FIRM_SLOTS (FIRM_SUBSCRIBERS * FIRM_QUEUE_DEPTH + FIRM_WRITERS + 1)
 
 typedef struct {
@@ -32,7 +32,7 @@ typedef struct {
 
 typedef char firm_slots_have_16_bits[FIRM_SLOTS <= 65535 ? 1 : -1];
 
-/* A frame to send; firm_queues_release gives its slot back. */
+/* A frame to send; firm_queues_release releases its slot. */
 typedef struct {
     unsigned subscriber;
     const uint8_t *frame;
@@ -46,7 +46,7 @@ void firm_queues_init(firm_queues_t *queues);
  * than FIRM_WRITERS tasks write. Do not call it in an interrupt. */
 bool firm_queues_put(firm_queues_t *queues, unsigned subscriber, const uint8_t *payload, size_t size);
 
-/* Get the next frame; returns false if no frame waits. One task only. */
+/* Get the next frame; returns false if no frame waits. Only one task may call this function. */
 bool firm_queues_get(firm_queues_t *queues, firm_next_t *next);
 void firm_queues_release(firm_queues_t *queues, const firm_next_t *next);
 

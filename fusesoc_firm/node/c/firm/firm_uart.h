@@ -21,7 +21,7 @@ void firm_uart_open(firm_uart_t *uart, uintptr_t base, uint8_t *buffer, size_t r
 /* Send a frame; wait while the line is busy. */
 void firm_uart_send(firm_uart_t *uart, const uint8_t *frame, size_t size);
 
-/* Take received bytes. Returns FIRM_FRAME (with decoder.filled bytes in decoder.buffer), or FIRM_MORE if no bytes are
+/* Read received bytes. Returns FIRM_FRAME (with decoder.filled bytes in decoder.buffer), or FIRM_MORE if no bytes are
  * left. Bytes that do not form a frame are counted and dropped until the line is silent; then a break is sent. While
  * firm_uart_is_silent is 0, do not send a frame that causes a response. */
 firm_status_t firm_uart_receive(firm_uart_t *uart);

@@ -61,7 +61,7 @@ class BurstJoiner {
       frame = std::move(begun->second);
       begun_.erase(begun);
       if (size <= beat_bytes_) {
-        throw BurstError("the burst that resumes the frame of id " + std::to_string(id) + " holds nothing but the id");
+        throw BurstError("the burst that resumes the frame with id " + std::to_string(id) + " contains nothing but the id");
       }
       // Only these bytes were inserted. They fill a beat, so that the bytes after them stay in their lanes.
       frame.insert(frame.end(), burst + beat_bytes_, burst + size);
@@ -73,7 +73,7 @@ class BurstJoiner {
       return JoinedFrame{id, std::move(frame)};
     }
     if (size % beat_bytes_ != 0) {
-      throw BurstError("a burst of id " + std::to_string(id) + " ends within a beat: " + std::to_string(size) +
+      throw BurstError("a burst with id " + std::to_string(id) + " ends within a beat: " + std::to_string(size) +
                        " bytes at " + std::to_string(beat_bytes_) + " per beat, and the frame is incomplete");
     }
     begun_.emplace(id, std::move(frame));
@@ -97,7 +97,7 @@ class BurstJoiner {
     std::string parts;
     for (const auto& [id, frame] : begun_) {
       if (!parts.empty()) parts += ", ";
-      parts += std::to_string(frame.size()) + " bytes of id " + std::to_string(id);
+      parts += std::to_string(frame.size()) + " bytes with id " + std::to_string(id);
     }
     begun_.clear();
     if (!parts.empty()) throw BurstError("the stream ends within frames: " + parts);
@@ -124,13 +124,13 @@ class BurstJoiner {
     std::uint64_t length = 0;
     for (std::size_t place = kHeaderBytes - 1; place > 0; --place) length = length << 8 | frame[place];
     if (length > longest_) {
-      throw BurstError("the frame of id " + std::to_string(id) + " announces " + std::to_string(length) +
-                       " bytes of payload; the longest has " + std::to_string(longest_));
+      throw BurstError("the frame with id " + std::to_string(id) + " announces " + std::to_string(length) +
+                       " bytes of payload; the longest payload has " + std::to_string(longest_) + " bytes");
     }
     const std::uint64_t received = frame.size() - kHeaderBytes;
     if (received > length) {
-      throw BurstError("the frame of id " + std::to_string(id) + " is " + std::to_string(received - length) +
-                       " bytes longer than it announces");
+      throw BurstError("the frame with id " + std::to_string(id) + " is " + std::to_string(received - length) +
+                       " bytes longer than its header announces");
     }
     return received == length;
   }

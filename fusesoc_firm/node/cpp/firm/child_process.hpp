@@ -84,7 +84,7 @@ class ChildProcess {
     const int error = posix_spawn(&pid_, "/bin/sh", &actions, &attributes, arguments, environ);
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw TransportError("'" + command + "' cannot be started: " + std::strerror(error));
+    if (error != 0) throw TransportError("cannot start '" + command + "': " + std::strerror(error));
     to_child_ = std::move(we_write);
     from_child_ = std::move(we_read);
   }
@@ -144,7 +144,7 @@ class ChildProcess {
       ::waitpid(pid_, &status_, 0);
       has_ended_ = true;
     }
-    if (WIFSIGNALED(status_)) return "was ended by signal " + std::to_string(WTERMSIG(status_));
+    if (WIFSIGNALED(status_)) return "was killed by signal " + std::to_string(WTERMSIG(status_));
     // By convention, the shell adds this to the number of the signal that ended its command.
     constexpr int kSignals = 128;
     const int status = WEXITSTATUS(status_);
@@ -161,7 +161,7 @@ class ChildProcess {
       if (information.si_pid == 0 && std::chrono::steady_clock::now() >= end) {
         kill();
         wait();
-        return "was killed, as it did not end";
+        return "did not end, so it was killed";
       }
       if (information.si_pid == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }

@@ -62,11 +62,11 @@ class Mapping {
 inline std::uint64_t number_in(const std::string& path) {
   std::ifstream file(path);
   std::string text;
-  if (!(file >> text)) throw TransportError(path + " cannot be read: is its driver loaded?");
+  if (!(file >> text)) throw TransportError("cannot read " + path + "; check whether the driver is loaded");
   try {
     return std::stoull(text, nullptr, 0);
   } catch (const std::exception&) {
-    throw TransportError(path + " holds '" + text + "', which is not a number");
+    throw TransportError(path + " contains '" + text + "', which is not a number");
   }
 }
 
@@ -123,7 +123,7 @@ class LinuxDmaDevice : public DmaDevice {
     }
     // Neither cached nor mapped as device memory, which allows only aligned accesses.
     if (!(std::ofstream(about + "/sync_mode") << 2 << std::flush)) {
-      throw TransportError(about + "/sync_mode cannot be written");
+      throw TransportError("cannot write " + about + "/sync_mode");
     }
     return static_cast<std::uint32_t>(address);
   }

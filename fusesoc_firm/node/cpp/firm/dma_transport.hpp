@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // AXI DMA between memory and the system's streams, for the block design of a board with a processor
-// (docs/how-to/build-for-a-board.md): scatter and gather, 26 bits of length, 32 bits of address, no realignment.
+// (docs/how-to/build-for-a-board.md): scatter-gather, 26-bit lengths, 32-bit addresses, no realignment.
 //
-// Each direction has a ring of descriptors with a buffer each. Frames are copied into free buffers and follow each
-// other without a pause. Bursts fill the next free buffers, so several may arrive while the processor is busy. A frame
-// or burst that is longer than a buffer continues in the next one. PG021 (AXI DMA) describes registers and descriptors.
+// Each direction has a ring of descriptors, each with a buffer. Frames are copied into free buffers and are sent
+// without pauses between them. Bursts fill the next free buffers, so several bursts may arrive while the processor is
+// busy. A frame or burst that is longer than a buffer continues in the next buffer. PG021 (AXI DMA) describes registers
+// and descriptors.
 #pragma once
 
 #include <algorithm>
@@ -25,11 +26,11 @@ namespace firm {
 struct DmaOptions {
   std::size_t send_buffers = 16;
   std::size_t receive_buffers = 16;
-  std::size_t buffer_bytes = 0;  // a multiple of 64; 0: as large as the memory allows
+  std::size_t buffer_bytes = 0;  // a multiple of 64; 0: the maximum that fits
 };
 
-// Completes all writes to memory before the engine is notified, and delays reads until it has reported.
-// The processor orders memory and registers separately, so a barrier between threads is not enough.
+// Completes all writes to memory before the engine is notified, and delays reads until the engine has reported. The
+// processor orders memory and registers separately, so a barrier between threads is not sufficient.
 inline void dma_barrier() {
 #if defined(__aarch64__) || defined(__arm__)
   __asm__ volatile("dsb sy" ::: "memory");
@@ -38,7 +39,7 @@ inline void dma_barrier() {
 #endif
 }
 
-// Offsets of the registers from the first register of a channel, and their bits.
+// The offsets of the registers from a channel's first register, and the registers' bits.
 namespace dma {
 constexpr std::size_t kMm2s = 0x00, kS2mm = 0x30;
 constexpr std::size_t kControl = 0x00, kStatus = 0x04, kFirstDescriptor = 0x08, kLastDescriptor = 0x10;
@@ -46,7 +47,7 @@ constexpr std::uint32_t kRun = 1U << 0, kReset = 1U << 2, kInterruptOnComplete =
 constexpr std::uint32_t kOneFrameAnInterrupt = 1U << 16;
 constexpr std::uint32_t kHalted = 1U << 0, kHasScatterGather = 1U << 3, kInterrupts = 7U << 12;
 
-// Words of a descriptor and their bits.
+// The words of a descriptor, and their bits.
 constexpr std::size_t kDescriptorBytes = 64;
 constexpr std::size_t kNext = 0, kBuffer = 2, kDescriptorControl = 6, kDescriptorStatus = 7;
 constexpr std::uint32_t kLength = (1U << 26) - 1, kEndOfFrame = 1U << 26, kStartOfFrame = 1U << 27;
@@ -74,7 +75,7 @@ class DmaRing {
     }
   }
 
-  // Start the channel; it waits for descriptors.
+  // Start the channel, which then waits for descriptors.
   void start(std::uint32_t interrupts) {
     dma_barrier();
     device_.write(channel_ + dma::kFirstDescriptor, address_of(0));
@@ -92,7 +93,7 @@ class DmaRing {
     device_.write(channel_ + dma::kLastDescriptor, address_of(index));
   }
 
-  // The engine's status of a descriptor; nothing while it is not done.
+  // Return the status word of a descriptor, or nothing until the engine has completed the descriptor.
   std::optional<std::uint32_t> done(std::size_t index) {
     const std::uint32_t status = word(index, dma::kDescriptorStatus);
     if ((status & dma::kComplete) == 0) return std::nullopt;
@@ -121,16 +122,16 @@ class DmaRing {
 
 class DmaTransport : public Transport {
  public:
-  // Resets the engine, and with it the system. Throws TransportError.
+  // Reset the engine and thereby the system. Throws TransportError.
   explicit DmaTransport(std::unique_ptr<DmaDevice> device, TransportOptions options = {}, DmaOptions dma = {})
       : options_(std::move(options)),
         device_(std::move(device)),
         count_(dma),
         to_system_(ring(dma::kMm2s, dma.send_buffers, 0)),
         from_system_(ring(dma::kS2mm, dma.receive_buffers, dma.send_buffers)) {
-    if (!reset()) throw TransportError("the DMA engine does not leave its reset: does it have a clock?");
+    if (!reset()) throw TransportError("the DMA engine does not leave reset; check the engine's clock");
     if ((device_->read(dma::kMm2s + dma::kStatus) & dma::kHasScatterGather) == 0) {
-      throw TransportError("the DMA engine lacks scatter-gather, so it is not from a generated block design");
+      throw TransportError("the DMA engine does not support scatter-gather, so it is not from a generated block design");
     }
     to_system_.start(dma::kInterruptOnError);
     from_system_.start(dma::kInterruptOnComplete | dma::kInterruptOnError);
@@ -192,19 +193,19 @@ class DmaTransport : public Transport {
     const std::size_t bytes = count_.buffer_bytes == 0 ? std::min(fitting, most) : count_.buffer_bytes;
     if (count < 2 || bytes == 0 || bytes % dma::kAlignment != 0 || bytes > std::min(fitting, most)) {
       throw TransportError("the DMA has " + std::to_string(count) + " buffers of " + std::to_string(bytes) +
-                           " bytes; legal: 2 and more, a multiple of 64, and all within the memory's " +
-                           std::to_string(device_->memory_bytes()));
+                           " bytes; legal: 2 or more, a multiple of 64, and all within the " +
+                           std::to_string(device_->memory_bytes()) + " bytes of memory");
     }
     return DmaRing(*device_, channel, count, before * dma::kDescriptorBytes, descriptors + before * bytes, bytes);
   }
 
-  // Reset both channels, which one reset does. Return whether the reset has finished.
+  // Reset both channels with a single reset; return whether the reset has finished.
   bool reset() {
     device_->write(dma::kMm2s + dma::kControl, dma::kReset);
     return is_cleared(dma::kMm2s + dma::kControl, dma::kReset);
   }
 
-  // Return whether a bit of a register is 0, or becomes 0 soon.
+  // Return whether a bit of a register becomes 0 within a short time.
   bool is_cleared(std::size_t offset, std::uint32_t bit) {
     const Deadline deadline(std::chrono::milliseconds(100));
     while ((device_->read(offset) & bit) != 0) {
@@ -235,7 +236,7 @@ class DmaTransport : public Transport {
   bool take(std::uint32_t status) {
     const std::size_t size = status & dma::kLength;
     const std::size_t longest = options_.longest_payload + kFrameHeaderBytes + dma::kAlignment;
-    if (size > from_system_.buffer_bytes()) throw TransportError("the DMA engine wrote beyond a buffer");
+    if (size > from_system_.buffer_bytes()) throw TransportError("the DMA engine wrote past the end of a buffer");
     if (status & dma::kStartOfFrame) burst_.data.clear(), is_too_long_ = false;
     is_too_long_ = is_too_long_ || burst_.data.size() + size > longest;
     if (!is_too_long_) {
@@ -258,16 +259,16 @@ class DmaTransport : public Transport {
       std::uint32_t bit;
       const char* text;
     };
-    static constexpr Fault kFaults[] = {{1U << 4, "DMAIntErr (internal)"},      {1U << 5, "DMASlvErr (memory's answer)"},
+    static constexpr Fault kFaults[] = {{1U << 4, "DMAIntErr (internal)"},      {1U << 5, "DMASlvErr (response from memory)"},
                                         {1U << 6, "DMADecErr (address)"},       {1U << 8, "SGIntErr (descriptor)"},
-                                        {1U << 9, "SGSlvErr (memory's answer)"}, {1U << 10, "SGDecErr (address)"}};
+                                        {1U << 9, "SGSlvErr (response from memory)"}, {1U << 10, "SGDecErr (address)"}};
     const std::uint32_t status = device_->read(channel + dma::kStatus);
     if (is_closed_) return;
     std::string text;
     for (const auto& fault : kFaults) {
       if (status & fault.bit) text += (text.empty() ? "" : ", ") + std::string(fault.text);
     }
-    if (text.empty() && (status & dma::kHalted)) text = "it has halted";
+    if (text.empty() && (status & dma::kHalted)) text = "the channel has halted";
     if (!text.empty()) throw TransportError(std::string("the DMA engine's ") + name + ": " + text);
   }
 

@@ -57,7 +57,7 @@ class FrameStream {
     }
     if (frame_.size() == kFrameHeaderBytes && payload_length(frame_.data()) > longest_) {
       throw FrameError("a frame announces " + std::to_string(payload_length(frame_.data())) +
-                       " bytes of payload; the longest has " + std::to_string(longest_));
+                       " bytes of payload; the longest payload has " + std::to_string(longest_) + " bytes");
     }
   }
 

@@ -8,7 +8,7 @@
 //     node.stop(std::chrono::seconds(10));                  // send all queued payloads, publish the responses
 //     engine.join();
 //
-// The middleware has serialised the payloads; nothing here parses them. C++17, no dependencies but POSIX.
+// The middleware has serialised the payloads, and the engine does not parse them. C++17, no dependencies except POSIX.
 #pragma once
 
 #include <atomic>
@@ -42,9 +42,9 @@ struct NodeConfiguration {
   std::size_t queue_depth = 10;             // frames, for each subscriber
   Overflow overflow = Overflow::kDropOldest;
   std::function<std::unique_ptr<Policy>()> policy = nullptr;  // default: least recently used
-  unsigned restarts = 0;                    // how often a failed transport is reopened
+  unsigned restarts = 0;                    // the number of times that a failed transport is reopened
   std::chrono::nanoseconds restart_delay = std::chrono::milliseconds(500);
-  // If the hardware cannot report that it is at rest, it is considered at rest after this time without output.
+  // Hardware that cannot report that it is at rest counts as at rest after this time without output.
   std::chrono::nanoseconds settling_time = std::chrono::milliseconds(200);
   std::ostream* log = nullptr;    // one line per fault
   std::ostream* trace = nullptr;  // CSV, one line per step of a message (firm/trace.hpp)
@@ -52,7 +52,7 @@ struct NodeConfiguration {
 
 struct NodeStatistics {
   std::uint64_t received = 0;   // payloads passed to put()
-  std::uint64_t dropped = 0;    // those dropped because their queue was full
+  std::uint64_t dropped = 0;    // payloads dropped because their queue was full
   std::uint64_t sent = 0;       // frames that the transport has taken
   std::uint64_t published = 0;  // payloads received from the hardware
   std::uint64_t errors = 0;     // pulses of frame_error and id_error, losses of bytes, illegal bursts
@@ -81,9 +81,10 @@ class Node {
             [address](const TransportOptions& options) { return open_transport(address, options); },
             std::move(publish)) {}
 
-  // Queue a payload for a subscriber; it is copied once. Return whether it is queued: it is not if the queue is full
-  // and drops the newest, or if the node stops. If the queues block, the call waits for room. Any thread. Throws
-  // std::out_of_range for an unknown subscriber, and std::length_error for a payload that is too long.
+  // Queue a payload for a subscriber, copied once; return whether it is queued. The payload is not queued if a full
+  // queue drops the newest payload, or if the node stops. If the queues block, the call waits for space. Any thread may
+  // call this function. Throws std::out_of_range for an unknown subscriber, and std::length_error for a payload that is
+  // too long.
   bool put(unsigned subscriber, const std::uint8_t* payload, std::size_t size) {
     if (subscriber >= configuration_.subscribers) {
       throw std::out_of_range("subscriber is " + std::to_string(subscriber) + "; legal: 0 to " +
@@ -91,8 +92,8 @@ class Node {
     }
     if (size > configuration_.longest_payload) {
       throw std::length_error("a payload for subscriber " + std::to_string(subscriber) + " has " +
-                              std::to_string(size) + " bytes; the longest has " +
-                              std::to_string(configuration_.longest_payload));
+                              std::to_string(size) + " bytes; the longest payload has " +
+                              std::to_string(configuration_.longest_payload) + " bytes");
     }
     const std::uint64_t number = received_++;
     trace_.write("received", subscriber, number, size);
@@ -106,8 +107,8 @@ class Node {
     }
   }
 
-  // Run until stop(), or until the transport fails for good. Return a process's exit status: 0, or 1 with error(). Call
-  // once.
+  // Run until stop(), or until the transport fails permanently. Return an exit status: 0, or 1 with error(). Call this
+  // function only once.
   int run() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -120,18 +121,19 @@ class Node {
       wait_before_restart();
       fault = session();
     }
-    // Nothing reads the queues any more, so wake all threads that wait for room in them.
+    // The queues have no reader any more, so wake all threads that wait for space.
     queues_.close();
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (is_abandoned_) fault = "the time limit for stopping is over, but some frames were not sent or received";
+    if (is_abandoned_) fault = "the time limit for stopping expired before all frames were sent and received";
     if (fault) log(error_ = *fault);
     has_ended_ = true;
     changed_.notify_all();
     return fault ? 1 : 0;
   }
 
-  // Take no more payloads, send the queued ones, publish the responses, and end. Work that is not done within `drain`
-  // is abandoned, and run() reports it. Returns when run() is about to return. Any thread except that of `publish`.
+  // Accept no more payloads, send the queued payloads, publish the responses, and end. Work that is not finished within
+  // `drain` is abandoned, and run() reports this. The function returns when run() is about to return; any thread except
+  // that of `publish` may call it.
   void stop(std::chrono::nanoseconds drain = std::chrono::seconds(10)) {
     queues_.close();
     std::unique_lock<std::mutex> lock(mutex_);
@@ -156,7 +158,7 @@ class Node {
     return statistics;
   }
 
-  // The reason why run() returned 1.
+  // Return the reason why run() returned 1.
   std::string error() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return error_;
@@ -167,7 +169,7 @@ class Node {
     std::uint64_t number;
     Bytes frame;
   };
-  // The longest time until the sender notices that the receiver has failed.
+  // The maximum time until the sender notices that the receiver has failed.
   static constexpr std::chrono::milliseconds kGlance{50};
 
   static NodeConfiguration checked(NodeConfiguration configuration) {
@@ -179,7 +181,7 @@ class Node {
     return configuration;
   }
 
-  // --- a session: the life of one transport ---------------------------------------------------------------------------
+  // --- a session: one transport from start to end ---------------------------------------------------------------------
 
   // Run one transport; return its fault, or nothing if the node is done.
   std::optional<std::string> session() {
@@ -198,7 +200,7 @@ class Node {
       receiver.join();
       const std::lock_guard<std::mutex> lock(mutex_);
       transport_ = nullptr;
-      // The receiver saw the cause, the sender only its effect.
+      // The receiver detected the cause, the sender only its effect.
       if (receiver_fault_) fault = receiver_fault_;
     } catch (const std::exception& error) {
       fault = error.what();
@@ -253,7 +255,7 @@ class Node {
     }
   }
 
-  // Wait until everything that was sent has had its effect.
+  // Wait until all sent frames are processed.
   void settle(const Transport& transport) {
     while (!has_receiver_failed() && !is_abandoned()) {
       const auto is_at_rest = transport.is_at_rest();

@@ -196,8 +196,8 @@ class PipeTransport : public Transport {
       default:
         break;
     }
-    char text[112];
-    std::snprintf(text, sizeof text, "byte %llu of the simulator's reports is 0x%02x, not the start of one: T, B, E, S",
+    char text[128];
+    std::snprintf(text, sizeof text, "byte %llu of the simulator's reports is 0x%02x; legal at the start of a report: T, B, E, S",
                   static_cast<unsigned long long>(place), letter);
     throw TransportError(text);
   }
@@ -206,7 +206,7 @@ class PipeTransport : public Transport {
     const Cycles cycles = this->cycles();
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (requested_ == 0) throw TransportError("the simulator reports a frame that it was not sent");
+      if (requested_ == 0) throw TransportError("the simulator reports a frame that was not sent to it");
       --requested_;
       changed_.notify_all();
     }
@@ -241,8 +241,8 @@ class PipeTransport : public Transport {
   void take_standing() {
     const std::uint64_t cycle = number(8), quiet = number(4);
     if (cycle < cycle_) {
-      throw TransportError("the simulator is at cycle " + std::to_string(cycle) + ", but was at " +
-                           std::to_string(cycle_) + " before");
+      throw TransportError("the simulator reports cycle " + std::to_string(cycle) + " after cycle " +
+                           std::to_string(cycle_));
     }
     cycle_ = cycle;
     const std::lock_guard<std::mutex> lock(mutex_);

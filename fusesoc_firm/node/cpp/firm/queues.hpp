@@ -6,7 +6,8 @@
 //     queues.put(subscriber, frame);                       // any thread, such as a callback of the middleware
 //     while (auto next = queues.get()) send(next->item);   // the thread that owns the DMA, until close()
 //
-// It does the same as fusesoc_firm/node/queues.py; both are tested with the same histories. C++17, no dependencies.
+// The behaviour equals that of fusesoc_firm/node/queues.py; both are tested with the same histories. C++17, no
+// dependencies.
 #pragma once
 
 #include <chrono>
@@ -25,17 +26,17 @@
 
 namespace firm {
 
-// Chooses the next subscriber: the one whose first frame has the smallest key; among equals, the lowest index.
+// The rule that chooses the next subscriber: the smallest key wins; among equal keys, the lowest index wins.
 class Policy {
  public:
   virtual ~Policy() = default;
-  // The key of a subscriber whose first frame arrived at `arrival` (ns).
+  // Return the key of a subscriber whose first queued frame arrived at `arrival` (in ns).
   virtual std::int64_t key(std::size_t subscriber, std::int64_t arrival) const = 0;
-  // Called after a subscriber's frame is taken.
+  // Record that a frame of this subscriber was read from its queue.
   virtual void served(std::size_t) {}
 };
 
-// The lowest index first.
+// A policy that serves the lowest index first.
 class FixedPriority : public Policy {
  public:
   std::int64_t key(std::size_t subscriber, std::int64_t) const override {
@@ -43,7 +44,7 @@ class FixedPriority : public Policy {
   }
 };
 
-// The next index after the one served last, cyclic; index 0 at first.
+// A policy that serves the indices in turn, beginning with index 0.
 class RoundRobin : public Policy {
  public:
   explicit RoundRobin(std::size_t subscribers) : subscribers_(subscribers) {}
@@ -57,8 +58,8 @@ class RoundRobin : public Policy {
   std::size_t first_ = 0;
 };
 
-// The subscriber served least recently (section 4.2.1); at first, the lowest index. A subscriber waits for at most
-// `subscribers` - 1 others.
+// A policy that serves the subscriber served least recently (section 4.2.1); at first, the lowest index. A subscriber
+// waits for at most `subscribers` - 1 others.
 class LeastRecentlyUsed : public Policy {
  public:
   explicit LeastRecentlyUsed(std::size_t subscribers) : served_at_(subscribers, -1) {}
@@ -70,7 +71,7 @@ class LeastRecentlyUsed : public Policy {
   std::int64_t now_ = 0;
 };
 
-// The subscriber whose first frame has the earliest deadline: its arrival plus the subscriber's relative deadline (ns).
+// A policy that serves the frame with the earliest deadline: its arrival time plus a relative deadline (in ns).
 class EarliestDeadlineFirst : public Policy {
  public:
   explicit EarliestDeadlineFirst(std::vector<std::int64_t> deadlines) : deadlines_(std::move(deadlines)) {}
@@ -82,8 +83,8 @@ class EarliestDeadlineFirst : public Policy {
   std::vector<std::int64_t> deadlines_;
 };
 
-// The subscriber whose first frame has the least slack: the time until its deadline minus its transfer time (ns). The
-// key is the latest time to start. It differs from the slack by the present time, which is the same for all.
+// A policy that serves the frame with the least slack: the time until its deadline minus its transfer time (in ns). The
+// key is the latest start time, which orders subscribers like their slack, since all share the current time.
 class LeastSlackTime : public Policy {
  public:
   LeastSlackTime(std::vector<std::int64_t> deadlines, const std::vector<std::int64_t>& transfer_times)
@@ -101,8 +102,8 @@ class LeastSlackTime : public Policy {
   std::vector<std::int64_t> latest_starts_;
 };
 
-// The action of put() if a queue is full: drop the queue's oldest frame as ROS's KEEP_LAST does, drop the new frame, or
-// wait for room.
+// The action of put() when a queue is full: drop the queue's oldest frame like KEEP_LAST in ROS, drop the new frame, or
+// wait for space.
 enum class Overflow { kDropOldest, kDropNewest, kBlock };
 
 // The queues are closed.
@@ -116,7 +117,7 @@ inline std::int64_t steady_nanoseconds() {
       .count();
 }
 
-// Bounded queues, one per subscriber, read as one. Any number of threads may write and read.
+// Bounded queues, one for each subscriber, that are read like one queue. Any number of threads may read and write.
 template <typename Item>
 class SubscriberQueues {
  public:
@@ -138,12 +139,12 @@ class SubscriberQueues {
         dropped_(subscribers, 0) {
     if (subscribers < 1 || capacity < 1) {
       throw std::invalid_argument("subscribers is " + std::to_string(subscribers) + ", capacity is " +
-                                  std::to_string(capacity) + "; legal: 1 and more");
+                                  std::to_string(capacity) + "; legal: 1 or more");
     }
   }
 
-  // Add an item; return whether it is queued. It is not if the full queue drops the newest, or if no room was found in
-  // time. Throws ClosedError, even during the wait, and std::out_of_range for an unknown subscriber.
+  // Add an item; return whether it is queued. The item is not queued if a full queue drops the newest item, or stays
+  // full until the timeout. Throws ClosedError, even during the wait, and std::out_of_range for an unknown subscriber.
   bool put(std::size_t subscriber, Item item, Timeout timeout = std::nullopt) {
     auto& queue = queues_.at(subscriber);
     std::unique_lock<std::mutex> lock(mutex_);
@@ -176,7 +177,7 @@ class SubscriberQueues {
     return next;
   }
 
-  // Take no more items; queued ones can still be read. Wakes all waiting threads.
+  // Accept no more items, and wake all waiting threads; queued items can still be read.
   void close() {
     const std::lock_guard<std::mutex> lock(mutex_);
     closed_ = true;
@@ -189,7 +190,7 @@ class SubscriberQueues {
     return closed_ && !first_waiting();
   }
 
-  // The number of dropped items of a subscriber.
+  // Return the number of items that a subscriber's queue has dropped.
   std::uint64_t dropped(std::size_t subscriber) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return dropped_.at(subscriber);

@@ -65,7 +65,7 @@ class RawCallback : public ros::SubscriptionCallbackHelper {
 class Ros1 {
  public:
   static constexpr bool kHasQuality = false;
-  static constexpr const char* kArguments = "ROS' own arguments: NAME:=VALUE remaps a topic, __name:=, __ns:=, __log:=";
+  static constexpr const char* kArguments = "ROS arguments: NAME:=VALUE remaps a topic, __name:=, __ns:=, __log:=";
 
   // Remove ROS's own arguments from `argv`. The node is called `name` unless `__name:=` is given.
   Ros1(int& argc, char** argv, const std::string& name) {

@@ -62,23 +62,23 @@ inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
   void* handle = dlopen(library.c_str(), RTLD_LAZY | RTLD_LOCAL);
   if (handle == nullptr) {
     throw MiddlewareError("the message " + topic.type + " of " + topic.name + " is not installed: " + dlerror() +
-                          "; is ROS, and the workspace with " + package + ", sourced?");
+                          "; source ROS and the workspace with " + package);
   }
   using Get = const rosidl_message_type_support_t* (*)();
   const auto get = reinterpret_cast<Get>(dlsym(handle, symbol.c_str()));
   if (get == nullptr) {
-    throw MiddlewareError(library + " has no message " + topic.type + ", which " + topic.name + " needs");
+    throw MiddlewareError(library + " does not contain the message " + topic.type + ", which " + topic.name + " needs");
   }
   const rosidl_message_type_support_t* support = get();
 #ifdef FIRM_HAS_TYPE_HASH
   rosidl_type_hash_t expected;
   if (rosidl_parse_type_hash_string(topic.signature.c_str(), &expected) != RCUTILS_RET_OK) {
     rcl_reset_error();
-    throw MiddlewareError("'" + topic.signature + "' is not the hash of a type, which " + topic.name + " needs");
+    throw MiddlewareError("'" + topic.signature + "', the signature of " + topic.name + ", is not a type hash");
   }
   const rosidl_type_hash_t* installed = support->get_type_hash_func(support);
   if (installed->version != expected.version || std::memcmp(installed->value, expected.value, sizeof expected.value) != 0) {
-    throw MiddlewareError("the message " + topic.type + " is installed in another version than the hardware has (" +
+    throw MiddlewareError("the message " + topic.type + " is installed in a version that differs from the hardware's (" +
                           topic.signature + ")");
   }
 #endif
@@ -90,7 +90,7 @@ class Ros2 {
  public:
   static constexpr bool kHasQuality = true;
   static constexpr const char* kArguments =
-      "ROS' own arguments stand behind --ros-args: -r NAME:=VALUE remaps a topic, -r __node:=, -r __ns:=, --log-level";
+      "ROS arguments, after --ros-args: -r NAME:=VALUE remaps a topic, -r __node:=, -r __ns:=, --log-level";
 
   // Remove ROS's own arguments from `argv`. The node is called `name` unless `__node:=` is given. Throws
   // MiddlewareError.
@@ -123,7 +123,7 @@ class Ros2 {
     const rcl_allocator_t allocator = rcl_get_default_allocator();
     check_rcl(rcl_logging_configure(&context_.global_arguments, &allocator), "log");
     const rcl_node_options_t options = rcl_node_get_default_options();
-    check_rcl(rcl_node_init(&node_, name_.c_str(), "", &context_, &options), "make the node " + name_);
+    check_rcl(rcl_node_init(&node_, name_.c_str(), "", &context_, &options), "create the node " + name_);
     check_rcl(rcl_wait_set_init(&waiting_, 0, 0, 0, 0, 0, 0, &context_, allocator), "wait for messages");
     is_started_ = true;
     return true;
@@ -204,7 +204,7 @@ class Ros2 {
   struct Subscription {
     Subscription(std::size_t most, MessageHandler handle_message) : depth(most), handler(std::move(handle_message)) {
       const rcl_allocator_t allocator = rcl_get_default_allocator();
-      check_rcl(rmw_serialized_message_init(&message, 0, &allocator), "make room for a message");
+      check_rcl(rmw_serialized_message_init(&message, 0, &allocator), "allocate a message");
     }
     ~Subscription() { ignore(rmw_serialized_message_fini(&message)); }
     Subscription(const Subscription&) = delete;

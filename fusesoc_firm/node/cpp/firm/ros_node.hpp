@@ -129,7 +129,7 @@ inline NodeArguments parse_arguments(const System& system, bool has_quality, int
     } else if (option == "--qos" && has_quality) {
       arguments.is_best_effort = word_of<bool>(option, value(), {{"best_effort", true}, {"reliable", false}});
     } else {
-      throw UsageError("'" + option + "' is no option");
+      throw UsageError("unknown option '" + option + "'");
     }
   }
   if (arguments.transport.empty()) throw UsageError("--transport is missing");
@@ -138,27 +138,27 @@ inline NodeArguments parse_arguments(const System& system, bool has_quality, int
 }
 
 inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool has_quality) {
-  out << "The node of the system " << system.name << ": it carries messages between its topics and the hardware.\n\n"
-      << "usage: " << system.name << "_node --transport ADDRESS [OPTION ...] [ROS' own arguments]\n\n"
+  out << "Carries messages between topics and the hardware of the system " << system.name << ".\n\n"
+      << "usage: " << system.name << "_node --transport ADDRESS [OPTION ...] [ROS ARGUMENTS]\n\n"
       << "  --transport ADDRESS  the transport to the hardware: pipe:COMMAND (a simulator), uart:DEVICE:BAUD[:rtscts],\n"
       << "                       dma:UIO:BUFFER[:poll]\n";
   if (system.has_software()) {
-    out << "  --software COMMAND   the blocks in software, such as\n"
+    out << "  --software COMMAND   the command that runs the blocks in software, such as\n"
         << "                       'python3 -m fusesoc_firm.node.software_process SPECIFICATION'\n";
   }
-  out << "  --depth N            capacity of each queue, including those of ROS, in messages (" << system.queue_depth << ")\n"
-      << "  --overflow WORD      treatment of a message for a full queue: drop_oldest (the default), drop_newest, or\n"
+  out << "  --depth N            capacity of each queue, including ROS queues, in messages (" << system.queue_depth << ")\n"
+      << "  --overflow WORD      action if a queue is full: drop_oldest (the default), drop_newest, or\n"
       << "                       block, which stops all topics\n"
       << "  --drain SECONDS      time limit for pending messages when the node ends (10)\n"
-      << "  --restart            open the transport again each time that it fails\n"
+      << "  --restart            reopen the transport each time it fails\n"
       << "  --trace FILE         write each step of each message to FILE, as CSV\n";
   if (has_quality) out << "  --qos WORD           reliability of all topics: reliable (the default) or best_effort\n";
-  out << "  --help               print this\n\n" << ros_arguments << "\n\ntopics to the hardware:\n";
+  out << "  --help               print this help\n\n" << ros_arguments << "\n\ntopics to the hardware:\n";
   for (const auto& topic : system.subscribers) out << "  " << topic.name << "  " << topic.type << "\n";
   out << "topics from the hardware:\n";
   for (const auto& topic : system.publishers) out << "  " << topic.name << "  " << topic.type << "\n";
-  out << "\nSIGINT and SIGTERM end it after all pending messages; a second one ends it at once.\n"
-      << "exit status: 0, 1 if the hardware or ROS failed, 2 for a wrong command line\n";
+  out << "\nSIGINT and SIGTERM end the node after all pending messages; a second signal ends the node at once.\n"
+      << "exit status: 0, 1 if the hardware or ROS failed, 2 for an invalid command line\n";
 }
 
 // Set by SIGINT or SIGTERM.
@@ -347,7 +347,7 @@ int run(const System& system, int argc, char** argv) {
     }
     return serve(ros, system, arguments);
   } catch (const UsageError& fault) {
-    std::cerr << system.name << "_node: " << fault.what() << "; --help says more" << std::endl;
+    std::cerr << system.name << "_node: " << fault.what() << "; see --help" << std::endl;
     return 2;
   } catch (const std::exception& fault) {
     std::cerr << system.name << "_node: " << fault.what() << std::endl;

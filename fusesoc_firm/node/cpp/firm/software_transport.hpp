@@ -27,7 +27,7 @@ class SoftwareTransport : public Transport {
     if (is_closed_) throw TransportError("the transport is closed");
     const SigpipeHeld held;
     // The receiver, which knows how the child ended, also reports its end.
-    if (!child_.write(frame, size)) throw TransportError("the software takes no more frames");
+    if (!child_.write(frame, size)) throw TransportError("the software no longer accepts frames");
   }
 
   // Close the child's input: the software ends after its last response.

@@ -11,9 +11,9 @@
 
 namespace firm {
 
-// A topic and the id of its converter in the hardware; no id if only software uses it. `signature` is that of the
-// message's definition: ROS 1's MD5 sum or ROS 2's hash (RIHS01). `definition` is its text with those of all nested
-// messages, as ROS 1 announces it.
+// A topic and the id of its converter in the hardware; no id if only software uses the topic. `signature` is the
+// definition's signature: the MD5 sum for ROS 1, the RIHS01 hash for ROS 2. `definition` is the definition's text with
+// the texts of all nested messages, as ROS 1 announces it.
 struct Topic {
   std::optional<unsigned> id;
   std::string name;
@@ -22,7 +22,7 @@ struct Topic {
   std::string definition{};
 };
 
-// Handles a serialised message: one from the middleware, or one to publish. The caller owns the bytes.
+// A function that handles a serialised message, from the middleware or to publish. The caller owns the bytes.
 using MessageHandler = std::function<void(const std::uint8_t* data, std::size_t size)>;
 
 // The middleware is missing, or does not know a requested item.

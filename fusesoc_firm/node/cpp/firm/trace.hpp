@@ -36,7 +36,7 @@ class Trace {
     write_line(event, {converter, message, bytes}, cycles);
   }
 
-  // Record a message before it is sent: simulated hardware may take it before the transport returns.
+  // Record a message before it is sent, since simulated hardware may take the message before the transport returns.
   void sending(unsigned converter, std::uint64_t message, std::size_t bytes) {
     if (!stream_) return;
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -52,7 +52,7 @@ class Trace {
     sent_.pop_front();
   }
 
-  // Forget all sent messages, which will never be taken.
+  // Forget all sent messages, which the hardware will never take.
   void forget_sent() {
     const std::lock_guard<std::mutex> lock(mutex_);
     sent_.clear();

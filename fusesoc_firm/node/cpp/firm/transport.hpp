@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one interface to the hardware: frames to it, bursts from it (docs/reference/transports.md).
+// The single interface to the hardware, which sends frames and receives bursts (docs/reference/transports.md).
 //
 //     auto transport = firm::open_transport("pipe:./simulator");   // firm/open_transport.hpp
 //     transport->send(frame.data(), frame.size());                 // waits while the hardware is not ready
-//     auto burst = transport->receive(std::chrono::seconds(1));    // nothing if none arrived in time
+//     auto burst = transport->receive(std::chrono::seconds(1));    // nothing if no burst arrived in time
 //
-// The counterpart in Python is fusesoc_firm/node/transport/transport.py. C++17, no dependencies but POSIX.
+// The counterpart in Python is fusesoc_firm/node/transport/transport.py. C++17, no dependencies except POSIX.
 #pragma once
 
 #include <chrono>
@@ -26,7 +26,7 @@ using Timeout = std::optional<std::chrono::nanoseconds>;
 constexpr std::size_t kIdBytes = 1;
 constexpr std::size_t kFrameHeaderBytes = 5;
 
-// The hardware, or the path to it, has gone or violates the protocol; the transport is unusable.
+// The hardware or the path to it is lost or violates the protocol; the transport is unusable.
 class TransportError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -38,8 +38,8 @@ struct Cycles {
   std::uint64_t last;
 };
 
-// The bytes of the system's stream up to a tlast that tkeep marks as valid: a frame or a part of one. `tid` is the
-// stream's, if the transport carries it; `cycles` is known for simulated hardware.
+// The valid bytes (by tkeep) of the system's stream up to a tlast: a frame or a part of a frame. `tid` is the stream's
+// tid, if the transport carries it; `cycles` is known only for simulated hardware.
 struct Burst {
   Bytes data;
   std::optional<std::uint8_t> tid = std::nullopt;
@@ -53,7 +53,8 @@ struct HardwareError {
   std::optional<std::uint64_t> cycle = std::nullopt;
 };
 
-// A transport's parameters from the system, and its callbacks beside bursts. Its threads call the functions.
+// A transport's parameters from the system, and callbacks for events other than bursts. The transport's threads call
+// the functions.
 struct TransportOptions {
   unsigned publishers = 256;              // of the Manager
   std::size_t longest_payload = 1 << 26;  // bytes, in either direction
@@ -61,7 +62,7 @@ struct TransportOptions {
   std::function<void(const HardwareError&)> on_error = nullptr;
 };
 
-// One thread may send while another receives; closing ends both.
+// A path to the hardware. One thread may send while another receives; closing the transport ends both calls.
 class Transport {
  public:
   virtual ~Transport() = default;
@@ -76,10 +77,10 @@ class Transport {
   // Declare that no more frames follow. Called by the sending thread; most hardware ignores it.
   virtual void finish() {}
 
-  // Return whether all frames sent have had their effect, and all responses were received; nothing if unknown.
+  // Return whether all sent frames are processed and all responses are received, or nothing if this is unknown.
   virtual std::optional<bool> is_at_rest() const { return std::nullopt; }
 
-  // Stop; sent frames may be lost. Any thread; a second call does nothing.
+  // Close the transport from any thread; sent frames may be lost. A second call does nothing.
   virtual void close() = 0;
 };
 
@@ -92,7 +93,7 @@ inline std::uint32_t payload_length(const std::uint8_t* frame) {
 
 // Return a frame with this payload. Throws std::length_error if the length does not fit its field.
 inline Bytes pack_frame(std::uint8_t id, const std::uint8_t* payload, std::size_t size) {
-  if (size > UINT32_MAX) throw std::length_error("a payload of 4 GiB and more does not fit a frame");
+  if (size > UINT32_MAX) throw std::length_error("a payload of 4 GiB or more does not fit into a frame");
   Bytes frame;
   frame.reserve(kFrameHeaderBytes + size);
   frame.push_back(id);

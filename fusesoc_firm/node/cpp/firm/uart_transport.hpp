@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A board's serial link (cores/board/README.md): raw frames, byte by byte, 8 bits, no parity.
 //
-// A byte stream has no markers. The board takes a break as one: the next byte begins a frame. From the board, only
-// silence is a marker: all bytes are dropped until the line is silent, and meanwhile nothing is sent that would cause a
-// response. The transport does both when it is opened, and whenever received bytes cannot form a frame: an illegal id
-// or length, or a pause in the middle of a frame.
+// A byte stream does not mark the start of a frame. To the board, a break marks it: the next byte begins a frame. From
+// the board, only silence marks it: all bytes are dropped until the line is silent, and in this time nothing is sent
+// that would cause a response. The transport uses both markers when it is opened, and whenever received bytes cannot
+// form a frame: after an illegal id or length, or a pause in the middle of a frame.
 #pragma once
 
 #include <fcntl.h>
@@ -49,7 +49,7 @@ class UartTransport : public Transport {
     cut();
     const Deadline deadline(uart_.patience);
     while (is_dropping_ && !deadline.is_over()) receive_within(deadline);
-    if (is_dropping_) throw TransportError(device_ + ": the board is never silent, so frames cannot be told apart");
+    if (is_dropping_) throw TransportError(device_ + ": the board is never silent, so the start of a frame cannot be found");
   }
 
   void send(const std::uint8_t* frame, std::size_t size) override {
