@@ -163,7 +163,7 @@ def _is_signature(text: str) -> bool:
 def read_bag(
     path: Path, subscribers: Sequence[Topic], hint: str = BAGS
 ) -> Iterator[tuple[Topic, bytes, dict[str, Any]]]:
-    """Yield the subscriber, payload and decoded value of each routed message, in the order of time.
+    """Yield the subscriber, payload and decoded value of each routed message in chronological order.
 
     May raise `InputError`.
     """

@@ -82,7 +82,7 @@ def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
     """Load the system of the specification in the arguments, and print its warnings.
 
-    Unless `needs_sources` is set, the sources of the system's accelerators may be missing. May raise `InputError`.
+    Missing sources of accelerators are an error only if `needs_sources` is set. May raise `InputError`.
     """
     from fusesoc_firm.system.message_sources import load_beside
 

@@ -42,7 +42,7 @@ def add_replay(commands: Any) -> None:
     replay.add_argument(
         "--format",
         choices=("ros1", "sqlite3", "mcap"),
-        help="format of the written bag (default: from its ending, otherwise the format of --in)",
+        help="format of the written bag (default: from its extension, otherwise the format of --in)",
     )
     replay.add_argument("--force", action="store_true", help="replace the bag at --out if it exists")
     replay.add_argument(

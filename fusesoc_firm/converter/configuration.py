@@ -108,7 +108,7 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
 
 
 def _first_position(stream: Stream) -> int:
-    """Return a publisher's first position; on 8-bit streams, it aligns the payload's start to a multiple of four.
+    """Return a publisher's first position. On 8-bit streams, the payload then starts at a multiple of four.
 
     Four payload bytes then share a LUT of the multiplexer, and the constant bytes before the payload need no LUT. The
     alignment saves a third of the LUTs.

@@ -160,7 +160,7 @@ def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
 
 
 def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, faults: Diagnostics) -> None:
-    """Check that no name is needed twice, since a tool keeps only one entity or package of each name."""
+    """Check that no two entities or packages have the same name, since a tool keeps only one of them."""
     owners: dict[str, tuple[str, Frame]] = {}
     for entry, wanted in found:
         package = constants_package(wanted.message, prefix=prefix)

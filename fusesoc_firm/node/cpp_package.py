@@ -160,7 +160,7 @@ def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) 
 
 
 def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
-    """Yield the definition text of each message once; ROS 2 needs no definitions."""
+    """Yield the definition text of each message once; a ROS 2 message has no text."""
     texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
     for name, text in texts.items():
         if text:

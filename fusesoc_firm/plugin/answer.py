@@ -264,7 +264,7 @@ def _write(files: Files, request: Request, marks: str, run: str) -> None:
         fail(
             f"{request.vlnv} and {other} define the design unit '{unit}' differently, but tools keep only one",
             find_requesting_core(request.files_root, request.name).instance(),
-            "rename the units of one core with the parameter 'name' of generator 'firm', such as name: left",
+            "rename the units of one core with the generator's parameter 'name', for example 'name: left'",
         )
 
 

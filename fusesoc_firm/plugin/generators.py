@@ -24,10 +24,11 @@ _LARGEST_SEED = 2147483562
 
 @dataclass(frozen=True)
 class Generator:
-    """A generator: its parameters, and the function that derives the data of a request.
+    """A generator: its parameters, and the function that derives the data for a request.
 
-    `load` derives all data of a request, and raises `InputError` for faults in the user's input. `programs` returns the
-    programs required to run the core. `tools` returns the versions of the programs that generate part of the core.
+    `load` derives all the data needed for a request, and raises `InputError` for faults in the user's input. `programs`
+    returns the programs required to run the core. `tools` returns the versions of the programs that generate part of
+    the core.
     """
 
     parameters: tuple[Parameter, ...]

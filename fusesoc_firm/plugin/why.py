@@ -231,7 +231,7 @@ def call_file(path: Path) -> tuple[Path, str]:
     if call is None:
         fail(
             f"{path} is not a generated file",
-            hint="generated files are in a build folder, below 'generator_cache' or in a folder <core>-<instance>",
+            hint="in a build folder, generated files are below 'generator_cache' or in a folder <core>-<instance>",
         )
     return call, path.relative_to(folder).as_posix()
 

@@ -234,7 +234,7 @@ def _form(target: Target, like: Form) -> Form:
     """Return the format of the bag to write."""
     said = form_of(target.path)
     if target.form and said and target.form is not said:
-        fail(f"cannot write {target.path}: --format is {target.form.value}, but the file's ending means {said.value}")
+        fail(f"cannot write {target.path}: --format is {target.form.value}, but the extension implies {said.value}")
     return target.form or said or like
 
 

@@ -91,7 +91,7 @@ class SystemRun:
 
     @cached_property
     def _entries(self) -> Mapping[str, End]:
-        """The sources of messages from software in other programs, by block."""
+        """The sources of the messages that software in other programs sends, by block."""
         return {topic.block: end for topic, end in sent_elsewhere(self.system).items()}
 
     @cached_property

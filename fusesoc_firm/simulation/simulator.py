@@ -191,7 +191,7 @@ def _words(work: Path, tool: str) -> list[str]:
 
 
 def _live(tool: str) -> Live:
-    """Return the tool's support for live simulation. Raise `InputError` if the tool has no support."""
+    """Return the tool's support for live simulation. Raise `InputError` if it has none."""
     if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
         fail(f"unknown simulator '{tool}' for live systems", hint=f"legal: {', '.join(known)}")
     return live

@@ -74,7 +74,7 @@ def sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
 
 
 def taken_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
-    """Return the inputs of software in other programs, as topics with their ends."""
+    """Return the topics that software in other programs receives, each with its end."""
     return _elsewhere(system, lambda type_: type_.inputs)
 
 

@@ -41,7 +41,7 @@ def _apart() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the file or folder at `path` that was read; each part has a distinct name."""
+    """One part that was read from the file or folder at `path`; each part has a distinct name."""
 
     path: Path
     name: str

@@ -105,8 +105,8 @@ def load_system(
 ) -> LoadedSystem:
     """Read a specification and derive its system, optionally for a board; raise `InputError` with all faults.
 
-    Unless `needs_sources` is set, accelerators' source files may be missing. Messages in the specification's `paths`
-    take precedence over messages in `libraries`.
+    Missing source files of accelerators are an error only if `needs_sources` is set. Messages in the `paths` of the
+    specification take precedence over messages in `libraries`.
     """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)

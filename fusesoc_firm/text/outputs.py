@@ -15,8 +15,8 @@ def check_output(path: Path, endings: Sequence[str] = ()) -> None:
     """
     if endings and path.suffix not in endings:
         fail(
-            f"cannot write {path}: the file's ending does not select a format",
-            hint=f"legal endings: {', '.join(endings)}",
+            f"cannot write {path}: unknown file extension",
+            hint=f"legal extensions: {', '.join(endings)}",
         )
     if path.is_dir():
         fail(f"cannot write {path}: the path is a folder")

@@ -58,7 +58,7 @@ def _spelt(name: str, entry: Key) -> Schema:
 
 
 def _property(entry: Key) -> Schema:
-    """Return the schema of a key's value; unless the key is required, it may be null."""
+    """Return the schema of a key's value; the value may be null unless the key is required."""
     value = _value(entry)
     legal = value if entry.is_required else {"anyOf": [value, {"type": "null"}]}
     return {"description": entry.meaning, **legal}

@@ -21,8 +21,8 @@ def check_picture(path: Path | None, form: str | None) -> None:
     check_output(path, ENDINGS)
     if form and path.suffix != f".{form}":
         fail(
-            f"the ending of {path} does not match the format {form}",
-            hint=f"without --format, the ending selects the format: {', '.join(ENDINGS)}",
+            f"the extension of {path} does not match the format {form}",
+            hint=f"without --format, the extension determines the format: {', '.join(ENDINGS)}",
         )
 
 

@@ -385,9 +385,7 @@ def test_where_nothing_can_be_written_is_told_before_the_work(
     """A name with another ending, a folder that is missing, and one in the file's place."""
     monkeypatch.chdir(tmp_path)
     message = error(capsys, *command, name)
-    assert message == (
-        f"error: cannot write {name}: the file's ending does not select a format\n      = legal endings: {legal}\n"
-    )
+    assert message == (f"error: cannot write {name}: unknown file extension\n      = legal extensions: {legal}\n")
     good = f"x{legal.split(',', maxsplit=1)[0]}"
     assert error(capsys, *command, f"none/{good}") == f"error: cannot write none/{good}: there is no folder none\n"
     (tmp_path / good).mkdir()

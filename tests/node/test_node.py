@@ -466,7 +466,7 @@ def test_a_trace_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "picture", "message"),
     [
-        ("trace.csv", "ways.gif", "ways.gif: the file's ending does not select a format"),
+        ("trace.csv", "ways.gif", "ways.gif: unknown file extension"),
         ("none.csv", "ways.svg", "cannot read "),
         ("other.csv", "ways.svg", "is not a node's trace"),
         ("trace.csv", "ways.svg", "contains no messages with a response"),

@@ -90,7 +90,7 @@ def test_the_name_says_the_form(tmp_path: Path, name: str, form: str | None, fil
 
 def test_a_form_against_the_name(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
-    with pytest.raises(InputError, match="--format is sqlite3, but the file's ending means mcap"):
+    with pytest.raises(InputError, match="--format is sqlite3, but the extension implies mcap"):
         run(loaded, bag(tmp_path, "mcap", points("mcap", 1)), Target(tmp_path / "o.mcap", Form.SQLITE3), "echo")
 
 

@@ -40,7 +40,7 @@ class UartTransport:
     def __init__(
         self, device: str, baud: int = DEFAULT_BAUD, *, has_flow_control: bool = False, longest: int = 2**26
     ) -> None:
-        """Open `device`, with flow control by RTS and CTS if `has_flow_control` is set, else at the line's full rate.
+        """Open `device`. If `has_flow_control` is set, RTS and CTS control the flow of data.
 
         No payload has more than `longest` bytes. May raise `TransportError`.
         """

@@ -206,6 +206,9 @@ def numbers_of(text: str, most: int = 256) -> tuple[int, ...]:
     found = set()
     for word in text.split(","):
         if not word.strip().isdecimal() or not 1 <= int(word) <= most:
-            fail(f"'{word.strip()}' is not a legal number of accelerators", hint=f"legal: 1 to {most}, such as 2,8,256")
+            fail(
+                f"'{word.strip()}' is not a legal number of accelerators",
+                hint=f"legal: 1 to {most}; an example of a list is 2,8,256",
+            )
         found.add(int(word))
     return tuple(sorted(found))

@@ -100,7 +100,7 @@ class Scheduler(ABC):
         """
 
     def _without_granted(self, request: Bools, without: Bools) -> Bools:
-        """Return a copy of `request` (B, N) without the granted requester's request where `without` (B,) is true."""
+        """Return a copy of `request` (B, N) in which the granted entry is false if `without` (B,) is true."""
         eligible = request.copy()
         eligible[self._members, self.grant_select] &= ~without
         return eligible

@@ -1,4 +1,4 @@
-"""Non-preemptive schedulers that choose among all requests in a single cycle."""
+"""Non-preemptive schedulers that need only a single cycle to choose among all requests."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ class Queue(ABC):
     @property
     @abstractmethod
     def clearing(self) -> bool:
-        """Whether the reset is still in progress, so that the queue accepts no item."""
+        """Whether the reset is still in progress; until it ends, the queue accepts no items."""
 
     @property
     @abstractmethod

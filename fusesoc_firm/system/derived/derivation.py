@@ -289,7 +289,7 @@ class _Analysis:
             self.faults.error(message, blocks[0].name.source, f"a {mode} is a block with 'mode: {mode}'")
         elif len(found) > MOST_CONVERTERS:
             self.faults.error(
-                f"the system has {len(found)} {mode}s; ids have one byte, so the limit is {MOST_CONVERTERS}",
+                f"the system has {len(found)} {mode}s; ids are one byte long, so the limit is {MOST_CONVERTERS}",
                 found[MOST_CONVERTERS].name.source,
             )
 

@@ -59,7 +59,9 @@ class Parts:
                 hint = f"a {mode} is a block with 'mode: {mode}', or a message between hardware and software"
                 faults.error(f"the hardware has no {mode}, but needs at least one", first, hint)
             elif len(found) > MOST_CONVERTERS:
-                message = f"the hardware has {len(found)} {mode}s; ids have one byte, so the limit is {MOST_CONVERTERS}"
+                message = (
+                    f"the hardware has {len(found)} {mode}s; ids are one byte long, so the limit is {MOST_CONVERTERS}"
+                )
                 faults.error(message, found[MOST_CONVERTERS].name.source)
         taking = {end.block for name, end in self.crossings.items() if self.blocks[name].mode == PUBLISHER}
         for block in self.software.blocks:

@@ -185,7 +185,7 @@ def _length(port: str, side: MessageSide) -> Context:
 
 
 def _counts(side: MessageSide, number: int) -> list[Context]:
-    """Return the arrays of fixed size in output `number`, whose elements are counted to mark the last one."""
+    """Return the fixed-size arrays of output `number`; their elements are counted to mark the last element."""
     if side.frame.is_fixed_size:
         return []
     ports = message_side(side.frame)
