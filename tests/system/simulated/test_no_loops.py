@@ -1,0 +1,32 @@
+"""No system has a combinational loop, whatever message it passes through; a sample of `make bench BENCH=loops`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.bench.loops import loops_of_messages, loops_of_random_system
+from tests.converter.simulated.pass_through import PassThrough
+
+SEED = 20260611
+RANDOM_SYSTEMS = 30
+# An array of messages with strings, an array of strings, and both without.
+SAMPLE = ("diagnostic_msgs/DiagnosticArray", "sensor_msgs/JointState", "sensor_msgs/Image")
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.parametrize("distribution", ["noetic", "humble"])
+@pytest.mark.parametrize("width", [8, 64])
+def test_messages_that_are_passed_through(tmp_path: Path, distribution: str, width: int) -> None:
+    found = loops_of_messages(PassThrough(distribution, SAMPLE, count=0, seed=0, width=width), tmp_path)
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("number", range(RANDOM_SYSTEMS))
+def test_a_random_system(tmp_path: Path, number: int) -> None:
+    """Accelerators are first versions, in which an input's ready depends on the outputs'."""
+    print(f"seed {SEED + number}")
+    found = loops_of_random_system(SEED + number, tmp_path)
+    assert not found, "\n".join(found)
