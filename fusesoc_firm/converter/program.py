@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -288,8 +288,7 @@ class _Builder:
         self._open(node)
         self._append(Stream(self.scope, node), in_segment=False)
         if node.terminator:
-            zeros = ((0, bytes(node.terminator)),)
-            self.block = replace(self.block, size=node.terminator, constants=zeros, checks=zeros)
+            self.block = _terminating(self.scope, node)
 
     def _loop(self, node: Loop) -> None:
         if node.count is None:
@@ -406,7 +405,26 @@ def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
     rest = steps[last + 1 : -1]
     if not any(isinstance(step, Count | Open) or (isinstance(step, Block) and not step.checks) for step in rest):
         return tuple(steps)
-    return (*steps[: last + 1], Tail(), Drop(), steps[-1])
+    # A stream's bytes, and a text's terminating zero, are counted when the stream opens, so the cut is behind them.
+    if opens_data(steps[last]):
+        last += 1
+    return (*steps[: last + 1], *_terminator(steps[last]), Tail(), Drop(), steps[-1])
+
+
+def opens_data(step: Step) -> bool:
+    """Whether a stream follows the step."""
+    return isinstance(step, Open) and isinstance(step.part, Data)
+
+
+def _terminator(step: Step) -> Iterator[Block]:
+    """Yield the step that reads a text's terminating zero after the text, if there is one."""
+    if isinstance(step, Stream) and step.part.terminator:
+        yield _terminating(step.scope, step.part)
+
+
+def _terminating(scope: Scope, text: Data) -> Block:
+    zeros = ((0, bytes(text.terminator)),)
+    return Block(scope, text.terminator, constants=zeros, checks=zeros)
 
 
 def _is_used(step: Step) -> bool:

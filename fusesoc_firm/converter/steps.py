@@ -18,6 +18,7 @@ from fusesoc_firm.converter.program import (
     Tail,
     comment,
     has_bytes,
+    opens_data,
 )
 from fusesoc_firm.frame.model import COUNT_BYTES, LENGTH_BYTES, Data, Loop
 from fusesoc_firm.text.render import Context
@@ -46,11 +47,6 @@ def fixed_size(step: Step) -> int:
 def is_counted(step: Step) -> bool:
     """Whether the step opens a part whose number of elements is on the wire."""
     return isinstance(step, Open) and (isinstance(step.part, Data) or step.part.count is None)
-
-
-def opens_data(step: Step) -> bool:
-    """Whether a stream follows the step."""
-    return isinstance(step, Open) and isinstance(step.part, Data)
 
 
 def is_hollow(step: Step) -> bool:

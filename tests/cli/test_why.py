@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -74,7 +75,9 @@ def test_every_line_is_that_of_the_template_named(application: str) -> None:
     for text, rendering in renderings.items():
         lines = traced_lines(rendering)
         assert [line.text for line in lines] == text.splitlines()
-        for line in lines:
+        for before, line in zip([None, *lines], lines, strict=False):
+            if before and replace(before, text=line.text) == line:
+                continue  # a value of several lines
             source = (TEMPLATES / line.template).read_text().splitlines()[line.line - 1]
             start = source.partition("{{")[0]
             assert not line.text or line.text.lstrip().startswith(start.lstrip()) or not start.strip()

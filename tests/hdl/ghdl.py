@@ -113,7 +113,11 @@ class Library:
         again and use the same generics.
         """
         netlist = self.directory / f"{entity}_netlist.vhd"
-        netlist.write_text(_in_order(self.synthesise(entity, generics)), encoding="utf-8")
+        # GHDL 2.0 writes an unsigned number of one bit as a character.
+        text = self.synthesise(entity, generics)
+        for bit in "01":
+            text = text.replace(f"unsigned'('{bit}')", f"unsigned'(0 => '{bit}')")
+        netlist.write_text(_in_order(text), encoding="utf-8")
         self.analyse([netlist])
         return netlist
 

@@ -22,7 +22,7 @@ def test_a_dialect_with_another_rule(tmp_path: Path) -> None:
     folder = tmp_path / "lab"
     folder.mkdir()
     (folder / "Few.msg").write_text("uint16[<=3] data\n", encoding="utf-8")
-    with pytest.raises(InputError, match="ROS 1 has no bounds"):
+    with pytest.raises(InputError, match="ROS 1 does not support bounds"):
         MessageLibrary(ROS1, [folder]).get(FEW)
     library = MessageLibrary(BOUNDED, [folder])
     assert str(library.get(FEW).fields[0].type) == "uint16[<=3]"

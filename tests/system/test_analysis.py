@@ -192,7 +192,7 @@ def test_what_is_wrong_beside_an_unreadable_block_is_reported(tmp_path: Path) ->
         derived(tmp_path, specification(blocks))
     assert [message.partition("(")[0] for message in messages(raised.value)] == [
         "'mode' cannot be 'publish'",
-        "'t' gives geometry_msgs/Pose ",
+        "'t' outputs geometry_msgs/Pose ",
         "the output of 'u' ",
     ]
 
@@ -218,5 +218,5 @@ def test_a_distribution_is_meant_for_its_own_version(tmp_path: Path, distro: str
 
 def test_an_unknown_distribution(tmp_path: Path) -> None:
     request = Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": "melodious"})
-    with pytest.raises(InputError, match="'melodious' is not a distribution"):
+    with pytest.raises(InputError, match="unknown ROS distribution 'melodious'"):
         load_requested(request)

@@ -236,7 +236,7 @@ def test_the_command_reports(tmp_path: Path, capsys: Captured) -> None:
         (["geometry_msgs/Piont"], "unknown message 'geometry_msgs/Piont'"),
         (["nowhere/*"], "no message matches 'nowhere/*'"),
         (["std_msgs/Bool", "--width", "7"], "converters do not support 7-bit streams"),
-        (["std_msgs/Bool", "--cluster", "tcp://127.0.0.1:1"], "no Dask scheduler answers|the package 'distributed'"),
+        (["std_msgs/Bool", "--cluster", "tcp://127.0.0.1:1"], "no Dask scheduler responds|the package 'distributed'"),
     ],
 )
 def test_what_cannot_be_done_is_said(

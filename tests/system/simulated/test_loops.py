@@ -12,14 +12,14 @@ from tests.hdl.verilog import loops
 from tests.system.simulated.systems import DATA, RUNTIME, generate_system
 from tests.system.simulated.test_variable_system import IMAGE, converter, image_accelerator
 
-FORWARDED = "out_data_axis_tvalid            <= in_data_axis_tvalid;"
+FORWARDED = "out_msg_valid                   <= in_msg_valid;"
 
 
 @pytest.mark.parametrize("waits", [True, False])
 def test_a_valid_that_waits_for_its_ready_is_named(tmp_path: Path, waits: bool) -> None:
     source = (DATA / "invert.vhd").read_text(encoding="ascii")
     assert FORWARDED in source
-    waiting = FORWARDED.replace(";", " and out_data_axis_tready;")
+    waiting = FORWARDED.replace(";", " and out_msg_ready;")
     (tmp_path / "invert.vhd").write_text(source.replace(FORWARDED, waiting) if waits else source, encoding="ascii")
     blocks = [
         converter("sub", "subscriber", IMAGE, "acc"),
@@ -36,5 +36,5 @@ def test_a_valid_that_waits_for_its_ready_is_named(tmp_path: Path, waits: bool) 
     said = loops(work[-1].stem, tmp_path, work, core_files(*RUNTIME))
     assert len(said) == waits, said
     if said:
-        assert "'out_data_axis_tvalid' of 'u_acc' depends on its 'out_data_axis_tready', which depends on it" in said[0]
-        assert "'u_pub' (from 'data_axis_tvalid' to 'data_axis_tready')" in said[0]
+        assert "'out_msg_valid' of 'u_acc' depends on its 'out_msg_ready', which depends on it" in said[0]
+        assert "'u_pub' (from 'msg_valid' to 'msg_ready')" in said[0]

@@ -337,7 +337,7 @@ def test_a_fault_in_cpp_is_shown_with_the_prototype(tmp_path: Path, code: str, m
 
 def test_an_included_file_must_be_a_source(tmp_path: Path) -> None:
     text = kernel_fault(tmp_path, '#include "unlisted.h"\nvoid twice(int data_in, int *data_out) {}\n')
-    assert f"'doubled' includes {tmp_path / 'unlisted.h'}" in text
+    assert f"'doubled' includes files that are not sources: {tmp_path / 'unlisted.h'}" in text
 
 
 # --- the main job and all VHDL -------------------------------------------------------------------------------------
