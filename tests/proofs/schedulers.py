@@ -150,8 +150,8 @@ def _round_robin() -> tuple[Proof, ...]:
         "scheduler_fairness": (
             Mutation(
                 "firm_sched_following.vhd",
-                "later := bits and above(index, COUNT);",
-                "later := bits;",
+                "later := asking and above(now_at, COUNT);",
+                "later := asking;",
                 ("after_at_most_all_others",),
             ),
         ),

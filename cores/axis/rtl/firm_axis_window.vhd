@@ -228,7 +228,8 @@ begin
       );
 
     next_first <= next_user(7);
-    next_bytes <= resize(unsigned(next_user(6 downto 0)), COUNT_BITS);
+    -- Without a beat, the number may be unknown in simulation.
+    next_bytes <= to_01(resize(unsigned(next_user(6 downto 0)), COUNT_BITS));
 
     both_beats <= next_tdata(WIDTH-9 downto 0) & tdata_r;
     window     <= bytes_from(both_beats, offset_r);
