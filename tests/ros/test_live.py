@@ -345,7 +345,7 @@ def test_a_simulator_that_is_killed_in_mid_frame_is_started_again(place: Place) 
             peer.publish("/image_in", sent.data)
             assert sent.is_in(version, peer.take()[1])
             peer.publish("/image_in", image(version, 100 + number, bytes(100)).data)
-            node.wait_until_said("it is restarted", number + 1)
+            node.wait_until_said("the hardware is restarted", number + 1)
         assert node.stop() == 0
         assert "restarts: 3" in node.said()
 
