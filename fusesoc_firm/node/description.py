@@ -12,8 +12,8 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere, way_to
-from fusesoc_firm.system.derived.model import Converter, Topic
-from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.system.derived.model import Converter, StatusAccess, Topic
+from fusesoc_firm.system.system_core import LoadedSystem, identity
 from fusesoc_firm.text.diagnostics import fail
 
 
@@ -53,7 +53,8 @@ class NodeDescription:
     Software on this host sends to the hardware through `entering` and receives from the hardware through `leaving`. For
     each publisher in hardware, `sources` lists the ids of the subscribers whose messages cause the publisher's
     messages. `longest_payload` is the size in bytes of the longest payload from any publisher, or None without a bound.
-    `clock_hz` is None if the specification has no clock.
+    `clock_hz` is None if the specification has no clock. `digest` is that of the hardware's identity, or empty if the
+    hardware does not tell it by frames.
     """
 
     name: str
@@ -65,6 +66,7 @@ class NodeDescription:
     leaving: tuple[Crossing, ...] = ()
     longest_payload: int | None = None
     clock_hz: float | None = None
+    digest: str = ""
 
     @property
     def inputs(self) -> tuple[NodeTopic | Crossing, ...]:
@@ -105,6 +107,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         leaving,
         max(length for length in lengths if length is not None) if None not in lengths else None,
         None if system.clock is None else float(system.clock),
+        identity(loaded).digest if system.status is StatusAccess.FRAMES else "",
     )
 
 

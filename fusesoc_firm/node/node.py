@@ -27,7 +27,13 @@ from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.statistics import Statistics
 from fusesoc_firm.node.trace import Entry, Trace, converter_names
-from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
+from fusesoc_firm.node.transport.transport import (
+    Burst,
+    LostFrameError,
+    Transport,
+    TransportError,
+    TransportResetError,
+)
 
 # The interval at which waiting threads check whether to end.
 _POLL_SECONDS = 0.1
@@ -261,6 +267,10 @@ class Node:
             hardware = self._hardware
             try:
                 burst = hardware.transport.receive(_POLL_SECONDS)
+            except LostFrameError as lost:
+                self.statistics.faults += 1
+                self._report(str(lost))
+                continue
             except TransportResetError as reset:
                 self._forget(hardware.transport, str(reset))
                 continue

@@ -57,6 +57,7 @@ def _table(description: NodeDescription) -> dict[str, Any]:
         "leaving": [{"block": str(item.block), "id": item.id} for item in description.leaving],
         "longest_payload": repr(description.longest_payload),
         "clock_hz": repr(description.clock_hz),
+        "digest": description.digest,
     }
 
 

@@ -17,6 +17,7 @@ from fusesoc_firm.node.node import Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.software import node_software
+from fusesoc_firm.node.status import checked
 from fusesoc_firm.node.trace import Trace
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -79,7 +80,8 @@ def run_node(
         with ExitStack() as stack:
             software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
             trace = stack.enter_context(closing(Trace(options.trace, description))) if options.trace else None
-            node = Node(description, open_transport, settings, software, trace)
+            opener = checked(open_transport, description) if description.digest else open_transport
+            node = Node(description, opener, settings, software, trace)
             # Published messages are sent before the node prints its statistics.
             stack.callback(lambda: _say(node.statistics.text()))
             stack.callback(node.close)

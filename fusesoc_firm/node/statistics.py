@@ -29,7 +29,7 @@ class Output:
 
 @dataclass
 class Statistics:
-    """The counts of a run, by block; `faults` counts illegal bursts and pulses of `id_error`."""
+    """The counts of a run, by block; `faults` counts illegal bursts, broken frames and pulses of `id_error`."""
 
     inputs: dict[str, Input] = field(default_factory=dict)
     outputs: dict[str, Output] = field(default_factory=dict)

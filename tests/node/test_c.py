@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import subprocess
-from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import pytest
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import BurstError, BurstJoiner
 from fusesoc_firm.node.queues import ClosedError, EmptyError, SubscriberQueues
+from tests.links import coded
 from tests.node.drivers import C_FOLDER, HERE, Driver, compile_c_driver
 from tests.node.test_bursts import _interleaved
 
@@ -54,7 +54,7 @@ def drivers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 @pytest.fixture(scope="module")
 def devices(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    sources = [f"firm/firm_{name}.c" for name in ("frame", "dma", "uart")]
+    sources = [f"firm/firm_{name}.c" for name in ("frame", "link", "dma", "uart")]
     port = C_FOLDER / "ports" / "bare_metal"
     return compile_c_driver(
         "devices", tmp_path_factory.mktemp("devices"), sources, [port], {"FIRM_DMA_BUFFER_BYTES": 128}
@@ -186,12 +186,16 @@ def test_errors_of_the_dma_are_told(devices: Driver, fault: str, answer: str) ->
 
 
 def test_frames_come_from_the_uart(devices: Driver) -> None:
-    """What begins before the line was silent is no frame; a frame that is broken costs what comes before a silence."""
-    frames = deque(pack_frame(number % 2, bytes([number])).hex() for number in range(6))
-    first, second, third, fourth, fifth, sixth = frames
-    words = [first, "-", second + third, "ff", ",", fourth, "-", fifth, "0004000000aa", "-", "-", sixth]
+    """What comes before the first zero is no frame; then a broken frame, an unknown publisher, and a long frame."""
+    frames = [pack_frame(number % 2, bytes([number])) for number in range(3)]
+    first, second, third = (coded(frame).hex() for frame in frames)
+    other, long = (coded(frame).hex() for frame in (pack_frame(2, b"x"), pack_frame(0, bytes(65))))
+    longest = pack_frame(1, bytes(64))
+    words = [first[4:], "-", "00", first, ",", second[:4] + second[6:], other, "-", long, third, coded(longest).hex()]
     answer = devices.answers([], "uart", *words)[0]
-    assert answer == f"{second} {third} {fifth} {sixth} errors 2 breaks 3 sent 0001000000aa"
+    got = " ".join(frame.hex() for frame in (frames[0], frames[2], longest))
+    sent = coded(bytes.fromhex("0001000000aa")).hex()
+    assert answer == f"{got} good 3 broken 1 refused 2 breaks 1 sent {sent}"
 
 
 @pytest.mark.parametrize(

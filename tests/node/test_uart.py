@@ -5,19 +5,19 @@ from __future__ import annotations
 import os
 import pty
 import random
-import select
 import termios
 import threading
 import time
 from collections.abc import Iterator
 
 import pytest
+from cobs import cobs
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.transport import uart
 from fusesoc_firm.node.transport.open_transport import open_transport
-from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
+from fusesoc_firm.node.transport.transport import Burst, LostFrameError, Transport, TransportError
 from fusesoc_firm.node.transport.uart import UartTransport
+from tests.links import coded
 
 SEED = 20240722
 
@@ -78,7 +78,8 @@ def test_frames_of_all_bytes_there_and_back(board: Board, transport: Transport) 
 
     def echo() -> None:
         for frame in frames:
-            data = board.read(len(frame))
+            data = board.read(len(coded(frame)))
+            assert data == coded(frame)
             for first in range(0, len(data), 700):
                 board.write(data[first : first + 700])
 
@@ -97,85 +98,49 @@ def test_frames_of_all_bytes_there_and_back(board: Board, transport: Transport) 
     assert transport.receive(0.01) is None
 
 
-def test_what_came_before_it_was_opened_is_dropped(board: Board, breaks: list[float]) -> None:
-    board.write(b"\x00\x05\x00\x00\x00half")
+def test_the_rest_of_a_frame_is_no_fault(board: Board, breaks: list[float]) -> None:
+    """The board was in the middle of a frame when the line was opened."""
     with UartTransport(board.device, 115200) as transport:
         assert len(breaks) == 1
-        board.write(pack_frame(1, b"whole"))
+        board.write(coded(pack_frame(1, b"half"))[4:] + coded(pack_frame(1, b"whole")))
         assert transport.receive(60) == Burst(pack_frame(1, b"whole"))
+        assert (transport.counts.good, transport.counts.broken) == (1, 0)
 
 
-def test_a_frame_that_comes_in_pieces(board: Board, transport: Transport, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uart, "_LONGEST_PAUSE_SECONDS", 5.0)
+def test_a_frame_that_comes_in_pieces(board: Board, transport: Transport) -> None:
     frame = pack_frame(2, b"abc")
-    board.write(frame[:3])
+    data = coded(frame)
+    board.write(data[:3])
     assert transport.receive(0.05) is None
-    board.write(frame[3:7])
+    board.write(data[3:7])
     assert transport.receive(0.05) is None
-    board.write(frame[7:])
+    board.write(data[7:])
     assert transport.receive(60) == Burst(frame)
 
 
 @pytest.mark.parametrize(
-    ("sent", "why"),
+    "broken",
     [
-        (b"\x00\xff\xff\xff\xff\x00", "announces 4294967295 bytes"),
-        (b"\x00\x09\x00\x00\x00abc", "a frame is incomplete"),
+        coded(pack_frame(1, b"abc"))[1:],
+        coded(pack_frame(1, b"abc"))[:-2] + b"\0",
+        coded(b"\1\4\0\0\0abc"),
+        coded(b"\1\4\0\0\0abcde"),
+        coded(b"\1\0"),
+        cobs.encode(pack_frame(1, b"abc") + bytes(4)) + b"\0",
+        b"\5\0",
+        bytes(range(1, 256)) * 5 + b"\0",
     ],
 )
-def test_what_cannot_be_a_frame_makes_a_break(
-    board: Board, transport: Transport, breaks: list[float], sent: bytes, why: str
-) -> None:
-    board.write(sent)
-    with pytest.raises(TransportResetError, match=why):
-        transport.receive(60)
-    assert len(breaks) == 2
-    board.write(pack_frame(1, b"whole"))
-    assert transport.receive(60) == Burst(pack_frame(1, b"whole"))
-
-
-def test_a_break_ends_the_frame_that_is_held(board: Board, transport: Transport) -> None:
-    refusals: list[str] = []
-
-    def send() -> None:
-        try:
-            # More than the line takes while nobody reads.
-            transport.send(pack_frame(0, bytes(100_000)))
-        except TransportResetError as error:
-            refusals.append(str(error))
-
-    sender = threading.Thread(target=send)
-    sender.start()
-    # It has begun.
-    select.select([board.end], [], [])
-    board.write(b"\x00\x09\x00\x00\x00abc")
-    # A receiver that waits for a short time only finds it, too.
-    assert transport.receive(0.01) is None
-    time.sleep(0.3)
-    with pytest.raises(TransportResetError, match="a frame is incomplete"):
-        transport.receive(0.01)
-    sender.join()
-    assert refusals == [f"{board.device}: a break interrupted a frame"]
-
-
-def test_a_line_that_is_never_silent(board: Board, breaks: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uart, "_MOST_SILENCE_SECONDS", 0.2)
-    # However busy the machine is, the chatter has no such pause.
-    monkeypatch.setattr(uart, "_SILENT_SECONDS", 2.0)
-    is_over = threading.Event()
-
-    def chatter() -> None:
-        while not is_over.wait(0.005):
-            board.write(b"x")
-
-    thread = threading.Thread(target=chatter)
-    thread.start()
-    try:
-        with pytest.raises(TransportError, match="is never silent"):
-            UartTransport(board.device, 115200)
-    finally:
-        is_over.set()
-        thread.join()
+def test_a_broken_frame_costs_itself_alone(board: Board, breaks: list[float], broken: bytes) -> None:
+    with UartTransport(board.device, 115200, longest=1000) as transport:
+        good = coded(pack_frame(1, b"whole"))
+        board.write(good + b"\0" + broken + b"\0" + good)
+        assert transport.receive(60) == Burst(pack_frame(1, b"whole"))
+        with pytest.raises(LostFrameError, match="a frame from the board was broken on the line"):
+            transport.receive(60)
+        assert transport.receive(60) == Burst(pack_frame(1, b"whole"))
+        assert (transport.counts.good, transport.counts.broken) == (2, 1)
+        assert len(breaks) == 1
 
 
 def test_closing_wakes_who_waits(board: Board, transport: Transport) -> None:

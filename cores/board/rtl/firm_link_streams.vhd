@@ -1,34 +1,37 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Connects a host link, which carries bytes, to a system's two streams of frames. Bytes from the host wait in a FIFO,
--- are divided into frames by their announced lengths, and fill beats. Beats to the host are sent byte by byte. The
--- host's bytes cannot be stalled here: the driver of the link must observe `room`. If bytes are lost, by the link or
--- for lack of room, the current frame is cut and all later bytes, whose meaning is unknown, are dropped. This lasts
--- until the host resynchronises, by its own cut or by TIMEOUT cycles of silence. Silence always cuts an incomplete
--- frame.
+-- Connects a host link, which carries bytes, to a system's two streams of frames. On the link, a frame is
+-- COBS(id, length, payload, CRC-32 of these) and a zero byte. A frame from the host is held until its checksum is
+-- right, and never passed on otherwise; so a lost, additional or wrong byte costs its frame, and the next one only if
+-- it was the zero byte between them. The host's bytes cannot be stalled here: the driver of the link must observe
+-- `room`.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
 
 entity firm_link_streams is
   generic (
-    WIDTH   : integer := 8;
-    DEPTH   : integer := 1024;  -- bytes from the host that can wait
-    TIMEOUT : integer := 0    -- 0: silence has no effect
+    WIDTH    : integer := 8;
+    LONGEST  : integer := 2000;  -- bytes of payload of the longest frame from the host
+    SPARE    : integer := 1;     -- bytes from the host that find room beside this frame
+    TX_DEPTH : integer := 512    -- bytes that can wait for the host, a power of two
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
 
+    -- Pulses, at most one of them in a cycle.
     rx_data  : in  std_logic_vector(7 downto 0);
-    rx_valid : in  std_logic;   -- a pulse with each byte
-    rx_cut   : in  std_logic;   -- a pulse: the next byte begins a frame
-    rx_lost  : in  std_logic;   -- a pulse: bytes were lost
-    room     : out natural range 0 to DEPTH;
+    rx_valid : in  std_logic;  -- with each byte
+    rx_cut   : in  std_logic;  -- the next byte begins a frame
+    rx_lost  : in  std_logic;  -- bytes were lost
+    room     : out natural;
 
-    tx_data  : out std_logic_vector(7 downto 0);
-    tx_valid : out std_logic;
-    tx_ready : in  std_logic;
+    tx_data    : out std_logic_vector(7 downto 0);
+    tx_valid   : out std_logic;
+    tx_ready   : in  std_logic;
+    tx_waiting : out natural range 0 to TX_DEPTH;
 
     -- Frames to the system.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
@@ -44,8 +47,16 @@ entity firm_link_streams is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- Pulses when bytes start to be dropped.
-    link_error : out std_logic
+    -- A pulse for each frame from the host that is not delivered: code 12 if it was broken or bytes were lost, 7 if it
+    -- is longer than LONGEST.
+    link_error      : out std_logic;
+    link_error_code : out std_logic_vector(3 downto 0);
+    -- Frames from the host since reset: delivered; with a wrong checksum; with bytes that are known to be lost; too
+    -- long.
+    good_frames    : out std_logic_vector(31 downto 0);
+    broken_frames  : out std_logic_vector(31 downto 0);
+    lost_frames    : out std_logic_vector(31 downto 0);
+    refused_frames : out std_logic_vector(31 downto 0)
   );
 end entity firm_link_streams;
 
@@ -57,142 +68,101 @@ architecture rtl of firm_link_streams is
   constant ONE        : std_logic_vector(COUNT_BITS-1 downto 0) := (0 => '1', others => '0');
   constant NONE       : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
 
-  signal dropping_r : std_logic;                           -- bytes were lost, and the host has not resynchronised
-  signal cut_r      : std_logic;                           -- a cut must be stored
-  signal silence_r  : natural range 0 to max(TIMEOUT, 1);  -- cycles until silence causes a cut; 0 when it has
-  signal silent     : std_logic;                           -- it does in this cycle
-  signal is_stored  : std_logic;                           -- the received byte is kept
-  signal lost       : std_logic;
-  signal stored_r   : natural range 0 to DEPTH;            -- items in the FIFO
+  constant TOO_LONG       : std_logic_vector(3 downto 0) := "0111";
+  constant WRONG_CHECKSUM : std_logic_vector(3 downto 0) := "1100";
 
-  signal put_valid : std_logic;
-  signal put_ready : std_logic;
+  constant CHECKSUM_BYTES : positive := 4;
 
-  signal item_data  : std_logic_vector(7 downto 0);
-  signal item_cut   : std_logic;
-  signal item_valid : std_logic;
-  signal item_ready : std_logic;
-  signal item_taken : std_logic;
+  signal decoded_data  : std_logic_vector(7 downto 0);
+  signal decoded_valid : std_logic;
+  signal decoded_end   : std_logic;
+  signal is_wrong      : std_logic;
+  signal is_lost       : std_logic;
 
-  signal framed_byte  : std_logic_vector(7 downto 0);
-  signal framed_data  : std_logic_vector(WIDTH-1 downto 0);
-  signal framed_last  : std_logic;
-  signal framed_valid : std_logic;
-  signal framed_ready : std_logic;
+  signal is_good    : std_logic;
+  signal is_broken  : std_logic;
+  signal is_missing : std_logic;
+  signal is_refused : std_logic;
+
+  signal good_r    : unsigned(31 downto 0);
+  signal broken_r  : unsigned(31 downto 0);
+  signal missing_r : unsigned(31 downto 0);
+  signal refused_r : unsigned(31 downto 0);
+
+  signal stored_byte  : std_logic_vector(7 downto 0);
+  signal stored_data  : std_logic_vector(WIDTH-1 downto 0);
+  signal stored_last  : std_logic;
+  signal stored_valid : std_logic;
+  signal stored_ready : std_logic;
 
   signal window    : std_logic_vector(WIDTH-1 downto 0);
   signal available : std_logic_vector(COUNT_BITS-1 downto 0);
+  signal is_last   : std_logic;  -- the frame ends with the available bytes
   signal has_byte  : std_logic;
   signal take      : std_logic;
+
+  signal summing_r  : std_logic;                           -- the bytes of the checksum are sent
+  signal left_r     : natural range 0 to CHECKSUM_BYTES-1;  -- of them, after this one
+  signal sum        : std_logic_vector(31 downto 0);
+  signal sum_clear  : std_logic;
+  signal sum_data   : std_logic_vector(7 downto 0);
+  signal send_data  : std_logic_vector(7 downto 0);
+  signal send_last  : std_logic;
+  signal send_valid : std_logic;
+  signal send_ready : std_logic;
+  signal sent       : std_logic;
 
 begin
 
   assert is_stream_width(WIDTH)
     report "firm_link_streams: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
-  assert DEPTH >= 16
-    report "firm_link_streams: DEPTH is " & integer'image(DEPTH) & "; legal: 16 or more"
-    severity failure;
-  assert TIMEOUT >= 0
-    report "firm_link_streams: TIMEOUT is " & integer'image(TIMEOUT) & "; legal: 0 or more"
-    severity failure;
 
   -- ------------------------------------------------------------------ from the host
 
-  -- The last place is reserved for the cut that follows when all others are in use.
-  is_stored <= '1' when rx_valid = '1' and dropping_r = '0' and cut_r = '0' and stored_r < DEPTH-1 else '0';
-  lost      <= rx_lost or (rx_valid and not is_stored);
-  put_valid <= '1' when is_stored = '1' or (cut_r = '1' and rx_valid = '0' and stored_r < DEPTH) else '0';
-  silent    <= '1' when silence_r = 1 and rx_valid = '0' else '0';
-
-  guard : process (clk)
-  begin
-    if rising_edge(clk) then
-      link_error <= lost and not dropping_r;
-      if put_valid = '1' and put_ready = '1' and is_stored = '0' then
-        cut_r <= '0';
-      end if;
-      if TIMEOUT > 0 then
-        if rx_valid = '1' then
-          silence_r <= TIMEOUT;
-        elsif silence_r /= 0 then
-          silence_r <= silence_r - 1;
-        end if;
-      end if;
-      if rx_cut = '1' or silent = '1' then
-        dropping_r <= '0';
-        cut_r      <= '1';
-      end if;
-      if lost = '1' then
-        dropping_r <= '1';
-        if dropping_r = '0' then
-          cut_r <= '1';
-        end if;
-      end if;
-      if rst_n = '0' then
-        link_error <= '0';
-        dropping_r <= '0';
-        cut_r      <= '0';
-        silence_r  <= 0;
-      end if;
-    end if;
-  end process guard;
-
-  count : process (clk)
-  begin
-    if rising_edge(clk) then
-      if (put_valid and put_ready) = '1' and item_taken = '0' then
-        stored_r <= stored_r + 1;
-      elsif (put_valid and put_ready) = '0' and item_taken = '1' then
-        stored_r <= stored_r - 1;
-      end if;
-      if rst_n = '0' then
-        stored_r <= 0;
-      end if;
-    end if;
-  end process count;
-
-  -- `tlast` marks a cut.
-  u_fifo : entity firm.firm_axis_fifo
-    generic map (
-      WIDTH => 8,
-      DEPTH => DEPTH
-    )
+  u_decoder : entity firm.firm_cobs_decoder
     port map (
-      clk             => clk,
-      rst_n           => rst_n,
-      s_axis_tdata    => rx_data,
-      s_axis_tkeep(0) => '1',
-      s_axis_tvalid   => put_valid,
-      s_axis_tlast    => cut_r,
-      s_axis_tready   => put_ready,
-      m_axis_tdata    => item_data,
-      m_axis_tkeep    => open,
-      m_axis_tvalid   => item_valid,
-      m_axis_tlast    => item_cut,
-      m_axis_tready   => item_ready
+      clk         => clk,
+      rst_n       => rst_n,
+      coded_data  => rx_data,
+      coded_valid => rx_valid,
+      coded_lost  => rx_lost,
+      coded_cut   => rx_cut,
+      data        => decoded_data,
+      valid       => decoded_valid,
+      ends        => decoded_end,
+      is_wrong    => is_wrong,
+      is_lost     => is_lost
     );
 
-  item_taken <= item_valid and item_ready;
-
-  u_framer : entity firm.firm_link_framer
+  u_store : entity firm.firm_link_store
+    generic map (
+      LONGEST => LONGEST,
+      SPARE   => SPARE
+    )
     port map (
       clk        => clk,
       rst_n      => rst_n,
-      item_data  => item_data,
-      item_cut   => item_cut,
-      item_valid => item_valid,
-      item_ready => item_ready,
-      data       => framed_byte,
-      last       => framed_last,
-      valid      => framed_valid,
-      ready      => framed_ready
+      data       => decoded_data,
+      valid      => decoded_valid,
+      ends       => decoded_end,
+      is_wrong   => is_wrong,
+      is_lost    => is_lost,
+      m_data     => stored_byte,
+      m_last     => stored_last,
+      m_valid    => stored_valid,
+      m_ready    => stored_ready,
+      room       => room,
+      is_good    => is_good,
+      is_broken  => is_broken,
+      is_missing => is_missing,
+      is_refused => is_refused
     );
 
-  fill_lane : process (framed_byte)
+  fill_lane : process (stored_byte)
   begin
-    framed_data             <= (others => '0');
-    framed_data(7 downto 0) <= framed_byte;
+    stored_data             <= (others => '0');
+    stored_data(7 downto 0) <= stored_byte;
   end process fill_lane;
 
   u_pack : entity firm.firm_axis_pack
@@ -202,17 +172,48 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      data          => framed_data,
+      data          => stored_data,
       count         => ONE,
-      last          => framed_last,
-      valid         => framed_valid,
-      ready         => framed_ready,
+      last          => stored_last,
+      valid         => stored_valid,
+      ready         => stored_ready,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tkeep  => m_axis_tkeep,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
       m_axis_tready => m_axis_tready
     );
+
+  count : process (clk)
+  begin
+    if rising_edge(clk) then
+      if is_good = '1' then
+        good_r <= good_r + 1;
+      end if;
+      if is_broken = '1' then
+        broken_r <= broken_r + 1;
+      end if;
+      if is_missing = '1' then
+        missing_r <= missing_r + 1;
+      end if;
+      if is_refused = '1' then
+        refused_r <= refused_r + 1;
+      end if;
+      if rst_n = '0' then
+        good_r    <= (others => '0');
+        broken_r  <= (others => '0');
+        missing_r <= (others => '0');
+        refused_r <= (others => '0');
+      end if;
+    end if;
+  end process count;
+
+  link_error      <= is_broken or is_missing or is_refused;
+  link_error_code <= TOO_LONG when is_refused = '1' else WRONG_CHECKSUM;
+  good_frames     <= std_logic_vector(good_r);
+  broken_frames   <= std_logic_vector(broken_r);
+  lost_frames     <= std_logic_vector(missing_r);
+  refused_frames  <= std_logic_vector(refused_r);
 
   -- ------------------------------------------------------------------ to the host
 
@@ -230,17 +231,68 @@ begin
       s_axis_tready => s_axis_tready,
       window        => window,
       available     => available,
-      is_last       => open,
+      is_last       => is_last,
+      shown         => open,
+      ends          => open,
       take_valid    => take,
       take          => ONE,
       skip          => '0'
     );
 
-  has_byte <= '0' when available = NONE else '1';
-  take     <= has_byte and tx_ready;
+  has_byte   <= '0' when available = NONE else '1';
+  send_valid <= has_byte or summing_r;
+  send_data  <= sum(7 downto 0) when summing_r = '1' else window(7 downto 0);
+  send_last  <= '1' when summing_r = '1' and left_r = 0 else '0';
+  sent       <= send_valid and send_ready;
+  take       <= has_byte and send_ready and not summing_r;
 
-  room     <= 0 when stored_r >= DEPTH-1 else DEPTH-1 - stored_r;
-  tx_data  <= window(7 downto 0);
-  tx_valid <= has_byte;
+  -- A byte that equals the register's lowest one shifts the register by a byte.
+  sum_data  <= not sum(7 downto 0) when summing_r = '1' else window(7 downto 0);
+  sum_clear <= (sent and send_last) or not rst_n;
+
+  u_crc : entity firm.firm_crc32
+    port map (
+      clk      => clk,
+      clear    => sum_clear,
+      data     => sum_data,
+      valid    => sent,
+      value    => sum,
+      is_right => open
+    );
+
+  append_checksum : process (clk)
+  begin
+    if rising_edge(clk) then
+      if sent = '1' and summing_r = '1' then
+        summing_r <= not send_last;
+        if left_r /= 0 then
+          left_r <= left_r - 1;
+        end if;
+      elsif sent = '1' and is_last = '1' and available = ONE then
+        summing_r <= '1';
+        left_r    <= CHECKSUM_BYTES-1;
+      end if;
+      if rst_n = '0' then
+        summing_r <= '0';
+      end if;
+    end if;
+  end process append_checksum;
+
+  u_encoder : entity firm.firm_cobs_encoder
+    generic map (
+      DEPTH => TX_DEPTH
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      data        => send_data,
+      last        => send_last,
+      valid       => send_valid,
+      ready       => send_ready,
+      coded_data  => tx_data,
+      coded_valid => tx_valid,
+      coded_ready => tx_ready,
+      waiting     => tx_waiting
+    );
 
 end architecture rtl;

@@ -1,13 +1,14 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over SPI, mode 0, highest bit first, with the host as master; frames are sent unchanged.
+-- The host's two streams over SPI, mode 0, highest bit first. The host is master. Frames: see firm_link_streams.
 -- SPI transfers bytes in both directions at once, so each selection (spi_cs_n low) begins with a command:
 --
 --   00  status  then receive: room for bytes to the system (two bytes, lower first), bytes waiting for the host (two)
 --   01  write   then send: bytes of frames, no more than there is room for
 --   02  read    then receive: bytes of frames; after the waiting ones, 00
---   03  cut     the next written byte begins a frame: this resynchronises both sides after a fault
+--   03  cut     the next written byte begins a frame: an incomplete frame is dropped
 --
--- During the command, the host receives 80, plus 1 if bytes wait, plus 2 if bytes were dropped since the last cut.
+-- During the command, the host receives 80, plus 1 if bytes wait, plus 2 if a frame was not delivered since the last
+-- cut.
 -- clk samples the pins, so a period of spi_sclk takes at least 10 cycles of clk. A byte counts when its last bit is
 -- clocked; selections may end anywhere.
 library ieee;
@@ -17,8 +18,9 @@ library firm;
 
 entity firm_spi_link is
   generic (
-    WIDTH : integer := 8;
-    DEPTH : integer := 1024  -- bytes that can wait, in each direction
+    WIDTH   : integer := 8;
+    LONGEST : integer := 2000;  -- bytes of payload of the longest frame from the host
+    DEPTH   : integer := 1024  -- bytes that can wait for the host, a power of two
   );
   port (
     clk   : in std_logic;
@@ -44,8 +46,14 @@ entity firm_spi_link is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- Pulses when bytes start to be dropped.
-    link_error : out std_logic
+    -- A pulse for each frame from the host that is not delivered, and the counts of frames from the host, as
+    -- firm_link_streams has them.
+    link_error      : out std_logic;
+    link_error_code : out std_logic_vector(3 downto 0);
+    good_frames     : out std_logic_vector(31 downto 0);
+    broken_frames   : out std_logic_vector(31 downto 0);
+    lost_frames     : out std_logic_vector(31 downto 0);
+    refused_frames  : out std_logic_vector(31 downto 0)
   );
 end entity firm_spi_link;
 
@@ -56,6 +64,8 @@ architecture rtl of firm_spi_link is
   constant WRITE  : byte_t := x"01";
   constant READ   : byte_t := x"02";
   constant CUT    : byte_t := x"03";
+  -- What the status can tell.
+  constant MOST_ROOM : positive := 65535;
 
   -- The pins, synchronous to clk.
   signal pins          : std_logic_vector(2 downto 0);
@@ -76,27 +86,23 @@ architecture rtl of firm_spi_link is
   signal received  : byte_t;
   signal complete  : std_logic;  -- a byte is complete in this cycle
   signal offered_r : std_logic;  -- the outgoing byte is from the FIFO
-  signal dropped_r : std_logic;  -- bytes were dropped since the last cut
+  signal dropped_r : std_logic;  -- a frame was not delivered since the last cut
   signal status_r  : std_logic_vector(31 downto 0);  -- room and waiting bytes of one moment, what goes out next lowest
 
-  signal rx_valid : std_logic;
-  signal rx_cut   : std_logic;
-  signal room     : natural range 0 to DEPTH;
-  signal error    : std_logic;
+  signal rx_valid   : std_logic;
+  signal rx_cut     : std_logic;
+  signal room       : natural;
+  signal error      : std_logic;
+  signal shown_room : natural range 0 to MOST_ROOM;
 
-  signal tx_data    : byte_t;
-  signal tx_valid   : std_logic;
-  signal tx_ready   : std_logic;
-  signal head_data  : byte_t;
+  signal head_data  : byte_t;  -- the next byte for the host
   signal head_valid : std_logic;
   signal head_taken : std_logic;
-  signal waiting_r  : unsigned(15 downto 0);  -- bytes for the host
+  signal waiting    : natural range 0 to DEPTH;  -- bytes for the host
 
 begin
 
-  assert DEPTH >= 16 and DEPTH <= 32768
-    report "firm_spi_link: DEPTH is " & integer'image(DEPTH) & "; legal: 16 to 32768"
-    severity failure;
+  shown_room <= room when room < MOST_ROOM else MOST_ROOM;
 
   pins <= spi_mosi & spi_cs_n & spi_sclk;
 
@@ -135,7 +141,7 @@ begin
         first_r <= '0';
         if first_r = '1' then
           command_r <= received;
-          status_r  <= std_logic_vector(waiting_r) & std_logic_vector(to_unsigned(room, 16));
+          status_r  <= std_logic_vector(to_unsigned(waiting, 16)) & std_logic_vector(to_unsigned(shown_room, 16));
         end if;
       end if;
     end procedure take_bit;
@@ -181,66 +187,39 @@ begin
 
   u_streams : entity firm.firm_link_streams
     generic map (
-      WIDTH => WIDTH,
-      DEPTH => DEPTH
-    )
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      rx_data       => received,
-      rx_valid      => rx_valid,
-      rx_cut        => rx_cut,
-      rx_lost       => '0',
-      room          => room,
-      tx_data       => tx_data,
-      tx_valid      => tx_valid,
-      tx_ready      => tx_ready,
-      m_axis_tdata  => m_axis_tdata,
-      m_axis_tkeep  => m_axis_tkeep,
-      m_axis_tvalid => m_axis_tvalid,
-      m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready,
-      s_axis_tdata  => s_axis_tdata,
-      s_axis_tkeep  => s_axis_tkeep,
-      s_axis_tvalid => s_axis_tvalid,
-      s_axis_tlast  => s_axis_tlast,
-      s_axis_tready => s_axis_tready,
-      link_error    => error
-    );
-
-  u_fifo : entity firm.firm_axis_fifo
-    generic map (
-      WIDTH => 8,
-      DEPTH => DEPTH
+      WIDTH    => WIDTH,
+      LONGEST  => LONGEST,
+      TX_DEPTH => DEPTH
     )
     port map (
       clk             => clk,
       rst_n           => rst_n,
-      s_axis_tdata    => tx_data,
-      s_axis_tkeep(0) => '1',
-      s_axis_tvalid   => tx_valid,
-      s_axis_tlast    => '0',
-      s_axis_tready   => tx_ready,
-      m_axis_tdata    => head_data,
-      m_axis_tkeep    => open,
-      m_axis_tvalid   => head_valid,
-      m_axis_tlast    => open,
-      m_axis_tready   => head_taken
+      rx_data         => received,
+      rx_valid        => rx_valid,
+      rx_cut          => rx_cut,
+      rx_lost         => '0',
+      room            => room,
+      tx_data         => head_data,
+      tx_valid        => head_valid,
+      tx_ready        => head_taken,
+      tx_waiting      => waiting,
+      m_axis_tdata    => m_axis_tdata,
+      m_axis_tkeep    => m_axis_tkeep,
+      m_axis_tvalid   => m_axis_tvalid,
+      m_axis_tlast    => m_axis_tlast,
+      m_axis_tready   => m_axis_tready,
+      s_axis_tdata    => s_axis_tdata,
+      s_axis_tkeep    => s_axis_tkeep,
+      s_axis_tvalid   => s_axis_tvalid,
+      s_axis_tlast    => s_axis_tlast,
+      s_axis_tready   => s_axis_tready,
+      link_error      => error,
+      link_error_code => link_error_code,
+      good_frames     => good_frames,
+      broken_frames   => broken_frames,
+      lost_frames     => lost_frames,
+      refused_frames  => refused_frames
     );
-
-  count : process (clk)
-  begin
-    if rising_edge(clk) then
-      if (tx_valid and tx_ready) = '1' and head_taken = '0' then
-        waiting_r <= waiting_r + 1;
-      elsif (tx_valid and tx_ready) = '0' and head_taken = '1' then
-        waiting_r <= waiting_r - 1;
-      end if;
-      if rst_n = '0' then
-        waiting_r <= (others => '0');
-      end if;
-    end if;
-  end process count;
 
   spi_miso   <= out_r(7);
   spi_irq    <= head_valid;

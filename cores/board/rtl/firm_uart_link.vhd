@@ -1,19 +1,17 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent unchanged, byte
--- by byte. A break from the host, or a pause of TIMEOUT_MS, ends an incomplete frame; both resynchronise the two sides
--- after a loss of bytes. uart_rts_n rises while there is little room, early enough for the bytes that an adapter still
--- sends.
+-- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames as firm_link_streams
+-- says. A break from the host drops an incomplete frame. uart_rts_n rises while there is little room, early enough for
+-- the bytes that an adapter still sends.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
 
 entity firm_uart_link is
   generic (
-    WIDTH      : integer := 8;
-    CLOCK_HZ   : integer := 100000000;
-    BAUD       : integer := 1000000;
-    DEPTH      : integer := 1024;  -- bytes from the host that can wait
-    TIMEOUT_MS : integer := 200
+    WIDTH    : integer := 8;
+    CLOCK_HZ : integer := 100000000;
+    BAUD     : integer := 1000000;
+    LONGEST  : integer := 2000  -- bytes of payload of the longest frame from the host
   );
   port (
     clk   : in std_logic;
@@ -39,8 +37,14 @@ entity firm_uart_link is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- Pulses when bytes start to be dropped.
-    link_error : out std_logic
+    -- A pulse for each frame from the host that is not delivered, and the counts of frames from the host, as
+    -- firm_link_streams has them.
+    link_error      : out std_logic;
+    link_error_code : out std_logic_vector(3 downto 0);
+    good_frames     : out std_logic_vector(31 downto 0);
+    broken_frames   : out std_logic_vector(31 downto 0);
+    lost_frames     : out std_logic_vector(31 downto 0);
+    refused_frames  : out std_logic_vector(31 downto 0)
   );
 end entity firm_uart_link;
 
@@ -63,7 +67,7 @@ architecture rtl of firm_uart_link is
   signal rx_valid : std_logic;
   signal rx_break : std_logic;
   signal rx_wrong : std_logic;
-  signal room     : natural range 0 to DEPTH;
+  signal room     : natural;
 
   signal tx_data  : std_logic_vector(7 downto 0);
   signal tx_valid : std_logic;
@@ -79,12 +83,6 @@ begin
   assert abs (CLOCK_HZ - DIVISOR*BAUD) <= CLOCK_HZ/40
     report "firm_uart_link: " & integer'image(DIVISOR) & " cycles of CLOCK_HZ are no bit at BAUD " & integer'image(BAUD)
            & ", it is off by more than 2.5 %"
-    severity failure;
-  assert DEPTH >= 2*RESERVE
-    report "firm_uart_link: DEPTH is " & integer'image(DEPTH) & "; legal: 64 or more"
-    severity failure;
-  assert TIMEOUT_MS >= 1 and TIMEOUT_MS <= 4000
-    report "firm_uart_link: TIMEOUT_MS is " & integer'image(TIMEOUT_MS) & "; legal: 1 to 4000"
     severity failure;
 
   u_receiver : entity firm.firm_uart_receiver
@@ -104,31 +102,37 @@ begin
   u_streams : entity firm.firm_link_streams
     generic map (
       WIDTH   => WIDTH,
-      DEPTH   => DEPTH,
-      TIMEOUT => CLOCK_HZ/1000 * TIMEOUT_MS
+      LONGEST => LONGEST,
+      SPARE   => RESERVE + 1
     )
     port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      rx_data       => rx_data,
-      rx_valid      => rx_valid,
-      rx_cut        => rx_break,
-      rx_lost       => rx_wrong,
-      room          => room,
-      tx_data       => tx_data,
-      tx_valid      => tx_valid,
-      tx_ready      => tx_ready,
-      m_axis_tdata  => m_axis_tdata,
-      m_axis_tkeep  => m_axis_tkeep,
-      m_axis_tvalid => m_axis_tvalid,
-      m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready,
-      s_axis_tdata  => s_axis_tdata,
-      s_axis_tkeep  => s_axis_tkeep,
-      s_axis_tvalid => s_axis_tvalid,
-      s_axis_tlast  => s_axis_tlast,
-      s_axis_tready => s_axis_tready,
-      link_error    => link_error
+      clk             => clk,
+      rst_n           => rst_n,
+      rx_data         => rx_data,
+      rx_valid        => rx_valid,
+      rx_cut          => rx_break,
+      rx_lost         => rx_wrong,
+      room            => room,
+      tx_data         => tx_data,
+      tx_valid        => tx_valid,
+      tx_ready        => tx_ready,
+      tx_waiting      => open,
+      m_axis_tdata    => m_axis_tdata,
+      m_axis_tkeep    => m_axis_tkeep,
+      m_axis_tvalid   => m_axis_tvalid,
+      m_axis_tlast    => m_axis_tlast,
+      m_axis_tready   => m_axis_tready,
+      s_axis_tdata    => s_axis_tdata,
+      s_axis_tkeep    => s_axis_tkeep,
+      s_axis_tvalid   => s_axis_tvalid,
+      s_axis_tlast    => s_axis_tlast,
+      s_axis_tready   => s_axis_tready,
+      link_error      => link_error,
+      link_error_code => link_error_code,
+      good_frames     => good_frames,
+      broken_frames   => broken_frames,
+      lost_frames     => lost_frames,
+      refused_frames  => refused_frames
     );
 
   u_transmitter : entity firm.firm_uart_transmitter

@@ -9,7 +9,7 @@ entity firm_link_tb is
     -- uart or spi
     LINK          : string  := "uart";
     WIDTH         : integer := 8;
-    DEPTH         : integer := 64;
+    LONGEST       : integer := 120;
     STIMULUS_FILE : string  := "stimulus.txt";
     EXPECTED_FILE : string  := "expected.txt";
     SEED          : integer := 1;
@@ -33,6 +33,7 @@ architecture simulation of firm_link_tb is
 
   signal host_tdata  : std_logic_vector(7 downto 0);
   signal host_tvalid : std_logic;
+  signal host_tlast  : std_logic;
   signal host_tready : std_logic;
 
   signal back_tdata  : std_logic_vector(7 downto 0);
@@ -74,7 +75,7 @@ begin
       m_axis_tdata   => host_tdata,
       m_axis_tkeep   => open,
       m_axis_tvalid  => host_tvalid,
-      m_axis_tlast   => open,
+      m_axis_tlast   => host_tlast,
       m_axis_tready  => host_tready,
       s_axis_tdata   => back_tdata,
       s_axis_tkeep   => back_tkeep,
@@ -123,6 +124,7 @@ begin
         rst_n         => rst_n,
         s_axis_tdata  => host_tdata,
         s_axis_tvalid => host_tvalid,
+        s_axis_tlast  => host_tlast,
         s_axis_tready => host_tready,
         m_axis_tdata  => back_tdata,
         m_axis_tkeep  => back_tkeep,
@@ -141,26 +143,31 @@ begin
         WIDTH    => WIDTH,
         CLOCK_HZ => CLOCK_HZ,
         BAUD     => BAUD,
-        DEPTH    => DEPTH
+        LONGEST  => LONGEST
       )
       port map (
-        clk           => clk,
-        rst_n         => rst_n,
-        uart_rxd      => rxd,
-        uart_txd      => txd,
-        uart_rts_n    => rts_n,
-        uart_cts_n    => cts_n,
-        m_axis_tdata  => to_tdata,
-        m_axis_tkeep  => to_tkeep,
-        m_axis_tvalid => to_tvalid,
-        m_axis_tlast  => to_tlast,
-        m_axis_tready => to_tready,
-        s_axis_tdata  => from_tdata,
-        s_axis_tkeep  => from_tkeep,
-        s_axis_tvalid => from_tvalid,
-        s_axis_tlast  => from_tlast,
-        s_axis_tready => from_tready,
-        link_error    => link_error
+        clk             => clk,
+        rst_n           => rst_n,
+        uart_rxd        => rxd,
+        uart_txd        => txd,
+        uart_rts_n      => rts_n,
+        uart_cts_n      => cts_n,
+        m_axis_tdata    => to_tdata,
+        m_axis_tkeep    => to_tkeep,
+        m_axis_tvalid   => to_tvalid,
+        m_axis_tlast    => to_tlast,
+        m_axis_tready   => to_tready,
+        s_axis_tdata    => from_tdata,
+        s_axis_tkeep    => from_tkeep,
+        s_axis_tvalid   => from_tvalid,
+        s_axis_tlast    => from_tlast,
+        s_axis_tready   => from_tready,
+        link_error      => link_error,
+        link_error_code => open,
+        good_frames     => open,
+        broken_frames   => open,
+        lost_frames     => open,
+        refused_frames  => open
       );
   end generate uart;
 
@@ -182,6 +189,7 @@ begin
         rst_n         => rst_n,
         s_axis_tdata  => host_tdata,
         s_axis_tvalid => host_tvalid,
+        s_axis_tlast  => host_tlast,
         s_axis_tready => host_tready,
         m_axis_tdata  => back_tdata,
         m_axis_tkeep  => back_tkeep,
@@ -198,28 +206,34 @@ begin
 
     u_link : entity firm.firm_spi_link
       generic map (
-        WIDTH => WIDTH,
-        DEPTH => DEPTH
+        WIDTH   => WIDTH,
+        LONGEST => LONGEST,
+        DEPTH   => 512
       )
       port map (
-        clk           => clk,
-        rst_n         => rst_n,
-        spi_sclk      => sclk,
-        spi_cs_n      => cs_n,
-        spi_mosi      => mosi,
-        spi_miso      => miso,
-        spi_irq       => irq,
-        m_axis_tdata  => to_tdata,
-        m_axis_tkeep  => to_tkeep,
-        m_axis_tvalid => to_tvalid,
-        m_axis_tlast  => to_tlast,
-        m_axis_tready => to_tready,
-        s_axis_tdata  => from_tdata,
-        s_axis_tkeep  => from_tkeep,
-        s_axis_tvalid => from_tvalid,
-        s_axis_tlast  => from_tlast,
-        s_axis_tready => from_tready,
-        link_error    => link_error
+        clk             => clk,
+        rst_n           => rst_n,
+        spi_sclk        => sclk,
+        spi_cs_n        => cs_n,
+        spi_mosi        => mosi,
+        spi_miso        => miso,
+        spi_irq         => irq,
+        m_axis_tdata    => to_tdata,
+        m_axis_tkeep    => to_tkeep,
+        m_axis_tvalid   => to_tvalid,
+        m_axis_tlast    => to_tlast,
+        m_axis_tready   => to_tready,
+        s_axis_tdata    => from_tdata,
+        s_axis_tkeep    => from_tkeep,
+        s_axis_tvalid   => from_tvalid,
+        s_axis_tlast    => from_tlast,
+        s_axis_tready   => from_tready,
+        link_error      => link_error,
+        link_error_code => open,
+        good_frames     => open,
+        broken_frames   => open,
+        lost_frames     => open,
+        refused_frames  => open
       );
   end generate spi;
 

@@ -13,7 +13,7 @@ use firm.firm_sim_pkg.all;
 entity firm_uart_script_tb is
   generic (
     WIDTH       : integer := 8;
-    DEPTH       : integer := 64;
+    LONGEST     : integer := 64;
     SCRIPT_FILE : string  := "script.txt";
     -- What the bench must print but `no room`; empty: anything.
     EXPECTED_FILE : string := ""
@@ -40,7 +40,8 @@ architecture simulation of firm_uart_script_tb is
   signal tlast  : std_logic;
   signal tready : std_logic := '1';
 
-  signal link_error : std_logic;
+  signal link_error      : std_logic;
+  signal link_error_code : std_logic_vector(3 downto 0);
 
 begin
 
@@ -114,7 +115,7 @@ begin
     assert not is_over or endfile(wanted_file) report "results are missing" severity failure;
     if rising_edge(clk) and rst_n = '1' then
       if link_error = '1' then
-        write(said, string'("error"));
+        write(said, "error " & integer'image(to_integer(unsigned(link_error_code))));
         write_result(output, wanted_file, EXPECTED_FILE, said);
       end if;
       if tvalid = '1' and tready = '1' then
@@ -139,30 +140,34 @@ begin
 
   u_link : entity firm.firm_uart_link
     generic map (
-      WIDTH      => WIDTH,
-      CLOCK_HZ   => CLOCK_HZ,
-      BAUD       => BAUD,
-      DEPTH      => DEPTH,
-      TIMEOUT_MS => 1
+      WIDTH    => WIDTH,
+      CLOCK_HZ => CLOCK_HZ,
+      BAUD     => BAUD,
+      LONGEST  => LONGEST
     )
     port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      uart_rxd      => rxd,
-      uart_txd      => open,
-      uart_rts_n    => rts_n,
-      uart_cts_n    => '0',
-      m_axis_tdata  => tdata,
-      m_axis_tkeep  => tkeep,
-      m_axis_tvalid => tvalid,
-      m_axis_tlast  => tlast,
-      m_axis_tready => tready,
-      s_axis_tdata  => (others => '0'),
-      s_axis_tkeep  => (others => '0'),
-      s_axis_tvalid => '0',
-      s_axis_tlast  => '0',
-      s_axis_tready => open,
-      link_error    => link_error
+      clk             => clk,
+      rst_n           => rst_n,
+      uart_rxd        => rxd,
+      uart_txd        => open,
+      uart_rts_n      => rts_n,
+      uart_cts_n      => '0',
+      m_axis_tdata    => tdata,
+      m_axis_tkeep    => tkeep,
+      m_axis_tvalid   => tvalid,
+      m_axis_tlast    => tlast,
+      m_axis_tready   => tready,
+      s_axis_tdata    => (others => '0'),
+      s_axis_tkeep    => (others => '0'),
+      s_axis_tvalid   => '0',
+      s_axis_tlast    => '0',
+      s_axis_tready   => open,
+      link_error      => link_error,
+      link_error_code => link_error_code,
+      good_frames     => open,
+      broken_frames   => open,
+      lost_frames     => open,
+      refused_frames  => open
     );
 
 end architecture simulation;

@@ -22,6 +22,10 @@ class TransportResetError(TransportError):
     """The hardware was reset, and the transport continues: all data in transit in either direction is lost."""
 
 
+class LostFrameError(TransportError):
+    """A frame from the hardware was broken on its way and is dropped; the transport continues otherwise."""
+
+
 @dataclass(frozen=True)
 class Burst:
     """The valid bytes (by `tkeep`) of the system's stream up to a `tlast`: a frame or a part of a frame.
@@ -45,7 +49,8 @@ class Transport(Protocol):
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next burst, or None after `timeout` seconds (None: no limit) or when the transport is closed.
 
-        May raise `TransportError`, in particular `TransportResetError` if incomplete frames must be dropped.
+        May raise `TransportError`, in particular `TransportResetError` if incomplete frames must be dropped, and
+        `LostFrameError` if one frame was lost.
         """
 
     def is_at_rest(self) -> bool | None:

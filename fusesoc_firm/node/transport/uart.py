@@ -1,12 +1,13 @@
-"""Hardware on a serial line (cores/board, robot:board:firm_link): raw frames, 8 bits, no parity, 1 stop bit.
+"""Hardware on a serial line (cores/board, robot:board:firm_link): 8 bits, no parity, 1 stop bit.
 
     with UartTransport("/dev/ttyUSB1") as transport:
         transport.send(pack_frame(0, payload))
         burst = transport.receive(timeout=1.0)          # a whole frame, since a link carries no parts of frames
+        transport.counts.broken                         # frames from the board that were dropped
 
-A byte stream does not mark the start of a frame. To the board, a break marks it: the next byte begins a frame. From the
-board, only silence marks it. The transport uses both markers when it is opened, and again when received bytes cannot
-form a frame: after an illegal length, or after a pause in the middle of a frame.
+`link_code` describes the frames on the line. A frame from the board that has a wrong checksum is dropped, counted and
+reported, and the next one is received. When it is opened, the transport sends a break, which ends a frame that an
+earlier host has begun.
 """
 
 from __future__ import annotations
@@ -16,22 +17,16 @@ import select
 import termios
 import threading
 import time
+from collections import deque
 from types import TracebackType
 
-from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
-from fusesoc_firm.node.transport.transport import Burst, TransportError, TransportResetError
+from fusesoc_firm.node.transport.link_code import Counts, LinkDecoder, encode
+from fusesoc_firm.node.transport.transport import Burst, LostFrameError, TransportError
 
 DEFAULT_BAUD = 1_000_000
 """The default of the hardware's generic BAUD; a board may set another one."""
 
-_HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 _CHUNK_BYTES = 65536
-# The silence that separates frames after bytes were lost; a USB adapter may delay bytes by milliseconds.
-_SILENT_SECONDS = 0.05
-# After this time without silence, the transport gives up on the board.
-_MOST_SILENCE_SECONDS = 2.0
-# The longest pause in the middle of a frame from the board.
-_LONGEST_PAUSE_SECONDS = 0.2
 
 
 class UartTransport:
@@ -45,13 +40,10 @@ class UartTransport:
         No payload has more than `longest` bytes. May raise `TransportError`.
         """
         self._device = device
-        self._longest = longest
-        self._begun = bytearray()
+        self._decoder = LinkDecoder(longest)
+        self._frames: deque[bytes | None] = deque()
         self._receiving = threading.Lock()
         self._sending = threading.Lock()
-        self._writing = threading.Lock()
-        self._cuts = 0
-        self._last_byte = 0.0  # time of its arrival
         self._is_closed = False
         speed = getattr(termios, f"B{baud}", None)
         if not speed:
@@ -64,31 +56,30 @@ class UartTransport:
         self._wake, self._woken = os.pipe()
         try:
             _configure(self._line, speed, has_flow_control=has_flow_control)
-            self._cut()
+            # Bytes that wait to be sent or read are those of an earlier host.
+            termios.tcflush(self._line, termios.TCIOFLUSH)
+            termios.tcsendbreak(self._line, 0)
         except termios.error as error:
             self.close()
             raise TransportError(f"{device} is not a serial line: {error.args[-1]}") from None
 
-    def send(self, frame: bytes) -> None:
-        """Send a whole frame; wait while the line is busy or held. May raise `TransportError`.
+    @property
+    def counts(self) -> Counts:
+        """The frames from the board so far, good and broken."""
+        return self._decoder.counts
 
-        Raise `TransportResetError` if a break ends the frame.
-        """
-        rest = memoryview(frame)
+    def send(self, frame: bytes) -> None:
+        """Send a whole frame; wait while the line is busy or held. May raise `TransportError`."""
+        rest = memoryview(encode(frame))
         with self._sending:
-            cuts = self._cuts
             while rest:
                 if self._is_closed:
                     raise TransportError("the transport is closed")
-                # While flow control holds the line, check repeatedly for a break from the board.
-                select.select([self._wake], [self._line], [], _LONGEST_PAUSE_SECONDS)
-                with self._writing:
-                    if self._cuts != cuts:
-                        raise TransportResetError(f"{self._device}: a break interrupted a frame")
-                    rest = rest[self._write(rest) :]
+                select.select([self._wake], [self._line], [])
+                rest = rest[self._write(rest) :]
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """Return the next frame as a burst. May raise `TransportError`, or `TransportResetError` for illegal bytes."""
+        """Return the next frame as a burst. May raise `TransportError`, and `LostFrameError` for a broken frame."""
         with self._receiving:
             return self._receive(timeout)
 
@@ -117,54 +108,22 @@ class UartTransport:
     def _receive(self, timeout: float | None) -> Burst | None:
         end = None if timeout is None else time.monotonic() + timeout
         while not self._is_closed:
-            if frame := self._next_frame():
-                return Burst(frame)
+            if self._frames:
+                return self._burst(self._frames.popleft())
             rest = None if end is None else max(0.0, end - time.monotonic())
-            pause = self._last_byte + _LONGEST_PAUSE_SECONDS - time.monotonic() if self._begun else None
-            if self._is_readable(_least(rest, pause)):
-                self._begun += self._read()
-                self._last_byte = time.monotonic()
-            elif pause is not None and (rest is None or pause <= rest):
-                self._begin_anew("a frame is incomplete")
+            if self._is_readable(rest):
+                self._frames += self._decoder.push(self._read())
             elif rest is not None:
                 return None
         return None
 
-    def _cut(self) -> None:
-        """Send a break; drop all bytes received before the break and all bytes that wait to be sent."""
-        with self._writing:
-            self._cuts += 1
-            termios.tcflush(self._line, termios.TCOFLUSH)
-            termios.tcsendbreak(self._line, 0)
-        end = time.monotonic() + _MOST_SILENCE_SECONDS
-        while self._is_readable(_SILENT_SECONDS):
-            self._read()
-            if time.monotonic() > end:
-                raise TransportError(f"{self._device} is never silent, so the start of a frame cannot be found")
-        self._begun.clear()
-
-    def _begin_anew(self, why: str) -> None:
-        if self._is_closed:
-            return
-        self._cut()
-        raise TransportResetError(f"{self._device}: {why}; bytes were lost")
+    def _burst(self, frame: bytes | None) -> Burst:
+        if frame is None:
+            raise LostFrameError(f"{self._device}: a frame from the board was broken on the line; it is dropped")
+        return Burst(frame)
 
     def _is_readable(self, seconds: float | None) -> bool:
         return self._line in select.select([self._line, self._wake], [], [], seconds)[0]
-
-    def _next_frame(self) -> bytes | None:
-        """Return the next complete frame, or None while it is incomplete."""
-        if len(self._begun) < _HEADER_BYTES:
-            return None
-        length = int.from_bytes(self._begun[ID_BYTES:_HEADER_BYTES], "little")
-        if length > self._longest:
-            self._begin_anew(f"a frame announces {length} bytes, more than {self._longest}")
-        end = _HEADER_BYTES + length
-        if len(self._begun) < end:
-            return None
-        frame = bytes(self._begun[:end])
-        del self._begun[:end]
-        return frame
 
     def _read(self) -> bytes:
         try:
@@ -197,8 +156,3 @@ def _configure(line: int, speed: int, *, has_flow_control: bool) -> None:
     special = termios.tcgetattr(line)[6]
     # Ignore received breaks, do not echo, and do not wait for complete lines of text.
     termios.tcsetattr(line, termios.TCSANOW, [termios.IGNBRK, 0, control, 0, speed, speed, special])
-
-
-def _least(*seconds: float | None) -> float | None:
-    """Return the shortest of several time limits; None means no limit."""
-    return min((max(0.0, item) for item in seconds if item is not None), default=None)

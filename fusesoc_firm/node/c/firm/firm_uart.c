@@ -13,17 +13,13 @@
 #define STATUS_TX_EMPTY 0x08u
 #define STATUS_TX_FULL 0x10u
 
-#define SILENCE_MS 50u
-#define LONGEST_PAUSE_MS 200u
 /* Longer than a byte at 9600 baud. */
 #define BREAK_MS 3u
 
 static int has(const firm_uart_t *uart, uint32_t bit) { return (firm_read(uart->base + STATUS) & bit) != 0; }
 
-static uint32_t since(uint32_t time) { return firm_milliseconds() - time; }
-
 /* Send a break after the bytes that are being sent. */
-static void cut(firm_uart_t *uart) {
+static void send_break(const firm_uart_t *uart) {
     const uint32_t control = CONTROL_RX_ENABLE | CONTROL_TX_ENABLE;
     uint32_t begun;
     while (!has(uart, STATUS_TX_EMPTY)) {
@@ -31,63 +27,33 @@ static void cut(firm_uart_t *uart) {
     }
     firm_write(uart->base + CONTROL, control | CONTROL_START_BREAK);
     begun = firm_milliseconds();
-    while (since(begun) < BREAK_MS) {
+    while (firm_milliseconds() - begun < BREAK_MS) {
         firm_pause();
     }
     firm_write(uart->base + CONTROL, control | CONTROL_STOP_BREAK);
-    uart->is_dropping = 1;
-    uart->moved_at = firm_milliseconds();
-    firm_decoder_reset(&uart->decoder);
 }
 
 void firm_uart_open(firm_uart_t *uart, uintptr_t base, uint8_t *buffer, size_t room, unsigned publishers) {
     uart->base = base;
-    uart->errors = 0;
-    firm_decoder_init(&uart->decoder, buffer, room, publishers);
+    firm_link_decoder_init(&uart->decoder, buffer, room, publishers);
     firm_write(base + CONTROL, CONTROL_RX_ENABLE | CONTROL_TX_ENABLE);
-    cut(uart);
+    send_break(uart);
 }
 
-void firm_uart_send(firm_uart_t *uart, const uint8_t *frame, size_t size) {
-    size_t place;
-    for (place = 0; place < size; ++place) {
-        while (has(uart, STATUS_TX_FULL)) {
-            firm_pause();
-        }
-        firm_write(uart->base + FIFO, frame[place]);
+static void put(void *context, uint8_t byte) {
+    const firm_uart_t *uart = context;
+    while (has(uart, STATUS_TX_FULL)) {
+        firm_pause();
     }
+    firm_write(uart->base + FIFO, byte);
 }
 
-/* Handle silence on the line. */
-static void be_silent(firm_uart_t *uart) {
-    if (uart->is_dropping) {
-        uart->is_dropping = since(uart->moved_at) < SILENCE_MS;
-    } else if (firm_decoder_has_begun(&uart->decoder) && since(uart->moved_at) >= LONGEST_PAUSE_MS) {
-        ++uart->errors;
-        cut(uart);
+void firm_uart_send(firm_uart_t *uart, const uint8_t *frame, size_t size) { firm_link_encode(frame, size, put, uart); }
+
+firm_link_status_t firm_uart_receive(firm_uart_t *uart) {
+    firm_link_status_t status = FIRM_LINK_MORE;
+    while (status == FIRM_LINK_MORE && !has(uart, STATUS_RX_EMPTY)) {
+        status = firm_link_decoder_push(&uart->decoder, (uint8_t)(firm_read(uart->base + FIFO) & 0xFFu));
     }
+    return status;
 }
-
-firm_status_t firm_uart_receive(firm_uart_t *uart) {
-    while (!has(uart, STATUS_RX_EMPTY)) {
-        const uint8_t byte = (uint8_t)(firm_read(uart->base + FIFO) & 0xFFu);
-        size_t taken;
-        firm_status_t status;
-        uart->moved_at = firm_milliseconds();
-        if (uart->is_dropping) {
-            continue;
-        }
-        status = firm_decoder_push(&uart->decoder, &byte, 1, &taken);
-        if (status == FIRM_FRAME) {
-            return status;
-        }
-        if (status != FIRM_MORE) {
-            ++uart->errors;
-            cut(uart);
-        }
-    }
-    be_silent(uart);
-    return FIRM_MORE;
-}
-
-int firm_uart_is_silent(const firm_uart_t *uart) { return !uart->is_dropping; }

@@ -4,15 +4,12 @@
 #ifndef FIRM_UART_H
 #define FIRM_UART_H
 
-#include "firm_frame.h"
+#include "firm_link.h"
 #include "firm_port.h"
 
 typedef struct {
     uintptr_t base;
-    firm_decoder_t decoder;
-    uint32_t moved_at; /* time of the last received bytes, ms */
-    int is_dropping;   /* drop received bytes until the line is silent */
-    uint32_t errors;
+    firm_link_decoder_t decoder; /* it counts frames */
 } firm_uart_t;
 
 /* Open the line with a break; `buffer` holds a frame from the board. */
@@ -21,10 +18,8 @@ void firm_uart_open(firm_uart_t *uart, uintptr_t base, uint8_t *buffer, size_t r
 /* Send a frame; wait while the line is busy. */
 void firm_uart_send(firm_uart_t *uart, const uint8_t *frame, size_t size);
 
-/* Read received bytes. Returns FIRM_FRAME (with decoder.filled bytes in decoder.buffer), or FIRM_MORE if no bytes are
- * left. Bytes that do not form a frame are counted and dropped until the line is silent; then a break is sent. While
- * firm_uart_is_silent is 0, do not send a frame that causes a response. */
-firm_status_t firm_uart_receive(firm_uart_t *uart);
-int firm_uart_is_silent(const firm_uart_t *uart);
+/* Read received bytes. Returns FIRM_LINK_FRAME (with decoder.filled bytes in decoder.buffer), FIRM_LINK_BROKEN or
+ * FIRM_LINK_REFUSED for a frame that is dropped, or FIRM_LINK_MORE if no bytes are left. */
+firm_link_status_t firm_uart_receive(firm_uart_t *uart);
 
 #endif

@@ -1,0 +1,161 @@
+"""Read and write the status of hardware over a transport, by frames of the status id.
+
+    status = read_status(transport)
+    print(status_text(status))
+
+The hardware tells its dimensions, from which its register map follows, so no specification is needed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.node import HardwareListener, OpenTransport
+from fusesoc_firm.node.transport.transport import Transport, TransportError
+from fusesoc_firm.system.hardware.registers import Register
+from fusesoc_firm.system.hardware.status import DIGEST_ADDRESS, DIGEST_WORDS, status_map
+from fusesoc_firm.system.status_frames import answered, read_request, write_request
+
+# Hardware without a status drops the request as a frame with an unknown id.
+_ANSWER_SECONDS = 5.0
+_MAGIC = 0x4D524946
+_VERSION = 1
+_SHAPE_ADDRESS = 4
+# The highest word first.
+_DIGEST_ADDRESSES = tuple(DIGEST_ADDRESS + 4 * number for number in reversed(range(DIGEST_WORDS)))
+
+
+@dataclass(frozen=True)
+class Status:
+    """The words of all registers by name, with the registers that give them a meaning."""
+
+    registers: Mapping[str, Register]
+    words: Mapping[str, int]
+
+    @property
+    def digest(self) -> str:
+        """The digest of the hardware's system, in hexadecimal digits."""
+        return "".join(f"{self.words[f'digest_{number}']:08x}" for number in reversed(range(DIGEST_WORDS)))
+
+    def field(self, register: str, name: str) -> int:
+        """Return the value of a field."""
+        fields = {field.name: field for field in self.registers[register].fields}
+        return fields[name].of(self.words[register])
+
+
+def access(transport: Transport, request: bytes) -> int:
+    """Send a request; return the register's word before the access. Other frames that arrive meanwhile are dropped.
+
+    Raise `TransportError` if there is no answer.
+    """
+    transport.send(request)
+    asked = answered(request)
+    end = time.monotonic() + _ANSWER_SECONDS
+    while (burst := transport.receive(max(0.0, end - time.monotonic()))) is not None:
+        answer = answered(burst.data)
+        if answer and asked and answer[0] == asked[0]:
+            return answer[1]
+    raise TransportError(f"the hardware did not answer within {_ANSWER_SECONDS:g} s: it has no status, or is stalled")
+
+
+def read_word(transport: Transport, address: int) -> int:
+    """Return the word of the register at an address. May raise `TransportError`."""
+    return access(transport, read_request(address))
+
+
+def write_word(transport: Transport, address: int, word: int) -> None:
+    """Write a word to the register at an address. May raise `TransportError`."""
+    access(transport, write_request(address, word))
+
+
+def read_digest(transport: Transport) -> str:
+    """Return the digest of the hardware's system. May raise `TransportError`."""
+    return "".join(f"{read_word(transport, address):08x}" for address in _DIGEST_ADDRESSES)
+
+
+def read_status(transport: Transport) -> Status:
+    """Read all registers. Raise `TransportError` if the hardware does not answer, or if its map is unknown."""
+    magic, shape = read_word(transport, 0), read_word(transport, _SHAPE_ADDRESS)
+    if magic != _MAGIC or shape >> 24 != _VERSION:
+        raise TransportError(f"the hardware has another kind of status: it begins with {magic:08x} {shape:08x}")
+    registers = status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF).registers
+    words = {register.name: read_word(transport, register.address) for register in registers}
+    return Status({register.name: register for register in registers}, words)
+
+
+def status_text(status: Status, names: Sequence[str] = ()) -> str:
+    """Return the status as text; `names` are the channels' blocks, the subscribers first."""
+    subscribers, publishers = (status.field("shape", name) for name in ("subscribers", "publishers"))
+    channels = [f"subscriber[{number}]" for number in range(subscribers)]
+    channels += [f"publisher[{number}]" for number in range(publishers)]
+    shown = dict(zip(channels, names or channels, strict=True))
+    width = max(map(len, shown.values()))
+    lines = [f"digest {status.digest}", _events(status, shown, channels)]
+    lines += [f"{'':{width}}  signature    frames   longest wait  faults"]
+    for channel, name in shown.items():
+        words = {word: status.words[f"{channel}.{word}"] for word in ("signature", "frames", "longest_wait")}
+        faults = ", ".join(_faults(status, channel)) or "none"
+        lines.append(
+            f"{name:{width}}  {words['signature']:08x}  {words['frames']:9}  {words['longest_wait']:6} cycles  {faults}"
+        )
+    return "\n".join(lines)
+
+
+def _faults(status: Status, channel: str) -> list[str]:
+    counts = {code: status.words[f"{channel}.faults[{code - 1}]"] for code in range(1, 13)}
+    return [f"{count} of code {code}" for code, count in counts.items() if count]
+
+
+def _events(status: Status, shown: Mapping[str, str], channels: Sequence[str]) -> str:
+    code, channel = (status.field("last_fault", name) for name in ("code", "channel"))
+    last = f"code {code} of {shown[channels[channel]]}" if code else "none"
+    counts = ", ".join(
+        f"{text} {status.words[name]}"
+        for name, text in (("id_errors", "unknown ids"), ("link_errors", "link errors"), ("lost", "uncounted faults"))
+    )
+    return f"last fault: {last}; {counts}"
+
+
+def checked(open_transport: OpenTransport, description: NodeDescription) -> OpenTransport:
+    """Return a function that opens a transport, and raises `TransportError` if the hardware is another system's."""
+
+    def opened(listener: HardwareListener) -> Transport:
+        late = _LateListener(listener)
+        transport = open_transport(late)
+        try:
+            check_digest(transport, description.digest, description.name)
+        except BaseException:
+            transport.close()
+            raise
+        late.listens = True
+        return transport
+
+    return opened
+
+
+class _LateListener:
+    """A listener that is not told of the frames that read the digest."""
+
+    def __init__(self, listener: HardwareListener) -> None:
+        self._listener = listener
+        self.listens = False
+
+    def taken(self, first_cycle: int, last_cycle: int) -> None:
+        if self.listens:
+            self._listener.taken(first_cycle, last_cycle)
+
+    def refused(self, converter: int | None) -> None:
+        if self.listens:
+            self._listener.refused(converter)
+
+
+def check_digest(transport: Transport, expected: str, system: str) -> None:
+    """Raise `TransportError` if the hardware is not that of a system, whose digest is `expected`."""
+    found = read_digest(transport)
+    if found != expected:
+        raise TransportError(
+            f"the hardware is not that of '{system}': its digest is {found}, and the specification's is {expected}"
+        )
