@@ -17,6 +17,7 @@ from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
 from fusesoc_firm.message.model import Definitions, MessageName
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.request.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.boards.block_design import (
@@ -43,6 +44,14 @@ from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import WRAPPER_TEMPLATE, wrapper_configuration
+from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, registers_configuration
+from fusesoc_firm.system.hardware.status import (
+    REGISTERS_TEMPLATE,
+    Identity,
+    identity_of,
+    status_description,
+    status_entity,
+)
 from fusesoc_firm.system.written.specification import Accelerator, Specification, is_core, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
@@ -223,7 +232,29 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for type_ in system.kernels:
         configuration = wrapper_configuration(type_)
         yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
+    if system.status:
+        configuration = registers_configuration(status_registers(loaded), identity(loaded).signatures)
+        yield Artifact(f"{status_entity(system)}.vhd", Part.COMPONENTS, REGISTERS_TEMPLATE, configuration)
     yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
+
+
+def identity(loaded: LoadedSystem) -> Identity:
+    """Return the identity of a system's hardware."""
+    system = loaded.system
+    messages = [(item.frame.ros, item.frame.message) for item in (*system.subscribers, *system.publishers)]
+    return identity_of(system, [signature(name, loaded.libraries[ros].closure(name)) for ros, name in messages])
+
+
+def status_registers(loaded: LoadedSystem) -> RegisterMap:
+    """Return the registers of a system's status."""
+    return register_map(status_text(loaded))
+
+
+def status_text(loaded: LoadedSystem) -> str:
+    """Return the description of a system's status in SystemRDL."""
+    system = loaded.system
+    shape = len(system.subscribers), len(system.publishers)
+    return status_description(system.name, *shape, identity(loaded).digest)
 
 
 def system_core(loaded: LoadedSystem) -> GeneratedCore:
@@ -244,7 +275,7 @@ def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]
     check_fits(loaded.system, board)
     if board.is_linked:
         return _linked_files(loaded, board)
-    return _processor_files(loaded, board) if board.flow == VIVADO else _clock_files(loaded, board, "sdc", "SDC")
+    return _processor_files(loaded, board) if board.flow == VIVADO else _clock_files(loaded, board, "sdc", "SDC", "|")
 
 
 def _linked_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
@@ -265,16 +296,17 @@ def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedF
         files |= {name: GeneratedFile(path.read_bytes(), "user") for name, path in paths.items()}
         script = render(PACKAGE_TEMPLATE, package_configuration(type_, list(paths), system, board, clock))
         files[f"{function_name(type_)}.tcl"] = GeneratedFile(script, "user")
-    if system.clocks:
-        files |= _clock_files(loaded, board, "xdc", "xdc")
+    files |= _clock_files(loaded, board, "xdc", "xdc", "/")
     design = render(BLOCK_DESIGN_TEMPLATE, block_design_configuration(system, board, clock))
     files[f"{board_entity(system, board)}.tcl"] = GeneratedFile(design, "tclSource")
     return files
 
 
-def _clock_files(loaded: LoadedSystem, board: Board, form: str, file_type: str) -> dict[str, GeneratedFile]:
+def _clock_files(
+    loaded: LoadedSystem, board: Board, form: str, file_type: str, separator: str
+) -> dict[str, GeneratedFile]:
     """Return the timing constraints of clocks."""
-    text = render(f"board/{form}", clocks_configuration(loaded.system, board, _clock(loaded)))
+    text = render(f"board/{form}", clocks_configuration(loaded.system, board, _clock(loaded), separator))
     return {f"{board.name}.{form}": GeneratedFile(text, file_type)}
 
 

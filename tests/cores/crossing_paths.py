@@ -1,8 +1,8 @@
 """Which paths of a netlist lead from one clock to another, and which of them no synchroniser stands in.
 
-A control signal may pass in one way only: from a register, with no logic behind it, into a register that nothing reads
-but another one of the same clock. Data that hold while they are looked at may pass otherwise: what a RAM gives, and
-registers that a test names. A reset may clear a register asynchronously.
+A control signal may pass in one way only: from a register or a pin, with no logic behind it, into a register that
+nothing reads but another one of the same clock. Data that hold while they are looked at may pass otherwise: what a RAM
+gives, and registers that a test names. A reset may clear a register asynchronously.
 """
 
 from __future__ import annotations
@@ -25,6 +25,19 @@ _SCRIPT = (
 )
 
 
+# All names of a bit: instances and a signal, with dots between them.
+Names = frozenset[str]
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """The names of both ends of a path, and the side of the register at its end."""
+
+    source: Names
+    sink: Names
+    side: str
+
+
 @dataclass(frozen=True)
 class Domains:
     """The clocks of a netlist: the side of each clock's port, and of every other port.
@@ -39,13 +52,22 @@ class Domains:
 
 def unsynchronised(verilog: str, top: str, folder: Path, domains: Domains) -> list[str]:
     """Return the faults, one per line."""
+    return sorted(set(_netlist(verilog, top, folder, domains).faults()))
+
+
+def crossing_paths(verilog: str, top: str, folder: Path, domains: Domains) -> set[Crossed]:
+    """Return all paths into registers from another side but those out of RAM."""
+    return set(_netlist(verilog, top, folder, domains).paths())
+
+
+def _netlist(verilog: str, top: str, folder: Path, domains: Domains) -> _Netlist:
     (folder / "netlist.v").write_text(verilog, encoding="utf-8")
     yosys = yowasp.Yosys()
     yosys.prepare()
     done = yosys.run(["-q", "-p", _SCRIPT.format(top=top)], folder)
     assert done.returncode == 0, done.stderr
     module = json.loads((folder / "out.json").read_text(encoding="utf-8"))["modules"][top]
-    return sorted(set(_Netlist(module, domains).faults()))
+    return _Netlist(module, domains)
 
 
 @dataclass(frozen=True)
@@ -71,7 +93,9 @@ class _Netlist:
         self.inputs: list[_Input] = []
         self.drivers: dict[int, list[int]] = {}  # of gates, by output
         self.registers: set[int] = set()
+        self.pins: set[int] = set()  # of inputs of the whole
         self.memories: set[int] = set()
+        self.before: dict[int, frozenset[str]] = {}  # the sides of all origins
         self.readers: dict[int, list[str]] = defaultdict(list)
         clocks = {module["ports"][port]["bits"][0]: side for port, side in domains.clocks.items()}
         for cell in module["cells"].values():
@@ -80,6 +104,7 @@ class _Netlist:
         for name, port in self.ports.items():
             for bit in port["bits"]:
                 if port["direction"] == "input":
+                    self.pins.add(bit)
                     self.sides[bit] = domains.side_of(name)
                 else:
                     self.readers[bit].append("a port")
@@ -105,7 +130,7 @@ class _Netlist:
     def faults(self) -> Iterator[str]:
         for item in self.inputs:
             for origin in self._foreign(item.bit, self.sides[item.output]):
-                is_direct = origin == item.bit and item.pin == "D" and origin in self.registers
+                is_direct = origin == item.bit and item.pin == "D" and origin in self.registers | self.pins
                 if not (is_direct and self._is_first(item.output)):
                     yield f"{self._name(origin)} into {self._name(item.output)}"
         for name, port in self.ports.items():
@@ -114,6 +139,12 @@ class _Netlist:
                     for origin in self._foreign(bit, self.domains.side_of(name)):
                         yield f"{self._name(origin)} to {name}"
 
+    def paths(self) -> Iterator[Crossed]:
+        for item in self.inputs:
+            for origin in self._foreign(item.bit, self.sides[item.output]):
+                source, sink = (frozenset(self.names[bit]) for bit in (origin, item.output))
+                yield Crossed(source, sink, self.sides[item.output])
+
     def _is_first(self, output: int) -> bool:
         """Return whether a register is read by exactly one other, without logic in between."""
         readers = self.readers[output]
@@ -121,10 +152,31 @@ class _Netlist:
 
     def _foreign(self, bit: int, side: str) -> Iterator[int]:
         """What a bit depends on within a cycle that is of another side and may change at any time."""
+        if self._sides_before(bit) <= {side}:
+            return
         for origin in self._origins(bit):
             is_held = any(name.split(".")[-1] in self.domains.held for name in self.names[origin])
             if self.sides.get(origin, side) != side and not is_held:
                 yield origin
+
+    def _sides_before(self, bit: int) -> frozenset[str]:
+        """The sides of all origins of a bit; each gate is looked at once, since most bits have one side."""
+        open_ = [bit]
+        while open_:
+            here = open_[-1]
+            before = (
+                [] if here in self.memories else [item for item in self.drivers.get(here, []) if isinstance(item, int)]
+            )
+            new = [item for item in before if item not in self.before]
+            if here not in self.before and new:
+                # Also ends a loop.
+                self.before[here] = frozenset()
+                open_ += new
+                continue
+            open_.pop()
+            own = {self.sides[here]} if not before and here in self.sides else set()
+            self.before[here] = frozenset(own.union(*(self.before[item] for item in before)))
+        return self.before[bit]
 
     def _origins(self, bit: int) -> set[int]:
         found: set[int] = set()

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.hdl.ghdl import Library, core_files
+from tests.hdl.ghdl import Generic, Library, core_files
+from tests.hdl.verilog import compile_verilog
 
 SEED = 20241130
 # The rule is the first word.
@@ -79,3 +80,56 @@ def test_an_illegal_width_is_refused(library: Library, tmp_path: Path) -> None:
     library.analyse([bench])
     done = library.run("wide")
     assert done.exit_code and "firm_axis_checker: WIDTH is 24; legal: 8, 16, 32" in done.output
+
+
+# --- the checker in Verilog ----------------------------------------------------------------------------------------
+
+IN_VERILOG = re.compile(r"^@(\d+)ns: firm_axis_checker: random frames: (\w+): (.*)$", re.MULTILINE)
+# The bench's signals in the order of a line of cycles.txt.
+SIGNALS = ("rst_n", "tvalid", "tready", "tlast", "tuser", "tkeep", "tdata")
+
+
+def cycles(dump: str) -> list[str]:
+    """The bench's signals before each rising edge of its clock, in bits, from a dump of a simulation."""
+    codes = dict(re.findall(r"^\$var reg \d+ (\S+) (\w+)(?:\[\d+:0\])? \$end", dump, re.MULTILINE))
+    values: dict[str, str] = {}
+    found = []
+    for moment in re.split(r"^#\d+\n", dump.partition("$enddefinitions $end")[2], flags=re.MULTILINE):
+        changes = {
+            codes[code]: bits
+            for bits, code in re.findall(r"^b?([01xXuU]+) ?(\S+)$", moment, re.MULTILINE)
+            if code in codes
+        }
+        if changes.get("clk") == "1":
+            found.append("".join(values[name] for name in SIGNALS))
+        values |= {name: bits.lower().replace("u", "x") for name, bits in changes.items()}
+    return found
+
+
+@pytest.mark.one_in(3)
+@pytest.mark.parametrize("width", [8, 64])
+@pytest.mark.parametrize("fault", ["none", *FAULTS])
+def test_the_checker_in_verilog_finds_the_same(library: Library, tmp_path: Path, fault: str, width: int) -> None:
+    if width == 8 and fault in ("stable tkeep", "keep gap"):
+        pytest.skip("a stream of one byte has no such fault")
+    seed = random.randrange(1, 2**31 - 86)
+    print(f"-gSEED={seed}")
+    generics: dict[str, Generic] = {"SEED": seed, "WIDTH": width, "FAULT": fault}
+    done = library.run("firm_axis_checker_tb", generics, options=[f"--vcd={tmp_path / 'dump.vcd'}"])
+    wanted = REPORT.findall(done.output)
+    assert bool(wanted) is (fault != "none")
+    lines = cycles((tmp_path / "dump.vcd").read_text(encoding="ascii"))
+    assert len(lines) == 4000
+    (tmp_path / "cycles.txt").write_text("\n".join(lines), encoding="ascii")
+    assert replayed(tmp_path, WIDTH=width) == wanted
+    if wanted:
+        rule = wanted[0][1].upper()
+        assert replayed(tmp_path, WIDTH=width, **{rule: 0}) == []
+
+
+def replayed(folder: Path, **parameters: Generic) -> list[tuple[str, str, str]]:
+    """Time, rule and fault of each report of the checker in Verilog for the cycles in `folder`."""
+    files = [*core_files("sim/verilog_checker"), Path(__file__).with_name("axis_replay.v")]
+    printed = compile_verilog("axis_replay", files, folder, parameters).run(folder).output
+    assert "PASS 4000 cycles" in printed
+    return IN_VERILOG.findall(printed)

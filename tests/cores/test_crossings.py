@@ -161,13 +161,14 @@ BINARY: Fault = (
         ("& read_seen(POINTER_BITS-3 downto 0)", "& read_seen(POINTER_BITS-2 downto 0)"),
     ),
 )
+_SYNCED = "synced <= stages_r((STAGES-1)*BITS-1 downto (STAGES-2)*BITS);"
 NO_SYNCHRONISER: Fault = (
     "firm_cdc_sync",
-    (("synced <= stages_r(STAGES*BITS-1 downto (STAGES-1)*BITS);", "synced <= level;"),),
+    ((_SYNCED, "synced <= level;"),),
 )
 ONE_STAGE: Fault = (
     "firm_cdc_sync",
-    (("synced <= stages_r(STAGES*BITS-1 downto (STAGES-1)*BITS);", "synced <= stages_r(BITS-1 downto 0);"),),
+    ((_SYNCED, "synced <= first_r;"),),
 )
 IN_MESSAGES: dict[str, Fault] = {
     "fields are not held": (

@@ -37,6 +37,9 @@ OTHER_FAULTS = {
     ("system/boards/board.py", "_check_places"): "a board that a right specification does not fit on",
     ("system/scaffold/core_file.py", "new_core"): "an option of the command line",
     ("system/scaffold/core_file.py", "updated_core"): "the file of a core",
+    ("system/scaffold/project.py", "create"): "options of the command line",
+    ("system/register_files.py", "write_register_files"): "a right specification without a status",
+    ("system/derived/status.py", "_check_id"): "a system of 256 converters, in test_status",
     ("system/derived/timing.py", "tasks_of"): "a question that a right specification does not answer",
 }
 

@@ -132,7 +132,7 @@ def _round_robin() -> tuple[Proof, ...]:
             Mutation(
                 file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
             ),
-            Mutation(file, "goes_on = '0' and found = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+            Mutation(file, "found and (finished", "(finished", ("no_grant_unasked",)),
         ),
         "scheduler_sticky": (
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
@@ -142,11 +142,9 @@ def _round_robin() -> tuple[Proof, ...]:
             Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("request_is_still_there",)),
         ),
         "scheduler_service": (
-            Mutation(file, "(started_r or beat) and not (beat and last)", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "(started_r or beat) and not finished", "started_r or beat", ("no_deadlock",)),
         ),
-        "scheduler_gaps": (
-            Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
-        ),
+        "scheduler_gaps": (Mutation(file, "(finished or not", "(not", ("no_gap_between_tasks",)),),
         "scheduler_fairness": (
             Mutation(
                 "firm_sched_following.vhd",
@@ -244,20 +242,18 @@ def _edf_resources() -> tuple[Proof, ...]:
         "scheduler_grants": (
             Mutation(
                 file,
-                "grant_select_r <= first_id",
-                "grant_select_r <= not first_id",
+                "grant_select_r <= next_id",
+                "grant_select_r <= not next_id",
                 ("only_to_a_requester",),
             ),
             Mutation(
                 file,
-                "grant_select_r <= a_id",
-                "grant_select_r <= (others => '1')",
+                "              a_id;",
+                "              (others => '1');",
                 ("at_most_one_grant",),
                 _THREE,
             ),
-            Mutation(
-                file, "if pop = '1' or take_b = '1' or take_a = '1' then", "if choose = '1' then", ("no_grant_unasked",)
-            ),
+            Mutation(file, "if given = '1' then", "if choose = '1' then", ("no_grant_unasked",)),
         ),
         "scheduler_preemption": (
             Mutation(
@@ -270,8 +266,8 @@ def _edf_resources() -> tuple[Proof, ...]:
         "scheduler_service": (
             Mutation(
                 file,
-                "choose    <= finished or not (running_r or beat)",
-                "choose    <= not (running_r or beat)",
+                "choose <= finished or not (running_r or beat)",
+                "choose <= not (running_r or beat)",
                 ("no_deadlock",),
             ),
         ),

@@ -56,6 +56,7 @@ def test_what_comes_for_a_processor(tmp_path: Path) -> None:
         "turn/src/turn.cpp": "user",
         "turn/src/turn.hpp": "user",
         "turn.tcl": "user",
+        "zynq7000.xdc": "xdc",
         "robot_zynq7000.tcl": "tclSource",
     }
     # Vivado reads it last: it refers to the top level.
@@ -93,3 +94,18 @@ def test_a_processor_makes_four_clocks(tmp_path: Path) -> None:
     parameters = {"spec": "spec.yaml", "board": "zcu104", "paths": None, "distro": None}
     with pytest.raises(InputError, match="board 'zcu104' has at most 4 clocks, including clk; the system has 5"):
         system_core(load_requested(Request("far", "test:sys:robot-system:0", tmp_path, parameters)))
+
+
+def test_a_status_has_a_bus_an_address_and_an_interrupt(tmp_path: Path) -> None:
+    design = str(made(tmp_path, ", status: axi_lite")["robot_zynq7000.tcl"].content)
+    assert "connect_bd_intf_net [get_bd_intf_pins control/M01_AXI] [get_bd_intf_pins system/s_axi]" in design
+    assert "connect_bd_net [get_bd_pins system/status_interrupt] [get_bd_pins interrupts/In2]" in design
+    assert "-offset 0x40410000 -range 64K" in design
+    assert "CONFIG.NUM_MI 2\n" in design
+    assert "CONFIG.NUM_PORTS 3\n" in design
+
+
+def test_without_a_status_nothing_is_added(tmp_path: Path) -> None:
+    design = str(made(tmp_path)["robot_zynq7000.tcl"].content)
+    assert "s_axi/reg0" not in design
+    assert "CONFIG.NUM_PORTS 2\n" in design

@@ -95,7 +95,7 @@ def test_a_fork_stands_between_one_source_and_its_sinks(tmp_path: Path) -> None:
         {"SINKS": "2"},
         {
             "clk": "clk",
-            "rst_n": "rst_n",
+            "rst_n": "system_rst_n",
             "source_valid": "s_segment_valid(0)",
             "source_ready": "s_msg_ready",
             "sink_valid": "s_fork_valid",

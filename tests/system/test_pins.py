@@ -45,7 +45,16 @@ def test_every_block_has_its_own_pins(tmp_path: Path) -> None:
     ]
     for block in found["accelerators"]:
         mapped = {port["formal"]: port["actual"] for port in block["ports"]}
-        assert (mapped["led"], mapped["tid"]) == (f"{block['block']}_led", f"{block['block']}_tid")
+        assert (mapped["led"], mapped["tid"]) == (f"{block['block']}_led", f"{block['block']}_tid_synced")
+
+
+def test_an_input_may_be_wired_directly(tmp_path: Path) -> None:
+    pins = "pins: [{name: sclk, direction: in, synchroniser: none}, {name: levels, direction: in, bits: 3}]"
+    found = system_configuration(system(tmp_path, "a", pins=pins))
+    ((block,), (synchroniser,)) = found["accelerators"], found["synchronisers"]
+    mapped = {port["formal"]: port["actual"] for port in block["ports"]}
+    assert (mapped["sclk"], mapped["levels"]) == ("a_sclk", "a_levels_synced")
+    assert (synchroniser["pin"], synchroniser["bits"], synchroniser["clock"]) == ("a_levels", 3, "clk")
 
 
 @pytest.mark.parametrize("block", ["m_axis", "from", "burst"])

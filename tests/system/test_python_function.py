@@ -129,7 +129,7 @@ def test_a_first_version_has_the_fields(tmp_path: Path) -> None:
         == '''\
 """mix: geometry_msgs/Point, geometry_msgs/Polygon in, diagnostic_msgs/DiagnosticStatus, geometry_msgs/Pose out.
 
-A first version: it responds with zeros. This file is yours; it is never regenerated.
+A first version: it copies equal fields, and sends defaults elsewhere. This file is yours; it is never regenerated.
 """
 
 
@@ -185,11 +185,20 @@ def test_a_first_version_answers_with_the_message(tmp_path: Path) -> None:
         folder.mkdir()
         scope: dict[str, Any] = {}
         exec(compile(first_version(folder, "Point", name), name, "exec"), scope)
-        answer = scope["mix"]({})
+        answer = scope["mix"]({"x": 0.0, "y": 0.0, "z": 0.0})
         (type_,) = load_system(folder / "spec.yaml", LIBRARIES).system.software.types
         frame = type_.outputs[0].frame
         assert decode(frame, encode_used(frame, answer)) == answer, name
         assert {names[0] for names in names_in_use(frame)} == answer.keys(), name
+
+
+def test_a_first_version_copies_equal_fields(tmp_path: Path) -> None:
+    text = first_version(
+        tmp_path, "Point geometry_msgs/PoseStamped", "geometry_msgs/PointStamped geometry_msgs/Vector3"
+    )
+    assert '"header": message1["header"],' in text
+    assert '"point": {"x": 0.0, "y": 0.0, "z": 0.0},' in text
+    assert '"x": message0["x"],' in text
 
 
 def test_software_without_outputs_or_sources(tmp_path: Path) -> None:

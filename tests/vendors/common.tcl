@@ -39,6 +39,7 @@ proc legal {value values} {
 # Ports by entity, each with direction (I or O) and bits where these are numbers; and what other entities instantiate.
 set entities {}
 set instantiated {}
+set labels {}
 proc existing {name} {
   if {![file isfile $name]} { wrong "there is no file $name" }
   return $name
@@ -50,6 +51,9 @@ proc read_vhdl {args} {
     set channel [open [existing $name]]
     set text [regsub -all -line -- {--.*$} [read $channel] ""]
     close $channel
+    foreach {all label} [regexp -all -inline -nocase {(\w+)\s*:\s*(?:entity\s+(?:work|firm)\.|component\s)} $text] {
+      dict set ::labels [string tolower $label] 1
+    }
     foreach {all name} [regexp -all -inline -nocase {:\s*entity\s+(?:work|firm)\.(\w+)} $text] {
       dict set ::instantiated [string tolower $name] 1
     }
@@ -77,6 +81,12 @@ proc ports_of {text} {
     }
   }
   return $found
+}
+# The instances in the name of a register, from `all` parts of it.
+proc instances {parts} {
+  foreach part $parts {
+    if {![dict exists $::labels [string tolower $part]]} { wrong "there is no instance $part" }
+  }
 }
 proc source {name} { uplevel #0 [list run_script [existing $name]] }
 proc check_instances {} {

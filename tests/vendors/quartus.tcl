@@ -40,12 +40,23 @@ proc get_clocks {name} {
   if {$name ni $::clocks} { wrong "there is no clock $name" }
   return $name
 }
-proc get_pins {args} { lindex [options {-compatibility_mode} {} $args] 1 }
+proc get_pins {args} {
+  set name [lindex [options {-compatibility_mode} {} $args] 1]
+  instances [lrange [split $name |] 0 end-2]
+  return $name
+}
+proc get_registers {args} {
+  lassign [options {-compatibility_mode} {} $args] given name
+  instances [lrange [split $name |] 0 end-1]
+  return $name
+}
 proc delay {what arguments} {
   lassign [options {} {-from -to} $arguments] given nanoseconds
   if {![string is double -strict [lindex $nanoseconds 0]]} { wrong "the delay is $nanoseconds" }
-  puts "$what [dict get $given -from] [dict get $given -to] $nanoseconds"
+  set sink [expr {[dict exists $given -to] ? [dict get $given -to] : ""}]
+  puts [concat $what [dict get $given -from] $sink $nanoseconds]
 }
+proc set_max_skew {args} { delay max_skew $args }
 proc set_max_delay {args} { delay max_delay $args }
 proc set_min_delay {args} { delay min_delay $args }
 proc set_false_path {args} { puts "false_path [dict get [lindex [options {} {-to} $args] 0] -to]" }

@@ -28,7 +28,7 @@ CORES = (
 
 pytestmark = pytest.mark.skipif(not shutil.which("tclsh"), reason="tclsh is not installed")
 
-# Three clocks, a preemptive scheduler, pins of both directions and kinds.
+# Three clocks, a preemptive scheduler, a status, pins of both directions and kinds.
 COPY = """\
 library ieee;
 use ieee.std_logic_1164.all;
@@ -42,6 +42,7 @@ project:
   width: 512
   scheduler: fixed_priority_preemptive
   clock: 80 MHz
+  status: axi_lite
   clocks: [{name: fast, frequency: 200 MHz}, {name: odd, frequency: 66.6 MHz}]
 accelerators:
   - name: copy
@@ -137,7 +138,7 @@ def test_every_system_beside_a_processor(tmp_path: Path, core: str, board: str) 
 @pytest.mark.parametrize("core", ["quat2euler", "multi_type_verilog"])
 def test_a_project_of_quartus(tmp_path: Path, core: str) -> None:
     lines = Project(tmp_path / "build", core, "quartus").lines()
-    assert [line.split()[:3] for line in lines] == [["clock", "clk", "clk"]]
+    assert [line.split()[:3] for line in lines if line.startswith("clock")] == [["clock", "clk", "clk"]]
 
 
 @pytest.fixture(scope="module")
@@ -165,34 +166,42 @@ def test_clocks_widths_and_pins(tmp_path: Path, library: Path, board: str, clock
         "system/m_axis_tkeep dma/s_axis_s2mm_tkeep 64",
         "first_level system/first_level 12",
         "system/second_lamp second_lamp 1",
+        "system/status_interrupt interrupts/In2 1",
     ):
         assert f"net {net}" in lines
-    # A cycle of the faster of two clocks, in ns: 12.5, 5 and 15.015.
-    delays = {(0, 1): "5.000", (0, 2): "12.500", (1, 2): "5.000"}
-    both = {pair: delay for one, delay in delays.items() for pair in (one, one[::-1])}
-    assert sorted(line for line in lines if line.startswith("max_delay")) == sorted(
-        f"max_delay {clock}{source} {clock}{sink} {delay}" for (source, sink), delay in both.items()
-    )
-    resets = [line for line in lines if line.startswith("false_path")]
-    assert len(resets) == 4
-    assert all(
-        any(f"*u_{word}*" in line for line in resets) for word in ("rst_fast", "seen_fast", "rst_odd", "seen_odd")
-    )
+    # Cycles of the clocks in ns: 12.5, 5 and 15.015.
+    crossing = "u_left_to_first_in_crossing"
+    for delay in (
+        f"{crossing}/request_r_reg* {crossing}/u_request/first_r_reg* 5.000",
+        f"{crossing}/answer_r_reg* {crossing}/u_return/first_r_reg* 12.500",
+        f"u_left/* {clock}1 5.000",
+        f"u_second/* {clock}0 12.500",
+    ):
+        assert f"max_delay {delay}" in lines
+    paths = [line.removeprefix("false_path ") for line in lines if line.startswith("false_path")]
+    assert paths[:2] == [f"u_{block}_level_sync/first_r_reg*" for block in ("first", "second")]
+    for label in ("u_system_rst", "u_domains_rst", "u_rst_fast", "u_seen_fast", "u_rst_odd", "u_seen_odd"):
+        assert {f"{label}/first_r_reg*/D", f"{label}/*_r_reg*/CLR"} <= set(paths)
     design = project.generated(f"robot_{board}.tcl").read_text(encoding="utf-8")
     assert "FREQMHZ 80\n" in design
     assert "FREQMHZ 200\n" in design
     assert "FREQMHZ 66.6\n" in design
     assert f"there is no clock {clock}3" in project.fault(f"{board}.xdc", f"{clock}2", f"{clock}3")
     assert "unknown option -datapath" in project.fault(f"{board}.xdc", "-datapath_only", "-datapath")
+    assert "there is no instance u_left_to" in project.fault(f"{board}.xdc", f"{crossing}/", "u_left_to/")
 
 
 def test_clocks_in_quartus(tmp_path: Path, library: Path) -> None:
     project = Project(tmp_path / "build", "robot", "quartus", library=library)
     lines = project.lines()
     assert "clock clk_fast clk_fast 5.000" in lines
-    assert "max_delay clk clk_odd 12.500" in lines
-    assert "min_delay clk_odd clk_fast -100" in lines
-    assert "false_path *u_seen_odd*stages_r*|clrn" in lines
+    crossing = "u_right_to_second_in_crossing"
+    assert f"max_delay {crossing}|request_r* {crossing}|u_request|first_r* 15.015" in lines
+    assert f"min_delay {crossing}|answer_r* {crossing}|u_return|first_r* -100" in lines
+    assert "max_delay u_right|* clk_odd 15.015" in lines
+    assert "false_path u_second_level_sync|first_r*" in lines
+    assert "false_path u_seen_odd|*_r*|clrn" in lines
+    assert "there is no instance u_again" in project.fault("quartus.sdc", "|u_return|", "|u_again|")
     assert "there is no port clk_slow" in project.fault("quartus.sdc", "[get_ports clk_odd]", "[get_ports clk_slow]")
     assert "there is no clock clk_o" in project.fault(
         "quartus.sdc", "-to [get_clocks clk_odd]", "-to [get_clocks clk_o]"

@@ -86,6 +86,7 @@ proc set_property {args} {
 }
 proc set_one {name value object} {
   if {[dict exists $::cells $object]} { return [configure $object $name $value] }
+  if {$name eq "CONFIG.ASSOCIATED_BUSIF" && [is_module_bus [file dirname $object]/$value]} return
   set kind [expr {$object in $::files ? [file extension $object] : $object}]
   if {![dict exists $::project_properties $kind] || $name ni [dict get $::project_properties $kind]} {
     wrong "unknown property $name of $object"
@@ -305,8 +306,14 @@ proc connect_bd_net {first second} {
   dict set ::nets $second $first
 }
 
+# Vivado finds AXI4-Lite by the names of a module's ports: UG994.
+proc is_module_bus {path} {
+  lassign [split $path /] cell name
+  expr {[dict exists $::cells $cell entity] && [dict exists $::entities [dict get $::cells $cell entity] ${name}_awaddr]}
+}
 proc get_bd_intf_pins {path} {
   lassign [split $path /] cell name
+  if {[is_module_bus $path]} { return $path }
   set ip [dict get $::cells [get_bd_cells $cell] ip]
   if {![dict exists $::catalog $ip interface $name]} { wrong "$ip has no interface $name" }
   if {![valued $cell [lindex [dict get $::catalog $ip interface $name] 1]]} {
@@ -316,6 +323,7 @@ proc get_bd_intf_pins {path} {
 }
 proc mode_of {path} {
   lassign [split $path /] cell name
+  if {[is_module_bus $path]} { return slave }
   lindex [dict get $::catalog [dict get $::cells $cell ip] interface $name] 0
 }
 proc connect_bd_intf_net {first second} {
@@ -333,6 +341,7 @@ proc get_bd_addr_spaces {path} { address space $path }
 proc get_bd_addr_segs {path} { address segment $path }
 proc address {what path} {
   regexp {^(\w+)/(.*)$} $path all cell name
+  if {$what eq "segment" && $name eq "s_axi/reg0" && [is_module_bus $cell/s_axi]} { return $path }
   if {![dict exists $::catalog [dict get $::cells [get_bd_cells $cell] ip] $what $name]} {
     wrong "there is no $what $path"
   }
@@ -367,6 +376,7 @@ proc validate_bd_design {} {
 proc is_connected {pin} { expr {[dict exists $::nets $pin] || $pin in [dict values $::nets]} }
 proc validate_module {cell} {
   dict for {name fact} [dict get $::entities [dict get $::cells $cell entity]] {
+    if {[regexp {^(s_axi)_} $name all bus] && [dict exists $::links $cell/$bus]} continue
     if {[lindex $fact 0] eq "I" && ![dict exists $::nets $cell/$name]} { wrong "input $cell/$name is not connected" }
   }
 }
@@ -417,13 +427,34 @@ proc get_clocks {name} {
 }
 proc get_pins {args} {
   lassign [options {-hierarchical} {-filter} $args] given
-  if {![regexp {^NAME =~ \*u_\w+\*stages_r_reg\*/CLR$} [dict get $given -filter]]} { wrong "get_pins $args" }
-  return [dict get $given -filter]
+  if {![regexp {^NAME =~ \*/(u_\w+)/(?:\*_r|first_r)_reg\*/(?:CLR|D)$} [dict get $given -filter] all label]} {
+    wrong "get_pins $args"
+  }
+  instances $label
+  return [string range [lindex [dict get $given -filter] 2] 2 end]
+}
+proc get_cells {args} {
+  lassign [options {-hierarchical} {-filter} $args] given
+  set filter [dict get $given -filter]
+  if {![regexp {^NAME =~ \*/(u_\w+)(?:/(u_\w+))?/(?:\w+_reg\*|\* && IS_SEQUENTIAL)$} $filter all label inner]} {
+    wrong "get_cells $args"
+  }
+  instances [concat $label $inner]
+  return [string range [lindex $filter 2] 2 end]
 }
 proc set_max_delay {args} {
   lassign [options {-datapath_only} {-from -to} $args] given delay
+  if {![dict exists $given -datapath_only]} { wrong "set_max_delay without -datapath_only" }
+  note_delay max_delay $given $delay
+}
+proc set_bus_skew {args} {
+  lassign [options {} {-from -to} $args] given delay
+  note_delay bus_skew $given $delay
+}
+proc note_delay {what given delay} {
   if {![string is double -strict $delay]} { wrong "the delay is $delay" }
-  lappend ::timing "max_delay [dict get $given -from] [dict get $given -to] $delay"
+  set sink [expr {[dict exists $given -to] ? [dict get $given -to] : ""}]
+  lappend ::timing [concat $what [dict get $given -from] $sink $delay]
 }
 proc set_false_path {args} {
   lassign [options {} {-to} $args] given

@@ -196,6 +196,48 @@ begin
       axis_tready => in_tready
     );
 
+  -- The first beat to a subscriber lacks the byte of the id. Two channels are enough, since each checker takes time.
+  checked_subscribers : for channel in 0 to SUBSCRIBERS-1 generate
+    first : if channel < 2 generate
+      u_check_sub : entity firm.firm_axis_checker
+        generic map (
+          WIDTH => WIDTH,
+          NAME  => "to subscriber " & integer'image(channel),
+          LEVEL => failure,
+          KEEP  => WIDTH = 8
+        )
+        port map (
+          clk         => clk,
+          rst_n       => rst_n,
+          axis_tdata  => sub_tdata,
+          axis_tkeep  => sub_tkeep,
+          axis_tvalid => sub_tvalid(channel),
+          axis_tlast  => sub_tlast,
+          axis_tready => sub_tready(channel)
+        );
+    end generate first;
+  end generate checked_subscribers;
+
+  checked_publishers : for channel in 0 to PUBLISHERS-1 generate
+    first : if channel < 2 generate
+      u_check_pub : entity firm.firm_axis_checker
+        generic map (
+          WIDTH => WIDTH,
+          NAME  => "from publisher " & integer'image(channel),
+          LEVEL => failure
+        )
+        port map (
+          clk         => clk,
+          rst_n       => rst_n,
+          axis_tdata  => pub_tdata((channel+1)*WIDTH-1 downto channel*WIDTH),
+          axis_tkeep  => pub_tkeep((channel+1)*WIDTH/8-1 downto channel*WIDTH/8),
+          axis_tvalid => pub_tvalid(channel),
+          axis_tlast  => pub_tlast(channel),
+          axis_tready => pub_tready(channel)
+        );
+    end generate first;
+  end generate checked_publishers;
+
   u_check_out : entity firm.firm_axis_checker
     generic map (
       WIDTH => WIDTH,

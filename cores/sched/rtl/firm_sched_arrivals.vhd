@@ -77,6 +77,8 @@ architecture rtl of firm_sched_arrivals is
   signal padded_id       : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
   signal finished_row    : row_t;
   signal finished_column : columns_t;
+  signal own_of_next     : columns_t;  -- the column of the one that may finish, if it is in the next row
+  signal own_of_batch    : columns_t;  -- the same, if it is in that of the batch
   signal forgets         : std_logic;
   signal finish_task     : std_logic;
   signal old_finished    : columns_t;
@@ -116,15 +118,17 @@ begin
       word     => row_asks
     );
 
-  -- Its columns. The request of the one that finishes is its last beat's, not a new task's.
+  -- Its columns. The request of the one that finishes is its last beat's, not a new task's. Since `finished` arrives
+  -- late, all depends on it only at the end.
 
   padded_id       <= std_logic_vector(resize(unsigned(finished_id), ROW_BITS+COLUMN_BITS));
   finished_row    <= padded_id(ROW_BITS+COLUMN_BITS-1 downto COLUMN_BITS);
-  finished_column <= decode(padded_id(COLUMN_BITS-1 downto 0), finished, COLUMNS);
+  finished_column <= decode(padded_id(COLUMN_BITS-1 downto 0), '1', COLUMNS);
+  own_of_next     <= finished_column when found_row = finished_row else (others => '0');
+  own_of_batch    <= finished_column when row_r = finished_row else (others => '0');
 
   row_known    <= row_accepted xor row_finished;
-  row_new      <= row_asks and not row_known and not finished_column when found_row = finished_row else
-                  row_asks and not row_known;
+  row_new      <= row_asks and not row_known and not gated(own_of_next, finished);
   load         <= not (any_of(batch_r) or clearing);
 
   accept_row   <= load or clearing;
@@ -144,7 +148,7 @@ begin
     );
 
   -- A finished requester is no longer known. A task that is dropped was known, too.
-  forgets      <= any_of(batch_r and finished_column) when row_r = finished_row else '0';
+  forgets      <= any_of(batch_r and own_of_batch);
   finish_task  <= finished and (finished_known or forgets);
   new_finished <= old_finished xor finished_column;
 
@@ -176,8 +180,8 @@ begin
         if leaves = '1' then
           staying := staying and not decode(first, '1', COLUMNS);
         end if;
-        if row_r = finished_row then
-          staying := staying and not finished_column;
+        if finished = '1' then
+          staying := staying and not own_of_batch;
         end if;
         batch_r <= staying;
         if load = '1' and any_of(rows_that_ask) = '1' then

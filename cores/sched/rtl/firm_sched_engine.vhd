@@ -10,6 +10,8 @@
 -- has no key yet, and keeps the grant until it has one. While the queue refills its root, B or an arriving task goes
 -- first if the root can preempt it after a beat; otherwise there is no grant.
 -- A task with a smaller key (EDF, LST) takes the grant; the preempted one goes back into the queue through B.
+-- `beat` and `last` pass through the Manager's multiplexer and arrive late. What they decide is therefore prepared for
+-- both cases, that the next grant is chosen and that the task goes on; they only select.
 -- Keys are compared as numbers that wrap around. They must stay less than half their range apart for any behaviour of
 -- the host. Time therefore stops while the key of the current task or of the root is overdue.
 library ieee;
@@ -75,9 +77,8 @@ architecture rtl of firm_sched_engine is
   signal b_id_r    : id_t;
   signal b_key_r   : key_t;
   signal b_is_free : std_logic;  -- is empty or leaves
-  signal b_inserts : std_logic;
 
-  signal insert_valid : std_logic;
+  signal insert       : std_logic;
   signal insert_ready : std_logic;
   signal root_valid   : std_logic;
   signal root_id      : id_t;
@@ -85,7 +86,6 @@ architecture rtl of firm_sched_engine is
   signal first_valid  : std_logic;
   signal first_id     : id_t;
   signal first_key    : key_t;
-  signal pop          : std_logic;
   signal empty        : std_logic;
 
   signal grant_valid_r  : std_logic;
@@ -93,19 +93,31 @@ architecture rtl of firm_sched_engine is
   signal running_r      : std_logic;  -- the grant is a task's, not parked
   signal keyed_r        : std_logic;  -- and the task has a key
   signal key_r          : key_t;
-  signal next_key       : key_t;
+  signal sent_key       : key_t;      -- the current task's key after this cycle
 
-  signal finished  : std_logic;
-  signal choose    : std_logic;  -- no task is entitled to the grant in the next cycle
-  signal gives_way : std_logic;  -- the queue yields to an item that is about to enter it
-  signal take_root : std_logic;
-  signal take_b    : std_logic;
-  signal take_a    : std_logic;
-  signal may_leave : std_logic;
-  signal preempt   : std_logic;
-  signal get_key   : std_logic;  -- the current task gets its key
+  signal finished    : std_logic;
+  signal choose      : std_logic;  -- no task is entitled to the grant in the next cycle
+  signal moves       : std_logic;  -- the next grant replaces the current one, unless there is none
+  signal gives_way   : std_logic;  -- the queue yields to an item that is about to enter it
+  signal may_take_b  : std_logic;
+  signal may_take_a  : std_logic;
+  signal next_id     : id_t;
+  signal next_key    : key_t;
+  signal given       : std_logic;  -- the choice finds a task
+  signal pop         : std_logic;
+  signal may_leave   : std_logic;
+  signal may_preempt : std_logic;  -- the root preempts the task if this goes on
+  signal preempt     : std_logic;
 
-  signal advance : std_logic;    -- time advances
+  -- What happens to arriving tasks if the next grant is chosen, and if the task goes on.
+  signal b_is_free_if_chosen : std_logic;
+  signal b_is_free_if_kept   : std_logic;
+  signal leaves_if_chosen    : std_logic;
+  signal leaves_if_kept      : std_logic;
+  signal enters_if_chosen    : std_logic;
+  signal enters_if_kept      : std_logic;
+
+  signal advance : std_logic;  -- time advances
 
 begin
 
@@ -195,9 +207,6 @@ begin
 
   -- The queue.
 
-  insert_valid <= b_valid_r and not take_b;
-  pop          <= take_root or preempt;
-
   of_few_luts : if not IS_SORTED generate
     u_heap : entity firm.firm_sched_heap
       generic map (
@@ -207,8 +216,9 @@ begin
       port map (
         clk          => clk,
         rst_n        => rst_n,
-        insert_valid => insert_valid,
+        insert_valid => b_valid_r,
         insert_ready => insert_ready,
+        insert       => insert,
         insert_id    => b_id_r,
         insert_key   => b_key_r,
         root_valid   => root_valid,
@@ -231,8 +241,9 @@ begin
       port map (
         clk          => clk,
         rst_n        => rst_n,
-        insert_valid => insert_valid,
+        insert_valid => b_valid_r,
         insert_ready => insert_ready,
+        insert       => insert,
         insert_id    => b_id_r,
         insert_key   => b_key_r,
         root_valid   => root_valid,
@@ -248,11 +259,21 @@ begin
 
   -- The next grant.
 
-  choose    <= finished or not (running_r or beat);
-  take_root <= choose and first_valid;
-  take_b    <= choose and gives_way and b_valid_r;
-  take_a    <= choose and gives_way and not b_valid_r and a_valid and not (finished and a_is_own);
-  get_key   <= a_valid and a_is_own and not choose;
+  choose <= finished or not (running_r or beat);
+  moves  <= choose or may_preempt;
+  pop    <= moves and first_valid;
+
+  may_take_b <= gives_way and b_valid_r;
+  may_take_a <= gives_way and a_valid and not b_valid_r;
+
+  next_id  <= first_id when first_valid = '1' else
+              b_id_r when b_valid_r = '1' else
+              a_id;
+  next_key <= first_key when first_valid = '1' else
+              b_key_r when b_valid_r = '1' else
+              a_key;
+  -- The task that finishes may be first of the arrivals.
+  given    <= choose and (first_valid or may_take_b or (may_take_a and not (finished and a_is_own)));
 
   preemptive : if not HAS_STAMPS generate
     signal root_is_before : std_logic;
@@ -262,11 +283,13 @@ begin
     b_has_room     <= '1' when IS_SORTED else not b_valid_r;
     -- A possibly wrong task is better than none, since the right one preempts it after a beat.
     gives_way      <= not first_valid when SHORTEST_RUN <= 1 else empty;
-    preempt        <= running_r and keyed_r and root_is_before and b_has_room and may_leave and not finished;
+    may_preempt    <= running_r and keyed_r and root_is_before and b_has_room and may_leave;
+    preempt        <= may_preempt and not choose;
   end generate preemptive;
   non_preemptive : if HAS_STAMPS generate
-    gives_way <= empty;
-    preempt   <= '0';
+    gives_way   <= empty;
+    may_preempt <= '0';
+    preempt     <= '0';
   end generate non_preemptive;
 
   runs_of_one : if SHORTEST_RUN <= 1 generate
@@ -293,11 +316,26 @@ begin
     end process count_beats;
   end generate longer_runs;
 
-  a_leaves   <= take_a or get_key or a_enters_b;
-  a_enters_b <= a_valid and b_is_free and key_ready and
-                not (preempt or take_a or (a_is_own and (finished or not choose)));
-  b_inserts  <= insert_valid and insert_ready;
-  b_is_free  <= not b_valid_r or take_b or b_inserts;
+  -- A choice pops the heap if it can, which then accepts no item; B is taken only if the choice cannot pop.
+  heap_inserts : if not IS_SORTED generate
+    insert              <= b_valid_r and insert_ready and not choose;
+    b_is_free_if_chosen <= gives_way or not b_valid_r;
+  end generate heap_inserts;
+  sorted_queue_inserts : if IS_SORTED generate
+    insert              <= b_valid_r and not (choose and gives_way);
+    b_is_free_if_chosen <= '1';
+  end generate sorted_queue_inserts;
+  b_is_free_if_kept <= insert_ready or not b_valid_r;
+
+  -- A task of the current requester stays in A until its key is the current one's, or until it finishes and is dropped.
+  enters_if_chosen <= a_valid and key_ready and b_is_free_if_chosen and not may_take_a;
+  enters_if_kept   <= a_valid and key_ready and b_is_free_if_kept and not (may_preempt or a_is_own);
+  leaves_if_chosen <= may_take_a or enters_if_chosen;
+  leaves_if_kept   <= (a_valid and a_is_own) or enters_if_kept;
+
+  a_leaves   <= leaves_if_chosen when choose = '1' else leaves_if_kept;
+  a_enters_b <= enters_if_chosen and not (finished and a_is_own) when choose = '1' else enters_if_kept;
+  b_is_free  <= b_is_free_if_chosen when choose = '1' else b_is_free_if_kept;
 
   hold_b : process (clk)
   begin
@@ -309,7 +347,7 @@ begin
       end if;
       if preempt = '1' then
         b_id_r  <= grant_select_r;
-        b_key_r <= next_key;
+        b_key_r <= sent_key;
       elsif a_enters_b = '1' then
         b_id_r  <= a_id;
         b_key_r <= a_key;
@@ -318,13 +356,13 @@ begin
   end process hold_b;
 
   sends_own_time : if POLICY = LST generate
-    signal step : unsigned(0 downto 0);
+    signal one_later : key_t;
   begin
-    step(0)  <= beat and advance;
-    next_key <= std_logic_vector(unsigned(key_r) + step);
+    one_later <= std_logic_vector(unsigned(key_r) + 1);
+    sent_key  <= one_later when beat = '1' and advance = '1' else key_r;
   end generate sends_own_time;
   keeps_key : if POLICY /= LST generate
-    next_key <= key_r;
+    sent_key <= key_r;
   end generate keeps_key;
 
   grant : process (clk)
@@ -336,29 +374,25 @@ begin
         running_r      <= '0';
         keyed_r        <= '0';
       else
-        if pop = '1' then
-          grant_select_r <= first_id;
-        elsif take_b = '1' then
-          grant_select_r <= b_id_r;
-        elsif take_a = '1' then
-          grant_select_r <= a_id;
+        -- If the task that finishes is the only one left, this is the index that has the grant.
+        if moves = '1' and (first_valid = '1' or may_take_b = '1' or may_take_a = '1') then
+          grant_select_r <= next_id;
         end if;
-        if pop = '1' or take_b = '1' or take_a = '1' then
+        if given = '1' then
           grant_valid_r <= '1';
         elsif choose = '1' and empty = '0' then
           grant_valid_r <= '0';
         end if;
-        running_r <= not choose or take_root or take_b or take_a;
-        keyed_r   <= take_root or take_b or take_a or (not choose and (keyed_r or get_key));
+        running_r <= given or not choose;
+        keyed_r   <= given or (not choose and (keyed_r or (a_valid and a_is_own)));
       end if;
-      if pop = '1' then
-        key_r <= first_key;
-      elsif take_b = '1' then
-        key_r <= b_key_r;
-      elsif take_a = '1' or get_key = '1' then
+      -- Without a task that has a key, its content does not matter.
+      if moves = '1' then
+        key_r <= next_key;
+      elsif a_valid = '1' and a_is_own = '1' then
         key_r <= a_key;
       else
-        key_r <= next_key;
+        key_r <= sent_key;
       end if;
     end if;
   end process grant;

@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Finds the next requesting index after a given one, cyclically; the given one itself is the last. No registers.
+-- Finds the next requesting index after a given one, cyclically; the given one itself is the last. Also tells whether
+-- the given one requests. No registers.
 -- Requesters are arranged in rows. A later requester in the row of the given one goes first; otherwise, the lowest one
 -- of the next row with a request, which may be the same row. Both are searched for in parallel.
 library ieee;
@@ -15,6 +16,7 @@ entity firm_sched_following is
   port (
     request   : in  std_logic_vector(REQUESTERS-1 downto 0);
     index     : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+    asks      : out std_logic;  -- the given one requests
     found     : out std_logic;
     following : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)  -- any if none is found
   );
@@ -41,6 +43,7 @@ architecture rtl of firm_sched_following is
 begin
 
   flat : if REQUESTERS >= 1 and REQUESTERS <= FEW generate
+    asks      <= any_of(request and decode(index, '1', REQUESTERS));
     found     <= any_of(request);
     following <= next_of(request, index);
   end generate flat;
@@ -57,11 +60,11 @@ begin
     signal row    : std_logic_vector(ROW_BITS-1 downto 0);  -- of the given index
     signal column : std_logic_vector(COLUMN_BITS-1 downto 0);
 
-    signal of_row     : std_logic_vector(COLUMNS-1 downto 0);  -- requests of its row, and those further on
-    signal later      : std_logic_vector(COLUMNS-1 downto 0);
-    signal next_row   : std_logic_vector(ROW_BITS-1 downto 0);
-    signal of_next    : std_logic_vector(COLUMNS-1 downto 0);
-    signal is_in_row  : std_logic;
+    signal of_row    : std_logic_vector(COLUMNS-1 downto 0);  -- requests of its row, and those further on
+    signal later     : std_logic_vector(COLUMNS-1 downto 0);
+    signal next_row  : std_logic_vector(ROW_BITS-1 downto 0);
+    signal of_next   : std_logic_vector(COLUMN_BITS-1 downto 0);
+    signal is_in_row : std_logic;
   begin
     pad : process (request)
     begin
@@ -87,22 +90,23 @@ begin
         word     => of_row
       );
 
-    u_of_next : entity firm.firm_axis_select
+    u_of_next : entity firm.firm_sched_first_of_row
       generic map (
-        WORDS => ROWS,
-        WIDTH => COLUMNS
+        ROWS    => ROWS,
+        COLUMNS => COLUMNS
       )
       port map (
-        words_in => padded,
-        index    => next_row,
-        word     => of_next
+        request => padded,
+        row     => next_row,
+        column  => of_next
       );
 
     later     <= of_row and above(column, COLUMNS);
+    asks      <= any_of(of_row and decode(column, '1', COLUMNS));
     is_in_row <= any_of(later);
     next_row  <= next_of(row_asks, row);
     found     <= any_of(row_asks);
-    following <= row & first_of(later) when is_in_row = '1' else next_row & first_of(of_next);
+    following <= row & first_of(later) when is_in_row = '1' else next_row & of_next;
   end generate in_rows;
 
 end architecture rtl;

@@ -26,8 +26,9 @@ entity firm_sched_heap is
     rst_n : in std_logic;
 
     -- An item that is not in the queue. Keys in the queue are less than half their range apart.
-    insert_valid : in  std_logic;
-    insert_ready : out std_logic;
+    insert_valid : in  std_logic;  -- an item is offered
+    insert_ready : out std_logic;  -- it can enter, unless there is a pop in this cycle
+    insert       : in  std_logic;  -- it enters; otherwise, it may stay offered only if it cannot, or there is no root
     insert_id    : in  std_logic_vector(index_bits(ITEMS)-1 downto 0);
     insert_key   : in  std_logic_vector(KEY_BITS-1 downto 0);
 
@@ -62,7 +63,6 @@ architecture rtl of firm_sched_heap is
   signal cleared_r : unsigned(LEVELS downto 0);  -- the next index whose path is to be cleared; the highest bit: all are
   signal clearing  : std_logic;
 
-  signal insert     : std_logic;
   signal root_stays : std_logic;
 
   -- The operation for level n, and the item with which level n+1 fills a hole of level n; the root is level 0.
@@ -80,8 +80,7 @@ architecture rtl of firm_sched_heap is
 begin
 
   clearing     <= not cleared_r(LEVELS);
-  insert_ready <= not (pop or filling_r or owing_r or clearing);
-  insert       <= insert_valid and not (pop or filling_r or owing_r or clearing);
+  insert_ready <= not (filling_r or owing_r or clearing);
   fill         <= (pop and not filling_r) or owing_r;
   root_stays   <= root_valid_r and is_before(root_key_r & root_id_r, insert_key & insert_id);
 
@@ -107,10 +106,12 @@ begin
           root_valid_r <= '1';
         end if;
       end if;
+      -- `pop` and `insert` arrive late. Where an offered item does not enter, there is no root in the next cycle, or
+      -- it is being filled, so its content does not depend on them.
       if filling_r = '1' then
         root_id_r  <= up_id(0);
         root_key_r <= up_key(0);
-      elsif insert = '1' and root_stays = '0' then
+      elsif insert_valid = '1' and root_stays = '0' then
         root_id_r  <= insert_id;
         root_key_r <= insert_key;
       end if;

@@ -83,6 +83,7 @@ architecture rtl of firm_sched_heap_level is
   signal second_right : std_logic;
   signal first_rank   : rank_t;
   signal second_rank  : rank_t;
+  signal second_first : std_logic;
   signal takes_second : std_logic;
 
   function rank(of_node : node_t; is_right : std_logic) return rank_t is
@@ -110,7 +111,8 @@ begin
         fill_r   <= fill;
         clear_r  <= clear;
       end if;
-      if insert = '1' or fill = '1' or clear = '1' then
+      -- Operations arrive late at the highest level, whose pair needs no address.
+      if LEVEL = 1 or insert = '1' or fill = '1' or clear = '1' then
         id_r  <= id;
         key_r <= key;
       end if;
@@ -185,7 +187,8 @@ begin
   end generate inner_nodes;
   first_rank   <= rank(first, not fill_r and id_r(SIDE));
   second_rank  <= rank(second, second_right);
-  takes_second <= second(NODE_BITS-1) and (is_before(second_rank, first_rank) or not first(NODE_BITS-1));
+  second_first <= is_before(second_rank, first_rank);
+  takes_second <= second(NODE_BITS-1) and (second_first or not first(NODE_BITS-1));
 
   hand_up : process (left, right, takes_second, id_r)
     variable smaller : node_t;
@@ -224,7 +227,8 @@ begin
     end loop;
   end process hand_down;
 
-  choose_write : process (item, insert_r, clear_r, id_r, takes_second, hole, hole_right,
+  -- The comparison is the last to arrive, and an INSERT has an item: its node stays only if it goes first.
+  choose_write : process (item, node, insert_r, clear_r, id_r, second_first, hole, hole_right,
                           filler_valid, filler_id, filler_key)
     variable keep_item : std_logic;
   begin
@@ -236,9 +240,9 @@ begin
         write_node(place) <= filler_id(place);
       end loop;
     end if;
-    keep_item   := insert_r and not takes_second;
-    write_left  <= clear_r or (keep_item and not id_r(SIDE)) or (hole and not hole_right);
-    write_right <= clear_r or (keep_item and id_r(SIDE)) or (hole and hole_right);
+    keep_item   := not (node(NODE_BITS-1) and second_first);
+    write_left  <= (insert_r and not id_r(SIDE) and keep_item) or (clear_r or (hole and not hole_right));
+    write_right <= (insert_r and id_r(SIDE) and keep_item) or (clear_r or (hole and hole_right));
   end process choose_write;
 
 end architecture rtl;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Finds the lowest requesting index except a given one, and tells whether the given one requests, too. No registers.
 -- Requesters are arranged in rows. The requests of the given one's row are read at once, since its number is known.
--- Meanwhile the first other row with a request is found, and then its first request. The rows' numbers decide which of
--- the two is lower.
+-- Meanwhile the first other row with a request is found, and its first request. The rows' numbers decide which of the
+-- two is lower.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -81,7 +81,7 @@ begin
 
     signal row_asks   : std_logic_vector(ROWS-1 downto 0);  -- of the other rows
     signal first_row  : std_logic_vector(ROW_BITS-1 downto 0);
-    signal of_first   : std_logic_vector(COLUMNS-1 downto 0);
+    signal of_first   : std_logic_vector(COLUMN_BITS-1 downto 0);
     signal row_before : std_logic;  -- a row of a lower number has requests
   begin
     pad : process (request)
@@ -100,15 +100,15 @@ begin
                              not is_row(row_index);
     end generate each_row;
 
-    u_of_first : entity firm.firm_axis_select
+    u_of_first : entity firm.firm_sched_first_of_row
       generic map (
-        WORDS => ROWS,
-        WIDTH => COLUMNS
+        ROWS    => ROWS,
+        COLUMNS => COLUMNS
       )
       port map (
-        words_in => padded,
-        index    => first_row,
-        word     => of_first
+        request => padded,
+        row     => first_row,
+        column  => of_first
       );
 
     of_row     <= word_at(padded, row);
@@ -120,7 +120,7 @@ begin
     asks      <= any_of(of_row and is_column);
     found     <= any_of(left) or any_of(row_asks);
     is_before <= '1' when row_before = '1' or (any_of(left) = '1' and first_left < column) else '0';
-    lowest    <= row & first_left when any_of(left) = '1' and row_before = '0' else first_row & first_of(of_first);
+    lowest    <= row & first_left when any_of(left) = '1' and row_before = '0' else first_row & of_first;
   end generate in_rows;
 
 end architecture rtl;

@@ -1,7 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Round robin, non-preemptive: the next index after the requester that was served last, cyclically.
+-- Round robin, non-preemptive: the next index after the one that has the grant, cyclically.
 -- The next task is chosen in the cycle of the last beat. The finishing requester needs no exclusion: it is the last in
--- the round, so it is chosen only if there are no other requests, which leaves the grant where it is.
+-- the round, so it is chosen only if there are no other requests, which leaves the grant where it is. A granted request
+-- keeps the grant until its task is finished, so the search always begins at the grant. The Manager selects `beat` and
+-- `last` by the grant. They arrive late, and only decide whether the choice becomes the grant.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -27,14 +29,14 @@ end entity firm_sched_round_robin;
 
 architecture rtl of firm_sched_round_robin is
 
-  signal served  : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);  -- had the last beat
-  signal found   : std_logic;
-  signal choice  : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-  signal goes_on : std_logic;
+  signal finished : std_logic;
+  signal offered  : std_logic;  -- the granted requester's request
+  signal found    : std_logic;
+  signal choice   : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+  signal moves    : std_logic;  -- the choice becomes the grant
 
   signal grant_valid_r  : std_logic;
   signal grant_select_r : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-  signal served_r       : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
   signal started_r      : std_logic;  -- the granted task has had a beat and needs more
 
 begin
@@ -43,8 +45,8 @@ begin
     report "firm_sched_round_robin: " & fault_of_size(REQUESTERS)
     severity failure;
 
-  served  <= grant_select_r when beat = '1' else served_r;
-  goes_on <= (started_r or beat) and not (beat and last);
+  finished <= beat and last;
+  moves    <= found and (finished or not (started_r or (grant_valid_r and offered)));
 
   u_choice : entity firm.firm_sched_following
     generic map (
@@ -52,7 +54,8 @@ begin
     )
     port map (
       request   => request,
-      index     => served,
+      index     => grant_select_r,
+      asks      => offered,
       found     => found,
       following => choice
     );
@@ -60,17 +63,15 @@ begin
   choose : process (clk)
   begin
     if rising_edge(clk) then
-      started_r <= goes_on;
-      served_r  <= served;
-      if goes_on = '0' and found = '1' then
+      started_r <= (started_r or beat) and not finished;
+      if moves = '1' then
         grant_valid_r  <= '1';
         grant_select_r <= choice;
       end if;
       if rst_n = '0' then
         started_r      <= '0';
-        served_r       <= (others => '1');  -- so that index 0 comes first
         grant_valid_r  <= '0';
-        grant_select_r <= (others => '0');
+        grant_select_r <= (others => '1');  -- so that index 0 comes first
       end if;
     end if;
   end process choose;

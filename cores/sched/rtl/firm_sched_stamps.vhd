@@ -5,7 +5,8 @@
 -- a quarter of the range; the count advances at most four times per step of the sweep. Requesters that were idle for so
 -- long have no order among each other, but go before all others. The memory has one port: a completion has priority,
 -- then a sweep that is due, then a read. A step of the sweep reads a stamp in one cycle and writes it, if necessary, in
--- a later one, which keeps the path through the memory short.
+-- a later one, which keeps the path through the memory short. A completion arrives late, and is recorded in the next
+-- cycle; no task of its requester can be read before.
 -- A requester without a stamp since reset uses its index: lower ones count as less recently used. Marks record which
 -- requesters have stamps, in rows like those of firm_sched_arrivals. After reset they are cleared, one row per cycle,
 -- while no task arrives.
@@ -46,6 +47,9 @@ architecture rtl of firm_sched_stamps is
 
   constant QUARTER : unsigned(STAMP_BITS-1 downto 0) := to_unsigned(2**(STAMP_BITS-2), STAMP_BITS);
 
+  signal completed_r    : std_logic;
+  signal completed_id_r : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+
   signal count_r : unsigned(STAMP_BITS-1 downto 0);
   signal sweep_r : unsigned(ID_BITS downto 0);     -- the highest bit: all marks are cleared
   signal swept_r : std_logic_vector(STAMP_BITS-1 downto 0);  -- the sweep's stamp, once read
@@ -73,12 +77,20 @@ architecture rtl of firm_sched_stamps is
 
 begin
 
+  hold_completion : process (clk)
+  begin
+    if rising_edge(clk) then
+      completed_r    <= completed and rst_n;
+      completed_id_r <= completed_id;
+    end if;
+  end process hold_completion;
+
   clearing <= not sweep_r(ID_BITS);
   due      <= steps_r(2);
-  reads    <= read and not (completed or due);
-  sweeps   <= not (completed or reads);
+  reads    <= read and not (completed_r or due);
+  sweeps   <= not (completed_r or reads);
 
-  address <= std_logic_vector(resize(unsigned(completed_id), ID_BITS)) when completed = '1' else
+  address <= std_logic_vector(resize(unsigned(completed_id_r), ID_BITS)) when completed_r = '1' else
              std_logic_vector(resize(unsigned(read_id), ID_BITS)) when reads = '1' else
              std_logic_vector(sweep_r(ID_BITS-1 downto 0));
   row     <= address(ID_BITS-1 downto COLUMN_BITS);
@@ -130,8 +142,8 @@ begin
   is_old <= age(STAMP_BITS-1) or age(STAMP_BITS-2);
   moves  <= known_r and (sweeps or not is_old);
 
-  write_enable <= completed or (sweeps and known_r and is_old);
-  write_word   <= std_logic_vector(count_r) when completed = '1' else std_logic_vector(count_r - QUARTER);
+  write_enable <= completed_r or (sweeps and known_r and is_old);
+  write_word   <= std_logic_vector(count_r) when completed_r = '1' else std_logic_vector(count_r - QUARTER);
 
   count : process (clk)
     variable steps : unsigned(2 downto 0);
@@ -141,7 +153,7 @@ begin
       if moves = '1' then
         steps := (others => '0');
       end if;
-      if completed = '1' and due = '0' then
+      if completed_r = '1' and due = '0' then
         steps   := steps + 1;
         count_r <= count_r + 1;
       end if;
@@ -167,7 +179,7 @@ begin
       end if;
       -- A stamp that was read is outdated if its requester completes a task.
       known_r <= not clearing and (sweeps or known_r) and not moves;
-      if completed = '1' and unsigned(completed_id) = sweep_r(ID_BITS-1 downto 0) then
+      if completed_r = '1' and unsigned(completed_id_r) = sweep_r(ID_BITS-1 downto 0) then
         known_r <= '0';
       end if;
       if rst_n = '0' then

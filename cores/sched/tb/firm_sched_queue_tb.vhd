@@ -36,6 +36,8 @@ architecture simulation of firm_sched_queue_tb is
   signal rst_n        : std_logic := '0';
   signal insert_valid : std_logic := '0';
   signal insert_ready : std_logic;
+  signal queue_ready  : std_logic;
+  signal insert       : std_logic;
   signal insert_id    : std_logic_vector(ID_BITS-1 downto 0)  := (others => '0');
   signal insert_key   : std_logic_vector(KEY_BITS-1 downto 0) := (others => '0');
   signal root_valid   : std_logic;
@@ -60,7 +62,8 @@ begin
         clk          => clk,
         rst_n        => rst_n,
         insert_valid => insert_valid,
-        insert_ready => insert_ready,
+        insert_ready => queue_ready,
+        insert       => insert,
         insert_id    => insert_id,
         insert_key   => insert_key,
         root_valid   => root_valid,
@@ -84,7 +87,8 @@ begin
         clk          => clk,
         rst_n        => rst_n,
         insert_valid => insert_valid,
-        insert_ready => insert_ready,
+        insert_ready => queue_ready,
+        insert       => insert,
         insert_id    => insert_id,
         insert_key   => insert_key,
         root_valid   => root_valid,
@@ -98,7 +102,9 @@ begin
       );
   end generate sorted_queue;
 
-  pop <= pop_wanted and first_valid;
+  pop          <= pop_wanted and first_valid;
+  insert_ready <= queue_ready when SORTED else queue_ready and not pop;
+  insert       <= insert_valid and insert_ready;
 
   drive : process
 

@@ -50,14 +50,17 @@ class Stamps(Keys):
         self._known: Bools = np.zeros(batch, np.bool_)
         self._steps: Ints = np.zeros(batch, np.int64)
         self._clearing, _ = rows_and_columns(requesters)
+        # The completion of the last cycle, which is recorded in this one.
+        self._completed: Bools = np.zeros(batch, np.bool_)
+        self._completed_id: Ints = np.zeros(batch, np.int64)
 
-    def _reads(self, wanted: Bools, finished: Bools) -> Bools:
+    def _reads(self, wanted: Bools) -> Bools:
         is_due: Bools = self._steps == self._STEPS
-        return wanted & ~(finished | is_due)
+        return wanted & ~(self._completed | is_due)
 
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
         """See `Keys`."""
-        return self._stamps[self._members, index], self._reads(wanted, finished)
+        return self._stamps[self._members, index], self._reads(wanted)
 
     def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
         """See `Keys`; stamps do not depend on time."""
@@ -68,19 +71,21 @@ class Stamps(Keys):
         if self._clearing:
             self._clearing -= 1
             return
-        sweeps = ~(finished | self._reads(wanted, finished))
+        completed, completed_id = self._completed, self._completed_id
+        sweeps = ~(completed | self._reads(wanted))
         is_old = self._known & (self._count - self._swept >= self._quarter)
         renews = sweeps & is_old
         moves = self._known & (sweeps | ~is_old)
         self._swept = np.where(self._known, self._swept, self._stamps[self._members, self._sweep])
         self._stamps[self._members[renews], self._sweep[renews]] = (self._count - self._quarter)[renews]
-        self._stamps[self._members[finished], finished_id[finished]] = self._count[finished]
-        is_lost = finished & (finished_id == self._sweep)
+        self._stamps[self._members[completed], completed_id[completed]] = self._count[completed]
+        is_lost = completed & (completed_id == self._sweep)
         self._known = (sweeps | self._known) & ~moves & ~is_lost
-        counts = finished & (self._steps < self._STEPS)
+        counts = completed & (self._steps < self._STEPS)
         self._count = self._count + counts
         self._steps = np.where(moves, 0, self._steps) + counts
         self._sweep = (self._sweep + moves) % self._size
+        self._completed, self._completed_id = finished, finished_id
 
 
 def lru(generics: Generics) -> Scheduler:

@@ -14,7 +14,7 @@ from fusesoc_firm.system.boards.board import Board, board_entity
 from fusesoc_firm.system.boards.processor import PROCESSORS, Processor
 from fusesoc_firm.system.boards.timing_constraints import period
 from fusesoc_firm.system.derived.cpp_function import function_name, kernel_entity
-from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, StatusAccess
 from fusesoc_firm.system.hardware.configuration import pin_groups
 from fusesoc_firm.system.hardware.names import Names
 from fusesoc_firm.text.render import Context
@@ -25,6 +25,8 @@ PACKAGE_TEMPLATE = "hls/package.tcl"
 # The width of a descriptor's length field in bits: the DMA engine's maximum (PG021).
 _LENGTH_BITS = 26
 _ADDRESS_BITS = 32
+# From the DMA engine's registers to those of the status; each have 64 KiB.
+_STATUS_OFFSET = 0x10000
 _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
 # Parameters that Vivado infers from whole interface connections and from pins of known polarity.
 _FOUND_OUT = {"c_s_axis_s2mm_tdata_width", "C_AUX_RESET_HIGH"}
@@ -45,7 +47,6 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
         "name": system.name,
         "board": board.name,
         "description": str(board.description),
-        "has_clocks": bool(system.clocks),
         "kernels": [{"function": function_name(type_), "kernel": kernel_entity(type_)} for type_ in system.kernels],
         "ip": processor.ip,
         "automation": " ".join(filter(None, (processor.automation, preset))),
@@ -60,12 +61,13 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
             }
             for cell, ip, meaning, properties in _cells(system, processor)
         ],
-        "interfaces": _pairs(_interfaces(processor)),
+        "interfaces": _pairs(_interfaces(system, processor)),
         "nets": [
             {"meaning": meaning, "connections": _pairs(pairs)} for meaning, pairs in _nets(system, processor) if pairs
         ],
         "pins": _pins(system),
         "base": processor.base,
+        "status": {"base": f"0x{int(processor.base, 16) + _STATUS_OFFSET:X}"} if _has_bus(system) else None,
     }
 
 
@@ -94,9 +96,11 @@ def _cells(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, s
             ("c_s_axis_s2mm_tdata_width", system.width),
         ],
     )
-    yield "control", "smartconnect", "Registers of the DMA engine.", [("NUM_SI", 1), ("NUM_MI", 1)]
+    registers = "Registers of the DMA engine" + (", and of the status." if _has_bus(system) else ".")
+    yield "control", "smartconnect", registers, [("NUM_SI", 1), ("NUM_MI", 2 if _has_bus(system) else 1)]
     yield "memory", "smartconnect", "Descriptors and frames in memory.", [("NUM_SI", 3), ("NUM_MI", 1)]
-    yield "interrupts", "xlconcat", "One for each direction.", [("NUM_PORTS", 2)]
+    lines = "One for each direction" + (", and one of the status." if system.status else ".")
+    yield "interrupts", "xlconcat", lines, [("NUM_PORTS", 3 if system.status else 2)]
     yield "reset", "proc_sys_reset", "The processor's reset, by the clock.", []
     yield (
         "system_reset",
@@ -106,9 +110,16 @@ def _cells(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, s
     )
 
 
-def _interfaces(processor: Processor) -> Iterator[tuple[str, str]]:
+def _has_bus(system: DerivedSystem) -> bool:
+    """Return whether the system has a port for AXI4-Lite."""
+    return system.status is StatusAccess.AXI_LITE
+
+
+def _interfaces(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, str]]:
     yield f"processor/{processor.control}", "control/S00_AXI"
     yield "control/M00_AXI", "dma/S_AXI_LITE"
+    if _has_bus(system):
+        yield "control/M01_AXI", "system/s_axi"
     for number, name in enumerate(("M_AXI_SG", "M_AXI_MM2S", "M_AXI_S2MM")):
         yield f"dma/{name}", f"memory/S{number:02}_AXI"
     yield "memory/M00_AXI", f"processor/{processor.memory}"
@@ -150,6 +161,7 @@ def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, li
         [
             ("dma/mm2s_introut", "interrupts/In0"),
             ("dma/s2mm_introut", "interrupts/In1"),
+            *([("system/status_interrupt", "interrupts/In2")] if system.status else ()),
             ("interrupts/dout", f"processor/{processor.interrupts}"),
         ],
     )

@@ -38,6 +38,7 @@ from fusesoc_firm.system.derived.model import (
 from fusesoc_firm.system.derived.partition import MOST_CONVERTERS, Parting, Parts, message_names
 from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
+from fusesoc_firm.system.derived.status import status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
 from fusesoc_firm.system.written.sources import declares_width
@@ -94,15 +95,16 @@ def derive(
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
+    subscribers = _converters(parts, SUBSCRIBER, connections)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
-    link = link_of(project, clock, scheduling, faults)
+    link = link_of(project, clock, scheduling, subscribers, faults)
     faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
         fpga_part=str(project.fpga_part or ""),
         width=project.width,
         scheduling=scheduling,
-        subscribers=_converters(parts, SUBSCRIBER, connections),
+        subscribers=subscribers,
         publishers=publishers,
         accelerators=analysis.instances(is_software=False),
         connections=connections,
@@ -111,6 +113,7 @@ def derive(
         software=parts.software,
         names=names,
         link=link,
+        status=status_of(project, link, max(len(subscribers), len(publishers)), faults),
     )
     check_entities(system, parts.blocks, faults)
     faults.raise_if_any()

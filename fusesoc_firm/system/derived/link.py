@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
 
-from fusesoc_firm.system.derived.model import Link, LinkKind, Scheduling
+from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.system.derived.model import Converter, Link, LinkKind, Scheduling
 from fusesoc_firm.system.written.specification import AXI_STREAM, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
+# The longest payload that a link accepts where a message is unbounded. With the header and the bytes that an adapter
+# sends late, it fills a memory of 2,048 bytes.
+_UNBOUNDED_BYTES = 2000
+# Bytes that ROS 2 may append to a payload.
+_TRAILING_BYTES = 3
+# The limit of the hardware's generic LONGEST.
+_MOST_BYTES = 2**20
 # A higher frequency would exceed the range of the generic CLOCK_HZ, a VHDL integer.
 _FASTEST = 10**9
 
 
-def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
+def link_of(
+    project: Project,
+    clock: Fraction | None,
+    scheduling: Scheduling,
+    subscribers: Iterable[Converter],
+    faults: Diagnostics,
+) -> Link | None:
     """Return the link between the host and a system, or None if the streams are ports of the system; note faults.
 
     `clock` is the frequency of clk in Hz, if it is given.
@@ -26,7 +41,21 @@ def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, fa
             project.interconnect.source,
             "a byte link does not mark the end of a burst; use a non-preemptive scheduler or 'axi_stream'",
         )
-    return Link(kind, _clock_hz(project, clock, faults))
+    longest = _longest(subscribers)
+    if longest > _MOST_BYTES:
+        faults.error(
+            f"interconnect '{kind.value}' cannot hold a frame of {longest} bytes",
+            project.interconnect.source,
+            f"a link holds whole frames from the host; legal here: messages of at most {_MOST_BYTES} bytes",
+        )
+    return Link(kind, _clock_hz(project, clock, faults), longest)
+
+
+def _longest(subscribers: Iterable[Converter]) -> int:
+    """Return the number of payload bytes in the longest frame from the host."""
+    payloads = [length_of(subscriber.frame).maximum for subscriber in subscribers]
+    bounded = max((payload for payload in payloads if payload is not None), default=0)
+    return max(bounded + _TRAILING_BYTES, _UNBOUNDED_BYTES if None in payloads else 0)
 
 
 def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:

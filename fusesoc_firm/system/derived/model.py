@@ -186,10 +186,21 @@ class LinkKind(Enum):
 
 @dataclass(frozen=True)
 class Link:
-    """The link between the host and the system; `clock_hz` is the frequency of clk, or 0 if it is unknown."""
+    """The link between the host and the system; `clock_hz` is the frequency of clk, or 0 if it is unknown.
+
+    `longest` is the number of payload bytes in the longest frame from the host that the link accepts.
+    """
 
     kind: LinkKind
     clock_hz: int
+    longest: int
+
+
+class StatusAccess(Enum):
+    """The access to the registers of a system's status."""
+
+    FRAMES = "frames"
+    AXI_LITE = "axi_lite"
 
 
 @dataclass(frozen=True)
@@ -255,6 +266,7 @@ class DerivedSystem:
     link: Link | None = None
     clock: Fraction | None = None
     clocks: tuple[Clock, ...] = ()
+    status: StatusAccess | None = None
 
     def clock_of(self, block: str) -> Clock | None:
         """Return the clock of a block, or None for the system's clock."""

@@ -34,6 +34,9 @@ def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
     if pin.bits is not None and not 1 <= pin.bits <= _MOST_BITS:
         message = f"'bits' of pin '{pin.name}' cannot be {pin.bits}"
         faults.error(message, pin.place("bits"), f"legal here: 1 to {_MOST_BITS}")
+    if "synchroniser" in pin.places and pin.direction == "out":
+        message = f"'synchroniser' is legal only for inputs, but pin '{pin.name}' has the direction {pin.direction}"
+        faults.error(message, pin.place("synchroniser"), "remove the key")
     if not pin.name:
         return
     if identifier(pin.name) != pin.name:

@@ -14,13 +14,23 @@ from fusesoc_firm.system.hardware.instances import (
     ERROR_CODE_BITS,
     accelerator_instance,
     component,
+    pin_synchroniser,
     publisher_instance,
     subscriber_instance,
 )
 from fusesoc_firm.system.hardware.interconnect import interconnect_configuration
 from fusesoc_firm.system.hardware.maps import port_map
-from fusesoc_firm.system.hardware.names import RELEASED, Names, blocks, reset_label, seen_reset
+from fusesoc_firm.system.hardware.names import (
+    OWN_RESET,
+    RELEASED,
+    Names,
+    blocks,
+    reset_label,
+    seen_reset,
+    synchronised_pins,
+)
 from fusesoc_firm.system.hardware.scheduler import scheduler_configuration
+from fusesoc_firm.system.hardware.status import status_configuration
 from fusesoc_firm.system.hardware.wires import connections
 from fusesoc_firm.text.render import Context
 
@@ -38,6 +48,7 @@ def system_configuration(system: DerivedSystem) -> Context:
         **dimensions(system),
         "name": system.name,
         **interconnect_configuration(system),
+        **status_configuration(system),
         **scheduler_configuration(system),
         "clocks": _clocks(system),
         "resets": _resets(system),
@@ -52,6 +63,7 @@ def system_configuration(system: DerivedSystem) -> Context:
         "publishers": [publisher_instance(names, converter, system) for converter in system.publishers],
         "accelerators": [accelerator_instance(names, block, system) for block in system.accelerators],
         "pins": pin_groups(names, system),
+        "synchronisers": [pin_synchroniser(names, *pin, system) for pin in synchronised_pins(system)],
         "connections": connections(names, system),
     }
 
@@ -113,22 +125,20 @@ def _clocks(system: DerivedSystem) -> list[Context]:
     ]
 
 
-def _resets(system: DerivedSystem) -> Context | None:
-    """Return the resets of all domains if there are clocks besides clk.
+def _resets(system: DerivedSystem) -> Context:
+    """Return the resets of all domains.
 
-    The domains are reset in turn and released together.
+    clk is released on its own. The domains of crossings are reset in turn and released together.
     """
-    if not system.clocks:
-        return None
-    before = ""
-    instances = []
-    for clock in system.clocks:
-        instances.append(_reset(clock.port, before, seen_reset(clock)))
-        before = seen_reset(clock)
-    instances.append(_reset("clk", before, RELEASED))
-    instances += [_reset(clock.port, RELEASED, clock.reset) for clock in system.clocks]
-    signals = [RELEASED, *(name for clock in system.clocks for name in (seen_reset(clock), clock.reset))]
-    return {"signals": signals, "instances": instances}
+    instances = [_reset("clk", "", OWN_RESET)]
+    if system.clocks:
+        before = ""
+        for clock in system.clocks:
+            instances.append(_reset(clock.port, before, seen_reset(clock)))
+            before = seen_reset(clock)
+        instances.append(_reset("clk", before, RELEASED))
+        instances += [_reset(clock.port, RELEASED, clock.reset) for clock in system.clocks]
+    return {"signals": [item["reset"] for item in instances], "has_turns": bool(system.clocks), "instances": instances}
 
 
 def _reset(clock: str, may_end: str, reset: str) -> Context:

@@ -8,7 +8,7 @@ from typing import Any
 
 from fusesoc_firm.converter.vhdl import bit, bits, vhdl_type
 from fusesoc_firm.system.hardware.crossings import Crossing, Scope, parts_of, port_of, word
-from fusesoc_firm.system.hardware.names import AXIS, RELEASED, Names
+from fusesoc_firm.system.hardware.names import AXIS, RELEASED, Names, reset_of
 
 
 @dataclass(frozen=True)
@@ -171,5 +171,5 @@ def _domains(crossing: Crossing) -> dict[str, str]:
     found = {}
     for side, clock in (("s", crossing.source_clock), ("m", crossing.sink_clock)):
         found[f"{side}_clock"] = port_of(clock)
-        found[f"{side}_reset"] = clock.reset if clock else RELEASED if crossing.is_clocked else "rst_n"
+        found[f"{side}_reset"] = RELEASED if crossing.is_clocked and not clock else reset_of(clock)
     return found

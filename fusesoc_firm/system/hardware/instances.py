@@ -9,10 +9,14 @@ from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.system.derived.model import AcceleratorBlock, AcceleratorType, Converter, DerivedSystem
 from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
+from fusesoc_firm.system.hardware.crossings import port_of
 from fusesoc_firm.system.hardware.maps import port_map
-from fusesoc_firm.system.hardware.names import AXIS, Names
+from fusesoc_firm.system.hardware.names import AXIS, Names, reset_of
+from fusesoc_firm.system.written.specification import Pin
 
 ERROR_CODE_BITS = 4
+# Begins the names of ports of the top level inside it, where the status reads or changes them.
+INNER = "inner_"
 
 
 def subscriber_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
@@ -23,7 +27,7 @@ def subscriber_instance(names: Names, converter: Converter, system: DerivedSyste
         "message": str(converter.frame.message),
         "id": converter.id,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
-        "error": _error(converter, system),
+        "error": error_of(converter, system),
     }
 
 
@@ -36,7 +40,7 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
         "message": str(converter.frame.message),
         **_part_of_manager(converter, system.width),
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
-        "error": _error(converter, system) if has_errors else None,
+        "error": error_of(converter, system) if has_errors else None,
         "buffer": _buffer(names, converter, system) if converter.buffer else None,
     }
 
@@ -53,10 +57,11 @@ def _part_of_manager(converter: Converter, width: int) -> dict[str, int]:
     }
 
 
-def _error(converter: Converter, system: DerivedSystem) -> dict[str, int]:
+def error_of(converter: Converter, system: DerivedSystem) -> dict[str, int | str]:
     """Return the slice of the system's error outputs that reports a converter's errors."""
     bit = system.error_blocks.index(converter.block)
-    return {"bit": bit, "high": ERROR_CODE_BITS * (bit + 1) - 1, "low": ERROR_CODE_BITS * bit}
+    scope = INNER if system.status else ""
+    return {"scope": scope, "bit": bit, "high": ERROR_CODE_BITS * (bit + 1) - 1, "low": ERROR_CODE_BITS * bit}
 
 
 def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
@@ -70,7 +75,7 @@ def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[s
         "depth": max(2, -(-(ID_BYTES + LENGTH_BYTES + converter.buffer) // lanes)),
         **{word: names.frame(block, word) for word in (*AXIS, "error", "error_code")},
         **_part_of_manager(converter, system.width),
-        "out": _error(converter, system),
+        "out": error_of(converter, system),
     }
 
 
@@ -79,17 +84,32 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedS
     clock = system.clock_of(block.block)
     differences = [clock.port] if clock else []
     differences += [f"{block.type.width} bits"] if block.type.width != system.width else []
-    formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type)]
-    formals += [str(pin.name) for pin in block.type.accelerator.pins]
+    sides = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type)]
+    ports = [(formal, names.port(block.block, formal)) for formal in sides]
+    for pin in block.type.accelerator.pins:
+        signal = names.synced if pin.is_synchronised else names.port
+        ports.append((str(pin.name), signal(block.block, pin.name)))
     return {
         **_instance(names, block.block, block.type.entity),
         "is_component": block.type.is_component,
         "has_width": block.type.has_width,
         "width": block.type.width,
         "differences": ", ".join(differences),
-        "clock": clock.port if clock else "clk",
-        "reset": clock.reset if clock else "rst_n",
-        "ports": port_map((formal, names.port(block.block, formal)) for formal in formals),
+        "clock": port_of(clock),
+        "reset": reset_of(clock),
+        "ports": port_map(ports),
+    }
+
+
+def pin_synchroniser(names: Names, block: AcceleratorBlock, pin: Pin, system: DerivedSystem) -> dict[str, Any]:
+    """Return the synchroniser of an input pin, in the clock of its block."""
+    return {
+        "label": names.label(block.block, pin.name, "sync"),
+        "bits": pin.bits,
+        "type": vhdl_type(pin.bits),
+        "clock": port_of(system.clock_of(block.block)),
+        "pin": names.port(block.block, pin.name),
+        "synced": names.synced(block.block, pin.name),
     }
 
 

@@ -32,6 +32,7 @@ def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
         "has_streams": False,
         "link": {
             "entity": f"firm_{system.link.kind.value}_link",
+            "longest": system.link.longest,
             "adapter": f"firm_sim_{system.link.kind.value}",
             "uart": {"clock_hz": system.link.clock_hz} if system.link.kind is LinkKind.UART else None,
             "pins": [

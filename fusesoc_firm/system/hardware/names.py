@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.payload_length import length_entity
-from fusesoc_firm.system.derived.model import Clock, Connection, DerivedSystem, End, LengthSource
+from fusesoc_firm.system.derived.model import AcceleratorBlock, Clock, Connection, DerivedSystem, End, LengthSource
 from fusesoc_firm.system.derived.sides import (
     PAYLOAD_LENGTH,
     Handshake,
@@ -16,10 +16,12 @@ from fusesoc_firm.system.derived.sides import (
     side_ports,
 )
 from fusesoc_firm.system.hardware.crossings import Crossing, all_crossings
+from fusesoc_firm.system.written.specification import Pin
 from fusesoc_firm.text.naming import distinct_identifiers
 
 # Names that the top level and its test bench use, which signals of blocks and pins must not have.
 _TAKEN = """
+    system_rst_n u_system_rst
     clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
     s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tid m_axis_tvalid m_axis_tlast m_axis_tready
@@ -30,12 +32,23 @@ _TAKEN = """
     sub_axis_tdata sub_axis_tkeep sub_axis_tlast sub_axis_tvalid sub_axis_tready
     pub_axis_tdata pub_axis_tkeep pub_axis_tvalid pub_axis_tlast pub_axis_tready
     sched_request sched_beat sched_last sched_grant_valid sched_grant_select
-    u_link u_adapter clock_hz baud link_error
+    u_link u_adapter clock_hz baud link_error link_error_code
     uart_rxd uart_txd uart_rts_n uart_cts_n spi_sclk spi_cs_n spi_mosi spi_miso spi_irq
     periods deadlines transfer_times firm_sched_pkg times_t
+    status_interrupt u_status_access u_status_registers u_status_counters
+    bus_valid bus_write bus_address bus_write_data bus_read_data bus_done
+    status_enable status_fault status_channel status_code status_lost status_address status_word status_clear
+    channel_error channel_error_code inner_id_error inner_link_error inner_frame_error inner_frame_error_code
+    inner_s_axis_tdata inner_s_axis_tkeep inner_s_axis_tvalid inner_s_axis_tlast inner_s_axis_tready
+    inner_m_axis_tdata inner_m_axis_tkeep inner_m_axis_tid inner_m_axis_tvalid inner_m_axis_tlast inner_m_axis_tready
+    s_axi_awaddr s_axi_awprot s_axi_awvalid s_axi_awready s_axi_wdata s_axi_wstrb s_axi_wvalid s_axi_wready
+    s_axi_bresp s_axi_bvalid s_axi_bready s_axi_araddr s_axi_arprot s_axi_arvalid s_axi_arready
+    s_axi_rdata s_axi_rresp s_axi_rvalid s_axi_rready
     std standard std_logic std_logic_vector
 """.split()
 AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
+# The reset of clk's domain.
+OWN_RESET = "system_rst_n"
 # Low until all clock domains have been reset.
 RELEASED = "domains_rst_n"
 # Between a publisher and its buffer.
@@ -57,6 +70,8 @@ class Names:
             if item.length and item.length.source is LengthSource.COMPUTED
         ]
         labels += [("u", block, "buffer") for block in buffered]
+        synchronised = [(block.block, str(pin.name)) for block, pin in synchronised_pins(system)]
+        labels += [("u", *pin, "sync") for pin in synchronised]
         labels += [("u", *_crossing_key(item, word)) for item in all_crossings(system) for word in item.instances()]
         label_names = distinct_identifiers(labels, _TAKEN)
         self._labels = dict(zip(labels, label_names, strict=True))
@@ -72,6 +87,7 @@ class Names:
             _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
         ]
         signals += [(block, "", word) for block in buffered for word in FRAME_SIGNALS]
+        signals += [(*pin, "synced") for pin in synchronised]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
         signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
         # Pins are named first, so that they get the requested names.
@@ -88,6 +104,10 @@ class Names:
     def port(self, block: str, port: str) -> str:
         """Return the signal of a block's port, or the top level's port for a pin."""
         return self._signals[block, port]
+
+    def synced(self, block: str, pin: str) -> str:
+        """Return the signal of a pin after its synchroniser."""
+        return self._signals[block, pin, "synced"]
 
     def at(self, end: End, port: str) -> str:
         """Return the signal of a message's port at one end of a connection."""
@@ -133,6 +153,12 @@ def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]
     return blocks
 
 
+def synchronised_pins(system: DerivedSystem) -> Iterator[tuple[AcceleratorBlock, Pin]]:
+    """Yield each block's pins that the top level synchronises."""
+    for block in system.accelerators:
+        yield from ((block, pin) for pin in block.type.accelerator.pins if pin.is_synchronised)
+
+
 def forked(connection: Connection) -> Iterator[Handshake]:
     """Yield the handshakes of a connection that need a fork."""
     if len(connection.sinks) > 1 and connection.frame.is_fixed_size:
@@ -148,10 +174,15 @@ def is_found_out(connection: Connection) -> bool:
 
 def clock_names(system: DerivedSystem) -> list[str]:
     """Return the names needed for clocks besides clk: ports, resets, and the labels of the reset instances."""
+    found = resets(system)[1:]
+    return [*(clock.port for clock in system.clocks), *found, *map(reset_label, found)]
+
+
+def resets(system: DerivedSystem) -> list[str]:
+    """Return the resets of all clocks, each the output of an instance; that of clk is first."""
     if not system.clocks:
-        return []
-    resets = [RELEASED, *(name for clock in system.clocks for name in (clock.reset, seen_reset(clock)))]
-    return [*(clock.port for clock in system.clocks), *resets, *map(reset_label, resets)]
+        return [OWN_RESET]
+    return [OWN_RESET, RELEASED, *(name for clock in system.clocks for name in (seen_reset(clock), clock.reset))]
 
 
 def reset_label(reset: str) -> str:
@@ -162,6 +193,11 @@ def reset_label(reset: str) -> str:
 def seen_reset(clock: Clock) -> str:
     """Return the signal that is low until a clock domain, and all domains before it, have been reset."""
     return f"seen_{clock.name}_n"
+
+
+def reset_of(clock: Clock | None) -> str:
+    """Return the reset of a clock's domain; None represents clk."""
+    return clock.reset if clock else OWN_RESET
 
 
 def _crossing_key(crossing: Crossing, word: str) -> tuple[str, ...]:

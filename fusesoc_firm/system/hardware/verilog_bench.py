@@ -33,6 +33,8 @@ def verilog_bench_configuration(
     return {
         **bench,
         "translated": translated_unit(system, has_environment=has_environment),
+        # The place of the system, whose inner streams are checked.
+        "inside": "u_system.u_system" if has_environment else "u_system",
         "open_pins": [] if has_environment else _open_pins(system),
         "most_frames": max(_LEAST_FRAMES, frames),
         "most_beats": beats,

@@ -16,7 +16,7 @@ from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, Handshake, handsha
 from fusesoc_firm.system.hardware.crossing_wires import SourceSide, crossing_configuration, field_pairs
 from fusesoc_firm.system.hardware.crossings import Crossing, crossings, port_of
 from fusesoc_firm.system.hardware.maps import port_map
-from fusesoc_firm.system.hardware.names import Names, forked, is_found_out
+from fusesoc_firm.system.hardware.names import Names, forked, is_found_out, reset_of
 
 # A 32-bit length.
 _LONGEST = 'x"FFFFFFFF"'
@@ -163,7 +163,7 @@ def _fork(names: Names, connection: Connection, fork: Handshake, system: Derived
         "label": names.fork(source, fork),
         "sinks": count,
         "clock": port_of(clock),
-        "reset": clock.reset if clock else "rst_n",
+        "reset": reset_of(clock),
         "source_valid": bit(source_valid, 0) if connection.frame.is_fixed_size else source_valid,
         "source_ready": names.at(source, fork.ready),
         "sink_valid": names.forked(source, fork, "valid"),

@@ -1,4 +1,4 @@
-"""A first version of an accelerator in software: a function with the messages' fields, and defaults as responses."""
+"""A first version of an accelerator in software: a function that copies equal fields, and sends defaults elsewhere."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
-from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node, Path
+from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node, Path, names_of
 from fusesoc_firm.frame.select import used_part, with_names_in_use
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.python_function import function_name, parameter_names
+from fusesoc_firm.system.scaffold.pass_through import equal_paths, top_paths
 from fusesoc_firm.text.quoting import python_string
 from fusesoc_firm.text.render import Context
 
@@ -26,7 +27,7 @@ def python_skeleton(type_: AcceleratorType) -> Context:
         "parameters": ", ".join(parameters),
         "inputs": [_described(name, side.frame) for name, side in zip(parameters, type_.inputs, strict=True)],
         "outputs": [
-            {**_described(name, side.frame), "values": _values(side.frame)}
+            {**_described(name, side.frame), "values": copied_fields(side.frame, _sources(type_, side.frame))}
             for name, side in zip(answers, type_.outputs, strict=True)
         ],
         "answer": ", ".join(answers) or "None",
@@ -69,10 +70,36 @@ def _size(path: Path) -> str:
     return "" if path[-1].count is None else f"[{path[-1].count}]"
 
 
-def _values(frame: Frame) -> list[Context]:
-    """Return the default of each used field."""
+def _sources(type_: AcceleratorType, output: Frame) -> dict[Path, str]:
+    """Return the parameter with an equal part for each path of an output that has one, preferably the first."""
+    pairs = [*zip(parameter_names(type_), type_.inputs, strict=True)]
+    return {path: name for name, side in reversed(pairs) for path in equal_paths(side.frame, output)}
+
+
+def copied_fields(frame: Frame, sources: Mapping[Path, str]) -> list[Context]:
+    """Return an expression for each used field: a copy from the variable in `sources`, or the default."""
     message = decode(frame, encode_used(with_names_in_use(frame, ()), {}))
-    return [{"field": name, "value": _literal(value)} for name, value in used_part(message, frame).items()]
+    found = {names_of(path): sources.get(path) for path in top_paths(frame)}
+    return [
+        {"field": name, "value": _copied(value, (name,), found, f"[{python_string(name)}]")}
+        for name, value in used_part(message, frame).items()
+    ]
+
+
+def _copied(value: Any, names: tuple[str, ...], sources: Mapping[tuple[str, ...], str | None], place: str) -> str:
+    """Return a copy of `place` in the source of the field with these names, or the default where there is no source."""
+    below = {source for path, source in sources.items() if path[: len(names)] == names}
+    if below == {None} or not below:
+        return _literal(value)
+    if len(below) == 1:
+        return f"{below.pop()}{place}"
+    if isinstance(value, Mapping):
+        inner = (
+            f"{python_string(name)}: {_copied(item, (*names, name), sources, f'{place}[{python_string(name)}]')}"
+            for name, item in value.items()
+        )
+        return f"{{{', '.join(inner)}}}"
+    return f"[{', '.join(_copied(item, names, sources, f'{place}[{n}]') for n, item in enumerate(value))}]"
 
 
 def _literal(value: Any) -> str:

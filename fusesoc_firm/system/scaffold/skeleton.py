@@ -1,8 +1,11 @@
-"""A first version of an accelerator without a source: ports for all messages, and zeros as responses."""
+"""A first version of an accelerator without a source: it copies the parts that its messages share, and sends zeros.
+
+`pass_through` determines these parts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +17,7 @@ from fusesoc_firm.frame.model import Loop, Node
 from fusesoc_firm.system.derived.cpp_function import arguments, function_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, MessageSide
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, SidePort, accelerator_ports
+from fusesoc_firm.system.scaffold.pass_through import Wires, wires_of
 from fusesoc_firm.system.scaffold.python_skeleton import python_skeleton
 from fusesoc_firm.system.written.specification import SOFTWARE, Pin
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
@@ -89,11 +93,13 @@ def _purpose(type_: AcceleratorType) -> str:
 
 def _function(type_: AcceleratorType) -> Context:
     inputs, outputs = arguments(type_)
+    ports = {item.signal: item.port for item in inputs}
+    copied = {name: ports[source] for wires in wires_of(type_) for name, source in wires.ports.items()}
     return {
         "function": function_name(type_),
         "prototype": prototype(type_),
         "inputs": [item.port for item in inputs],
-        "outputs": [item.port for item in outputs],
+        "outputs": [{"port": item.port, "value": copied.get(item.signal, "0")} for item in outputs],
     }
 
 
@@ -106,7 +112,10 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
     pins = type_.accelerator.pins
     names = distinct_identifiers(((name,) for name in _SIGNALS), [str(pin.name) for pin in pins])
     own = dict(zip(_SIGNALS, names, strict=True))
-    gives = [_given(number, side, of_side[side.prefix]) for number, side in enumerate(type_.outputs)]
+    wires = wires_of(type_)
+    gives = [_given(number, side, of_side[side.prefix], wires[number]) for number, side in enumerate(type_.outputs)]
+    pairs = zip(type_.outputs, wires, strict=True)
+    forwards = next((_forwards(type_, side, item) for side, item in pairs if item.carrier), None)
     return {
         **own,
         "entity": identifier(type_.accelerator.name),
@@ -114,8 +123,9 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
         "takes": [side.prefix for side in type_.inputs],
         "output_count": max(1, len(type_.outputs)),
         "gives": gives,
+        "forwards": forwards,
         "counts": [count for given in gives for count in given["counts"]],
-        "discards": _discards(type_.inputs, of_side),
+        "discards": _discards(type_.inputs, of_side, {name for item in wires for name in item.ready}),
         "pins": [{"port": str(pin.name), "bits": pin.bits} for pin in pins if pin.direction == "out"],
     }
 
@@ -155,20 +165,48 @@ def _declarations(
     ]
 
 
-def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Context:
-    """Return the assignments of an output: the handshake, the length of an all-zero message, and zeros elsewhere."""
-    counts = _counts(side, number)
+def _forwards(type_: AcceleratorType, side: MessageSide, wires: Wires) -> Context:
+    """Return the handshakes of an output whose strings and arrays come from an input without storage."""
+    assert wires.carrier
+    others = [f"{item.prefix}msg_valid" for item in type_.inputs if item is not wires.carrier]
+    source = f"{wires.carrier.prefix}segment_valid"
+    return {
+        "valid": f"{side.prefix}msg_valid",
+        "ready": f"{side.prefix}msg_ready",
+        "segment_valid": f"{side.prefix}segment_valid",
+        "segments": [
+            {
+                "number": number,
+                "waits": [] if place is None else [{"source": source, "place": place}],
+                "others": [] if place is None else others,
+            }
+            for number, place in enumerate(wires.segments)
+        ],
+        "takes": [item.prefix for item in type_.inputs],
+        "streams": [{"port": name, "source": other} for name, other in wires.ready.items()],
+    }
+
+
+def _given(number: int, side: MessageSide, ports: Sequence[SidePort], wires: Wires) -> Context:
+    """Return the assignments of an output: the handshake, copies, the length of an all-zero message, and zeros."""
+    counts = [] if wires.carrier else _counts(side, number)
     by_name = {f"{side.prefix}{port.name}": port for port in ports}
     length = f"{side.prefix}{PAYLOAD_LENGTH}"
     segments = [f"{side.prefix}segment_valid", *(count["segment_valid"] for count in counts)]
     valid = [f"{side.prefix}msg_valid", *(count["valid"] for count in counts)]
-    driven = {length, *segments, *valid, *(count["last"] for count in counts)}
+    driven = {length, *segments, *valid, *(count["last"] for count in counts), *wires.ports}
+    is_forwarded = wires.carrier is not None
     return {
         "number": number,
         "ready": f"{side.prefix}msg_ready",
-        "segments": [{"port": name, "bits": by_name[name].width or 1} for name in segments if name in by_name],
-        "valid": [name for name in valid if name in by_name],
-        "length": _length(length, side) if length in by_name else None,
+        "segments": [
+            {"port": name, "bits": by_name[name].width or 1}
+            for name in segments
+            if name in by_name and not is_forwarded
+        ],
+        "valid": [name for name in valid if name in by_name and not is_forwarded],
+        "length": _length(length, side) if length in by_name and length not in wires.ports else None,
+        "copies": [{"port": name, "source": wires.ports[name]} for name in by_name if name in wires.ports],
         "zeros": [
             {"port": name, "bits": port.width}
             for name, port in by_name.items()
@@ -215,11 +253,13 @@ def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
             yield from _fixed_loops(node.body)
 
 
-def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> list[str]:
-    """Return the streams and elements of inputs, which must be read to the end."""
+def _discards(
+    inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]], forwarded: Collection[str]
+) -> list[str]:
+    """Return the streams and elements of inputs that are not forwarded, which must be read to the end."""
     return [
         f"{side.prefix}{port.name}"
         for side in inputs
         for port in of_side[side.prefix]
-        if port.is_output and port.name != "msg_ready"
+        if port.is_output and port.name != "msg_ready" and f"{side.prefix}{port.name}" not in forwarded
     ]

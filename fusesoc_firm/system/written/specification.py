@@ -40,8 +40,13 @@ AUTO_SCHEDULER = "auto"
 # The routes of frames between the host and the system: streams of the top level, or a byte link (cores/board).
 AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
+# The accesses to the registers of a system's status, if it has one.
+NO_STATUS = "none"
+STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
+# Whether the top level synchronises an input pin to its block's clock.
+ADDED, NOT_ADDED = SYNCHRONISERS = ("added", "none")
 # `vendor:library:name`, with an optional version.
 _CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
 
@@ -100,6 +105,11 @@ class Project(Section):
         choices=(AXI_STREAM, *LINKS),
         default=Text(AXI_STREAM),
     )
+    status: Text = key(
+        "access to the status registers, if the system has any: frames of the id 255, or a port for AXI4-Lite",
+        choices=(NO_STATUS, *STATUS),
+        default=Text(NO_STATUS),
+    )
     clock: Text | None = key("frequency of clk, such as 100 MHz; required for times with a unit and for clocks")
     clocks: tuple[ClockDomain, ...] = key("additional clocks for accelerators", form="sections", section=ClockDomain)
 
@@ -136,6 +146,16 @@ class Pin(Section):
     name: Text = key("the port's name, which becomes <block>_<name> at the top level", is_required=True)
     direction: Text = key("direction of the port at the accelerator", is_required=True, choices=DIRECTIONS)
     bits: int | None = key("width in bits of a std_logic_vector (default: a std_logic)", form="integer")
+    synchroniser: Text = key(
+        "synchroniser of an input to the block's clock; none for clocks and for pins that the accelerator synchronises",
+        choices=SYNCHRONISERS,
+        default=Text(ADDED),
+    )
+
+    @property
+    def is_synchronised(self) -> bool:
+        """Whether the top level synchronises the pin to its block's clock."""
+        return self.direction == "in" and self.synchroniser == ADDED
 
 
 @dataclass(frozen=True)

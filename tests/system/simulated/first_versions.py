@@ -27,6 +27,9 @@ POSE = {"position": ZEROS, "orientation": {**ZEROS, "w": 0.0}}
 STAMP = {"sec": 0, "nsec": 0}
 IMAGE = {"header": {"seq": 0, "stamp": STAMP, "frame_id": ""}, "height": 0, "width": 0, "encoding": "",
          "is_bigendian": 0, "step": 0, "data": []}
+# The fields of the stimulus' image, without its strings and arrays.
+FIELDS = {**IMAGE, "header": {"seq": 1, "stamp": {"sec": 2, "nsec": 3}, "frame_id": ""}, "height": 2, "width": 3,
+          "step": 3}
 BOARD = {"number": 0, "marks": [{"kind": 0, "labels": ["", ""], "ways": []}] * 3, "rest": [], "is_done": False}
 """
 

@@ -22,7 +22,10 @@ RUNTIME = (
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
     "board/link",
+    "status/status",
 )
+# The same with the synchronisers of the hardware, which can be synthesised.
+HARDWARE = tuple("cdc/sync" if core == "sim/sync" else core for core in RUNTIME)
 SIMULATION = ("sim/checker", "sim/host", "sim/link")
 
 
@@ -97,9 +100,10 @@ def write(request: Request, folder: Path) -> list[Path]:
     return [*kernels, *_write(system_core.system_core(loaded), folder), bench]
 
 
-def generate_system(spec: Path, folder: Path) -> list[Path]:
+def generate_system(spec: Path, folder: Path, board: str | None = None) -> list[Path]:
     """Generate a system without its simulation into `folder`: its VHDL, in order. Raises `InputError`."""
     parameters: dict[str, Plain] = {"spec": spec.name, "product": "system", "paths": None, "distro": None}
+    parameters |= {"board": board} if board else {}
     request = Request("far", "test:sys:system:0", spec.parent, parameters)
     return _write(system_core.system_core(system_core.load_requested(request)), folder)
 

@@ -9,7 +9,7 @@ import yaml
 
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import loops
-from tests.system.simulated.systems import DATA, RUNTIME, generate_system
+from tests.system.simulated.systems import DATA, HARDWARE, generate_system
 from tests.system.simulated.test_variable_system import IMAGE, converter, image_accelerator
 
 FORWARDED = "out_msg_valid                   <= in_msg_valid;"
@@ -33,7 +33,7 @@ def test_a_valid_that_waits_for_its_ready_is_named(tmp_path: Path, waits: bool) 
     }
     (tmp_path / "system.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     work = generate_system(tmp_path / "system.yaml", tmp_path / "work")
-    said = loops(work[-1].stem, tmp_path, work, core_files(*RUNTIME))
+    said = loops(work[-1].stem, tmp_path, work, core_files(*HARDWARE))
     assert len(said) == waits, said
     if said:
         assert "'out_msg_valid' of 'u_acc' depends on its 'out_msg_ready', which depends on it" in said[0]

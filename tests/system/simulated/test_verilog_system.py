@@ -9,7 +9,7 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.text.diagnostics import InputError
-from tests.hdl.verilog import Icarus, build
+from tests.hdl.verilog import Icarus, build, compile_verilog, translated
 from tests.system.simulated import systems
 from tests.system.simulated.first_versions import BOARD, IMAGE_STIMULUS, ZEROS, write_messages
 
@@ -56,7 +56,7 @@ FIRST_MODEL = (
 
 
 def respond(subscriber, message):
-    return {"image": [], "point": [("image_out", IMAGE), ("pose_out", POSE), ("board", BOARD)]}[subscriber]
+    return {"image": [], "point": [("image_out", FIELDS), ("pose_out", POSE), ("board", BOARD)]}[subscriber]
 """
 )
 
@@ -196,7 +196,7 @@ def passes(made: Icarus, folder: Path, messages: int, **options: int) -> bool:
     return result.exit_code == 0 and f"PASS {messages}/{messages}" in result.output.splitlines()
 
 
-def test_a_first_version_answers_with_zeros(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_first_version_copies_fields(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, {"spec.yaml": FIRST, "stimuli.yaml": FIRST_STIMULI * 5, "model.py": FIRST_MODEL})
     command = ["system", "skeleton", str(tmp_path / "spec.yaml"), "--path", str(write_messages(tmp_path))]
     assert main(command) == 0
@@ -218,6 +218,30 @@ def test_verilog_and_vhdl_work_together(tmp_path: Path, environment: bool) -> No
     made = compiled(tmp_path, **({"environment": ["tb/around.vhd"]} if environment else {}))
     for seed, stall_percent in ((1, 0), (2, 30), (3, 80)):
         assert passes(made, tmp_path, 29, SEED=seed, STALL_PERCENT=stall_percent)
+
+
+def test_a_broken_stream_is_found(tmp_path: Path) -> None:
+    """Between system and host, and of a publisher within the system."""
+    write(tmp_path, {**SOURCES, "spec.yaml": SWAP, "stimuli.yaml": SWAP_STIMULI})
+    (tmp_path / "model.py").write_text(SWAP_MODEL.format(asks=False), encoding="utf-8")
+    call = systems.call(tmp_path / "spec.yaml", tmp_path / "stimuli.yaml", tmp_path / "model.py")
+    top, files = translated(call, tmp_path)
+    (bench,) = (path for path in files if path.stem == top)
+    text = bench.read_text(encoding="utf-8")
+    # tvalid is low in every second cycle.
+    odd = "  reg odd = 0;\n  always @(posedge clk) odd <= !odd;\n"
+    outer = text.replace(".m_axis_tvalid(from_tvalid)", ".m_axis_tvalid(sent_tvalid)").replace(
+        "  wire from_tvalid;\n", f"  wire sent_tvalid;\n{odd}  wire from_tvalid = sent_tvalid && odd;\n"
+    )
+    inner = text.replace("= u_system.pub_axis_tvalid;", "= u_system.pub_axis_tvalid && odd;").replace(
+        "  wire from_tvalid;\n", f"{odd}  wire from_tvalid;\n"
+    )
+    for stream, broken in (("to the host", outer), ("from a publisher", inner)):
+        assert broken.count("&& odd;") == 1
+        bench.write_text(broken, encoding="utf-8")
+        done = compile_verilog(top, files, tmp_path).run(tmp_path, SEED=2, STALL_PERCENT=50)
+        assert done.exit_code
+        assert f"firm_axis_checker: {stream}: stable: tvalid fell before tready" in done.output
 
 
 def test_ghdl_is_not_asked_for_verilog(tmp_path: Path) -> None:

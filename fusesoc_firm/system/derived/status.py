@@ -1,0 +1,38 @@
+"""The access to the registers of a system's status: the specification's `status`."""
+
+from __future__ import annotations
+
+from fusesoc_firm.system.derived.model import Link, StatusAccess
+from fusesoc_firm.system.written.specification import NO_STATUS, STATUS_FRAMES, Project
+from fusesoc_firm.text.diagnostics import Diagnostics
+
+# Frames of this id carry accesses in both directions, so no converter has it.
+STATUS_ID = 255
+
+
+def status_of(project: Project, link: Link | None, converters: int, faults: Diagnostics) -> StatusAccess | None:
+    """Return the access to the status, or None without one; note faults.
+
+    `converters` is the number of subscribers or of publishers, whichever is greater.
+    """
+    if project.status == NO_STATUS:
+        return None
+    access = StatusAccess(project.status)
+    if access is StatusAccess.AXI_LITE and link:
+        faults.error(
+            f"interconnect '{link.kind.value}' has no port for AXI4-Lite",
+            project.status.source,
+            f"use 'status: {STATUS_FRAMES}'",
+        )
+    if access is StatusAccess.FRAMES:
+        _check_id(project, converters, faults)
+    return access
+
+
+def _check_id(project: Project, converters: int, faults: Diagnostics) -> None:
+    if converters > STATUS_ID:
+        faults.error(
+            f"'status: {STATUS_FRAMES}' needs the id {STATUS_ID}, which a converter has",
+            project.status.source,
+            f"at most {STATUS_ID} subscribers and {STATUS_ID} publishers are possible with it",
+        )

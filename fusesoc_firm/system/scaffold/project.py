@@ -1,0 +1,248 @@
+"""`firm init`: a new project in a folder of its own, which passes its simulation at once.
+
+The accelerator's first version copies the parts that both messages share; the model does the same.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.frame.codec import decode
+from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.length import sent_length_of
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop
+from fusesoc_firm.frame.model import Path as FieldPath
+from fusesoc_firm.frame.select import with_names_in_use
+from fusesoc_firm.message.library import Libraries
+from fusesoc_firm.message.middleware import Middleware, middleware_of
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
+from fusesoc_firm.system.scaffold.pass_through import equal_paths, wires_of
+from fusesoc_firm.system.scaffold.python_skeleton import copied_fields
+from fusesoc_firm.system.scaffold.skeleton import missing_sources
+from fusesoc_firm.system.system_core import LoadedSystem, load_system
+from fusesoc_firm.system.written.specification import SOFTWARE
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.outputs import check_parent, write
+from fusesoc_firm.text.prompts import Asker, Question
+from fusesoc_firm.text.render import Context, render
+from fusesoc_firm.text.yaml_text import yaml_dump
+
+_SUBSCRIBER, _PUBLISHER, _FORWARDER = "sub", "pub", "pass_through"
+_MESSAGES = 3
+# Bytes; block RAM of a small FPGA. The author of a specification chooses the size that the messages need.
+_BUFFER = 4096
+_IGNORED = "build/*\n!build/FUSESOC_IGNORE\n__pycache__/\n"
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language of accelerators: the type in specifications and the ending of a source's name."""
+
+    type: str
+    source: str
+
+
+LANGUAGES = {
+    "vhdl": Language("VHDL", "rtl/{}.vhd"),
+    "verilog": Language("Verilog", "rtl/{}.v"),
+    "hls": Language("HLS", "hls/{}.cpp"),
+    "python": Language(SOFTWARE, "software/{}.py"),
+}
+
+
+@dataclass(frozen=True)
+class Project:
+    """The answers that determine a new project; `width` is in bits."""
+
+    name: str
+    input: str
+    output: str
+    ros: int = 2
+    language: str = "vhdl"
+    width: int = 8
+
+
+def name_fault(name: str) -> str | None:
+    """Return the reason why a project cannot have this name, or None."""
+    if identifier(name) != name:
+        return f"'{name}' is not legal; legal here: letters, digits and single '_' between them, except keywords"
+    if name.lower() in (_SUBSCRIBER, _PUBLISHER, _FORWARDER):
+        return f"'{name}' is the name of another block of the new system"
+    return None
+
+
+def ask(known: dict[str, str], asker: Asker, names: Callable[[int], Sequence[str]], widths: Sequence[str]) -> Project:
+    """Return a project from the known answers, and ask for the others.
+
+    `names` returns the messages of a ROS version.
+    """
+
+    def answer(name: str, meaning: str, words: Sequence[str] = (), default: str = "", **rules: Any) -> str:
+        question = Question(name, meaning, words, default=default, is_required=True, **rules)
+        return known[name] if name in known else asker.ask(question)
+
+    name = answer("name", "the project's name, and the name of its folder and accelerator", check=name_fault)
+    ros = int(answer("ros", "the ROS version of the messages", ("1", "2"), "2", is_choice=True))
+    messages = names(ros)
+    return Project(
+        name,
+        answer("in", "the message that the accelerator receives", messages, is_choice=True),
+        answer("out", "the message that the accelerator sends", messages, is_choice=True),
+        ros,
+        answer("language", "the accelerator's language", tuple(LANGUAGES), "vhdl", is_choice=True),
+        int(answer("width", "the width in bits of the streams", widths, "8", is_choice=True)),
+    )
+
+
+def create(project: Project, folder: Path, known: Libraries, library: Path, paths: Sequence[Path] = ()) -> list[Path]:
+    """Write a new project, and return its files, relative to `folder`.
+
+    `library` is the folder of the generators, and `paths` are the places of further message definitions. May raise
+    `InputError`, before anything is written, also if the folder is not empty.
+    """
+    if fault := name_fault(project.name):
+        fail(fault)
+    check_parent(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        fail(f"cannot write {folder}: it exists", hint="choose another name, or remove it")
+    with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=".firm") as made:
+        inner = Path(made) / project.name
+        _write_all(project, inner, known, library, [os.path.relpath(path, folder) for path in paths])
+        shutil.copytree(inner, folder, dirs_exist_ok=True)
+    return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+
+
+def _write_all(project: Project, folder: Path, known: Libraries, library: Path, paths: Sequence[str]) -> None:
+    ros = middleware_of(project.ros)
+    taken, given = (_frame(name, ros, known) for name in (project.input, project.output))
+    spec = folder / f"{project.name}.yaml"
+    write(spec, render("project/specification.yaml", _specification(project, ros, taken, given)))
+    loaded = load_system(spec, known, needs_sources=False)
+    for path, text in missing_sources(loaded.system, folder).items():
+        write(path, text)
+    write(folder / "stimuli.yaml", yaml_dump([{_SUBSCRIBER: message} for message in _examples(taken)]))
+    write(folder / "model.py", render("project/model.py", _model(project, loaded, given)))
+    core = spec.with_suffix(".core")
+    options = CoreOptions(description=f"{project.input} to {project.output}", paths=paths)
+    write(core, new_core(loaded.system, spec.name, options))
+    write(folder / "fusesoc.conf", render("project/fusesoc.conf", {"name": project.name, "library": str(library)}))
+    write(folder / ".gitignore", _IGNORED)
+    write(folder / "build" / "FUSESOC_IGNORE", "")
+
+
+def _frame(name: str, ros: Middleware, known: Libraries) -> Frame:
+    message = parse_name(name)
+    return frame_of(message, known[ros].closure(message))
+
+
+def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame) -> Context:
+    language = LANGUAGES[project.language]
+    own = {"name": project.name, "type": language.type, "source": language.source.format(project.name)}
+    accelerators: list[Context] = []
+    buffer: list[int] = []
+    if language.type == SOFTWARE:
+        source = LANGUAGES["vhdl"].source.format(_FORWARDER)
+        first = {"name": _FORWARDER, "type": "VHDL", "source": source, "next": project.name, "buffer": []}
+        accelerators = [first | {"output": project.input, "length": [] if taken.is_fixed_size else ["given"]}]
+        length: list[str] = []
+    else:
+        length, buffer = _length(taken, given)
+    accelerators.append(own | {"output": project.output, "length": length, "next": _PUBLISHER, "buffer": []})
+    return {
+        "name": project.name,
+        "input": project.input,
+        "output": project.output,
+        "middleware": ros.words[0],
+        "width": [project.width] if project.width != Project.width else [],
+        "accelerators": accelerators,
+        "subscriber": _SUBSCRIBER,
+        "publisher": _PUBLISHER,
+        "first": accelerators[0]["name"],
+        "buffer": buffer,
+    }
+
+
+def _length(taken: Frame, given: Frame) -> tuple[list[str], list[int]]:
+    """Return the source of the output's length and the publisher's buffer, each empty for the default.
+
+    With a counted length, all equal strings and arrays can be forwarded.
+    """
+    if given.is_fixed_size:
+        return [], []
+    if taken.message == given.message:
+        return ["given"], []
+    kinds = {node.path: node for node in given.nodes if isinstance(node, Data | Loop)}
+    shared = equal_paths(taken, given) & kinds.keys()
+    if sent_length_of(given).is_computed and len(shared) <= 1:
+        return [], []
+    return ["buffered"], [_BUFFER]
+
+
+def _model(project: Project, loaded: LoadedSystem, given: Frame) -> Context:
+    types = {str(item.accelerator.name): item for item in loaded.system.accelerator_types}
+    paths: frozenset[FieldPath]
+    forwarded: list[str] = []
+    if project.name in types:
+        (wires,) = wires_of(types[project.name])
+        paths = wires.paths
+    else:
+        (software,) = loaded.system.software.types
+        paths = equal_paths(software.inputs[0].frame, given)
+        forwarded = [f"{project.name}_in"]
+    return {
+        "name": project.name,
+        "answer": "answer",
+        "publisher": _PUBLISHER,
+        "forwarded": forwarded,
+        "values": copied_fields(given, dict.fromkeys(paths, "message")),
+    }
+
+
+def _examples(frame: Frame) -> Iterator[dict[str, Any]]:
+    """Yield messages with different values in all fields; arrays of messages are empty."""
+    for number in range(_MESSAGES):
+        message = decode(frame, encode_used(with_names_in_use(frame, ()), {}))
+        count = number
+        for node in frame.nodes:
+            for part in node.fields if isinstance(node, Fixed) else [node] if isinstance(node, Data) else []:
+                count += 1
+                _set(message, part.names, _value(part, count))
+        yield message
+
+
+def _set(message: Any, names: Sequence[str], value: Any) -> None:
+    """Set a field; on a path through an array of messages, in all of its elements."""
+    if isinstance(message, list):
+        for item in message:
+            _set(item, names, value)
+    elif len(names) > 1:
+        _set(message[names[0]], names[1:], value)
+    elif isinstance(message[names[0]], list) and not isinstance(value, list | str):
+        message[names[0]] = [value] * len(message[names[0]])
+    else:
+        message[names[0]] = value
+
+
+def _value(part: FrameField | Data, number: int) -> Any:
+    """Return a legal value that depends on `number`."""
+    if isinstance(part, FrameField):
+        return _scalar(part.type.name, number)
+    most = 3 if part.bound is None else min(3, part.bound)
+    if part.kind is DataKind.ARRAY:
+        return [_scalar(part.element.name, number + place) for place in range(most)]
+    return f"n{number}"[:most]
+
+
+def _scalar(type_: str, number: int) -> bool | int | float:
+    if type_ == "bool":
+        return number % 2 == 1
+    return number / 2 if type_.startswith("float") else number % 100

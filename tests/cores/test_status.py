@@ -1,0 +1,149 @@
+"""The status's registers and counters against their description: every register, through AXI4-Lite with stalls."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.system.hardware.registers import Kind, Register, registers_configuration
+from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, status_map
+from fusesoc_firm.text.render import render
+from tests.hdl.ghdl import Library, RunResult, core_files
+
+BENCH = "status_bench"
+DIGEST = "0123456789abcdef" * 2
+SIGNATURES = ("deadbeef", "00c0ffee", "12345678")
+MAP = status_map("bench", 2, 1, DIGEST)
+COUNT_BITS = 4
+CHANNELS = ("subscriber[0]", "subscriber[1]", "publisher[0]")
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    folder = tmp_path_factory.mktemp("status")
+    registers = folder / "bench_status.vhd"
+    registers.write_text(render(REGISTERS_TEMPLATE, registers_configuration(MAP, SIGNATURES)))
+    library = Library("firm", folder)
+    library.analyse([*core_files("axis/package", "axis/axis", "status/status"), registers])
+    library.analyse([Path(__file__).with_name("status_bench.vhd")])
+    return library
+
+
+class Script:
+    """Lines for the bench."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def act(self, action: str, first: int, second: int) -> None:
+        self.lines.append(f"{action} {first:08x} {second:08x}\n")
+
+    def read(self, name: str, word: int) -> None:
+        self.act("r", MAP.by_name[name].address, word)
+
+    def write(self, name: str, word: int) -> None:
+        self.act("w", MAP.by_name[name].address, word)
+
+    def run(self, library: Library, folder: Path, seed: int = 1) -> RunResult:
+        (folder / "script.txt").write_text("".join(self.lines))
+        options = ("--ieee-asserts=disable-at-0", "--assert-level=failure")
+        result = library.run(BENCH, {"SEED": seed, "COUNT_BITS": COUNT_BITS}, directory=folder, options=options)
+        assert result.exit_code == 0, f"seed {seed}: {result.output}"
+        assert f"PASS {len(self.lines)}" in result.output
+        return result
+
+
+def at_reset(register: Register) -> int:
+    """The word of a register after reset, before anything has happened."""
+    if register.name.endswith(".signature"):
+        return int(SIGNATURES[CHANNELS.index(register.name.removesuffix(".signature"))], 16)
+    return sum(field.reset << field.low for field in register.fields)
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.check)])
+def test_every_register_has_its_reset_value_and_its_access(library: Library, tmp_path: Path, seed: int) -> None:
+    script = Script()
+    for register in MAP.registers:
+        script.read(register.name, at_reset(register))
+    for register in MAP.registers:
+        script.write(register.name, 0xFFFFFFFF)
+        stored = sum((1 << f.width) - 1 << f.low for f in register.fields if f.kind is Kind.STORAGE)
+        constant = sum(f.reset << f.low for f in register.fields if f.kind is not Kind.STORAGE)
+        script.read(register.name, at_reset(register) if register.is_external else stored | constant)
+        script.act("h", register.address, 0)
+        script.read(register.name, at_reset(register) if register.is_external else stored | constant)
+        script.write(register.name, at_reset(register))
+        script.read(register.name, at_reset(register))
+    # A reserved address.
+    script.act("r", 0x40, 0)
+    script.act("r", 0x80C4, 0)
+    script.run(library, tmp_path, seed)
+
+
+def test_a_written_one_clears_an_interrupt_and_a_zero_does_not(library: Library, tmp_path: Path) -> None:
+    script = Script()
+    script.act("i", 1, 0)
+    script.act("i", 1, 1)
+    script.read("interrupt", 0b0110)
+    script.act("q", 0, 0)
+    script.write("interrupt_enable", 0b0100)
+    script.act("q", 0, 1)
+    script.write("interrupt", 0b0010)
+    script.read("interrupt", 0b0100)
+    script.act("q", 0, 1)
+    script.write("interrupt", 0b1011)
+    script.read("interrupt", 0b0100)
+    script.write("interrupt", 0b0100)
+    script.read("interrupt", 0)
+    script.act("q", 0, 0)
+    script.run(library, tmp_path)
+
+
+def test_counters_stop_at_their_highest_value(library: Library, tmp_path: Path) -> None:
+    script = Script()
+    script.act("i", 65534, 0)
+    script.read("id_errors", 65534)
+    script.act("i", 2, 0)
+    script.read("id_errors", 65535)
+    script.read("link_errors", 0)
+    for count in range(1, 2**COUNT_BITS + 2):
+        script.act("f", 1, 3)
+        script.act("s", 2, 0)
+        script.read("subscriber[1].faults[2]", min(count, 2**COUNT_BITS - 1))
+        script.read("publisher[0].frames", min(count, 2**COUNT_BITS - 1))
+    script.run(library, tmp_path)
+
+
+def test_faults_frames_and_waits_are_counted_in_their_channels(library: Library, tmp_path: Path) -> None:
+    script = Script()
+    for channel, name in enumerate(CHANNELS):
+        for code in range(1, 13):
+            script.act("f", channel, code)
+            script.read(f"{name}.faults[{code - 1}]", 1)
+        script.read("last_fault", channel << 4 | 12)
+        for wait in (0, 7, 3):
+            script.act("s", channel, wait)
+        script.read(f"{name}.frames", 3)
+        script.read(f"{name}.longest_wait", 7)
+    # Two channels in the same cycle, twice in a row, and a channel that has two at once.
+    script.act("b", 0, 5)
+    script.act("q", 0, 0)
+    script.act("b", 1, 5)
+    script.act("q", 0, 0)
+    script.read("subscriber[0].faults[4]", 2)
+    script.read("subscriber[1].faults[4]", 3)
+    script.read("publisher[0].faults[4]", 2)
+    script.read("lost", 0)
+    # The second publisher's fault waits for the two below it.
+    script.act("b", 1, 6)
+    script.act("f", 2, 6)
+    script.read("publisher[0].faults[5]", 2)
+    script.read("lost", 1)
+    script.read("interrupt", 0b1001)
+    script.write("control", 0)
+    script.act("f", 0, 1)
+    script.act("s", 0, 100)
+    script.read("subscriber[0].faults[0]", 1)
+    script.read("subscriber[0].frames", 3)
+    script.run(library, tmp_path)
