@@ -25,8 +25,8 @@ SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
 # VHDL counts the bits of a publisher's frame, including up to three bytes before the frame, up to 2**31-1.
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
-# The position encodes 2**3 states that are not beats; while a message waits, the next beat is the first beat.
-_STATE_BITS = 3
+# After a fault, the position holds its code.
+_CODE_BITS = 2
 # The number of a literal's bytes on each line.
 _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
@@ -54,32 +54,19 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
     return {
         **_common(frame, stream, entity or subscriber_entity(frame), "out"),
         **store_configuration(stores),
-        **_states(stream.beat(ends[-1])),
+        "position_bits": max(_CODE_BITS, stream.beat(ends[-1]).bit_length()),
         "is_byte_wide": stream.lanes == 1,
         "fields": _field_slices(frame, stream, stores),
         "has_trailing": frame.trailing_bytes > 0,
         "lengths": frame.trailing_bytes + 1,
-        "length_beats": _length_beats(frame, stream),
+        "length_beats": (length_beats := _length_beats(frame, stream)),
+        # Without trailing bytes, one comparison tells whether the length is right.
+        "is_length_early": len(length_beats) == 1
+        and stream.beat(ends[0]) > 0
+        and frame.checked_prefix > 0
+        and frame.trailing_bytes > 0,
         "encoding": [_byte_check(stream, *item) for item in _prefix_bytes(frame, stream)],
         "ends": [_end(stream, byte, number if len(ends) > 1 else None) for number, byte in enumerate(ends)],
-    }
-
-
-def _states(last_position: int) -> Context:
-    """Return the position values that do not represent beats; all begin with more ones than any beat's position.
-
-    In the three lowest bits, bit 2 tells whether the frame has ended, and bits 1 and 0 hold a code.
-    """
-    bits = max(_STATE_BITS + 1, (last_position + 2**_STATE_BITS).bit_length())
-    ones = next(count for count in range(1, bits) if last_position < 2**bits - 2 ** (bits - count))
-    high = "1" * ones + "0" * (bits - ones - _STATE_BITS)
-    return {
-        "position_bits": bits,
-        "beyond": "1" * ones,
-        "beyond_low": bits - ones,
-        "broken": f"{high}000",
-        "ended": f"{high}100",
-        "complete": f"{high}010",
     }
 
 

@@ -148,11 +148,6 @@ class Program:
     steps: tuple[Step, ...]
 
     @property
-    def loops(self) -> tuple[Loop, ...]:
-        """All loops that have an `Open` step, in wire order."""
-        return tuple(step.part for step in self.steps if isinstance(step, Open) and isinstance(step.part, Loop))
-
-    @property
     def streams(self) -> tuple[Data, ...]:
         """All strings and arrays of numbers, in wire order."""
         return tuple(step.part for step in self.steps if isinstance(step, Stream))

@@ -49,6 +49,11 @@ def is_counted(step: Step) -> bool:
     return isinstance(step, Open) and (isinstance(step.part, Data) or step.part.count is None)
 
 
+def is_count_whole(lanes: int) -> bool:
+    """Whether a beat holds a whole count, or the payload's length."""
+    return lanes >= COUNT_BYTES
+
+
 def is_hollow(step: Step) -> bool:
     """Whether the step opens an array whose elements take no bytes."""
     return isinstance(step, Open) and isinstance(step.part, Loop) and not has_bytes(step.part)
@@ -88,8 +93,13 @@ def _takes(step: Step) -> bool:
     return is_fixed(step) or is_stream(step) or isinstance(step, Padding)
 
 
-def _settles(step: Step) -> bool:
-    return is_counted(step) or isinstance(step, Guard | Tail | End)
+def _settles(step: Step, lanes: int) -> bool:
+    """Whether the step decides a cycle before it acts: on a count only if no earlier beat tells part of it."""
+    return isinstance(step, Tail | End) or (is_count_whole(lanes) and (is_counted(step) or isinstance(step, Guard)))
+
+
+def _is_text_count(step: Step) -> bool:
+    return isinstance(step, Count | Open) and terminator_of(step.part) > 0
 
 
 def _size_is(size: int) -> Callable[[Step], bool]:
@@ -99,13 +109,12 @@ def _size_is(size: int) -> Callable[[Step], bool]:
 # The sets of steps that a template uses; empty sets are omitted.
 _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("TAKES", "Takes bytes.", _takes),
-    ("SETTLES", "Decides in its first cycle.", _settles),
     ("IS_FIXED", "Takes a known number of bytes.", is_fixed),
     ("IS_STREAM", "Hands bytes on, or drops them.", is_stream),
     ("IS_COUNT", "Takes a count.", lambda step: isinstance(step, Count)),
     ("IS_PADDING", "Takes padding.", lambda step: isinstance(step, Padding)),
     ("IS_OPEN", "Knows a count.", is_counted),
-    ("IS_TEXT", "Its count includes a closing zero.", is_text),
+    ("IS_TEXT", "Takes or knows a count that includes a closing zero.", _is_text_count),
     ("CLOSES_TEXT", "Begins with that zero.", closes_text),
     ("IS_HOLLOW", "Its elements take no bytes.", is_hollow),
     ("OPENS_DATA", "A stream follows.", opens_data),
@@ -115,7 +124,9 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
 )
 # The names of the sets in VHDL, in lower case.
 SET_NAMES = frozenset(
-    f"{kind}_{name}".lower() for kind in ("step", "next") for name in ("IS_BEAT", *(name for name, _, _ in _SETS))
+    f"{kind}_{name}".lower()
+    for kind in ("step", "next")
+    for name in ("SETTLES", "IS_BEAT", *(name for name, _, _ in _SETS))
 ) | {"next_aligns_to_2", "next_aligns_to_4"}
 
 
@@ -123,6 +134,7 @@ def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
     """The sets as rows of digits, one digit for each step, on a stream with this number of lanes."""
     sets = (
         *_SETS,
+        ("SETTLES", "Decides in its first cycle, and acts in the next one.", lambda step: _settles(step, lanes)),
         ("IS_BEAT", "Takes a known number of bytes, in one beat.", lambda step: 0 < fixed_size(step) <= lanes),
     )
     found = []
@@ -148,7 +160,7 @@ _REGISTERS = {
     "IS_COUNT": ("count_r", "it takes a count"),
     "CLOSES_TEXT": ("closes_r", "its next byte ends a text"),
     "IS_OPEN": ("counted_r", "it knows a count"),
-    "IS_TEXT": ("text_r", "of a text, with its terminating zero"),
+    "IS_TEXT": ("text_r", "it takes or knows a text's count, which includes a terminating zero"),
     "OPENS_DATA": ("opens_r", "of a stream"),
     **{f"HAS_{size}": (f"has_{size}_r", f"with elements of {size} bytes") for size in (2, 4, 8)},
 }

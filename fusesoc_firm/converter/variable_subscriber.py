@@ -37,6 +37,7 @@ from fusesoc_firm.converter.steps import (
     digit_rows,
     element_size,
     fixed_size,
+    is_count_whole,
     is_counted,
     is_hollow,
     is_stream,
@@ -103,14 +104,14 @@ class _Subscriber:
             "lane_bits": (self.lanes - 1).bit_length(),
             "is_byte_wide": self.lanes == 1,
             "is_narrow": self.lanes < _LARGEST_ALIGNMENT,
-            # A count or the payload's length fits into one beat.
-            "is_count_whole": self.lanes >= COUNT_BYTES,
+            "is_count_whole": is_count_whole(self.lanes),
+            "count_beat_bits": max(COUNT_BYTES // self.lanes - 1, 0).bit_length(),
             "void_lanes": 0 if self.lanes == 1 else ID_BYTES,
             "ports": port_declarations(message_ports(self.frame, self.window.width), "out"),
             "segments": self.side.segments,
             "end_step": len(self.steps) - 1,
             "step_bits": (len(self.steps) - 1).bit_length(),
-            "trailing_bytes": self.frame.trailing_bytes,
+            "trailing_bits": self.frame.trailing_bytes.bit_length(),
             "first_phase": -len(self.frame.prefix) % _LARGEST_ALIGNMENT,
             **self._tables(),
             **self._kinds(),
@@ -186,13 +187,15 @@ class _Subscriber:
         prefix = self.frame.prefix[: self.frame.checked_prefix]
         beats = [prefix[first : first + self.lanes] for first in range(0, len(prefix), self.lanes)]
         has_zeros = any(map(closes_text, self.steps))
+        # Otherwise, the number is that of elements without a terminating zero.
+        is_whole = is_count_whole(self.lanes)
         counts: list[Context] = [{"bound": None}] if any(map(is_text, self.steps)) else []
         counts += [
             {"bound": {"step": place, "most": most}}
             for place, step in enumerate(self.steps)
             if isinstance(step, Open)
             and step.part.bound is not None
-            and (most := step.part.bound + terminator_of(step.part)) < _LARGEST_NATURAL
+            and (most := step.part.bound + is_whole * terminator_of(step.part)) < _LARGEST_NATURAL
         ]
         return {
             "encoding": [

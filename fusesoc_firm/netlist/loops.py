@@ -116,7 +116,7 @@ class _Bits:
         inputs = [self.of(net) for net in gate.inputs]
         if gate.kind in _REGISTERED or constant(gate) is not None:
             return [()] * width
-        if not gate.kind.startswith("$"):
+        if not gate.is_gate:
             return self._of_instance(gate, output, inputs)
         if gate.kind in _BITWISE:
             return [[bits[bit] for bits in inputs if bit < len(bits)] for bit in range(width)]
@@ -220,13 +220,9 @@ class _Bits:
         for component in self._components:
             if len(component) > 1 or component[0] in self.sources[component[0]]:
                 inside = set(component)
-                ports = [bit for bit in component if not self._kind(bit).startswith("$")]
+                ports = [bit for bit in component if (gate := self.driver[bit]) and not gate.is_gate]
                 found = (self._loop(bit, inside) for bit in ports[:_CANDIDATES] or component[:1])
                 yield min(found, key=lambda loop: (len([*_of_instances(loop)]), len(loop)))
-
-    def _kind(self, bit: int) -> str:
-        driver = self.driver[bit]
-        return driver.kind if driver else "$"
 
     def _loop(self, start: int, inside: set[int]) -> list[_Step]:
         """The shortest way from a bit back to itself, from each bit to one on which it depends."""
@@ -265,7 +261,7 @@ def _ones(mask: int) -> Iterator[int]:
 
 
 def _of_instances(loop: Iterable[_Step]) -> Iterator[_Step]:
-    return (step for step in loop if not step.gate.kind.startswith("$"))
+    return (step for step in loop if not step.gate.is_gate)
 
 
 def _sentence(bits: _Bits, loop: Sequence[_Step]) -> str:

@@ -50,6 +50,11 @@ class Instance:
         return NetlistError(f"{self.location or self.name}: error: {message}")
 
     @property
+    def is_gate(self) -> bool:
+        """Whether it is a gate, and not an instance of a module."""
+        return self.kind.startswith("$")
+
+    @property
     def numbers(self) -> list[int]:
         """The values of a gate's parameters."""
         return [int(text.rpartition("=")[2]) for text in self.parameters]

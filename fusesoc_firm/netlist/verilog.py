@@ -192,7 +192,7 @@ class _Writer:
     def _name_all(self) -> None:
         """Name all nets and instances as GHDL does; append a number to a name that is already in use."""
         for gate in self.module.instances:
-            if gate.kind in _MEMORIES or not gate.kind.startswith("$"):
+            if gate.kind in _MEMORIES or not gate.is_gate:
                 self.labels[id(gate)] = self._distinct(gate.name)
             for net in gate.outputs:
                 self.names[net.number] = self._distinct(gate.name if gate.kind in _SIGNALS else net.name)
@@ -295,7 +295,7 @@ class _Writer:
             return
         if gate.kind in _IGNORED or gate.kind in _EDGES or gate.kind in _MEMORY_PORTS:
             return
-        if not gate.kind.startswith("$"):
+        if not gate.is_gate:
             yield from self._module_instance(gate)
         elif gate.kind in _MEMORIES:
             yield from self._memory(gate)

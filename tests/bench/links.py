@@ -23,8 +23,8 @@ _CROSSINGS: dict[str, tuple[str, dict[str, Generic]]] = {
     },
 }
 _NOTES = {
-    LINKS_TITLE: """The FIFOs have their default depths and are in block RAM. The clock is 100 MHz, and the UART runs
-        at 1 Mbaud.""",
+    LINKS_TITLE: """The buffers have their default sizes and are in block RAM; all counts are connected.
+        The clock is 100 MHz, and the UART runs at 1 Mbaud.""",
     CROSSINGS_TITLE: """The crossing of a message of fixed size has no registers for fields, since the fields are
         stable until the message is accepted.""",
 }

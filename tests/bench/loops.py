@@ -21,7 +21,7 @@ from tests.converter.simulated.pass_through import PassThrough, systems_of_all
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import loops
 from tests.random_systems import random_system
-from tests.system.simulated.systems import RUNTIME, generate_system
+from tests.system.simulated.systems import HARDWARE, generate_system
 
 TITLE = "Combinational loops"
 DISTRIBUTIONS, WIDTHS = ("noetic", "humble"), (8, 64)
@@ -134,5 +134,5 @@ def loops_of_random_system(seed: int, folder: Path) -> list[str]:
 
 
 def _loops(work: Sequence[Path], folder: Path) -> list[str]:
-    found = loops(work[-1].stem, folder, work, core_files(*RUNTIME))
+    found = loops(work[-1].stem, folder, work, core_files(*HARDWARE))
     return [sentence.replace(f"{folder}/", "") for sentence in found]

@@ -25,7 +25,7 @@ from tests.bench.yosys import SynthesisError
 from tests.converter.simulated.pass_through import PassThrough
 from tests.hdl.ghdl import GhdlError, Library, core_files
 from tests.hdl.verilog import netlist
-from tests.system.simulated.systems import RUNTIME, generate_system
+from tests.system.simulated.systems import HARDWARE, generate_system
 
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.
@@ -199,7 +199,7 @@ def _passed(messages: Sequence[str], width: int) -> Callable[[Path], Design]:
     def make(folder: Path) -> Design:
         specification = PassThrough("humble", messages, count=0, seed=0, width=width).specification(folder)
         work = generate_system(specification, folder / "system")
-        file = netlist(work[-1].stem, folder, work, core_files(*RUNTIME))
+        file = netlist(work[-1].stem, folder, work, core_files(*HARDWARE))
         return Design(file.read_text(encoding="utf-8"), work[-1].stem)
 
     return make

@@ -203,27 +203,6 @@ def test_where_a_frame_may_end(width: int, last_beats: list[int], last_lanes: li
 
 
 @pytest.mark.parametrize(
-    ("size", "broken", "ended", "complete"),
-    [
-        # Beats 0 to 7 of 16 values leave the highest bit to the states, 0 to 55 of 64 the highest three.
-        (1, "1000", "1100", "1010"),
-        (4, "1000", "1100", "1010"),
-        (5, "10000", "10100", "10010"),
-        (32, "110000", "110100", "110010"),
-        (52, "111000", "111100", "111010"),
-        (53, "1000000", "1000100", "1000010"),
-    ],
-)
-def test_the_states_beyond_the_beats(size: int, broken: str, ended: str, complete: str) -> None:
-    configuration = subscriber_configuration(layout(ROS1, f"uint8[{size}] a\n"), 8)
-    assert [configuration[name] for name in ("broken", "ended", "complete")] == [broken, ended, complete]
-    assert len(broken) == configuration["position_bits"]
-    # The last beat, behind 4 bytes of length, is none of them, and all of them have the same bits above the lowest.
-    assert size + 3 < int(broken, 2)
-    assert size + 3 < int("1" * (len(broken) - configuration["beyond_low"]) + "0" * configuration["beyond_low"], 2)
-
-
-@pytest.mark.parametrize(
     ("width", "first", "last", "keep"), [(8, 3, 15, "1"), (32, 0, 3, "0001"), (64, 0, 1, "00011111")]
 )
 def test_the_publishers_beats(width: int, first: int, last: int, keep: str) -> None:

@@ -13,9 +13,9 @@ from fusesoc_firm.simulation import simulation_core
 from fusesoc_firm.system import system_core
 from tests.hdl.ghdl import CORES, Generic, RunResult, core_files
 from tests.processes import limited
-from tests.system.simulated.systems import RUNTIME
+from tests.system.simulated.systems import HARDWARE
 
-HOST = tuple(CORES / "sim" / "rtl" / f"{name}.v" for name in ("firm_sim_host", "firm_sim_join"))
+HOST = tuple(CORES / "sim" / "rtl" / f"{name}.v" for name in ("firm_sim_host", "firm_sim_join", "firm_axis_checker"))
 
 
 @dataclass(frozen=True)
@@ -112,5 +112,5 @@ def translated(request: Request, folder: Path, *cores: str) -> tuple[str, list[P
     bench = verilog[-1].stem
     system = bench.removesuffix("_tb")
     tops = [path.stem for path in work if path.stem == f"{system}_in_environment"] or [system]
-    runtime = [path for path in core_files(*RUNTIME, *cores) if path.parent.parent.name != "sim"]
+    runtime = [path for path in core_files(*HARDWARE, *cores) if path.parent.parent.name != "sim"]
     return bench, [netlist(tops[0], folder, work, runtime, verilog), *verilog, *HOST]

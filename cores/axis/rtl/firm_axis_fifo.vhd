@@ -82,7 +82,6 @@ begin
   end process access_memory;
 
   count_beats : process (clk)
-    variable level : natural range 0 to DEPTH;
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
@@ -93,20 +92,25 @@ begin
         filled_r      <= '0';
         valid_r       <= '0';
       else
-        level := level_r;
-        if write_beat = '1' and read_beat = '0' then
-          level := level_r + 1;
-        elsif write_beat = '0' and read_beat = '1' then
-          level := level_r - 1;
-        end if;
-        level_r <= level;
-        ready_r <= '1';
-        if level = DEPTH then
-          ready_r <= '0';
-        end if;
+        -- The flags depend on the former level: `m_axis_tready` may be late, so it is not in a path with an adder.
+        ready_r  <= '1';
         filled_r <= '1';
-        if level = 0 then
-          filled_r <= '0';
+        if write_beat = read_beat then
+          if level_r = DEPTH then
+            ready_r <= '0';
+          elsif level_r = 0 then
+            filled_r <= '0';
+          end if;
+        elsif write_beat = '1' then
+          level_r <= level_r + 1;
+          if level_r = DEPTH-1 then
+            ready_r <= '0';
+          end if;
+        else
+          level_r <= level_r - 1;
+          if level_r = 1 then
+            filled_r <= '0';
+          end if;
         end if;
         if write_beat = '1' then
           write_index_r <= next_index(write_index_r);

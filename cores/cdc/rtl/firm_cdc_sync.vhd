@@ -3,7 +3,7 @@
 -- bit must come directly from a register of its own domain, without logic after it. Bits that change together may
 -- arrive at different times.
 --
--- Constraint: the path into the first register is asynchronous (docs/how-to/use-several-clocks.md).
+-- Constraint: the path into first_r is asynchronous (docs/how-to/use-several-clocks.md).
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -22,17 +22,19 @@ end entity firm_cdc_sync;
 
 architecture rtl of firm_cdc_sync is
 
-  -- The first stage has the lowest bits. Place all stages side by side; they must never become a shift register in RAM.
-  signal stages_r : std_logic_vector(STAGES*BITS-1 downto 0);
+  -- The first stage has a name of its own, to which constraints refer. Place all stages side by side; they must never
+  -- become a shift register in RAM.
+  signal first_r  : std_logic_vector(BITS-1 downto 0);
+  signal stages_r : std_logic_vector((STAGES-1)*BITS-1 downto 0);
 
   attribute async_reg     : string;
   attribute shreg_extract : string;
   attribute preserve      : boolean;
   attribute altera_attribute : string;
-  attribute async_reg of stages_r        : signal is "true";
-  attribute shreg_extract of stages_r    : signal is "no";
-  attribute preserve of stages_r         : signal is true;
-  attribute altera_attribute of stages_r : signal is
+  attribute async_reg of first_r, stages_r     : signal is "true";
+  attribute shreg_extract of first_r, stages_r : signal is "no";
+  attribute preserve of first_r, stages_r      : signal is true;
+  attribute altera_attribute of first_r        : signal is
     "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS";
 
 begin
@@ -47,10 +49,14 @@ begin
   pass_on : process (clk)
   begin
     if rising_edge(clk) then
-      stages_r <= stages_r((STAGES-1)*BITS-1 downto 0) & level;
+      first_r                   <= level;
+      stages_r(BITS-1 downto 0) <= first_r;
+      for stage in 1 to STAGES-2 loop
+        stages_r((stage+1)*BITS-1 downto stage*BITS) <= stages_r(stage*BITS-1 downto (stage-1)*BITS);
+      end loop;
     end if;
   end process pass_on;
 
-  synced <= stages_r(STAGES*BITS-1 downto (STAGES-1)*BITS);
+  synced <= stages_r((STAGES-1)*BITS-1 downto (STAGES-2)*BITS);
 
 end architecture rtl;

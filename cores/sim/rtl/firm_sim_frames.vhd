@@ -1,9 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's end of a link that carries bytes: it finds frames by their lengths and passes each on when it is complete.
--- Its memory is unbounded. Simulation only.
+-- The host's end of a link, receiving: it decodes frames (COBS), checks their lengths and checksums, and passes each on
+-- when it is complete. A broken frame ends the simulation. The memory is unbounded. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_sim_link_pkg.all;
 
 entity firm_sim_frames is
   port (
@@ -48,30 +50,67 @@ begin
     variable newest : item_ptr_t;
     variable whole  : natural := 0;  -- bytes of complete frames
 
-    variable taken  : natural := 0;  -- bytes so far
-    variable bytes  : natural := 0;  -- of the incoming frame
+    variable taken  : natural := 0;  -- coded bytes so far
+    variable left   : natural := 0;  -- coded bytes of the block still to come
+    variable is_due : boolean := false;  -- a zero is between this block and the next one
+    variable bytes  : natural := 0;  -- of the incoming frame, with its checksum
     variable header : unsigned(8*HEADER_BYTES-1 downto 0);
+    variable crc    : crc_t   := CRC_START;
 
-    procedure take_byte is
+    impure function frame_bytes return natural is
+    begin
+      return HEADER_BYTES + to_integer(header(8*HEADER_BYTES-1 downto 8));
+    end function frame_bytes;
+
+    procedure take_byte(byte : in std_logic_vector(7 downto 0)) is
       variable item : item_ptr_t;
     begin
+      crc := next_crc(crc, byte);
       if bytes < HEADER_BYTES then
-        header(8*bytes+7 downto 8*bytes) := unsigned(data);
+        header(8*bytes+7 downto 8*bytes) := unsigned(byte);
       end if;
       bytes := bytes + 1;
-      item  := new item_t'(data, std_logic_vector(header(7 downto 0)), false, null);
-      if first = null then
-        first := item;
-      else
-        newest.next_item := item;
-      end if;
-      newest := item;
-      if bytes >= HEADER_BYTES and bytes - HEADER_BYTES = header(8*HEADER_BYTES-1 downto 8) then
-        newest.is_last := true;
-        whole          := whole + bytes;
-        bytes          := 0;
+      if bytes <= HEADER_BYTES or bytes <= frame_bytes then
+        item := new item_t'(byte, std_logic_vector(header(7 downto 0)), false, null);
+        if first = null then
+          first := item;
+        else
+          newest.next_item := item;
+        end if;
+        newest := item;
       end if;
     end procedure take_byte;
+
+    procedure end_frame is
+    begin
+      assert left = 0 and bytes >= HEADER_BYTES + CHECKSUM_BYTES and crc = CRC_RESIDUE
+        report "firm_sim_frames: the system sent a frame whose code or checksum is wrong"
+        severity failure;
+      assert bytes = frame_bytes + CHECKSUM_BYTES
+        report "firm_sim_frames: the system sent a frame whose length is wrong"
+        severity failure;
+      newest.is_last := true;
+      whole          := whole + frame_bytes;
+      bytes          := 0;
+      is_due         := false;
+      crc            := CRC_START;
+    end procedure end_frame;
+
+    procedure decode_byte is
+    begin
+      if data = x"00" then
+        end_frame;
+      elsif left = 0 then
+        if is_due then
+          take_byte(x"00");
+        end if;
+        left   := to_integer(unsigned(data)) - 1;
+        is_due := data /= x"ff";
+      else
+        left := left - 1;
+        take_byte(data);
+      end if;
+    end procedure decode_byte;
 
     procedure show_byte is
       variable shown : item_ptr_t;
@@ -96,7 +135,7 @@ begin
     if rising_edge(clk) and rst_n = '1' then
       if taken /= count then
         taken := taken + 1;
-        take_byte;
+        decode_byte;
       end if;
       if valid_r = '0' or m_axis_tready = '1' then
         show_byte;

@@ -22,6 +22,7 @@ entity firm_sim_spi is
     -- Frames of the host.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
     s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(7 downto 0);
@@ -42,6 +43,10 @@ end entity firm_sim_spi;
 architecture simulation of firm_sim_spi is
 
   subtype byte_t is std_logic_vector(7 downto 0);
+
+  signal coded_data  : std_logic_vector(7 downto 0);
+  signal coded_valid : std_logic;
+  signal coded_ready : std_logic;
 
   signal received_data  : byte_t;
   signal received_count : natural := 0;
@@ -121,13 +126,13 @@ begin
       begin_selection(x"01");
       while room > 0 loop
         if not has_one then
-          exit when s_axis_tvalid /= '1';
+          exit when coded_valid /= '1';
           wait until falling_edge(clk);
-          s_axis_tready <= '1';
+          coded_ready <= '1';
           wait until rising_edge(clk);
-          unsent        := s_axis_tdata;
+          unsent        := coded_data;
           has_one       := true;
-          s_axis_tready <= '0';
+          coded_ready <= '0';
           wait until rising_edge(clk);
         end if;
         if happens then
@@ -162,7 +167,7 @@ begin
     end procedure read_bytes;
 
   begin
-    s_axis_tready <= '0';
+    coded_ready <= '0';
     spi_cs_n      <= '1';
     spi_sclk      <= '0';
     wait until rising_edge(clk) and rst_n = '1';
@@ -170,11 +175,11 @@ begin
     begin_selection(x"03");
     end_selection;
     loop
-      if s_axis_tvalid /= '1' and not has_one and spi_irq = '0' then
-        wait until s_axis_tvalid = '1' or spi_irq = '1';
+      if coded_valid /= '1' and not has_one and spi_irq = '0' then
+        wait until coded_valid = '1' or spi_irq = '1';
       end if;
       ask_status;
-      if (s_axis_tvalid = '1' or has_one) and room > 0 then
+      if (coded_valid = '1' or has_one) and room > 0 then
         write_bytes;
       end if;
       if waiting > 0 then
@@ -182,6 +187,19 @@ begin
       end if;
     end loop;
   end process master;
+
+  u_coder : entity firm.firm_sim_coder
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      data          => coded_data,
+      valid         => coded_valid,
+      ready         => coded_ready
+    );
 
   u_frames : entity firm.firm_sim_frames
     port map (

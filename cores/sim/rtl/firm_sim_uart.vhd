@@ -22,6 +22,7 @@ entity firm_sim_uart is
     -- Frames of the host.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
     s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(7 downto 0);
@@ -40,6 +41,10 @@ entity firm_sim_uart is
 end entity firm_sim_uart;
 
 architecture simulation of firm_sim_uart is
+
+  signal coded_data  : std_logic_vector(7 downto 0);
+  signal coded_valid : std_logic;
+  signal coded_ready : std_logic;
 
   signal received_data  : std_logic_vector(7 downto 0);
   signal received_count : natural := 0;
@@ -80,7 +85,7 @@ begin
     variable data : std_logic_vector(7 downto 0);
 
   begin
-    s_axis_tready <= '0';
+    coded_ready <= '0';
     uart_rxd      <= '1';
     wait until rising_edge(clk) and rst_n = '1';
     wait for 4 * BIT_TIME;
@@ -92,10 +97,10 @@ begin
     loop
       wait_for_leave;
       wait until falling_edge(clk);
-      s_axis_tready <= '1';
-      wait until rising_edge(clk) and s_axis_tvalid = '1';
-      data          := s_axis_tdata;
-      s_axis_tready <= '0';
+      coded_ready <= '1';
+      wait until rising_edge(clk) and coded_valid = '1';
+      data          := coded_data;
+      coded_ready <= '0';
       uniform(random_1, random_2, draw);
       if 100.0 * draw < real(STALL_PERCENT) then
         uniform(random_1, random_2, draw);
@@ -137,6 +142,19 @@ begin
       uart_cts_n <= '1';
     end if;
   end process want;
+
+  u_coder : entity firm.firm_sim_coder
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      data          => coded_data,
+      valid         => coded_valid,
+      ready         => coded_ready
+    );
 
   u_frames : entity firm.firm_sim_frames
     port map (

@@ -24,7 +24,6 @@ architecture simulation of firm_axis_checker_tb is
 
   constant LANES  : positive := WIDTH/8;
   constant CYCLES : positive := 4000;
-  constant FULL   : std_logic_vector(LANES-1 downto 0) := (others => '1');
 
   signal clk   : std_logic := '0';
   signal rst_n : std_logic := '0';
@@ -70,6 +69,7 @@ begin
     variable is_waiting : boolean;              -- since an earlier cycle
     -- The beat that is offered
     variable bytes      : std_logic_vector(WIDTH-1 downto 0);
+    variable lanes_kept : positive;
     variable kept       : std_logic_vector(LANES-1 downto 0);
     variable user       : std_logic_vector(1 downto 0);
     variable last       : std_logic;
@@ -91,10 +91,10 @@ begin
     end function drawn_bit;
 
     procedure draw_beat is
-      variable lanes_kept : positive := LANES;
     begin
-      last := drawn_bit(30);
-      user := drawn_bit(50) & (last and drawn_bit(20));
+      last       := drawn_bit(30);
+      user       := drawn_bit(50) & (last and drawn_bit(20));
+      lanes_kept := LANES;
       if last = '1' then
         lanes_kept := 1 + draw(LANES);
       end if;
@@ -124,16 +124,16 @@ begin
     end procedure offer;
 
     -- Break a beat that is waiting.
-    procedure break_waiting(is_full, is_last : in boolean) is
+    procedure break_waiting is
     begin
       has_broken := true;
       if FAULT = "stable tvalid" then
         tvalid <= '0';
       elsif FAULT = "stable tdata" then
         tdata(0) <= not bytes(0);
-      elsif FAULT = "stable tkeep" and is_full and is_last then
-        tkeep(LANES-1) <= '0';
-      elsif FAULT = "stable tlast" and is_full then
+      elsif FAULT = "stable tkeep" and last = '1' and lanes_kept > 1 then
+        tkeep(lanes_kept-1) <= '0';
+      elsif FAULT = "stable tlast" and lanes_kept = LANES then
         tlast    <= not last;
         tuser(0) <= '0';
       elsif FAULT = "stable tuser" then
@@ -144,7 +144,7 @@ begin
     end procedure break_waiting;
 
     -- Break a beat that is accepted at once.
-    procedure break_accepted(is_full, is_last : in boolean) is
+    procedure break_accepted is
     begin
       has_broken := true;
       if FAULT = "known tvalid" then
@@ -159,13 +159,13 @@ begin
         tlast <= 'U';
       elsif FAULT = "known tuser" then
         tuser(0) <= 'X';
-      elsif FAULT = "keep gap" and is_full and is_last then
+      elsif FAULT = "keep gap" and last = '1' and lanes_kept > 1 then
         tkeep(0) <= '0';
-      elsif FAULT = "keep partial" and not is_last then
+      elsif FAULT = "keep partial" and last = '0' then
         tkeep(LANES-1) <= '0';
-      elsif FAULT = "keep empty" and is_last then
+      elsif FAULT = "keep empty" and last = '1' then
         tkeep <= (others => '0');
-      elsif FAULT = "abort" and not is_last then
+      elsif FAULT = "abort" and last = '0' then
         tuser(0) <= '1';
       else
         has_broken := false;
@@ -194,9 +194,9 @@ begin
         has_broken := true;
       elsif cycle >= from_cycle and not has_broken then
         if is_waiting then
-          break_waiting(kept = FULL, last = '1');
+          break_waiting;
         elsif is_offered and ready = '1' then
-          break_accepted(kept = FULL, last = '1');
+          break_accepted;
         end if;
       end if;
       wait for 5 ns;

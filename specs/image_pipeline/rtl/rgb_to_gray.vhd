@@ -217,22 +217,20 @@ begin
 
   -- A row ends with a pixel, so nothing is carried into the next one.
   find_pixels : process (clk)
-    variable bytes : natural range 0 to LANES+2;
-    variable count : natural range 0 to PIXELS;
   begin
     if rising_edge(clk) then
       if run = '0' then
         carried_r <= 0;
       elsif advance = '1' and group_valid = '1' then
-        bytes := carried_r + to_integer(unsigned(group_count));
-        count := 0;
-        for pixel in 1 to PIXELS loop
-          if bytes >= 3*pixel then
-            count := pixel;
-          end if;
+        -- A table, as sums and comparisons one behind the other are slower.
+        for carried in 0 to 2 loop
+          for bytes in 0 to LANES loop
+            if carried_r = carried and unsigned(group_count) = bytes then
+              carried_r  <= (carried + bytes) mod 3;
+              count_r(1) <= to_unsigned((carried + bytes) / 3, COUNT_BITS);
+            end if;
+          end loop;
         end loop;
-        carried_r  <= bytes - 3*count;
-        count_r(1) <= to_unsigned(count, COUNT_BITS);
         previous_r <= joined(8*LANES+15 downto 8*LANES);
         for pixel in 0 to PIXELS-1 loop
           if carried_r = 0 then

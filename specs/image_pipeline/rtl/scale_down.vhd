@@ -96,6 +96,7 @@ architecture rtl of scale_down is
   -- For each pixel of a group, by how many lanes it moves down.
   type shifts_t is array (natural range 0 to LANES-1) of unsigned(SHIFT_BITS-1 downto 0);
   type counts_t is array (natural range 2 to 3) of unsigned(COUNT_BITS-1 downto 0);
+  type sums_t is array (natural range 0 to LANES-1) of unsigned(COUNT_BITS-1 downto 0);
 
   -- The phase `steps` pixels further on.
   function moved(phase, steps, size_out, size_in : natural) return natural is
@@ -106,6 +107,36 @@ architecture rtl of scale_down is
     end if;
     return phase + (size_in - BACK);
   end function moved;
+
+  -- Yosys makes a carry chain of `+`, which is slower at so few bits.
+  function added(left, right : unsigned(COUNT_BITS-1 downto 0)) return unsigned is
+    variable sum   : unsigned(COUNT_BITS-1 downto 0);
+    variable carry : std_logic := '0';
+  begin
+    for k in sum'reverse_range loop
+      sum(k) := left(k) xor right(k) xor carry;
+      carry  := (left(k) and right(k)) or (carry and (left(k) or right(k)));
+    end loop;
+    return sum;
+  end function added;
+
+  -- For each lane, the bits from the lowest one to its own that are set: sums over 2, 4, 8 ... lanes.
+  function sums_of(bits : std_logic_vector(LANES-1 downto 0)) return sums_t is
+    variable sums : sums_t;
+  begin
+    for lane in 0 to LANES-1 loop
+      sums(lane)    := (others => '0');
+      sums(lane)(0) := bits(lane);
+    end loop;
+    for level in 0 to clog2(LANES)-1 loop
+      for lane in 0 to LANES-1 loop
+        if (lane / 2**level) mod 2 = 1 then
+          sums(lane) := added(sums(lane), sums((lane / 2**level) * 2**level - 1));
+        end if;
+      end loop;
+    end loop;
+    return sums;
+  end function sums_of;
 
   signal run          : std_logic;
   signal group_data   : std_logic_vector(WIDTH-1 downto 0);
@@ -247,23 +278,18 @@ begin
 
   -- A pixel moves down by the number of those below it that go.
   place : process (clk)
-    variable gone : unsigned(COUNT_BITS-1 downto 0);
-    variable left : unsigned(COUNT_BITS-1 downto 0);
+    variable gone : sums_t;
   begin
     if rising_edge(clk) and advance = '1' then
       placed_r <= data_r;
-      gone     := (others => '0');
-      left     := (others => '0');
+      gone     := sums_of(not stays_r);
       for lane in 0 to LANES-1 loop
         shifts_r(lane) <= (others => '0');
-        if stays_r(lane) = '1' then
-          shifts_r(lane) <= resize(gone, SHIFT_BITS);
-          left := left + 1;
-        else
-          gone := gone + 1;
+        if lane > 0 and stays_r(lane) = '1' then
+          shifts_r(lane) <= gone(max(0, lane-1))(SHIFT_BITS-1 downto 0);
         end if;
       end loop;
-      count_r(2) <= left;
+      count_r(2) <= LANES - gone(LANES-1);
     end if;
   end process place;
 

@@ -68,13 +68,15 @@ end entity mobile_robot;
 
 architecture rtl of mobile_robot is
 
-  constant WHEELS : positive := 4;
+  constant WHEELS         : positive := 4;
+  -- From the tick on: more than a command takes to become speeds.
+  constant COMMAND_CYCLES : positive := 12;
 
   signal position_r     : natural range 0 to PWM_CYCLES-1;
-  signal pwm_last       : std_logic;
+  -- The last cycle of a period of the PWM, and of one of control.
+  signal pwm_last_r     : std_logic;
+  signal tick_r         : std_logic;
   signal period_r       : natural range 0 to PWM_PERIODS-1;
-  -- The last cycle of a period of control.
-  signal tick           : std_logic;
 
   signal counts         : std_logic_vector(8*WHEELS-1 downto 0);
   signal counts_r       : std_logic_vector(8*WHEELS-1 downto 0);
@@ -93,16 +95,13 @@ architecture rtl of mobile_robot is
   signal z              : std_logic_vector(63 downto 0);
   signal out_valid_r    : std_logic;
   -- Cycles since the tick, until the controllers start.
-  signal wait_r         : natural range 0 to 12;
+  signal wait_r         : natural range 0 to COMMAND_CYCLES;
   signal start          : std_logic;
 
 begin
 
-  -- As many cycles as a command takes to become speeds.
-  start             <= '1' when wait_r = 12 else '0';
-  pwm_last          <= '1' when position_r = PWM_CYCLES-1 else '0';
-  tick              <= '1' when pwm_last = '1' and period_r = PWM_PERIODS-1 else '0';
-  taking            <= tick and in_msg_valid and not out_valid_r;
+  start             <= '1' when wait_r = COMMAND_CYCLES else '0';
+  taking            <= tick_r and in_msg_valid and not out_valid_r;
   in_msg_ready      <= taken_r(1);
   out_segment_valid <= (others => out_valid_r);
   out_linear_x      <= x;
@@ -115,17 +114,25 @@ begin
   time_base : process (clk)
   begin
     if rising_edge(clk) then
-      if pwm_last = '0' then
+      pwm_last_r <= '0';
+      tick_r     <= '0';
+      if position_r = PWM_CYCLES-2 then
+        pwm_last_r <= '1';
+        if period_r = PWM_PERIODS-1 then
+          tick_r <= '1';
+        end if;
+      end if;
+      if pwm_last_r = '0' then
         position_r <= position_r + 1;
       else
         position_r <= 0;
-        if tick = '1' then
+        if tick_r = '1' then
           period_r <= 0;
         else
           period_r <= period_r + 1;
         end if;
       end if;
-      if tick = '1' then
+      if tick_r = '1' then
         wait_r <= 1;
       elsif start = '1' then
         wait_r <= 0;
@@ -135,6 +142,8 @@ begin
       if rst_n = '0' then
         position_r <= 0;
         period_r   <= 0;
+        pwm_last_r <= '0';
+        tick_r     <= '0';
         wait_r     <= 0;
       end if;
     end if;
@@ -144,7 +153,7 @@ begin
   begin
     if rising_edge(clk) then
       taken_r <= taken_r(0) & taking;
-      if tick = '1' then
+      if tick_r = '1' then
         counts_r <= counts;
         if taking = '1' then
           silence_r <= 0;
@@ -215,7 +224,7 @@ begin
         rst_n  => rst_n,
         enc_a  => enc_a(k),
         enc_b  => enc_b(k),
-        sample => tick,
+        sample => tick_r,
         count  => counts(8*k+7 downto 8*k),
         errors => enc_errors(8*k+7 downto 8*k)
       );
@@ -243,7 +252,7 @@ begin
         clk      => clk,
         rst_n    => rst_n,
         position => position_r,
-        is_last  => pwm_last,
+        is_last  => pwm_last_r,
         duty     => duty,
         pwm      => pwm(k),
         dir      => dir(k)

@@ -85,6 +85,9 @@ architecture rtl of skid_steer is
 
   constant PRODUCT_FRACTION : positive := TWIST_FRACTION + GAIN_FRACTION;
   subtype product_t is signed(TWIST_BITS+31 downto 0);
+  -- A number times a part of the bits of a constant, the lower or the upper half.
+  constant PART_BITS : positive := 16;
+  subtype partial_t is signed(TWIST_BITS+PART_BITS downto 0);
   -- 32 bits: ghdl 2.0 makes netlists that compare wider numbers with a negative integer as if that were positive.
   subtype speed_t is signed(TWIST_BITS+32-PRODUCT_FRACTION+SPEED_FRACTION downto 0);
   subtype back_t is signed(41 downto 0);
@@ -96,14 +99,17 @@ architecture rtl of skid_steer is
   signal fixed           : std_logic_vector(TWIST_BITS-1 downto 0);
   signal undefined       : std_logic;
 
-  -- The number is z; its product; the sides follow.
+  -- The number is z, and its constant; its product, first in parts; the sides follow.
   signal is_z_r          : std_logic;
+  signal gain_r          : signed(31 downto 0);
+  signal low_r           : partial_t;
+  signal high_r          : partial_t;
   signal product_r       : product_t;
-  signal product_valid_r : std_logic;
-  signal product_is_z_r  : std_logic;
+  -- Of the parts, and of the product.
+  signal product_valid_r : std_logic_vector(1 downto 0);
+  signal product_is_z_r  : std_logic_vector(1 downto 0);
   signal forward_r       : product_t;
-  signal x_lost_r        : std_logic;
-  signal lost_r          : std_logic;
+  signal lost_r          : std_logic_vector(2 downto 0);
   signal sides_valid_r   : std_logic;
   signal left_r          : speed_t;
   signal right_r         : speed_t;
@@ -112,9 +118,11 @@ architecture rtl of skid_steer is
   signal in_right_r      : std_logic_vector(15 downto 0);
 
   -- Sums of counts, and the product with a constant.
-  signal back_step_r     : unsigned(2 downto 0);
+  signal back_step_r     : unsigned(3 downto 0);
   signal sum_r           : signed(9 downto 0);
   signal difference_r    : signed(9 downto 0);
+  signal factor_r        : signed(9 downto 0);
+  signal back_gain_r     : signed(31 downto 0);
   signal back_r          : back_t;
   signal float_in        : std_logic_vector(63 downto 0);
   signal float_in_valid  : std_logic;
@@ -183,33 +191,35 @@ begin
     );
 
   to_speeds : process (clk)
-    variable gain        : integer;
     variable left, right : signed(TWIST_BITS+32 downto 0);
   begin
     if rising_edge(clk) then
       start_r <= in_start;
 
       is_z_r <= fixed_valid and not is_z_r;
-      gain   := X_GAIN;
-      if is_z_r = '1' then
-        gain := Z_GAIN;
+      gain_r <= to_signed(X_GAIN, 32);
+      if fixed_valid = '1' and is_z_r = '0' then
+        gain_r <= to_signed(Z_GAIN, 32);
       end if;
+
       if fixed_valid = '1' then
-        product_r <= signed(fixed) * to_signed(gain, 32);
+        low_r  <= signed(fixed) * signed('0' & gain_r(PART_BITS-1 downto 0));
+        high_r <= signed(fixed) * resize(gain_r(31 downto PART_BITS), PART_BITS+1);
       end if;
-      product_valid_r <= fixed_valid;
-      product_is_z_r  <= is_z_r;
-      x_lost_r        <= undefined;
-      lost_r          <= x_lost_r or undefined;
+      product_r       <= (resize(high_r, product_t'length-PART_BITS) & to_signed(0, PART_BITS)) + low_r;
+      product_valid_r <= product_valid_r(0) & fixed_valid;
+      product_is_z_r  <= product_is_z_r(0) & is_z_r;
+      lost_r          <= lost_r(1 downto 0) & undefined;
 
       forward_r     <= product_r;
-      sides_valid_r <= product_valid_r and product_is_z_r;
-      if product_valid_r = '1' then
+      sides_valid_r <= product_valid_r(1) and product_is_z_r(1);
+      if product_valid_r(1) = '1' then
         left    := resize(forward_r, left'length) - product_r;
         right   := resize(forward_r, right'length) + product_r;
         left_r  <= rounded(left);
         right_r <= rounded(right);
-        if lost_r = '1' then
+        -- z, or the x before it.
+        if lost_r(1) = '1' or lost_r(2) = '1' then
           left_r  <= (others => '0');
           right_r <= (others => '0');
         end if;
@@ -223,7 +233,7 @@ begin
       if rst_n = '0' then
         start_r         <= '0';
         is_z_r          <= '0';
-        product_valid_r <= '0';
+        product_valid_r <= "00";
         sides_valid_r   <= '0';
         done_r          <= '0';
       end if;
@@ -247,11 +257,15 @@ begin
         sum_r        <= (front_left + rear_left) + (front_right + rear_right);
         difference_r <= (front_right + rear_right) - (front_left + rear_left);
       end if;
-      back_step_r  <= back_step_r(1 downto 0) & out_start;
-      if back_step_r(0) = '1' then
-        back_r <= sum_r * to_signed(X_BACK, 32);
-      elsif back_step_r(1) = '1' then
-        back_r <= difference_r * to_signed(Z_BACK, 32);
+      back_step_r <= back_step_r(2 downto 0) & out_start;
+      factor_r    <= sum_r;
+      back_gain_r <= to_signed(X_BACK, 32);
+      if back_step_r(1) = '1' then
+        factor_r    <= difference_r;
+        back_gain_r <= to_signed(Z_BACK, 32);
+      end if;
+      if back_step_r(1) = '1' or back_step_r(2) = '1' then
+        back_r <= factor_r * back_gain_r;
       end if;
 
       out_done_r <= float_valid and is_second_r;
@@ -261,14 +275,14 @@ begin
         out_z_r     <= float;
       end if;
       if rst_n = '0' then
-        back_step_r <= "000";
+        back_step_r <= "0000";
         is_second_r <= '0';
         out_done_r  <= '0';
       end if;
     end if;
   end process back;
 
-  float_in_valid <= back_step_r(1) or back_step_r(2);
+  float_in_valid <= back_step_r(2) or back_step_r(3);
   float_in       <= std_logic_vector(resize(back_r, 64));
 
   u_float : entity firm.firm_fixed_to_float64

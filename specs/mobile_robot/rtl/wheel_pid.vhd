@@ -32,7 +32,7 @@ entity wheel_pid is
     setpoint : in  std_logic_vector(15 downto 0);
     speed    : in  std_logic_vector(7 downto 0);
 
-    -- From -LIMIT to LIMIT, six cycles after start.
+    -- From -LIMIT to LIMIT, seven cycles after start.
     duty     : out std_logic_vector(15 downto 0);
     stalled  : out std_logic
   );
@@ -52,10 +52,12 @@ architecture rtl of wheel_pid is
   -- Without fraction.
   subtype whole_t is signed(39-SUM_FRACTION downto 0);
 
-  signal step_r      : natural range 0 to 5;
+  signal step_r      : natural range 0 to 6;
   signal error_r     : error_t;
   signal slowing_r   : error_t;
   signal before_r    : signed(7 downto 0);
+  signal factor_r    : error_t;
+  signal gain_r      : signed(GAIN_BITS-1 downto 0);
   signal product_r   : product_t;
   -- P and D, and then all.
   signal sum_r       : sum_t;
@@ -80,8 +82,6 @@ begin
   multiply : process (clk)
     variable fixed  : error_t;
     variable slower : signed(8 downto 0);
-    variable left   : error_t;
-    variable gain   : natural;
   begin
     if rising_edge(clk) then
       if start = '1' then
@@ -92,16 +92,16 @@ begin
         before_r  <= signed(speed);
       end if;
 
+      factor_r <= error_r;
+      gain_r   <= to_signed(KP, GAIN_BITS);
+      if step_r = 2 then
+        gain_r <= to_signed(KI, GAIN_BITS);
+      elsif step_r = 3 then
+        factor_r <= slowing_r;
+        gain_r   <= to_signed(KD, GAIN_BITS);
+      end if;
       if step_r /= 0 then
-        left := error_r;
-        gain := KP;
-        if step_r = 2 then
-          gain := KI;
-        elsif step_r = 3 then
-          left := slowing_r;
-          gain := KD;
-        end if;
-        product_r <= left * to_signed(gain, GAIN_BITS);
+        product_r <= factor_r * gain_r;
       end if;
       if rst_n = '0' then
         before_r <= (others => '0');
@@ -109,7 +109,7 @@ begin
     end if;
   end process multiply;
 
-  -- Step 1 to 3 multiply, 2 to 4 add, 5 decides.
+  -- Step 1 to 3 choose factors, 2 to 4 multiply, 3 to 5 add, 6 decides.
   control : process (clk)
     variable whole     : whole_t;
     variable is_beyond : boolean;
@@ -117,20 +117,20 @@ begin
     if rising_edge(clk) then
       if start = '1' then
         step_r <= 1;
-      elsif step_r = 5 then
+      elsif step_r = 6 then
         step_r <= 0;
       elsif step_r /= 0 then
         step_r <= step_r + 1;
       end if;
 
-      if step_r = 2 then
+      if step_r = 3 then
         sum_r <= resize(product_r, sum_t'length);
-      elsif step_r = 3 then
+      elsif step_r = 4 then
         increased_r <= integral_r + product_r;
         sum_r       <= sum_r + integral_r + product_r;
-      elsif step_r = 4 then
-        sum_r <= sum_r + product_r;
       elsif step_r = 5 then
+        sum_r <= sum_r + product_r;
+      elsif step_r = 6 then
         whole     := sum_r(sum_t'left downto SUM_FRACTION);
         is_beyond := false;
         duty_r    <= whole(15 downto 0);

@@ -4,6 +4,7 @@
 
 library ieee;
 use ieee.std_logic_1164.all;
+library firm;
 
 entity chassis is
   port (
@@ -24,11 +25,21 @@ architecture behaviour of chassis is
   type speeds_t is array (0 to 3) of positive;
   constant FULL_SPEEDS : speeds_t := (80_000, 75_000, 85_000, 80_000);
 
+  -- The motors leave the reset together with the system, so that their periods are those of its PWM.
+  signal motor_rst_n : std_logic;
+
   signal enc_a    : std_logic_vector(3 downto 0);
   signal enc_b    : std_logic_vector(3 downto 0);
   signal glitch_r : std_logic := '0';
 
 begin
+
+  u_reset : entity firm.firm_cdc_reset
+    port map (
+      clk          => clk,
+      rst_n        => rst_n,
+      synced_rst_n => motor_rst_n
+    );
 
   wheels : for k in 0 to 3 generate
     u_motor : entity work.motor
@@ -39,7 +50,7 @@ begin
       )
       port map (
         clk   => clk,
-        rst_n => rst_n,
+        rst_n => motor_rst_n,
         pwm   => base_pwm(k),
         dir   => base_dir(k),
         held  => '0',

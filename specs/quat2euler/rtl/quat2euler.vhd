@@ -7,7 +7,7 @@
 -- after Bernardes and Viollet, "Quaternion to Euler angles conversion" (2022). Lengths cancel, so the
 -- quaternion need not be a unit, and nothing is ill-conditioned but what has no answer at the gimbal lock.
 -- Two CORDIC units turn (Q, R) and (P, S); a third makes the pitch of their lengths while they work on the
--- next message. 88 cycles from taking a message to its result, a new message every 36.
+-- next message. 90 cycles from taking a message to its result, a new message every 36.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -101,11 +101,14 @@ architecture rtl of quat2euler is
   signal length_qr       : word_vector_t;
   signal length_ps       : word_vector_t;
 
-  -- Roll and yaw, not yet wrapped.
+  -- Roll and yaw, not yet wrapped: the one that goes first, which is compared with a half turn in the next cycle.
   signal angles_valid_r  : std_logic;
   signal angles_kind_r   : kind_t;
-  signal roll_r          : word_t;
-  signal yaw_r           : word_t;
+  signal first_r         : word_t := (others => '0');
+  signal second_r        : word_t;
+  signal compared_r      : std_logic;
+  signal above_r         : std_logic;
+  signal below_r         : std_logic;
 
   signal pitch_in_ready  : std_logic;
   signal pitch_out_valid : std_logic;
@@ -240,19 +243,38 @@ begin
       if half_in_valid = '1' and half_in_ready = '1' then
         half_kind_r <= sum_kind_r;
       end if;
+      compared_r <= angles_valid_r;
       if half_out_ready = '1' then
         angles_valid_r <= '1';
         angles_kind_r  <= half_kind_r;
-        roll_r         <= resize(signed(alpha), WIDTH) - signed(beta);
-        yaw_r          <= resize(signed(alpha), WIDTH) + signed(beta);
-      elsif turn_r = YAW then
+        first_r        <= resize(signed(alpha), WIDTH) - signed(beta);
+        second_r       <= resize(signed(alpha), WIDTH) + signed(beta);
+      elsif compared_r = '1' and turn_r = ROLL then
+        first_r    <= second_r;
+        compared_r <= '0';
+      elsif compared_r = '1' and turn_r = YAW then
         angles_valid_r <= '0';
+        compared_r     <= '0';
       end if;
       if rst_n = '0' then
         angles_valid_r <= '0';
+        compared_r     <= '0';
       end if;
     end if;
   end process angles;
+
+  compare : process (clk)
+  begin
+    if rising_edge(clk) then
+      above_r <= '0';
+      below_r <= '0';
+      if first_r > pi then
+        above_r <= '1';
+      elsif first_r <= -pi then
+        below_r <= '1';
+      end if;
+    end if;
+  end process compare;
 
   u_pitch : entity firm.firm_cordic_vectoring
     generic map (
@@ -275,8 +297,7 @@ begin
 
   pitch_out_ready <= '1' when turn_r = PITCH else '0';
 
-  issue <= angles_valid_r when turn_r = ROLL else
-           '1' when turn_r = YAW else
+  issue <= compared_r when turn_r = ROLL or turn_r = YAW else
            pitch_out_valid when turn_r = PITCH else
            '0';
 
@@ -309,19 +330,14 @@ begin
     if rising_edge(clk) then
       angle_valid_r <= issue and rst_n;
       if issue = '1' then
-        if turn_r = ROLL then
-          raw := roll_r;
-        elsif turn_r = YAW then
-          raw := yaw_r;
-        else
-          raw := signed(half_pitch & '0');
-        end if;
+        raw    := first_r;
         offset := (others => '0');
         if turn_r = PITCH then
+          raw    := signed(half_pitch & '0');
           offset := -half_pi;
-        elsif raw > pi then
+        elsif above_r = '1' then
           offset := -two_pi;
-        elsif raw <= -pi then
+        elsif below_r = '1' then
           offset := two_pi;
         end if;
         angle_r <= raw + offset;

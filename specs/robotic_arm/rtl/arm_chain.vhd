@@ -47,10 +47,12 @@ architecture rtl of arm_chain is
   constant LAST_SLOT  : natural  := 5;
   -- Three rows, and one to see the last one off.
   constant LAST_ROW   : natural  := 3;
-  -- Cycles between the number that is asked for and its fixed-point form.
-  constant CONVERSION : positive := 3;
-  -- Sixteen elements through conversion, difference, product and sum.
-  constant LAST_TURN  : natural  := 15 + CONVERSION + 3;
+  -- Cycles between the number that is asked for and its fixed-point form: one to choose it, three to convert it.
+  constant CONVERSION : positive := 4;
+  -- Sixteen elements through conversion, difference, product in two steps, and sum.
+  constant LAST_TURN  : natural  := 15 + CONVERSION + 4;
+  -- Cycles of firm_fixed_to_float64.
+  constant TO_FLOAT   : positive := 5;
   -- Bits of a product that the sum of squares goes without.
   constant SQUARE_CUT : positive := 8;
   -- A number as firm_fixed_to_float64 takes it: three bits more before the point, and zeros behind, as a mean of
@@ -64,6 +66,9 @@ architecture rtl of arm_chain is
   subtype wide_t is signed(FRACTION+4 downto 0);
   subtype operand_t is signed(FRACTION+3 downto 0);
   subtype product_t is signed(2*FRACTION+7 downto 0);
+  -- An operand times the lower bits of the other one, or the rest of these.
+  constant LOWER : positive := 17;
+  subtype partial_t is signed(FRACTION+4+LOWER downto 0);
   subtype column_index_t is natural range 0 to 2;
   type column_t is array (column_index_t) of number_t;
   type entries_t is array (natural range 0 to ENTRIES-1) of std_logic_vector(ENTRY-1 downto 0);
@@ -104,6 +109,8 @@ architecture rtl of arm_chain is
   signal feed_start       : std_logic;
   signal ask              : std_logic;
   signal asked            : std_logic_vector(63 downto 0);
+  signal ask_r            : std_logic;
+  signal asked_r          : std_logic_vector(63 downto 0);
   signal fixed_valid      : std_logic;
   signal fixed            : std_logic_vector(FRACTION+4 downto 0);
   signal fixed_overflow   : std_logic;
@@ -146,10 +153,19 @@ architecture rtl of arm_chain is
   signal operands_valid_r : std_logic;
   signal operands_slot_r  : natural range 0 to LAST_SLOT;
   signal operands_row_r   : natural range 0 to LAST_ROW;
+  signal low_r            : partial_t;
+  signal high_r           : partial_t;
+  signal partial_valid_r  : std_logic;
+  signal partial_slot_r   : natural range 0 to LAST_SLOT;
+  signal partial_row_r    : natural range 0 to LAST_ROW;
   signal product_r        : product_t;
   signal product_valid_r  : std_logic;
   signal product_slot_r   : natural range 0 to LAST_SLOT;
   signal product_row_r    : natural range 0 to LAST_ROW;
+  signal rounded_r        : number_t;
+  signal rounded_valid_r  : std_logic;
+  signal rounded_slot_r   : natural range 0 to LAST_SLOT;
+  signal rounded_row_r    : natural range 0 to LAST_ROW;
   -- The first of two products.
   signal part_r           : number_t;
   signal sum_r            : signed(63 downto 0);
@@ -161,7 +177,7 @@ architecture rtl of arm_chain is
   signal float_valid      : std_logic;
   signal float            : std_logic_vector(63 downto 0);
   -- Whether what is on its way to float64 is a number.
-  signal float_unfit_r    : std_logic_vector(2 downto 0);
+  signal float_unfit_r    : std_logic_vector(TO_FLOAT-1 downto 0);
 
   -- In the order in which they leave: joint, row, column.
   signal entries_r        : entries_t;
@@ -264,6 +280,14 @@ begin
     end if;
   end process choose;
 
+  hold_asked : process (clk)
+  begin
+    if rising_edge(clk) then
+      ask_r   <= ask and rst_n;
+      asked_r <= asked;
+    end if;
+  end process hold_asked;
+
   u_fixed : entity firm.firm_float64_to_fixed
     generic map (
       WIDTH    => wide_t'length,
@@ -272,8 +296,8 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      in_valid      => ask,
-      in_number     => asked,
+      in_valid      => ask_r,
+      in_number     => asked_r,
       out_valid     => fixed_valid,
       out_number    => fixed,
       out_overflow  => fixed_overflow,
@@ -441,23 +465,42 @@ begin
         operands_valid_r <= '1';
       end if;
 
-      product_r       <= left_r * right_r;
-      product_valid_r <= operands_valid_r;
-      product_slot_r  <= operands_slot_r;
-      product_row_r   <= operands_row_r;
       if rst_n = '0' then
         operands_valid_r <= '0';
-        product_valid_r  <= '0';
       end if;
     end if;
   end process operands;
 
-  results : process (clk)
-    variable product : number_t;
-    variable y       : number_t;
+  multiply : process (clk)
   begin
     if rising_edge(clk) then
-      product := rounded(product_r);
+      low_r           <= left_r * signed('0' & right_r(LOWER-1 downto 0));
+      high_r          <= left_r * resize(right_r(operand_t'left downto LOWER), LOWER+1);
+      partial_valid_r <= operands_valid_r;
+      partial_slot_r  <= operands_slot_r;
+      partial_row_r   <= operands_row_r;
+
+      product_r       <= (resize(high_r, product_t'length-LOWER) & to_signed(0, LOWER)) + low_r;
+      product_valid_r <= partial_valid_r;
+      product_slot_r  <= partial_slot_r;
+      product_row_r   <= partial_row_r;
+
+      rounded_r       <= rounded(product_r);
+      rounded_valid_r <= product_valid_r;
+      rounded_slot_r  <= product_slot_r;
+      rounded_row_r   <= product_row_r;
+      if rst_n = '0' then
+        partial_valid_r <= '0';
+        product_valid_r <= '0';
+        rounded_valid_r <= '0';
+      end if;
+    end if;
+  end process multiply;
+
+  results : process (clk)
+    variable y : number_t;
+  begin
+    if rising_edge(clk) then
       if phase_r = IDLE then
         for k in column_index_t loop
           x_r(k) <= (others => '0');
@@ -468,20 +511,20 @@ begin
         x_r(0) <= to_signed(ONE, number_t'length);
         y_r(1) <= to_signed(ONE, number_t'length);
         z_r(2) <= to_signed(ONE, number_t'length);
-      elsif product_valid_r = '1' and phase_r = TURN then
+      elsif rounded_valid_r = '1' and phase_r = TURN then
         for k in column_index_t loop
-          if product_row_r = k then
-            if product_slot_r = 0 then
-              p_r(k) <= p_r(k) + product;
-            elsif product_slot_r = 2 then
-              x_r(k) <= part_r + product;
+          if rounded_row_r = k then
+            if rounded_slot_r = 0 then
+              p_r(k) <= p_r(k) + rounded_r;
+            elsif rounded_slot_r = 2 then
+              x_r(k) <= part_r + rounded_r;
               if TURNS(step_r) < 0 then
-                x_r(k) <= part_r - product;
+                x_r(k) <= part_r - rounded_r;
               end if;
-            elsif product_slot_r = 4 then
-              y := product;
+            elsif rounded_slot_r = 4 then
+              y := rounded_r;
               if TURNS(step_r) < 0 then
-                y := -product;
+                y := -rounded_r;
               end if;
               y_r(k) <= y - part_r;
               if TURNS(step_r) > 0 then
@@ -489,16 +532,16 @@ begin
               elsif TURNS(step_r) < 0 then
                 z_r(k) <= y_r(k);
               end if;
-            elsif product_slot_r = 5 then
-              p_r(k) <= p_r(k) + product;
+            elsif rounded_slot_r = 5 then
+              p_r(k) <= p_r(k) + rounded_r;
               if TURNS(step_r) > 0 then
-                p_r(k) <= p_r(k) - product;
+                p_r(k) <= p_r(k) - rounded_r;
               end if;
             end if;
           end if;
         end loop;
-        if product_slot_r = 1 or product_slot_r = 3 then
-          part_r <= product;
+        if rounded_slot_r = 1 or rounded_slot_r = 3 then
+          part_r <= rounded_r;
         end if;
       end if;
 
@@ -540,7 +583,7 @@ begin
 
   -- To float64 ------------------------------------------------------------------------------------------------------
 
-  -- A row leaves while the next one is in work; its results are all there in the next one's slot 2.
+  -- A row leaves while the next one is in work; each result is there before its slot.
   emit <= '1' when phase_r = TURN and row_r /= 0 and slot_r >= 2 and step_r /= STEPS-1 else '0';
 
   select_number : process (x_r, y_r, z_r, p_r, row_r, slot_r)
@@ -589,13 +632,13 @@ begin
     variable number : std_logic_vector(63 downto 0);
   begin
     if rising_edge(clk) then
-      float_unfit_r <= float_unfit_r(1 downto 0) & unfit_r;
+      float_unfit_r <= float_unfit_r(TO_FLOAT-2 downto 0) & unfit_r;
       if phase_r = COMPARE then
         float_unfit_r(0) <= unfit_r or given_unfit_r;
       end if;
       if float_valid = '1' then
         number := float;
-        if float_unfit_r(2) = '1' then
+        if float_unfit_r(TO_FLOAT-1) = '1' then
           -- The quiet NaN.
           number               := (others => '0');
           number(62 downto 51) := (others => '1');

@@ -164,11 +164,15 @@ architecture rtl of sobel is
   signal second_r  : std_logic;  -- there is one row before
   signal lowest_r  : std_logic;  -- no row comes any more
   signal valid_r   : std_logic;
-  signal upper     : pixels_t;
-  signal middle    : pixels_t;
-  signal lower     : pixels_t;
-  signal ahead_s   : smooths_t;
-  signal ahead_d   : smooths_t;
+
+  -- The same with the pixels above it, and its columns.
+  signal ahead_r       : group_t;
+  signal ahead_valid_r : std_logic;
+  signal upper_r       : pixels_t;
+  signal middle_r      : pixels_t;
+  signal lower_r       : pixels_t;
+  signal ahead_s       : smooths_t;
+  signal ahead_d       : smooths_t;
 
   -- The group before it, whose row is the one before, and the column before that.
   signal here_r   : group_t;
@@ -367,14 +371,34 @@ begin
     end if;
   end process take_group;
 
-  middle <= earlier(WIDTH-1 downto 0);
-  upper  <= middle when second_r = '1' else earlier(2*WIDTH-1 downto WIDTH);
-  lower  <= middle when lowest_r = '1' else data_r;
+  -- A register behind the memory, whose output is late in its cycle.
+  align_rows : process (clk)
+  begin
+    if rising_edge(clk) then
+      if run = '0' then
+        ahead_valid_r <= '0';
+      elsif advance = '1' then
+        ahead_valid_r <= valid_r;
+      end if;
+      if advance = '1' then
+        ahead_r  <= group_r;
+        upper_r  <= earlier(2*WIDTH-1 downto WIDTH);
+        middle_r <= earlier(WIDTH-1 downto 0);
+        lower_r  <= data_r;
+        if second_r = '1' then
+          upper_r <= earlier(WIDTH-1 downto 0);
+        end if;
+        if lowest_r = '1' then
+          lower_r <= earlier(WIDTH-1 downto 0);
+        end if;
+      end if;
+    end if;
+  end process align_rows;
 
   columns : for lane in 0 to LANES-1 generate
-    ahead_s(lane) <= smoothed(upper(8*lane+7 downto 8*lane), middle(8*lane+7 downto 8*lane),
-                              lower(8*lane+7 downto 8*lane));
-    ahead_d(lane) <= difference(upper(8*lane+7 downto 8*lane), lower(8*lane+7 downto 8*lane));
+    ahead_s(lane) <= smoothed(upper_r(8*lane+7 downto 8*lane), middle_r(8*lane+7 downto 8*lane),
+                              lower_r(8*lane+7 downto 8*lane));
+    ahead_d(lane) <= difference(upper_r(8*lane+7 downto 8*lane), lower_r(8*lane+7 downto 8*lane));
   end generate columns;
 
   filter : process (clk)
@@ -390,16 +414,16 @@ begin
       elsif advance = '1' then
         xy_valid_r <= '0';
         xy_end_r   <= '0';
-        if valid_r = '1' then
-          here_r     <= group_r;
+        if ahead_valid_r = '1' then
+          here_r     <= ahead_r;
           xy_valid_r <= here_r.gives;
-        elsif phase_r = TELL_END then
+        elsif phase_r = TELL_END and valid_r = '0' then
           -- The last group is on its way.
           xy_valid_r <= '1';
           xy_end_r   <= '1';
         end if;
       end if;
-      if advance = '1' and valid_r = '1' then
+      if advance = '1' and ahead_valid_r = '1' then
         here_s     <= ahead_s;
         here_d     <= ahead_d;
         behind_s   <= here_s(LANES-1);

@@ -45,21 +45,20 @@ architecture rtl of axis_to_geometry_msgs_quaternion is
   constant BAD_ENCODING : code_t := "100";
   constant NO_LENGTH    : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's first beat. Values from BROKEN on are states after the last beat:
-  -- BROKEN + code    the frame has a fault, and is skipped up to its end
-  -- ENDED + code     the frame has ended, and its fault is reported
-  -- COMPLETE         the message waits to be accepted; a frame that ended early is not skipped, so this code is free
-  -- A code has two bits.
-  subtype position_t is unsigned(3 downto 0);
-  constant BROKEN       : position_t := "1000";
-  constant ENDED        : position_t := "1100";
-  constant COMPLETE     : position_t := "1010";
+  -- The beat on s_axis, counted from the length's first beat. After a fault, the two low bits are its code. Then stores
+  -- may change, since their frame is lost.
+  subtype position_t is unsigned(2 downto 0);
   signal position_r     : position_t := (others => '0');
   signal next_position  : position_t;
-  signal beyond         : std_logic;
   signal is_first       : std_logic;
-  signal is_waiting     : std_logic;
-  signal is_told        : std_logic;
+
+  -- The state is one-hot, so that s_axis_tready is one LUT.
+  signal broken_r       : std_logic := '0';  -- the frame has a fault, and is skipped up to its end
+  signal ended_r        : std_logic := '0';  -- the frame has ended, and its fault is reported
+  signal complete_r     : std_logic := '0';  -- the message waits to be accepted
+  signal next_broken    : std_logic;
+  signal next_ended     : std_logic;
+  signal next_complete  : std_logic;
 
   -- The possible lengths so far: bit k stands for k bytes more than the payload's 36 bytes.
   signal match_r        : std_logic_vector(3 downto 0) := (others => '0');
@@ -75,13 +74,10 @@ architecture rtl of axis_to_geometry_msgs_quaternion is
 
 begin
 
-  beyond     <= '1' when position_r(3 downto 3) = "1" else '0';
-  is_waiting <= '1' when beyond = '1' and position_r(2 downto 0) = COMPLETE(2 downto 0) else '0';
-  is_told    <= beyond and position_r(2);
-  is_first   <= '1' when position_r = 0 or is_waiting = '1' else '0';
+  is_first <= '1' when position_r = 0 else '0';
 
   -- The next frame starts in the cycle in which the message is accepted, but not in the one that reports a fault.
-  ready         <= not is_told and (msg_ready or not is_waiting);
+  ready         <= not ended_r and (msg_ready or not complete_r);
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
 
@@ -101,10 +97,12 @@ begin
   w(55 downto 0)  <= fields_1_r(223 downto 168);
   w(63 downto 56) <= fields_0_r(31 downto 24);
 
-  segment_valid    <= (others => is_waiting);
-  msg_valid        <= is_waiting;
-  frame_error      <= is_told;
-  frame_error_code <= '0' & BAD_ENCODING when position_r(1 downto 0) = "00"
+  segment_valid    <= (others => complete_r);
+  msg_valid        <= complete_r;
+  frame_error      <= ended_r;
+  -- A wrong length is found a beat late, but is the frame's first fault.
+  frame_error_code <= '0' & BAD_LENGTH when match_r = NO_LENGTH
+                      else '0' & BAD_ENCODING when position_r(1 downto 0) = "00"
                       else "00" & std_logic_vector(position_r(1 downto 0));
 
   compare : process (position_r, is_first, s_axis_tdata, s_axis_tkeep, match_r)
@@ -149,34 +147,34 @@ begin
     end if;
   end process;
 
-  check : process (position_r, is_first, s_axis_tdata, s_axis_tkeep, s_axis_tlast, match)
+  check : process (position_r, is_first, s_axis_tdata, s_axis_tkeep, s_axis_tlast, match_r)
   begin
     fault <= NO_FAULT;
-    if match = NO_LENGTH then
+    if is_first = '0' and match_r = NO_LENGTH then
       fault <= BAD_LENGTH;
     elsif is_first = '1' and s_axis_tkeep(5) = '1' and s_axis_tdata(47 downto 40) /= x"00" then
       fault <= BAD_ENCODING;
     elsif is_first = '1' and s_axis_tkeep(6) = '1' and s_axis_tdata(55 downto 48) /= x"01" then
       fault <= BAD_ENCODING;
-    elsif match(0) = '1' and position_r = 5 then
+    elsif match_r(0) = '1' and position_r = 5 then
       if s_axis_tlast = '0' or s_axis_tkeep(1) = '1' then
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(0) = '0' then
         fault <= SHORT_FRAME;
       end if;
-    elsif match(1) = '1' and position_r = 5 then
+    elsif match_r(1) = '1' and position_r = 5 then
       if s_axis_tlast = '0' or s_axis_tkeep(2) = '1' then
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(1) = '0' then
         fault <= SHORT_FRAME;
       end if;
-    elsif match(2) = '1' and position_r = 5 then
+    elsif match_r(2) = '1' and position_r = 5 then
       if s_axis_tlast = '0' or s_axis_tkeep(3) = '1' then
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(2) = '0' then
         fault <= SHORT_FRAME;
       end if;
-    elsif match(3) = '1' and position_r = 5 then
+    elsif match_r(3) = '1' and position_r = 5 then
       if s_axis_tlast = '0' or s_axis_tkeep(4) = '1' then
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(3) = '0' then
@@ -187,25 +185,23 @@ begin
     end if;
   end process;
 
-  follow : process (position_r, beyond, is_first, s_axis_tlast, fault)
+  follow : process (position_r, broken_r, s_axis_tlast, fault)
   begin
-    if beyond = '1' and is_first = '0' then
+    next_position <= position_r + 1;
+    next_broken   <= '0';
+    next_ended    <= '0';
+    next_complete <= '0';
+    if broken_r = '1' or fault /= NO_FAULT then
       -- The first fault of a frame is the one reported.
       next_position <= position_r;
-      if s_axis_tlast = '1' then
-        next_position <= position_r or ENDED;
+      if broken_r = '0' then
+        next_position <= resize(unsigned(fault(1 downto 0)), position_t'length);
       end if;
-    elsif fault /= NO_FAULT then
-      next_position <= BROKEN or resize(unsigned(fault(1 downto 0)), position_t'length);
-      if s_axis_tlast = '1' then
-        next_position <= ENDED or resize(unsigned(fault(1 downto 0)), position_t'length);
-      end if;
+      next_broken <= not s_axis_tlast;
+      next_ended  <= s_axis_tlast;
     elsif s_axis_tlast = '1' then
-      next_position <= COMPLETE;
-    elsif is_first = '1' then
-      next_position <= to_unsigned(1, position_t'length);
-    else
-      next_position <= position_r + 1;
+      next_position <= (others => '0');
+      next_complete <= '1';
     end if;
   end process;
 
@@ -214,7 +210,12 @@ begin
     if rising_edge(clk) then
       if beat = '1' then
         position_r <= next_position;
-        match_r    <= match;
+        broken_r   <= next_broken;
+        ended_r    <= next_ended;
+        complete_r <= next_complete;
+        if broken_r = '0' then
+          match_r <= match;
+        end if;
         if store_0 = '1' then
           fields_0_r <=
               s_axis_tdata(7 downto 0) &
@@ -225,11 +226,17 @@ begin
               s_axis_tdata(63 downto 8) &
               fields_1_r(223 downto 56);
         end if;
-      elsif is_told = '1' or (is_waiting = '1' and msg_ready = '1') then
+      elsif ended_r = '1' or msg_ready = '1' then
+        ended_r    <= '0';
+        complete_r <= '0';
+      end if;
+      if rst_n = '0' or ended_r = '1' then
         position_r <= (others => '0');
       end if;
       if rst_n = '0' then
-        position_r <= (others => '0');
+        broken_r   <= '0';
+        ended_r    <= '0';
+        complete_r <= '0';
       end if;
     end if;
   end process;

@@ -49,21 +49,20 @@ architecture rtl of axis_to_awkward_msgs_gaps is
   constant BAD_ENCODING : code_t := "100";
   constant NO_LENGTH    : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's first beat. Values from BROKEN on are states after the last beat:
-  -- BROKEN + code    the frame has a fault, and is skipped up to its end
-  -- ENDED + code     the frame has ended, and its fault is reported
-  -- COMPLETE         the message waits to be accepted; a frame that ended early is not skipped, so this code is free
-  -- A code has two bits.
+  -- The beat on s_axis, counted from the length's first beat. After a fault, the two low bits are its code. Then stores
+  -- may change, since their frame is lost.
   subtype position_t is unsigned(6 downto 0);
-  constant BROKEN       : position_t := "1110000";
-  constant ENDED        : position_t := "1110100";
-  constant COMPLETE     : position_t := "1110010";
   signal position_r     : position_t := (others => '0');
   signal next_position  : position_t;
-  signal beyond         : std_logic;
   signal is_first       : std_logic;
-  signal is_waiting     : std_logic;
-  signal is_told        : std_logic;
+
+  -- The state is one-hot, so that s_axis_tready is one LUT.
+  signal broken_r       : std_logic := '0';  -- the frame has a fault, and is skipped up to its end
+  signal ended_r        : std_logic := '0';  -- the frame has ended, and its fault is reported
+  signal complete_r     : std_logic := '0';  -- the message waits to be accepted
+  signal next_broken    : std_logic;
+  signal next_ended     : std_logic;
+  signal next_complete  : std_logic;
 
   -- The possible lengths so far: bit k stands for k bytes more than the payload's 92 bytes.
   signal match_r        : std_logic_vector(3 downto 0) := (others => '0');
@@ -77,13 +76,10 @@ architecture rtl of axis_to_awkward_msgs_gaps is
 
 begin
 
-  beyond     <= '1' when position_r(6 downto 4) = "111" else '0';
-  is_waiting <= '1' when beyond = '1' and position_r(2 downto 0) = COMPLETE(2 downto 0) else '0';
-  is_told    <= beyond and position_r(2);
-  is_first   <= '1' when position_r = 0 or is_waiting = '1' else '0';
+  is_first <= '1' when position_r = 0 else '0';
 
   -- The next frame starts in the cycle in which the message is accepted, but not in the one that reports a fault.
-  ready         <= not is_told and (msg_ready or not is_waiting);
+  ready         <= not ended_r and (msg_ready or not complete_r);
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
 
@@ -112,9 +108,9 @@ begin
   single_tail                    <= fields_r(367 downto 360);
   last                           <= fields_r(431 downto 368);
 
-  segment_valid    <= (others => is_waiting);
-  msg_valid        <= is_waiting;
-  frame_error      <= is_told;
+  segment_valid    <= (others => complete_r);
+  msg_valid        <= complete_r;
+  frame_error      <= ended_r;
   frame_error_code <= '0' & BAD_ENCODING when position_r(1 downto 0) = "00"
                       else "00" & std_logic_vector(position_r(1 downto 0));
 
@@ -241,25 +237,23 @@ begin
     end if;
   end process;
 
-  follow : process (position_r, beyond, is_first, s_axis_tlast, fault)
+  follow : process (position_r, broken_r, s_axis_tlast, fault)
   begin
-    if beyond = '1' and is_first = '0' then
+    next_position <= position_r + 1;
+    next_broken   <= '0';
+    next_ended    <= '0';
+    next_complete <= '0';
+    if broken_r = '1' or fault /= NO_FAULT then
       -- The first fault of a frame is the one reported.
       next_position <= position_r;
-      if s_axis_tlast = '1' then
-        next_position <= position_r or ENDED;
+      if broken_r = '0' then
+        next_position <= resize(unsigned(fault(1 downto 0)), position_t'length);
       end if;
-    elsif fault /= NO_FAULT then
-      next_position <= BROKEN or resize(unsigned(fault(1 downto 0)), position_t'length);
-      if s_axis_tlast = '1' then
-        next_position <= ENDED or resize(unsigned(fault(1 downto 0)), position_t'length);
-      end if;
+      next_broken <= not s_axis_tlast;
+      next_ended  <= s_axis_tlast;
     elsif s_axis_tlast = '1' then
-      next_position <= COMPLETE;
-    elsif is_first = '1' then
-      next_position <= to_unsigned(1, position_t'length);
-    else
-      next_position <= position_r + 1;
+      next_position <= (others => '0');
+      next_complete <= '1';
     end if;
   end process;
 
@@ -268,17 +262,28 @@ begin
     if rising_edge(clk) then
       if beat = '1' then
         position_r <= next_position;
-        match_r    <= match;
+        broken_r   <= next_broken;
+        ended_r    <= next_ended;
+        complete_r <= next_complete;
+        if broken_r = '0' then
+          match_r <= match;
+        end if;
         if store = '1' then
           fields_r <=
               s_axis_tdata(7 downto 0) &
               fields_r(431 downto 8);
         end if;
-      elsif is_told = '1' or (is_waiting = '1' and msg_ready = '1') then
+      elsif ended_r = '1' or msg_ready = '1' then
+        ended_r    <= '0';
+        complete_r <= '0';
+      end if;
+      if rst_n = '0' or ended_r = '1' then
         position_r <= (others => '0');
       end if;
       if rst_n = '0' then
-        position_r <= (others => '0');
+        broken_r   <= '0';
+        ended_r    <= '0';
+        complete_r <= '0';
       end if;
     end if;
   end process;

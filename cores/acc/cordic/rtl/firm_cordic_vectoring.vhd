@@ -3,7 +3,9 @@
 --
 -- The vector is folded into the quadrant x >= 0, y >= 0, so that mirrored vectors give exactly the same length and
 -- mirrored angles. It is then turned towards the x axis by atan(2**-i), i = 0, 1, ...
--- `scaled_r` holds y * 2**i: it needs no shifter and loses no bit, so small vectors keep their accuracy.
+-- `scaled_r` holds y * 2**i: it needs no shifter and loses no bit, so small vectors keep their accuracy. x grows by
+-- y * 2**-i, which is `scaled_r` shifted by 2*i places: by a multiple of 16 on the way into `aligned_r`, and by the
+-- remaining places after it.
 -- As soon as y is 0, the angle is exact and no longer changes: multiples of pi/4 have no error, and
 -- (0, 0) has the angle 0. Otherwise the error is at most 2**-(ITERATIONS-1) rad.
 -- A vector takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
@@ -45,11 +47,16 @@ end entity firm_cordic_vectoring;
 architecture rtl of firm_cordic_vectoring is
 
   -- The table has 64 rotations, and an angle of 64 fraction bits cannot use more.
-  constant COUNT_WIDTH : positive := 6;
+  constant COUNT_WIDTH  : positive := 6;
+  -- So many rotations have a coarse shift in common, of 2*FINE_STEPS places each; and how many such shifts there are.
+  constant FINE_WIDTH   : positive := 3;
+  constant FINE_STEPS   : positive := 2**FINE_WIDTH;
+  constant LAST_COARSE  : natural  := (ITERATIONS-1) / FINE_STEPS;
 
   subtype magnitude_t is signed(WIDTH-1 downto 0);
   -- After rotation i, y <= x * 2**-i: so y * 2**(i+1) needs one bit more than x.
   subtype scaled_t is signed(WIDTH downto 0);
+  subtype count_t is unsigned(COUNT_WIDTH-1 downto 0);
   subtype angle_t is signed(FRACTION+2 downto 0);
   type angles_t is array (natural range 0 to 2**COUNT_WIDTH-1) of angle_t;
 
@@ -74,6 +81,23 @@ architecture rtl of firm_cordic_vectoring is
     return signed(number);
   end function absolute;
 
+  -- Moved by the coarse part of a rotation's shift. Place by place, as ghdl 2.0 translates a shift of a signed number
+  -- to Verilog without its sign.
+  function aligned(scaled : scaled_t; count : count_t) return scaled_t is
+    variable result : scaled_t;
+  begin
+    result := scaled;
+    for k in 1 to LAST_COARSE loop
+      if count(COUNT_WIDTH-1 downto FINE_WIDTH) = k then
+        result := (others => scaled(WIDTH));
+        for place in 0 to WIDTH-2*FINE_STEPS*k loop
+          result(place) := scaled(place + 2*FINE_STEPS*k);
+        end loop;
+      end if;
+    end loop;
+    return result;
+  end function aligned;
+
   constant ANGLES : angles_t := all_angles;
 
   -- Multiples of the first angle, so that folding and rotating agree to the bit. Signals, set bit by bit:
@@ -82,13 +106,14 @@ architecture rtl of firm_cordic_vectoring is
   signal half_pi     : angle_t;
   signal pi          : angle_t;
 
-  signal count_r     : unsigned(COUNT_WIDTH-1 downto 0);
+  signal count_r     : count_t;
   signal busy_r      : std_logic;
   signal done_r      : std_logic;
   signal ready       : std_logic;
 
   signal magnitude_r : magnitude_t;
   signal scaled_r    : scaled_t;
+  signal aligned_r   : scaled_t;
   signal angle_r     : angle_t;
   -- The folded vector is mirrored: its angle counts backwards.
   signal mirrored_r  : std_logic;
@@ -142,6 +167,8 @@ begin
 
   rotate : process (clk)
     variable below    : boolean;
+    variable scaled   : scaled_t;
+    variable sign     : unsigned(WIDTH downto 0);
     variable distance : unsigned(WIDTH downto 0);
     variable step     : angle_t;
   begin
@@ -151,6 +178,7 @@ begin
         exact_r     <= '0';
         magnitude_r <= absolute(in_x);
         scaled_r    <= resize(absolute(in_y), WIDTH+1);
+        aligned_r   <= resize(absolute(in_y), WIDTH+1);
         angle_r     <= (others => '0');
         if signed(in_x) < 0 then
           angle_r <= pi;
@@ -161,6 +189,7 @@ begin
           -- On the y axis: turned onto the x axis at once, which is exact.
           magnitude_r <= absolute(in_y);
           scaled_r    <= (others => '0');
+          aligned_r   <= (others => '0');
           if signed(in_y) < 0 then
             angle_r <= -half_pi;
           elsif signed(in_y) > 0 then
@@ -169,16 +198,17 @@ begin
         end if;
       elsif busy_r = '1' then
         below := scaled_r(WIDTH) = '1';
-        -- The one's complement approximates |y|: it is at most one unit short, and saves the carry.
-        distance := unsigned(scaled_r);
+        scaled := shift_left(scaled_r - magnitude_r, 1);
         if below then
-          distance := not unsigned(scaled_r);
-          scaled_r <= shift_left(scaled_r + magnitude_r, 1);
-        else
-          scaled_r <= shift_left(scaled_r - magnitude_r, 1);
+          scaled := shift_left(scaled_r + magnitude_r, 1);
         end if;
-        -- |y| * 2**i reaches x as |y| * 2**-i.
-        distance    := shift_right(distance, to_integer(count_r & '0'));
+        scaled_r  <= scaled;
+        aligned_r <= aligned(scaled, count_r + 1);
+
+        -- |y| * 2**i reaches x as |y| * 2**-i. The one's complement approximates |y|: it is at most one unit short, and
+        -- saves the carry.
+        sign        := (others => scaled_r(WIDTH));
+        distance    := shift_right(unsigned(aligned_r) xor sign, to_integer(count_r(FINE_WIDTH-1 downto 0) & '0'));
         magnitude_r <= magnitude_r + signed(distance(WIDTH-1 downto 0));
 
         step := ANGLES(to_integer(count_r));

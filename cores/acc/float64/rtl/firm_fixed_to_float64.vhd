@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Converts a 64-bit two's complement fixed-point number to float64, rounded to nearest, ties to even.
 --
--- Three pipeline registers, one number per cycle, no stalls: magnitude, coarse and fine normalisation. The
--- rounding adder drives the output, so the user's own register must end its path. Zero is always +0.
+-- Five pipeline registers, one number per cycle, no stalls: magnitude, count of zero bytes, coarse and fine
+-- normalisation, direction of rounding. The rounding adder drives the output, so the user's own register must end its
+-- path. Zero is always +0.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -20,7 +21,7 @@ entity firm_fixed_to_float64 is
     in_valid   : in  std_logic;
     in_number  : in  std_logic_vector(63 downto 0);
 
-    -- High three cycles after in_valid.
+    -- High five cycles after in_valid.
     out_valid  : out std_logic;
     out_number : out std_logic_vector(63 downto 0)
   );
@@ -28,23 +29,51 @@ end entity firm_fixed_to_float64;
 
 architecture rtl of firm_fixed_to_float64 is
 
+  constant LATENCY : positive := 5;
+
   -- float64's exponent of a number whose leading one is bit 63.
   constant TOP_EXPONENT : integer := 1023 + 63 - FRACTION;
 
   subtype magnitude_t is unsigned(63 downto 0);
+  subtype eight_t is unsigned(7 downto 0);
 
-  signal valid_r       : std_logic_vector(2 downto 0);
-  signal magnitude_r   : magnitude_t;
-  signal sign_r        : std_logic;
+  signal valid_r        : std_logic_vector(LATENCY-1 downto 0);
+  signal magnitude_r    : magnitude_t;
+  signal sign_r         : std_logic;
 
-  signal coarse_r      : magnitude_t;
-  signal coarse_sign_r : std_logic;
+  signal counted_r      : magnitude_t;
+  signal counted_sign_r : std_logic;
   -- Leading zeros, in eights.
-  signal eights_r      : unsigned(2 downto 0);
+  signal eights_r       : unsigned(2 downto 0);
 
-  signal fine_r        : magnitude_t;
-  signal fine_sign_r   : std_logic;
-  signal zeros_r       : unsigned(5 downto 0);
+  signal coarse_r       : magnitude_t;
+  signal coarse_sign_r  : std_logic;
+  signal coarse_zeros_r : unsigned(2 downto 0);
+
+  signal fine_r         : magnitude_t;
+  signal fine_sign_r    : std_logic;
+  signal zeros_r        : unsigned(5 downto 0);
+
+  -- The result before rounding, and its last unit if it is rounded up.
+  signal number_r       : unsigned(62 downto 0);
+  signal number_sign_r  : std_logic;
+  signal up_r           : unsigned(0 downto 0);
+
+  -- Up to seven leading zeros.
+  function leading_zeros(bits : eight_t) return unsigned is
+    variable remaining : eight_t;
+    variable zeros     : unsigned(2 downto 0);
+  begin
+    remaining := bits;
+    zeros     := (others => '0');
+    for k in zeros'range loop
+      if remaining(7 downto 8-2**k) = 0 then
+        remaining := shift_left(remaining, 2**k);
+        zeros(k)  := '1';
+      end if;
+    end loop;
+    return zeros;
+  end function leading_zeros;
 
 begin
 
@@ -52,12 +81,14 @@ begin
     report "firm_fixed_to_float64: FRACTION is " & integer'image(FRACTION) & ", legal: 0 to 512"
     severity failure;
 
-  out_valid <= valid_r(2);
+  out_valid  <= valid_r(LATENCY-1);
+  -- A mantissa that rounds up to two correctly carries into the exponent.
+  out_number <= number_sign_r & std_logic_vector(number_r + up_r);
 
   valid : process (clk)
   begin
     if rising_edge(clk) then
-      valid_r <= valid_r(1 downto 0) & in_valid;
+      valid_r <= valid_r(LATENCY-2 downto 0) & in_valid;
       if rst_n = '0' then
         valid_r <= (others => '0');
       end if;
@@ -65,9 +96,8 @@ begin
   end process valid;
 
   normalise : process (clk)
-    variable number : magnitude_t;
-    variable eights : unsigned(2 downto 0);
-    variable ones   : unsigned(2 downto 0);
+    variable present : eight_t;
+    variable ones    : unsigned(2 downto 0);
   begin
     if rising_edge(clk) then
       if in_valid = '1' then
@@ -80,50 +110,49 @@ begin
       end if;
 
       if valid_r(0) = '1' then
-        number := magnitude_r;
-        eights := (others => '0');
-        for k in eights'range loop
-          if number(63 downto 64-8*2**k) = 0 then
-            number    := shift_left(number, 8*2**k);
-            eights(k) := '1';
+        for k in present'range loop
+          present(k) := '0';
+          if magnitude_r(8*k+7 downto 8*k) /= 0 then
+            present(k) := '1';
           end if;
         end loop;
-        coarse_r      <= number;
-        coarse_sign_r <= sign_r;
-        eights_r      <= eights;
+        counted_r      <= magnitude_r;
+        counted_sign_r <= sign_r;
+        eights_r       <= leading_zeros(present);
       end if;
 
       if valid_r(1) = '1' then
-        number := coarse_r;
-        ones   := (others => '0');
-        for k in ones'range loop
-          if number(63 downto 64-2**k) = 0 then
-            number  := shift_left(number, 2**k);
-            ones(k) := '1';
-          end if;
-        end loop;
-        fine_r      <= number;
+        coarse_r       <= shift_left(counted_r, to_integer(eights_r & "000"));
+        coarse_sign_r  <= counted_sign_r;
+        coarse_zeros_r <= eights_r;
+      end if;
+
+      if valid_r(2) = '1' then
+        ones        := leading_zeros(coarse_r(63 downto 56));
+        fine_r      <= shift_left(coarse_r, to_integer(ones));
         fine_sign_r <= coarse_sign_r;
-        zeros_r     <= eights_r & ones;
+        zeros_r     <= coarse_zeros_r & ones;
       end if;
     end if;
   end process normalise;
 
-  round : process (fine_r, fine_sign_r, zeros_r)
+  round : process (clk)
     variable exponent : unsigned(10 downto 0);
-    variable up       : unsigned(0 downto 0);
-    variable rounded  : unsigned(62 downto 0);
   begin
-    up := "0";
-    if fine_r(10) = '1' and (fine_r(11) = '1' or fine_r(9 downto 0) /= 0) then
-      up := "1";
-    end if;
-    exponent := TOP_EXPONENT - resize(zeros_r, 11);
-    -- A mantissa that rounds up to two correctly carries into the exponent.
-    rounded    := (exponent & fine_r(62 downto 11)) + up;
-    out_number <= fine_sign_r & std_logic_vector(rounded);
-    if fine_r(63) = '0' then
-      out_number <= (others => '0');
+    if rising_edge(clk) then
+      if valid_r(3) = '1' then
+        exponent      := TOP_EXPONENT - resize(zeros_r, 11);
+        number_r      <= exponent & fine_r(62 downto 11);
+        number_sign_r <= fine_sign_r;
+        up_r          <= "0";
+        if fine_r(10) = '1' and (fine_r(11) = '1' or fine_r(9 downto 0) /= 0) then
+          up_r <= "1";
+        end if;
+        if fine_r(63) = '0' then
+          number_r      <= (others => '0');
+          number_sign_r <= '0';
+        end if;
+      end if;
     end if;
   end process round;
 

@@ -2,8 +2,9 @@
 -- Converts COUNT float64 numbers to two's complement with one common exponent (block floating point).
 --
 -- The numbers are in a ring. It first turns past one comparator, which finds the largest exponent, and then past one
--- shifter, which aligns each number to it: 2*COUNT + 2 cycles from input to output. The largest number is exact; the
--- others are rounded to the nearest unit, ties away from zero.
+-- shifter, which aligns each number to it: 2*COUNT + 2 cycles from input to output. The comparator begins with the
+-- first number as it arrives, so that the ring need not turn past it, and how far a number is shifted is known a cycle
+-- before. The largest number is exact; the others are rounded to the nearest unit, ties away from zero.
 -- A denormal number beside a normal one has its exact value.
 
 library ieee;
@@ -48,17 +49,29 @@ architecture rtl of firm_float64_to_block is
   type ring_t is array (natural range 0 to COUNT-1) of slot_t;
   -- A result's magnitude and, below it, the bit that rounds it.
   subtype shifted_t is unsigned(FRACTION downto 0);
-  type step_t is (IDLE, SEARCH, ALIGN, DRAIN, OFFER);
+  subtype exponent_t is unsigned(10 downto 0);
+  type step_t is (IDLE, SEARCH, MEASURE, ALIGN, DRAIN, OFFER);
+
+  -- The number that the ring shows next.
+  constant SECOND : natural := 1 mod COUNT;
+
+  function exponent_of(number : slot_t) return unsigned is
+  begin
+    return unsigned(number(62 downto 52));
+  end function exponent_of;
 
   signal step_r      : step_t;
   signal position_r  : natural range 0 to COUNT-1;
-  signal ring_r      : ring_t;
-  signal largest_r   : unsigned(10 downto 0);
+  signal ring_r      : ring_t     := (others => (others => '0'));
+  signal largest_r   : exponent_t := (others => '0');
   signal undefined_r : std_logic;
   signal zero_r      : std_logic;
+  -- The places that the number in the ring's first slot moves, and whether it moves beyond all.
+  signal distance_r  : unsigned(SHIFT_WIDTH-1 downto 0);
+  signal vanishes_r  : std_logic;
   -- The number between shifting and rounding.
-  signal shifted_r   : shifted_t;
-  signal negative_r  : std_logic;
+  signal shifted_r   : shifted_t := (others => '0');
+  signal negative_r  : std_logic := '0';
 
 begin
 
@@ -77,27 +90,30 @@ begin
   end generate numbers;
 
   control : process (clk)
-    variable is_last : boolean;
   begin
     if rising_edge(clk) then
-      is_last := position_r = COUNT-1;
       if rst_n = '0' then
-        step_r     <= IDLE;
-        position_r <= 0;
+        step_r <= IDLE;
       elsif step_r = IDLE then
+        position_r <= SECOND;
         if in_valid = '1' then
           step_r <= SEARCH;
+          if COUNT = 1 then
+            step_r <= MEASURE;
+          end if;
         end if;
+      elsif step_r = MEASURE then
+        step_r <= ALIGN;
       elsif step_r = DRAIN then
         step_r <= OFFER;
       elsif step_r = OFFER then
         if out_ready = '1' then
           step_r <= IDLE;
         end if;
-      elsif is_last then
+      elsif position_r = COUNT-1 then
         position_r <= 0;
         if step_r = SEARCH then
-          step_r <= ALIGN;
+          step_r <= MEASURE;
         else
           step_r <= DRAIN;
         end if;
@@ -108,15 +124,21 @@ begin
   end process control;
 
   find : process (clk)
-    variable exponent : unsigned(10 downto 0);
+    variable exponent : exponent_t;
   begin
     if rising_edge(clk) then
-      exponent := unsigned(ring_r(0)(62 downto 52));
-      if step_r = IDLE then
-        largest_r   <= (others => '0');
+      if step_r = IDLE and in_valid = '1' then
+        exponent    := exponent_of(in_numbers(63 downto 0));
+        largest_r   <= exponent;
         undefined_r <= '0';
-        zero_r      <= '1';
+        zero_r      <= '0';
+        if exponent = 0 then
+          zero_r <= '1';
+        elsif exponent = 2047 then
+          undefined_r <= '1';
+        end if;
       elsif step_r = SEARCH then
+        exponent := exponent_of(ring_r(0));
         if exponent > largest_r then
           largest_r <= exponent;
           zero_r    <= '0';
@@ -128,26 +150,44 @@ begin
     end if;
   end process find;
 
+  -- The first number is measured at rest; each other one as it comes into the first slot.
+  gauge : process (clk)
+    variable exponent : exponent_t;
+    variable distance : exponent_t;
+  begin
+    if rising_edge(clk) then
+      exponent := exponent_of(ring_r(SECOND));
+      if step_r = MEASURE then
+        exponent := exponent_of(ring_r(0));
+      end if;
+      distance := largest_r - exponent;
+      -- A denormal number has the exponent 1.
+      if exponent = 0 then
+        distance := largest_r - 1;
+      end if;
+      distance_r <= distance(SHIFT_WIDTH-1 downto 0);
+      vanishes_r <= '0';
+      if distance >= 2**SHIFT_WIDTH then
+        vanishes_r <= '1';
+      end if;
+    end if;
+  end process gauge;
+
   shift : process (clk)
-    variable exponent : unsigned(10 downto 0);
-    variable distance : unsigned(10 downto 0);
     variable mantissa : shifted_t;
   begin
     if rising_edge(clk) then
       if step_r = ALIGN then
         mantissa := (others => '0');
         mantissa(FRACTION downto FRACTION-MANTISSA_WIDTH+1) := unsigned('1' & ring_r(0)(51 downto 0));
-        exponent := unsigned(ring_r(0)(62 downto 52));
-        distance := largest_r - exponent;
-        -- A denormal number has the exponent 1 and no leading one.
-        if exponent = 0 then
+        -- A denormal number has no leading one.
+        if exponent_of(ring_r(0)) = 0 then
           mantissa(FRACTION) := '0';
-          distance           := largest_r - 1;
         end if;
-        shifted_r  <= (others => '0');
+        shifted_r  <= shift_right(mantissa, to_integer(distance_r));
         negative_r <= ring_r(0)(63);
-        if distance < 2**SHIFT_WIDTH then
-          shifted_r <= shift_right(mantissa, to_integer(distance(SHIFT_WIDTH-1 downto 0)));
+        if vanishes_r = '1' then
+          shifted_r <= (others => '0');
         end if;
       end if;
     end if;
@@ -160,8 +200,9 @@ begin
   begin
     if rising_edge(clk) then
       if step_r = IDLE and in_valid = '1' then
+        -- Number 0 comes last: it is found already.
         for k in ring_r'range loop
-          ring_r(k) <= in_numbers(64*k+63 downto 64*k);
+          ring_r((k + COUNT-1) mod COUNT) <= in_numbers(64*k+63 downto 64*k);
         end loop;
       elsif step_r = SEARCH or step_r = ALIGN or step_r = DRAIN then
         -- (m + r) and -(m + r) = not m + (1 - r): rounding and sign share one carry chain.

@@ -95,6 +95,9 @@ begin
   shift : process (clk)
     variable exponent : unsigned(10 downto 0);
     variable distance : signed(12 downto 0);
+    -- Masks of a variable bit: ghdl 2.0 translates a constant of more than 32 ones to a Verilog string.
+    variable beyond   : shifted_t;
+    variable defined  : shifted_t;
   begin
     if rising_edge(clk) then
       if in_valid = '1' then
@@ -114,35 +117,37 @@ begin
         end if;
       end if;
 
+      -- NaN and numbers that are too large are replaced here, so that the next stage has a single carry chain.
       if valid_r(0) = '1' then
-        shifted_r           <= shift_right(mantissa_r, to_integer(distance_r));
+        beyond              := (others => overflow_r);
+        defined             := (others => not undefined_r);
+        shifted_r           <= (shift_right(mantissa_r, to_integer(distance_r)) or beyond) and defined;
         shifted_negative_r  <= negative_r;
         shifted_overflow_r  <= overflow_r;
         shifted_undefined_r <= undefined_r;
+        if overflow_r = '1' then
+          shifted_r(0) <= '0';
+        end if;
       end if;
     end if;
   end process shift;
 
   round : process (clk)
-    variable rounded : unsigned(WIDTH-1 downto 0);
-    variable beyond  : std_logic;
-    -- Masks of a variable bit: ghdl 2.0 translates a constant of more than 32 ones to a Verilog string.
-    variable highest : unsigned(WIDTH-1 downto 0);
-    variable defined : unsigned(WIDTH-1 downto 0);
+    variable sign    : signed(WIDTH-1 downto 0);
+    variable is_full : std_logic;
+    variable carry   : unsigned(0 downto 0);
   begin
     if rising_edge(clk) then
       if valid_r(1) = '1' then
-        rounded := ('0' & shifted_r(WIDTH-1 downto 1)) + ('0' & shifted_r(0 downto 0));
-        beyond  := shifted_overflow_r or rounded(WIDTH-1);
-        highest := (others => beyond);
-        defined := (others => not shifted_undefined_r);
-        rounded := (rounded or highest) and defined;
-        rounded(WIDTH-1) := '0';
-        number_r <= signed(rounded);
-        if shifted_negative_r = '1' then
-          number_r <= -signed(rounded);
+        is_full := '0';
+        if shifted_r(0) = '1' and (not shifted_r(WIDTH-1 downto 1)) = 0 then
+          is_full := '1';
         end if;
-        number_overflow_r  <= beyond and not shifted_undefined_r;
+        -- (m + r) and -(m + r) = not m + (1 - r): rounding and sign share the carry chain.
+        sign               := (others => shifted_negative_r);
+        carry(0)           := (shifted_r(0) and not is_full) xor shifted_negative_r;
+        number_r           <= (signed('0' & shifted_r(WIDTH-1 downto 1)) xor sign) + signed('0' & carry);
+        number_overflow_r  <= shifted_overflow_r or is_full;
         number_undefined_r <= shifted_undefined_r;
       end if;
     end if;

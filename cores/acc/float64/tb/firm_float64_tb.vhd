@@ -161,7 +161,7 @@ begin
         wait until rising_edge(clk);
       end if;
     end loop;
-    for drain in 1 to 5 loop
+    for drain in 1 to 7 loop
       wait until rising_edge(clk);
     end loop;
     assert received = sent

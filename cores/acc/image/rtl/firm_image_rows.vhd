@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Cuts the data of an image into rows, and these into groups of pixels from lane 0 up. Padding and all bytes after the
--- last row are dropped. A full group leaves every cycle, wherever rows begin in the stream.
+-- last row are dropped. A full group leaves every cycle, wherever rows begin in the stream, and comes from a register.
+-- How many bytes are taken next, and whether they are the last ones of the row or its padding, is known a cycle before.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -30,7 +31,7 @@ entity firm_image_rows is
 
     -- Lanes from `group_count` on are undefined.
     group_data  : out std_logic_vector(WIDTH-1 downto 0);
-    group_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
+    group_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0) := (others => '0');
     group_first : out std_logic;  -- of a row
     group_last  : out std_logic;  -- of a row
     group_final : out std_logic;  -- of the image: it is the last one with pixels
@@ -43,29 +44,36 @@ end entity firm_image_rows;
 
 architecture rtl of firm_image_rows is
 
+  constant LANES      : positive := max(1, WIDTH/8);
   constant COUNT_BITS : positive := clog2(WIDTH/8+1);
 
   subtype count_t is unsigned(COUNT_BITS-1 downto 0);
+  subtype size_t is unsigned(31 downto 0);
+  -- The next bytes in the window: of a row, of its padding, or after the last row.
+  type section_t is (ROW, GAP, REST);
 
-  signal available_lanes : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal available       : count_t;
-  signal is_last         : std_logic;
-  signal take_valid      : std_logic;
-  signal take            : count_t;
+  signal window    : std_logic_vector(WIDTH-1 downto 0);
+  signal available : std_logic_vector(COUNT_BITS-1 downto 0);
+  signal is_last   : std_logic;
+  signal shown     : std_logic;
+  signal ends      : std_logic;
 
-  signal rows_r    : unsigned(15 downto 0) := (others => '0');  -- rows to come, this one included
-  signal bytes_r   : unsigned(17 downto 0) := (others => '0');  -- of the row; zero while its padding is dropped
-  signal padding_r : unsigned(31 downto 0) := (others => '0');  -- to be dropped
+  signal section_r : section_t;
+  signal wanted_r  : count_t := (others => '0');               -- bytes that are taken next
+  signal behind_r  : size_t := (others => '0');                -- the section's bytes after them
+  signal closes_r  : std_logic;                                -- there are none
+  signal rows_r    : unsigned(15 downto 0) := (others => '0'); -- rows to come, this one included
   signal first_r   : std_logic;
-  signal over_r    : std_logic;              -- the stream is over
-  signal told_r    : std_logic;              -- and the end was reported
+  signal short_r   : std_logic;                                -- the stream ends before all that are wanted
+  signal over_r    : std_logic;                                -- the stream is over
+  signal told_r    : std_logic;                                -- and the end was reported
 
-  signal in_row    : std_logic;
-  signal in_gap    : std_logic;
-  signal ends_row  : std_logic;
-  signal ends_gap  : std_logic;
-  signal wanted    : count_t;
-  signal has_group : std_logic;
+  signal is_final   : std_logic;                               -- no row follows
+  signal take_group : std_logic;
+  signal take_valid : std_logic;
+  signal is_free    : std_logic;                               -- the output takes a group
+
+  signal valid_r    : std_logic;
 
 begin
 
@@ -85,83 +93,115 @@ begin
       s_axis_tvalid => s_axis_tvalid,
       s_axis_tlast  => s_axis_tlast,
       s_axis_tready => s_axis_tready,
-      window        => group_data,
-      available     => available_lanes,
+      window        => window,
+      available     => available,
       is_last       => is_last,
+      shown         => shown,
+      ends          => ends,
       take_valid    => take_valid,
-      take          => std_logic_vector(take),
+      take          => std_logic_vector(wanted_r),
       skip          => '0'
     );
 
-  available <= unsigned(available_lanes);
+  is_free  <= group_ready or not valid_r;
+  is_final <= '1' when rows_r = 1 else '0';
 
-  in_row   <= '1' when rows_r /= 0 and bytes_r /= 0 else '0';
-  in_gap   <= '1' when rows_r /= 0 and bytes_r = 0 else '0';
-  ends_row <= '1' when bytes_r <= GROUP_BYTES else '0';
-  ends_gap <= '1' when padding_r <= available else '0';
-  wanted   <= bytes_r(COUNT_BITS-1 downto 0) when ends_row = '1' else to_unsigned(GROUP_BYTES, COUNT_BITS);
+  -- An incomplete row gives no group: the frame is broken, and the image is about to be withdrawn. After the last row,
+  -- the stream may end with fewer bytes than are wanted.
+  take_group <= shown and is_free and not over_r when section_r = ROW else '0';
+  take_valid <= take_group when section_r = ROW and shown = '1' else
+                (shown or is_last) and not over_r when section_r = REST else
+                (shown or short_r) and not over_r;
 
-  has_group <= '1' when rst_n = '1' and over_r = '0' and in_row = '1' and available >= wanted else '0';
-
-  -- An incomplete row gives no group: the frame is broken, and the image is about to be withdrawn.
-  choose : process (in_row, in_gap, ends_gap, has_group, group_ready, wanted, available, is_last, padding_r, over_r)
-  begin
-    take       <= available;
-    take_valid <= not over_r;
-    if in_row = '1' and has_group = '1' then
-      take       <= wanted;
-      take_valid <= group_ready;
-    elsif in_row = '1' then
-      take_valid <= is_last and not over_r;
-    elsif in_gap = '1' and ends_gap = '1' then
-      take <= padding_r(COUNT_BITS-1 downto 0);
-    end if;
-  end process choose;
-
-  count : process (clk)
+  note_end : process (clk)
   begin
     if rising_edge(clk) then
+      short_r <= '0';
+      if take_valid = '0' and is_last = '1' and unsigned(available) < wanted_r then
+        short_r <= '1';
+      end if;
+      if take_valid = '1' and (shown = '0' or ends = '1') then
+        over_r <= is_last or short_r or ends;
+      end if;
+      if over_r = '1' and is_free = '1' then
+        told_r <= '1';
+      end if;
       if rst_n = '0' then
-        rows_r    <= unsigned(rows);
-        bytes_r   <= unsigned(row_bytes);
-        padding_r <= unsigned(padding);
-        first_r   <= '1';
-        over_r    <= is_empty;
-        told_r    <= '0';
-      else
-        if has_group = '1' and group_ready = '1' then
-          first_r <= '0';
-          bytes_r <= bytes_r - wanted;
-          if ends_row = '1' then
-            first_r <= '1';
-            if unsigned(padding) = 0 then
-              rows_r  <= rows_r - 1;
-              bytes_r <= unsigned(row_bytes);
-            end if;
-          end if;
-        elsif in_gap = '1' and over_r = '0' then
-          padding_r <= padding_r - available;
-          if ends_gap = '1' then
-            padding_r <= unsigned(padding);
-            bytes_r   <= unsigned(row_bytes);
-            rows_r    <= rows_r - 1;
-          end if;
-        end if;
-        if take_valid = '1' and is_last = '1' and take = available then
-          over_r <= '1';
-        end if;
-        if over_r = '1' and group_ready = '1' then
-          told_r <= '1';
-        end if;
+        short_r <= '0';
+        over_r  <= is_empty;
+        told_r  <= '0';
       end if;
     end if;
-  end process count;
+  end process note_end;
 
-  group_count <= std_logic_vector(wanted) when over_r = '0' else (others => '0');
-  group_first <= first_r;
-  group_last  <= ends_row;
-  group_final <= '1' when ends_row = '1' and rows_r = 1 else '0';
-  group_end   <= over_r;
-  group_valid <= has_group or (rst_n and over_r and not told_r);
+  -- What is taken next: of this section, or of the one that follows it.
+  plan : process (clk)
+    variable section : section_t;
+    variable size    : size_t;
+    variable most    : count_t;
+  begin
+    if rising_edge(clk) and (rst_n = '0' or take_valid = '1') then
+      section := section_r;
+      size    := behind_r;
+      if rst_n = '0' or (closes_r = '1' and (section_r /= ROW or unsigned(padding) = 0)) then
+        section := ROW;
+        size    := resize(unsigned(row_bytes), size'length);
+        rows_r  <= rows_r - 1;
+        if is_final = '1' then
+          section := REST;
+        end if;
+      elsif closes_r = '1' then
+        section := GAP;
+        size    := unsigned(padding);
+      end if;
+      if rst_n = '0' then
+        section := ROW;
+        rows_r  <= unsigned(rows);
+        if unsigned(rows) = 0 then
+          section := REST;
+        end if;
+      end if;
+
+      most := to_unsigned(LANES, COUNT_BITS);
+      if section = ROW then
+        most := to_unsigned(GROUP_BYTES, COUNT_BITS);
+      end if;
+      section_r <= section;
+      wanted_r  <= most;
+      behind_r  <= size - most;
+      closes_r  <= '0';
+      if section /= REST and size <= most then
+        wanted_r <= size(COUNT_BITS-1 downto 0);
+        closes_r <= '1';
+      end if;
+    end if;
+  end process plan;
+
+  offer : process (clk)
+  begin
+    if rising_edge(clk) then
+      if is_free = '1' then
+        valid_r     <= take_group or (over_r and not told_r);
+        group_data  <= window;
+        group_count <= std_logic_vector(wanted_r);
+        group_first <= first_r;
+        group_last  <= closes_r;
+        group_final <= closes_r and is_final;
+        group_end   <= over_r;
+        if over_r = '1' then
+          group_count <= (others => '0');
+        end if;
+      end if;
+      if take_group = '1' then
+        first_r <= closes_r;
+      end if;
+      if rst_n = '0' then
+        valid_r <= '0';
+        first_r <= '1';
+      end if;
+    end if;
+  end process offer;
+
+  group_valid <= valid_r;
 
 end architecture rtl;
