@@ -38,13 +38,8 @@ PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # Programs other than Python that tests run.
 TEST_TOOLS := ccache iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
-# Option and value are joined by `=`, since the value begins with a dash. FuseSoC appends these options to the core's
-# sim_options, which are GHDL's.
-SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
-# The path of the waves is printed after a failed run, too.
-SAY_WAVES = $(if $(WAVES),trap 'ls -t build/*/sim/waves.ghw | sed -n "1s/^/waves: /p"' EXIT;)
-# A host in Verilog takes its seed from FuseSoC.
-RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 requires GHDL (TARGET=sim)))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
+SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET))) $(if $(SEED),--seed $(SEED)) \
+  $(if $(WAVES),--waves) $(if $(SIM_OPTIONS),--options="$(SIM_OPTIONS)")
 
 # ROS 1 for a node and its peers, from Debian: programs, libraries, and modules of Debian's own Python.
 DEBIAN_MODULES := /usr/lib/python3/dist-packages
@@ -65,13 +60,10 @@ help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-# Without the messages of make and Edalize about folders, the last line is the result.
 sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED=N, WAVES=1, SIM_OPTIONS='...'
 	@$(BIN)/python .ci/check_target.py $(SYSTEM) $(TARGET) sim >/dev/null
 	@./.ci/install-tools $(subst icarus,iverilog,$(patsubst sim_%,%,$(filter sim_%,$(TARGET)))) >/dev/null
-	@$(SAY_WAVES) MAKEFLAGS=--no-print-directory PYTHONUNBUFFERED=1 \
-	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
-	  sed -u "/^\(Entering\|Leaving\) directory '/d"
+	@$(BIN)/firm sim $(SYSTEM) $(SIM_FLAGS)
 
 test check: TOOLS = $(TEST_TOOLS)
 test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTIONS='...'

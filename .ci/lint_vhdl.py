@@ -28,6 +28,9 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.hardware.registers import registers_configuration
+from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, status_map
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.loop import loop_text
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -89,6 +92,12 @@ def write_loop() -> None:
     (SAMPLES / "loop.vhd").write_text(text, encoding="ascii")
 
 
+def write_registers() -> None:
+    """Write the registers of a system's status."""
+    configuration = registers_configuration(status_map("robot_status", 2, 1), ["0"] * 3)
+    (SAMPLES / "registers.vhd").write_text(render(REGISTERS_TEMPLATE, configuration), encoding="ascii")
+
+
 def run(*command: str | Path, cwd: Path) -> None:
     """Run a program. Ends this one, with its output, if it fails."""
     done = subprocess.run(command, cwd=cwd, text=True, capture_output=True, check=False)
@@ -103,6 +112,7 @@ def samples() -> list[Path]:
         list(pool.map(generate, CALLS))
     write_skeletons()
     write_loop()
+    write_registers()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]
     return sorted([*made, *GOLDEN.glob("*.vhd")])
 

@@ -17,6 +17,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from zlib import crc32
 
 import psutil
 import pytest
@@ -84,8 +85,11 @@ def pytest_collection_modifyitems(items: Iterable[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.filterwarnings(rule))
         if one_in := item.get_closest_marker("one_in"):
             test = item.parent, item.name.partition("[")[0]
-            if cases[test] % one_in.args[0]:
-                item.add_marker(pytest.mark.check)
+            every, others = (*one_in.args, 1)[:2]
+            if cases[test] % every:
+                # Spread over types and widths: these alternate in the order of the cases.
+                is_next = not crc32(item.name.encode()) % others
+                item.add_marker(pytest.mark.check if is_next else pytest.mark.thorough)
             cases[test] += 1
 
 

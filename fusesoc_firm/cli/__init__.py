@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fusesoc_firm import __version__
 from fusesoc_firm.cli.build import add_build
 from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
+from fusesoc_firm.cli.init import add_init
 from fusesoc_firm.cli.live import add_live
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
 from fusesoc_firm.cli.replay import add_replay
 from fusesoc_firm.cli.scheduler import add_scheduler
+from fusesoc_firm.cli.sim import add_sim
 from fusesoc_firm.cli.simulator import add_simulator
+from fusesoc_firm.cli.status import add_status
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
@@ -25,6 +30,14 @@ from fusesoc_firm.node.options import remappings
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.interrupts import accept_interrupts
 from fusesoc_firm.tools.library_path import demos_root, docs_root, library_root
+
+# The commands of `firm --help`; commands that are not listed here follow as 'more'.
+GROUPS = {
+    "start": ("init", "system"),
+    "run": ("sim", "live", "replay"),
+    "look": ("message", "trace", "why", "graph"),
+    "build": ("build", "affected", "lock", "cache", "path"),
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,6 +63,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     """Parse the command line, in which remappings for a ROS node may be at any position."""
     parser = _parser()
+    if "_ARGCOMPLETE" in os.environ:
+        from argcomplete import autocomplete
+
+        autocomplete(parser)
     arguments, rest = parser.parse_known_args(argv)
     if rest and not hasattr(arguments, "remappings"):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
@@ -59,9 +76,17 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="firm", description="ROS messages and robot systems as FPGA hardware.")
+    parser = argparse.ArgumentParser(
+        prog="firm",
+        usage="firm [-h] [--version] COMMAND ...",
+        description="ROS messages and robot systems as FPGA hardware.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--version", action="version", version=f"firm {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    # The epilog lists the commands in groups, which argparse does not support.
+    commands = parser.add_subparsers(prog="firm", metavar="COMMAND", required=True, help=argparse.SUPPRESS)
+    add_init(commands)
+    add_sim(commands)
     path = command(
         commands,
         "path",
@@ -81,6 +106,7 @@ def _parser() -> argparse.ArgumentParser:
     add_system(commands)
     add_simulator(commands)
     add_live(commands)
+    add_status(commands)
     add_scheduler(commands)
     add_build(commands)
     add_replay(commands)
@@ -88,7 +114,38 @@ def _parser() -> argparse.ArgumentParser:
     add_why(commands)
     add_cache(commands)
     add_tool(commands)
+    completion = command(
+        commands,
+        "completion",
+        "print the code with which a shell completes commands, options and their values",
+        'eval "$(firm completion bash)"',
+        _print_completion,
+    )
+    completion.add_argument("shell", choices=("bash", "zsh", "fish"), help="the shell")
+    parser.epilog = _grouped(commands.choices)
     return parser
+
+
+def _grouped(commands: Mapping[str, argparse.ArgumentParser]) -> str:
+    """Return the list of the commands for the help: the commands of `GROUPS`, then all others."""
+    rest = [name for name in commands if not any(name in names for names in GROUPS.values())]
+    width = max(map(len, commands)) + 2
+    lines: list[str] = []
+    for title, names in {**GROUPS, "more": rest}.items():
+        lines.append(f"{title}:")
+        for name in names:
+            text = str(commands[name].description).rstrip(".")
+            indent = " " * (width + 2)
+            words = f"  {name:{width}}{text[0].lower()}{text[1:]}"
+            lines += textwrap.wrap(words, shutil.get_terminal_size((100, 24)).columns - 2, subsequent_indent=indent)
+        lines.append("")
+    return "\n".join([*lines, "'firm COMMAND --help' describes a command and shows an example."])
+
+
+def _print_completion(arguments: argparse.Namespace) -> None:
+    from argcomplete.shell_integration import shellcode
+
+    print(shellcode(["firm"], shell=arguments.shell), end="")
 
 
 def _print_path(arguments: argparse.Namespace) -> None:

@@ -132,6 +132,8 @@ QUOTES: Mapping[str, Mapping[str, Quote]] = MappingProxyType(
         "cpp": {"comment": comment, "string": c_string},
         "py": {"comment": comment, "string": python_string},
         "core": {"scalar": yaml_scalar},
+        "yaml": {"scalar": yaml_scalar},
+        "conf": {},
         "dot": {"text": dot_text},
         "html": _MARKUP,
         "xml": _MARKUP,

@@ -63,6 +63,9 @@ def test_a_relative_path_leads_to_the_same_folder(
     "command",
     [
         [],
+        ["init"],
+        ["sim"],
+        ["completion"],
         ["path"],
         ["message"],
         ["message", "list"],
@@ -99,6 +102,37 @@ def test_every_command_has_help_with_an_example(command: list[str], capsys: Capt
     text = capsys.readouterr().out
     assert text.startswith("usage: firm")
     assert not command or "example: " in text
+
+
+def test_the_commands_of_the_first_hour_come_first(capsys: Captured) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        main(["--help"])
+    text = capsys.readouterr().out
+    places = [
+        text.index(f"\n{word}") for word in ("start:\n  init ", "  system ", "run:\n  sim ", "  live ", "  replay ")
+    ]
+    assert places == sorted(places)
+    assert places[-1] < text.index("\nlook:") < text.index("\nbuild:") < text.index("\nmore:")
+    assert "  scheduler " in text
+
+
+@pytest.mark.parametrize(("line", "words"), [("firm ini", ["init"]), ("firm sim --tool ver", ["verilator"])])
+def test_a_shell_completes(tmp_path: Path, line: str, words: list[str]) -> None:
+    answer = tmp_path / "answer"
+    environment = os.environ | {
+        "_ARGCOMPLETE": "1",
+        "_ARGCOMPLETE_IFS": "\n",
+        "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+    }
+    subprocess.run([sys.executable, "-m", "fusesoc_firm.cli"], env=environment, check=True)
+    assert [word.strip() for word in answer.read_text().splitlines()] == words
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_code_of_a_shell(shell: str, capsys: Captured) -> None:
+    assert "_ARGCOMPLETE" in out(capsys, "completion", shell)
 
 
 @pytest.mark.parametrize("arguments", [[], ["massage"], ["message", "show"], ["message", "show", "a/B", "--ros", "3"]])
@@ -320,7 +354,7 @@ def test_a_reader_that_leaves_early_is_no_fault() -> None:
 def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec, picture = tmp_path / "robot.yaml", tmp_path / "robot.dot"
     point = "geometry_msgs/Point"
-    answers = ["robot", *[""] * 8, "no", "sub", "", "ROS", "subscriber", point, *[""] * 3, "yes", "pub", "", "", "no"]
+    answers = ["robot", *[""] * 9, "no", "sub", "", "ROS", "subscriber", point, *[""] * 3, "yes", "pub", "", "", "no"]
     answers += ["yes", "pub", "", "ROS", "publisher", point, *[""] * 7, "no", "no"]
     monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
     assert f"{spec}: robot is valid: 1 subscriber" in out(capsys, "system", "new", str(spec))

@@ -265,6 +265,8 @@ def test_constraints_of_quartus(project: Project, tmp_path: Path) -> None:
         "get_ports",
         "create_clock",
         "derive_clock_uncertainty",
+        # The reset of clk.
+        *("get_registers", "set_false_path", "get_pins", "set_false_path"),
     ]
 
 
@@ -329,7 +331,7 @@ int run(const System& system, int, char**) {
 
 
 def test_python(project: Project, tmp_path: Path) -> None:
-    """The node's table and the skeletons of software, whose defaults are those of the message."""
+    """The node's table and the skeletons of software, which copy the message."""
     for path, number in ((project.ros_1, 1), (project.ros_2, 2)):
         folder = tmp_path / f"node_{number}"
         options = ("--language", "python", "--path", project.folder / f"odd_msgs_{number}", "-o", folder)
@@ -347,9 +349,8 @@ def test_python(project: Project, tmp_path: Path) -> None:
     names: dict[str, Any] = {}
     exec(compile((project.folder / "odd.py").read_text(encoding="utf-8"), "odd.py", "exec"), names)
     (function,) = (value for name, value in names.items() if callable(value) and not name.startswith("__"))
-    answer = function({})
-    assert answer["text"] == "\" [exec touch hostile_canary] \\ 🤖 ''' Ω"
-    assert (answer["a"], answer["b"][1], answer["c"]) == (float("inf"), -float("inf"), True)
+    message = {name: object() for name in ("text", "a", "b", "c")}
+    assert message.items() <= function(message).items()
 
 
 def test_yaml(project: Project, tmp_path: Path) -> None:

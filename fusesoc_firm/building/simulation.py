@@ -1,0 +1,198 @@
+"""Run one simulation of a core through FuseSoC, with the whole output in a log, and read the report in it."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.building.cores import configuration
+from fusesoc_firm.building.plan import Build, make_plan
+from fusesoc_firm.request.core_reader import read_core
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.tools.library_path import library_root
+from fusesoc_firm.tools.programs import explanation, missing, simulation_programs
+from fusesoc_firm.tools.simulators import SIMULATORS
+
+_LIBRARY_CORE = "robot:firm:firm_system"
+_WAVES = "waves.ghw"
+_MESSAGE = re.compile(r" *(\d+) > (\S+) \S+ ?(.*)")
+_RESPONSE = re.compile(r" +< (\S+) \S+ ?(.*)")
+_CYCLES = re.compile(r" +(\d+) cycles first beat in to last beat out, (-?\d+) last beat in to first beat out")
+_VERDICT = re.compile(r"(PASS|FAIL) \d+/\d+")
+_FAULT = re.compile(r"fault in cycle \d+: |nothing moved |missing: |and \d+ more faults")
+# The first line of the host's report.
+_BEGIN = re.compile(r"seed \d+, ")
+
+
+@dataclass
+class Message:
+    """A sent message and its responses as texts; the cycles are unknown (-1) without a response."""
+
+    number: int
+    sent: str
+    received: list[str] = field(default_factory=list)
+    cycles: int = -1
+    latency: int = -1
+
+
+@dataclass
+class Report:
+    """The result of a simulation: the conditions, the messages, the faults, and the verdict with the lines before it.
+
+    Without a verdict, the simulation did not run to its end. `status` is FuseSoC's exit status.
+    """
+
+    title: str = ""
+    messages: list[Message] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    summary: list[str] = field(default_factory=list)
+    verdict: str = ""
+    status: int = 0
+
+    @property
+    def is_good(self) -> bool:
+        """Whether all responses are right."""
+        return self.verdict.startswith("PASS")
+
+    def add(self, line: str) -> None:
+        """Read a line of the output."""
+        if _BEGIN.match(line):
+            self.title = line.partition(";")[0]
+        elif not self.title or self.verdict:
+            return
+        elif match := _MESSAGE.fullmatch(line):
+            self.messages.append(Message(int(match[1]), f"{match[2]} {match[3]}".strip()))
+        elif (match := _RESPONSE.fullmatch(line)) and self.messages:
+            self.messages[-1].received.append(f"{match[1]} {match[2]}".strip())
+        elif (match := _CYCLES.fullmatch(line)) and self.messages:
+            self.messages[-1].cycles, self.messages[-1].latency = int(match[1]), int(match[2])
+        elif _VERDICT.fullmatch(line):
+            self.verdict = line
+        elif _FAULT.match(line) or "error" in line:
+            self.faults.append(line)
+        elif line.endswith("last beat out") or line.startswith("in: "):
+            self.summary.append(line)
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a user asks of a simulation; an empty tool and a seed of None are the core's."""
+
+    tool: str = ""
+    seed: int | None = None
+    has_waves: bool = False
+    options: str = ""
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulation that can be run: its build, its simulator, and the options for FuseSoC after the core's name."""
+
+    build: Build
+    simulator: str
+    options: tuple[str, ...]
+    waves: Path | None
+
+    def run(self, tell: Callable[[str, Report], None]) -> Report:
+        """Run FuseSoC, call `tell` for each line with the report so far, and return the report."""
+        self.build.log.parent.mkdir(parents=True, exist_ok=True)
+        os.environ.setdefault("EDALIZE_LAUNCHER", shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
+        environment = os.environ | {"MAKEFLAGS": "--no-print-directory", "PYTHONUNBUFFERED": "1"}
+        code = "import sys; from fusesoc.main import main; sys.exit(main())"
+        command = [sys.executable, "-c", code, "--monochrome", "run", f"--target={self.build.target}"]
+        report = Report()
+        with (
+            self.build.log.open("w", encoding="utf-8") as log,
+            subprocess.Popen(
+                [*command, self.build.core, *self.options],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                errors="backslashreplace",
+            ) as process,
+        ):
+            assert process.stdout
+            for line in process.stdout:
+                log.write(line)
+                report.add(line.rstrip())
+                tell(line.rstrip(), report)
+        report.status = process.returncode
+        return report
+
+
+def core_name(path: Path, *, is_system: bool = False) -> str:
+    """Return the name of a core; with `is_system`, an empty name unless it generates a simulation.
+
+    May raise `InputError`.
+    """
+    core = read_core(path)
+    return str(core.data.get("name", "")) if not is_system or "simulation" in core.section("generate") else ""
+
+
+def simulation(core: str, folder: Path | None, wishes: Wishes) -> Simulation:
+    """Return the simulation of a core; `folder` is another folder in which FuseSoC searches for it.
+
+    Raise `InputError` if the core or the tool is unknown, or if a program is missing.
+    """
+    _add_libraries(core, folder)
+    plan = make_plan([core], ["sim"])
+    targets = _targets(plan.fusesoc.get_core(plan.builds[0].core))
+    target = next((name for name in targets if wishes.tool in ("", targets[name])), "")
+    if not target:
+        others = ", ".join(dict.fromkeys(targets.values()))
+        fail(f"{core} has no target for {wishes.tool or 'a simulator'}", hint=f"its simulators: {others or 'none'}")
+    tool = targets[target]
+    if absent := missing(simulation_programs(tool)):
+        fail(explanation(absent).removeprefix("error: "))
+    if wishes.has_waves and not SIMULATORS[tool].reads_vhdl:
+        fail(f"{SIMULATORS[tool].title} cannot write waves here", hint="add '--tool ghdl'")
+    (build,) = plan.builds if target == "sim" else make_plan([core], [target]).builds
+    waves = build.work_root / _WAVES if wishes.has_waves else None
+    return Simulation(build, tool, tuple(_options(wishes, reads_vhdl=SIMULATORS[tool].reads_vhdl)), waves)
+
+
+def _options(wishes: Wishes, *, reads_vhdl: bool) -> Iterator[str]:
+    """Yield the options of `fusesoc run` after the core's name. A host in Verilog takes its seed from FuseSoC."""
+    if not reads_vhdl:
+        if wishes.seed is not None:
+            yield f"--SEED={wishes.seed}"
+        yield from shlex.split(wishes.options)
+        return
+    flags = [f"-gSEED={wishes.seed}"] * (wishes.seed is not None) + [f"--wave={_WAVES}"] * wishes.has_waves
+    if text := " ".join([*flags, wishes.options]).strip():
+        # Option and value are joined by `=`, since the value begins with a dash. FuseSoC appends it to the core's.
+        yield f"--sim_options={text}"
+
+
+def _targets(core: Any) -> dict[str, str]:
+    """Return the simulation targets of a core with their simulators, the default first."""
+    targets = core.get_data({}).targets
+    names = [name for name in targets if name == "sim" or name.startswith("sim_")]
+    tools = {name: str((getattr(targets[name], "flow_options", None) or {}).get("tool", "")) for name in sorted(names)}
+    return {name: tool for name, tool in tools.items() if tool in SIMULATORS}
+
+
+def _add_libraries(core: str, folder: Path | None) -> None:
+    """Add our library and `folder` to FuseSoC's libraries, for this process and those that it starts, if missing."""
+    from fusesoc.fusesoc import Fusesoc
+
+    known = {name.rpartition(":")[0] for name in Fusesoc(configuration()).get_cores()}
+    places = [library_root()] if _LIBRARY_CORE not in known else []
+    if folder and core.rpartition(":")[0] not in known and core not in known:
+        places.append(folder.resolve())
+    if places:
+        former = os.environ.get("FUSESOC_CORES")
+        os.environ["FUSESOC_CORES"] = ":".join([*([former] if former else []), *map(str, places)])
+        # A library that contains the builds must not provide their generated cores.
+        root = Path(configuration().build_root)
+        root.mkdir(parents=True, exist_ok=True)
+        (root / "FUSESOC_IGNORE").touch()

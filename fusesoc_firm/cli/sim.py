@@ -1,0 +1,171 @@
+"""`firm sim`: simulate a system, and print the result, the messages and the files to look at."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusesoc_firm.cli.common import command, natural
+from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.building.simulation import Message, Report, Simulation
+
+_MOST_MESSAGES, _MOST_LINES = 10, 30
+_NARROWEST = 60
+# GHDL's errors begin with a place only.
+_ERROR = re.compile(r"(?:\b|:)error\b|^Traceback|^\S+:\d+:\d+: ", re.IGNORECASE)
+# Lines of FuseSoC, Edalize and make around the message of the tool that failed.
+_NOISE = re.compile(
+    r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|Setup failed)|far: |(Entering|Leaving) directory "
+    r"|\S+ -m fusesoc_firm\.cli tool "
+)
+# A place in a file that FuseSoC copied into the build folder.
+_COPY = re.compile(r"^src/[^/\s]+/([^\s:]+)(?=:\d+:\d+: )")
+
+
+def add_sim(commands: Any) -> None:
+    """Declare the command."""
+    sim = command(
+        commands,
+        "sim",
+        "simulate a system, compare every byte with its model, and print the result",
+        "firm sim --waves",
+        _sim,
+    )
+    sim.add_argument(
+        "system",
+        metavar="SPEC|CORE",
+        nargs="?",
+        help="a specification with a core beside it, or a core's name in FuseSoC (default: the core in this folder)",
+    )
+    sim.add_argument("--tool", choices=("ghdl", "icarus", "verilator"), help="the simulator (default: the core's)")
+    sim.add_argument("--seed", type=natural, metavar="N", help="the seed of the random stalls (default: the core's)")
+    sim.add_argument("--waves", action="store_true", help="write a waveform file (GHDL only)")
+    sim.add_argument(
+        "--options", default="", metavar="TEXT", help="further options for the simulator, such as '-gSTALL_PERCENT=0'"
+    )
+    detail = sim.add_mutually_exclusive_group()
+    detail.add_argument("-v", "--verbose", action="store_true", help="print the tools' output as it appears")
+    detail.add_argument("-q", "--quiet", action="store_true", help="print only the verdict and errors")
+
+
+def _sim(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.building.simulation import Wishes, simulation
+    from fusesoc_firm.text.outputs import shown
+
+    core, folder = _core(arguments.system)
+    wishes = Wishes(arguments.tool or "", arguments.seed, arguments.waves, arguments.options)
+    chosen = simulation(core, folder, wishes)
+    report = _run(chosen, is_verbose=arguments.verbose, is_quiet=arguments.quiet)
+    if not report.verdict:
+        if not arguments.verbose:
+            _print_errors(chosen.build.log, chosen.build.work_root, folder)
+        fail("the simulation did not run to its end", hint=f"the whole output: {shown(chosen.build.log)}")
+    if not arguments.quiet:
+        if not arguments.verbose:
+            _print_report(chosen, report)
+        print(f"log:   {shown(chosen.build.log)}")
+        if chosen.waves:
+            print(f"waves: {shown(chosen.waves)}")
+    print(report.verdict, flush=True)
+    if not report.is_good or report.status:
+        sys.exit(1)
+
+
+def _run(chosen: Simulation, *, is_verbose: bool, is_quiet: bool) -> Report:
+    """Run a simulation, and print its output or, at a terminal, its progress."""
+    is_progress = sys.stderr.isatty() and not (is_verbose or is_quiet)
+
+    def tell(line: str, report: Report) -> None:
+        if is_verbose:
+            print(line, flush=True)
+        elif is_progress:
+            step = f"simulating: {len(report.messages)} messages" if report.title else f"building: {line}"
+            print(f"\r\033[K{step[: _width() - 1]}", end="", file=sys.stderr, flush=True)
+
+    report = chosen.run(tell)
+    if is_progress:
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+    return report
+
+
+def _core(system: str | None) -> tuple[str, Path | None]:
+    """Return the name of a system's core, and the folder of its file, if known. May raise `InputError`."""
+    from fusesoc_firm.building.simulation import core_name
+    from fusesoc_firm.system.message_sources import core_of
+
+    if system is None:
+        found = {path: name for path in sorted(Path().glob("*.core")) if (name := core_name(path, is_system=True))}
+        if len(found) != 1:
+            names = " or ".join(map(str, found)) or "no .core file with a system"
+            fail(f"which system? This folder has {names}", hint="name a specification or a core, or run 'firm init'")
+        return found.popitem()[1], Path()
+    path = Path(system)
+    if path.suffix not in (".yaml", ".yml", ".core"):
+        return system, None
+    if not path.is_file():
+        fail(f"there is no file {path}")
+    if path.suffix == ".core":
+        return core_name(path), path.parent
+    core = core_of(path)
+    if core is None:
+        fail(f"no core for {path} is beside it", hint=f"write it: firm system core {path}")
+    return str(core.data.get("name", "")), path.parent
+
+
+def _print_errors(log: Path, work_root: Path, folder: Path | None) -> None:
+    """Print the lines of the log from the first error on, or its last lines; copies are named after their originals."""
+    lines = [line for line in log.read_text(encoding="utf-8").splitlines() if not _NOISE.match(line)]
+    first = next((number for number, line in enumerate(lines) if _ERROR.search(line)), max(0, len(lines) - _MOST_LINES))
+    for line in lines[first : first + _MOST_LINES]:
+        print(_COPY.sub(lambda match: _original(match, work_root, folder), line), file=sys.stderr)
+
+
+def _original(copy: re.Match[str], work_root: Path, folder: Path | None) -> str:
+    """Return the path of the user's file with the content of a copy, or the copy's path if there is no such file."""
+    parts = Path(copy[1]).parts
+    for number in range(len(parts) if folder else 0):
+        path = Path(folder or "", *parts[number:])
+        if path.is_file() and path.read_bytes() == (work_root / copy[0]).read_bytes():
+            return str(path)
+    return copy[0]
+
+
+def _print_report(chosen: Simulation, report: Report) -> None:
+    from fusesoc_firm.tools.simulators import SIMULATORS
+
+    print(f"{chosen.build.core} in {SIMULATORS[chosen.simulator].title}, {report.title}")
+    _print_messages(report.messages)
+    for line in (*report.faults, *report.summary):
+        print(line)
+
+
+def _print_messages(messages: list[Message]) -> None:
+    """Print a table of the first messages: cycles from the first beat in, latency, message and responses."""
+    width = max((_width() - 26) // 2, _NARROWEST // 2)
+    print(f"{'message':>7}  {'cycles':>6}  {'latency':>7}  {'sent':{width}}  received")
+    for item in messages[:_MOST_MESSAGES]:
+        cycles, latency = (
+            "" if value < 0 and not item.received else str(value) for value in (item.cycles, item.latency)
+        )
+        received = item.received or ["-"]
+        print(
+            f"{item.number:7}  {cycles:>6}  {latency:>7}  {_cut(item.sent, width):{width}}  {_cut(received[0], width)}"
+        )
+        for further in received[1:]:
+            print(f"{'':{26 + width}}{_cut(further, width)}")
+    if len(messages) > _MOST_MESSAGES:
+        print(f"    ... {len(messages) - _MOST_MESSAGES} more in the log")
+
+
+def _width() -> int:
+    return shutil.get_terminal_size((100, 24)).columns
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 3]}..."

@@ -1,0 +1,65 @@
+"""`firm status`: print the status of hardware. `firm registers`: write the registers' description, header and page."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.cli.common import add_sources, command, load
+from fusesoc_firm.text.diagnostics import fail
+
+
+def add_status(commands: Any) -> None:
+    """Declare the commands."""
+    status = command(
+        commands,
+        "status",
+        "print what a system's hardware has counted, over a transport that no node uses",
+        "firm status uart:/dev/ttyUSB1:1000000:rtscts --system robot.yaml",
+        _print_status,
+    )
+    status.add_argument("address", metavar="ADDRESS", help="the transport to the hardware")
+    status.add_argument(
+        "--system", type=Path, metavar="SPEC", help="the system's specification, for names and to compare the digest"
+    )
+    add_sources(status)
+    registers = command(
+        commands,
+        "registers",
+        "write a system's status registers: SystemRDL, C header, Python package and HTML page",
+        "firm registers robot.yaml -o registers",
+        _write_registers,
+    )
+    registers.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    registers.add_argument("-o", "--output", type=Path, metavar="DIR", required=True, help="the folder to write")
+    add_sources(registers)
+
+
+def _print_status(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.node.status import check_digest, read_status, status_text
+    from fusesoc_firm.node.transport.open_transport import open_transport
+    from fusesoc_firm.node.transport.transport import TransportError
+    from fusesoc_firm.system.system_core import identity
+
+    names: list[str] = []
+    expected = ""
+    if arguments.system:
+        arguments.spec = arguments.system
+        loaded = load(arguments, needs_sources=False)
+        names = [item.block for item in (*loaded.system.subscribers, *loaded.system.publishers)]
+        expected = identity(loaded).digest
+    try:
+        with open_transport(arguments.address) as transport:
+            if expected:
+                check_digest(transport, expected, loaded.system.name)
+            print(status_text(read_status(transport), names))
+    except TransportError as error:
+        fail(str(error))
+
+
+def _write_registers(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.register_files import write_register_files
+
+    write_register_files(load(arguments, needs_sources=False), arguments.output)
+    print(arguments.output)
