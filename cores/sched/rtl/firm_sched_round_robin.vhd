@@ -6,6 +6,7 @@
 -- `last` by the grant. They arrive late, and only decide whether the choice becomes the grant.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
 use firm.firm_sched_pkg.all;
@@ -71,7 +72,8 @@ begin
       if rst_n = '0' then
         started_r      <= '0';
         grant_valid_r  <= '0';
-        grant_select_r <= (others => '1');  -- so that index 0 comes first
+        -- Index 0 comes first.
+        grant_select_r <= std_logic_vector(to_unsigned(REQUESTERS-1, grant_select_r'length));
       end if;
     end if;
   end process choose;
