@@ -118,13 +118,14 @@ def _limited(item: pytest.Item) -> Iterator[None]:
         yield
         return
     limit = float(item.config.getini("waiting_limit"))
+    activity = _Activity()
     # Moments of the last while, and how much had been done by then; most tests are over before the first.
     seen: deque[tuple[float, float]] = deque()
     looking = 0.0
 
     def look(*_: object) -> None:
         nonlocal looking
-        begun, now, done = time.process_time(), time.monotonic(), _busy_seconds() - looking
+        begun, now, done = time.process_time(), time.monotonic(), activity.seconds() - looking
         looking += time.process_time() - begun
         if seen and now - seen[-1][0] > limit / 2:
             # The machine slept, or the test held the looks back.
@@ -132,8 +133,7 @@ def _limited(item: pytest.Item) -> Iterator[None]:
         seen.append((now, done))
         if now - seen[0][0] >= limit:
             then, done_then = seen.popleft()
-            # What ends without being waited for takes its time with it.
-            if abs(done - done_then) < _AT_REST * (now - then):
+            if done - done_then < _AT_REST * (now - then):
                 pytest.fail(f"neither the test nor a process below it has done anything for {limit:g} s")
 
     signal.signal(signal.SIGALRM, look)
@@ -144,14 +144,21 @@ def _limited(item: pytest.Item) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
 
-def _busy_seconds() -> float:
-    """Return how long this process and all below it have had a processor or have waited for one."""
-    this = psutil.Process()
-    total = sum(os.times()[:4]) + _seconds_in_queues(this.pid)
-    for process in this.children(recursive=True):
-        with suppress(psutil.Error):
-            total += sum(process.cpu_times()[:4]) + _seconds_in_queues(process.pid)
-    return total
+class _Activity:
+    """How long a process and all below it have had a processor or have waited for one.
+
+    What ends takes along how long it waited for a processor, so the last known number of each process is kept.
+    """
+
+    def __init__(self) -> None:
+        self._this = psutil.Process()
+        self._seconds: dict[psutil.Process, float] = {}
+
+    def seconds(self) -> float:
+        for process in (self._this, *self._this.children(recursive=True)):
+            with suppress(psutil.Error):
+                self._seconds[process] = sum(process.cpu_times()[:4]) + _seconds_in_queues(process.pid)
+        return sum(self._seconds.values())
 
 
 def _seconds_in_queues(pid: int) -> float:

@@ -32,6 +32,11 @@ def test_work():
     code = "import time\\nwhile time.process_time() < 3: pass"
     subprocess.run([sys.executable, "-c", code], check=True)
 
+def test_work_of_processes_that_end():
+    for _ in range(6):
+        code = "import time\\nwhile time.process_time() < 0.5: pass"
+        subprocess.run([sys.executable, "-c", code], check=True)
+
 def test_default():
     import signal
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -66,6 +71,7 @@ def test_a_run_that_inherits_an_ignored_interrupt(tmp_path: Path) -> None:
         "test_thread": "FAILED",
         "test_fixture": "ERROR",
         "test_work": "PASSED",
+        "test_work_of_processes_that_end": "PASSED",
         "test_default": "PASSED",
         "test_thorough": "PASSED",
     }
