@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm.frame.faults import Fault
 from tests.hdl.ghdl import REPOSITORY
@@ -12,7 +13,7 @@ TEXTS = [fault.text for fault in Fault]
 NODE = REPOSITORY / "fusesoc_firm" / "node"
 
 
-def found(path: Path, pattern: str) -> list[tuple[str, ...]]:
+def found(path: Path, pattern: str) -> list[Any]:
     return re.findall(pattern, path.read_text(), re.MULTILINE)
 
 
