@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Watches that a frame is as long as its header announces. A frame that is shorter or longer, or whose source reports a
--- fault, ends with an abort at once, and the rest of what is offered is dropped. It is placed before firm_axis_pack and has the same ports on both sides. Its output is a register; only
--- `m_ready` reaches `ready` in the same cycle. The remaining bytes are counted with 32 bits, but compared with few:
--- they are less than two beats if they were before the previous piece, or they are enough for any piece.
+-- fault, ends with an abort at once, and the rest of what is offered is dropped. It is placed before firm_axis_pack and
+-- has the same ports on both sides. Its output is a register; only `m_ready` reaches `ready` in the same cycle. The
+-- remaining bytes are counted with 32 bits, but compared with few: they are less than two beats if they were before the
+-- previous piece, or they are enough for any piece.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -27,9 +28,9 @@ entity firm_axis_trim is
     header    : in  std_logic;
     announced : out std_logic_vector(31 downto 0);
 
-    -- As at firm_axis_pack, but `last` comes without bytes: the frame ends before it. The lanes of `data` then are its
-    -- padding, and must be zeros. `abort` comes with `last`; a pulse of `fault` after the first bytes and before `last`,
-    -- or with it, aborts the frame in between.
+    -- As at firm_axis_pack, but `last` comes without bytes: the frame ends before it. The lanes of `data` are then its
+    -- padding, and must be zeros. `abort` comes with `last`. A pulse of `fault` aborts the frame, too; it comes after
+    -- the header and not after `last`.
     data  : in  std_logic_vector(WIDTH-1 downto 0);
     count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     last  : in  std_logic;
@@ -38,11 +39,11 @@ entity firm_axis_trim is
     valid : in  std_logic;
     ready : out std_logic;
 
-    -- Bytes were offered beyond the end of the frame, or it ended with more bytes missing than padding; both are a cycle
-    -- late. `is_closed`: the frame was aborted, so the rest of what is offered is dropped.
-    is_cut    : out std_logic;
+    -- Bytes were offered beyond the frame's end, or it ended with more bytes missing than padding may add; both are a
+    -- cycle late. `is_closed`: the frame was aborted, so the rest of what is offered is dropped.
+    is_cut     : out std_logic;
     is_lacking : out std_logic;
-    is_closed : out std_logic;
+    is_closed  : out std_logic;
 
     m_data  : out std_logic_vector(WIDTH-1 downto 0);
     m_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends frames from a file, cut into random pieces after their header, through the trimmer to a sink that stalls. The
 -- four bytes after a frame's first one are its announced length, which may differ from its real one. The output goes to
--- a file, one line per frame: the bytes in hex, or those of the header of an aborted frame, and then `aborted`, and `cut`
--- or `lacking` if the trimmer reported it.
+-- a file, one line per frame: the bytes in hex; of an aborted frame, those of the header, `aborted`, and `cut` or
+-- `lacking` if the trimmer reported it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -95,12 +95,12 @@ architecture rtl of firm_link_streams is
   signal stored_valid : std_logic;
   signal stored_ready : std_logic;
 
-  signal window    : std_logic_vector(WIDTH-1 downto 0);
-  signal available : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal is_last   : std_logic;  -- the frame ends with the available bytes
+  signal window     : std_logic_vector(WIDTH-1 downto 0);
+  signal available  : std_logic_vector(COUNT_BITS-1 downto 0);
+  signal is_last    : std_logic;  -- the frame ends with the available bytes
   signal is_aborted : std_logic;
-  signal has_byte  : std_logic;
-  signal take      : std_logic;
+  signal has_byte   : std_logic;
+  signal take       : std_logic;
 
   signal summing_r  : std_logic;                           -- the bytes of the checksum are sent
   signal abort_r    : std_logic;                           -- of a frame that was aborted
@@ -246,8 +246,8 @@ begin
 
   has_byte   <= '0' when available = NONE else '1';
   send_valid <= has_byte or summing_r;
-  send_data  <= window(7 downto 0)   when summing_r = '0' else
-                not sum(7 downto 0)  when abort_r = '1' else
+  send_data  <= window(7 downto 0) when summing_r = '0' else
+                not sum(7 downto 0) when abort_r = '1' else
                 sum(7 downto 0);
   send_last  <= '1' when summing_r = '1' and left_r = 0 else '0';
   sent       <= send_valid and send_ready;

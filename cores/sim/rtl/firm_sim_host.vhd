@@ -72,6 +72,11 @@ architecture simulation of firm_sim_host is
   constant NO_ID         : integer  := -1;
   constant LINE_BYTES    : positive := 64;
 
+  function percent_of(beats, cycles : natural) return string is
+  begin
+    return integer'image(beats) & " beats, " & integer'image(integer(100.0 * real(beats) / real(cycles))) & " %";
+  end function percent_of;
+
 begin
 
   assert is_stream_width(WIDTH)
@@ -250,11 +255,7 @@ begin
         print("    < " & receiving.label_text.all);
         return;
       end if;
-      cause := stimulus.first;
-      for number in 1 to receiving.cause loop
-        exit when cause = null;
-        cause := cause.next_frame;
-      end loop;
+      find_frame(stimulus, receiving.cause, cause);
       if cause = null then
         print("    < " & receiving.label_text.all);
         frame_fault("caused by stimulus " & integer'image(receiving.cause) & ", which does not exist");
@@ -527,11 +528,6 @@ begin
         fault(name & " pulsed " & integer'image(pulses) & " times, announced: " & integer'image(announced));
       end if;
     end procedure check_announced;
-
-    impure function percent_of(beats, cycles : natural) return string is
-    begin
-      return integer'image(beats) & " beats, " & integer'image(integer(100.0 * real(beats) / real(cycles))) & " %";
-    end function percent_of;
 
     procedure report_traffic is
       variable cycles : natural := 0;

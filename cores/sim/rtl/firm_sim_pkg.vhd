@@ -62,6 +62,9 @@ package firm_sim_pkg is
   function existing(path : string) return string;
   procedure write_result(file results : text; file expected : text; path : in string; row : inout line);
 
+  -- Frame `number`, counted from 0, in the order of the file; null if there are fewer.
+  procedure find_frame(content : inout frame_file_t; number : in natural; frame : out frame_ptr_t);
+
 end package firm_sim_pkg;
 
 package body firm_sim_pkg is
@@ -466,5 +469,15 @@ package body firm_sim_pkg is
   begin
     read_frame_file(path, '<', content);
   end procedure read_expected_file;
+
+  procedure find_frame(content : inout frame_file_t; number : in natural; frame : out frame_ptr_t) is
+    variable found : frame_ptr_t := content.first;
+  begin
+    for passed in 1 to number loop
+      exit when found = null;
+      found := found.next_frame;
+    end loop;
+    frame := found;
+  end procedure find_frame;
 
 end package body firm_sim_pkg;

@@ -42,6 +42,7 @@ begin
       WIDTH         => WIDTH,
       STIMULUS_FILE => STIMULUS_FILE,
       EXPECTED_FILE => EXPECTED_FILE,
+      RECEIVED_FILE => "received.txt",
       SEED          => SEED,
       STALL_PERCENT => STALL_PERCENT,
       WATCHDOG      => 200,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import re
-import struct
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
