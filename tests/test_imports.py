@@ -34,7 +34,9 @@ ALLOWED: dict[str, str] = {
     "node": "frame message request simulation system text tools",
     "plugin": "building converter message node request simulation store system text tools",
     "replay": "bags frame message node simulation system text",
-    "cli": "accelerator building converter message node plugin replay scheduling simulation store system text tools verify",
+    "cli": (
+        "accelerator building converter message node plugin replay scheduling simulation store system text tools verify"
+    ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
 STOREYS = {
