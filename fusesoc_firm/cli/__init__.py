@@ -24,6 +24,7 @@ from fusesoc_firm.cli.sim import add_sim
 from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.status import add_status
 from fusesoc_firm.cli.system import add_system
+from fusesoc_firm.cli.test import add_test
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.node.options import remappings
@@ -36,7 +37,7 @@ GROUPS = {
     "start": ("init", "system"),
     "run": ("sim", "live", "replay"),
     "look": ("message", "trace", "why", "graph"),
-    "build": ("build", "affected", "lock", "cache", "path"),
+    "build": ("build", "test", "affected", "lock", "cache", "path"),
 }
 
 
@@ -109,6 +110,7 @@ def _parser() -> argparse.ArgumentParser:
     add_status(commands)
     add_scheduler(commands)
     add_build(commands)
+    add_test(commands)
     add_replay(commands)
     add_project(commands)
     add_why(commands)
