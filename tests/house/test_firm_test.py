@@ -134,7 +134,7 @@ def run(library: Path, *arguments: str, **variables: str) -> tuple[int, str]:
 
 
 def results(text: str) -> dict[str, str]:
-    return dict(re.findall(r"^acme:m:\w+:1\.0  (\w+) +(\w+) ", text, re.MULTILINE))
+    return dict(re.findall(r"^acme:m:\w+:1\.0 +(\w+) +(\w+) ", text, re.MULTILINE))
 
 
 def test_unchanged_tests_start_no_tool(library: Path) -> None:
