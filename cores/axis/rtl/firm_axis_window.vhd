@@ -4,6 +4,8 @@
 -- next one. One shifter of radix 4 joins the two: nothing else is between the registers and `window`, and no path leads
 -- from the stream to the window or from `take` to `s_axis_tready`. At any offset, a beat enters every cycle as long as
 -- all available bytes are taken. At 8 bits there is nothing to shift, and the window is the stream.
+-- A broken beat (see is_broken_beat) ends its frame without a byte; what follows it up to `tlast` does not enter. At 8
+-- bits every beat holds its byte, and `tkeep` is ignored.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -31,6 +33,8 @@ entity firm_axis_window is
     available : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     -- The frame ends with the available bytes, which may be none.
     is_last : out std_logic;
+    -- If so, it ends there because of a broken beat.
+    is_broken : out std_logic;
     -- For a reader whose `take` is a register: the first `take` bytes are available; and if so, the frame ends with
     -- them. Both are a cycle late for bytes that reach into the frame's last beat, which keeps the paths short.
     shown : out std_logic;
@@ -72,6 +76,7 @@ begin
     window        <= s_axis_tdata;
     available(0)  <= s_axis_tvalid and not skipping_r;
     is_last       <= s_axis_tvalid and s_axis_tlast and not skipping_r;
+    is_broken     <= '0';
     shown         <= (s_axis_tvalid and not skipping_r) or not take(0);
     ends          <= s_axis_tlast and take(0);
     s_axis_tready <= dropping or (take_valid and take(0));
@@ -141,23 +146,32 @@ begin
     -- A legal number, so that the assert above reports first.
     constant VOID : natural := max(0, VOID_LANES);
 
-    signal starting_r    : std_logic;  -- the next beat to enter is the first of a frame
-    signal entering      : count_t;    -- the bytes of the beat that enters
-    signal entering_user : std_logic_vector(7 downto 0);
+    signal starting_r     : std_logic;         -- the next beat to enter is the first of a frame
+    signal cutting_r      : std_logic := '0';  -- it follows a broken beat of its frame
+    signal entering       : count_t;           -- the bytes of the beat that enters
+    signal entering_keep  : std_logic_vector(LANES-1 downto 0) := (others => '0');
+    signal entering_user  : std_logic_vector(7 downto 0);
+    signal entering_valid : std_logic;
+    signal entering_last  : std_logic;
+    signal breaks         : std_logic;         -- it is broken
+    signal slice_ready    : std_logic;
 
     -- The beat after the window's first one. In `tuser`, the slice carries the number of its bytes, and whether it is
-    -- the first of a frame.
+    -- the first of a frame; in the first bit of `tkeep`, whether it is broken.
     signal next_tdata  : std_logic_vector(WIDTH-1 downto 0);
     signal next_user   : std_logic_vector(7 downto 0);
     signal next_tvalid : std_logic;
     signal next_tlast  : std_logic;
     signal next_first  : std_logic;
     signal next_bytes  : count_t;
+    signal next_keep   : std_logic_vector(LANES-1 downto 0);
+    signal next_broken : std_logic;
 
     -- The beat in which the window begins.
     signal filled_r : std_logic := '0';  -- the beat is valid
     signal tdata_r  : std_logic_vector(WIDTH-1 downto 0);
     signal last_r   : std_logic := '0';
+    signal broken_r : std_logic := '0';  -- a broken beat ended the frame after it
     signal offset_r : unsigned(OFFSET_BITS-1 downto 0) := (others => '0');  -- the window's first lane
     signal left_r   : count_t := (others => '0');                           -- its bytes from there on
 
@@ -179,7 +193,9 @@ begin
 
   begin
 
-    count_entering : process (s_axis_tkeep, starting_r)
+    breaks <= is_broken_beat(s_axis_tkeep, s_axis_tlast);
+
+    count_entering : process (s_axis_tkeep, starting_r, breaks)
       variable kept : count_t;
     begin
       kept     := unsigned(lanes_kept(s_axis_tkeep));
@@ -190,21 +206,30 @@ begin
           entering <= (others => '0');
         end if;
       end if;
+      if breaks = '1' then
+        entering <= (others => '0');
+      end if;
     end process count_entering;
 
-    mark_first : process (clk)
+    follow_frame : process (clk)
     begin
       if rising_edge(clk) then
         if rst_n = '0' then
           starting_r <= '1';
+          cutting_r  <= '0';
         elsif s_axis_tvalid = '1' and s_axis_tready_out = '1' then
           starting_r <= s_axis_tlast;
+          cutting_r  <= (cutting_r or breaks) and not s_axis_tlast;
         end if;
       end if;
-    end process mark_first;
+    end process follow_frame;
 
-    entering_user <= starting_r & std_logic_vector(resize(entering, 7));
-    s_axis_tready <= s_axis_tready_out;
+    entering_keep(0)  <= breaks;
+    entering_user     <= starting_r & std_logic_vector(resize(entering, 7));
+    entering_valid    <= s_axis_tvalid and not cutting_r;
+    entering_last     <= s_axis_tlast or breaks;
+    s_axis_tready_out <= slice_ready or cutting_r;
+    s_axis_tready     <= s_axis_tready_out;
 
     u_slice : entity firm.firm_axis_register_slice
       generic map (
@@ -214,20 +239,21 @@ begin
         clk           => clk,
         rst_n         => rst_n,
         s_axis_tdata  => s_axis_tdata,
-        s_axis_tkeep  => s_axis_tkeep,
+        s_axis_tkeep  => entering_keep,
         s_axis_tuser  => entering_user,
-        s_axis_tvalid => s_axis_tvalid,
-        s_axis_tlast  => s_axis_tlast,
-        s_axis_tready => s_axis_tready_out,
+        s_axis_tvalid => entering_valid,
+        s_axis_tlast  => entering_last,
+        s_axis_tready => slice_ready,
         m_axis_tdata  => next_tdata,
-        m_axis_tkeep  => open,
+        m_axis_tkeep  => next_keep,
         m_axis_tuser  => next_user,
         m_axis_tvalid => next_tvalid,
         m_axis_tlast  => next_tlast,
         m_axis_tready => move
       );
 
-    next_first <= next_user(7);
+    next_first  <= next_user(7);
+    next_broken <= next_keep(0);
     -- Without a beat, the number may be unknown in simulation.
     next_bytes <= to_01(resize(unsigned(next_user(6 downto 0)), COUNT_BITS));
 
@@ -252,6 +278,8 @@ begin
         is_last   <= '0';
       end if;
     end process show_count;
+
+    is_broken <= broken_r when last_r = '1' else next_tvalid and next_broken;
 
     wanted   <= unsigned(take);
     exceeds  <= is_less(left_r, wanted);
@@ -304,6 +332,7 @@ begin
             end if;
             filled_r <= next_tvalid and not uses_up;
             last_r   <= next_tlast and next_tvalid;
+            broken_r <= next_broken;
           end if;
         end if;
       end if;
