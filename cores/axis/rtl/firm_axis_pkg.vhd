@@ -30,6 +30,10 @@ package firm_axis_pkg is
   -- `word` if `enable` is '1', else zeros. ORs of such words select one of them in parallel.
   function gated(word : std_logic_vector; enable : std_logic) return std_logic_vector;
 
+  -- `left` minus `right`, of equal lengths, modulo 2**length. As LUTs, since Yosys makes a carry chain of `-`, which is
+  -- slower at few bits.
+  function difference(left, right : std_logic_vector) return std_logic_vector;
+
   -- '1' if all bits are. A comparison with a constant would be limited to 32 bits, and give a warning for unknown bits.
   function are_ones(bits : std_logic_vector) return std_logic;
 
@@ -157,6 +161,21 @@ package body firm_axis_pkg is
     end loop;
     return result;
   end function gated;
+
+  function difference(left, right : std_logic_vector) return std_logic_vector is
+    variable minuend    : std_logic_vector(left'length-1 downto 0);
+    variable subtrahend : std_logic_vector(left'length-1 downto 0);
+    variable result     : std_logic_vector(left'length-1 downto 0);
+    variable borrow     : std_logic := '0';
+  begin
+    minuend    := left;
+    subtrahend := right;
+    for place in result'reverse_range loop
+      result(place) := minuend(place) xor subtrahend(place) xor borrow;
+      borrow        := (not minuend(place) and (subtrahend(place) or borrow)) or (subtrahend(place) and borrow);
+    end loop;
+    return result;
+  end function difference;
 
   function are_ones(bits : std_logic_vector) return std_logic is
     variable all_are : std_logic := '1';

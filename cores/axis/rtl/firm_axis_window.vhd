@@ -24,6 +24,7 @@ entity firm_axis_window is
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -31,10 +32,11 @@ entity firm_axis_window is
     -- The next bytes of the frame from lane 0 up; lanes from `available` on are undefined.
     window    : out std_logic_vector(WIDTH-1 downto 0);
     available : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
-    -- The frame ends with the available bytes, which may be none.
-    is_last : out std_logic;
-    -- If so, it ends there because of a broken beat.
-    is_broken : out std_logic;
+    -- The frame ends with the available bytes, which may be none; with it, whether the frame was aborted, or ends there
+    -- because of a broken beat.
+    is_last    : out std_logic;
+    is_aborted : out std_logic;
+    is_broken  : out std_logic;
     -- For a reader whose `take` is a register: the first `take` bytes are available; and if so, the frame ends with
     -- them. Both are a cycle late for bytes that reach into the frame's last beat, which keeps the paths short.
     shown : out std_logic;
@@ -76,6 +78,7 @@ begin
     window        <= s_axis_tdata;
     available(0)  <= s_axis_tvalid and not skipping_r;
     is_last       <= s_axis_tvalid and s_axis_tlast and not skipping_r;
+    is_aborted    <= s_axis_tuser(0);
     is_broken     <= '0';
     shown         <= (s_axis_tvalid and not skipping_r) or not take(0);
     ends          <= s_axis_tlast and take(0);
@@ -149,29 +152,27 @@ begin
     signal starting_r     : std_logic;         -- the next beat to enter is the first of a frame
     signal cutting_r      : std_logic := '0';  -- it follows a broken beat of its frame
     signal entering       : count_t;           -- the bytes of the beat that enters
-    signal entering_keep  : std_logic_vector(LANES-1 downto 0) := (others => '0');
-    signal entering_user  : std_logic_vector(7 downto 0);
+    signal entering_user  : std_logic_vector(9 downto 0);
     signal entering_valid : std_logic;
     signal entering_last  : std_logic;
     signal breaks         : std_logic;         -- it is broken
     signal slice_ready    : std_logic;
 
-    -- The beat after the window's first one. In `tuser`, the slice carries the number of its bytes, and whether it is
-    -- the first of a frame; in the first bit of `tkeep`, whether it is broken.
+    -- The beat after the window's first one. In `tuser`, the slice carries the number of its bytes, whether it is the
+    -- first of a frame, whether it aborts the frame, and whether it is broken.
     signal next_tdata  : std_logic_vector(WIDTH-1 downto 0);
-    signal next_user   : std_logic_vector(7 downto 0);
+    signal next_user   : std_logic_vector(9 downto 0);
     signal next_tvalid : std_logic;
     signal next_tlast  : std_logic;
     signal next_first  : std_logic;
     signal next_bytes  : count_t;
-    signal next_keep   : std_logic_vector(LANES-1 downto 0);
-    signal next_broken : std_logic;
 
     -- The beat in which the window begins.
     signal filled_r : std_logic := '0';  -- the beat is valid
     signal tdata_r  : std_logic_vector(WIDTH-1 downto 0);
     signal last_r   : std_logic := '0';
-    signal broken_r : std_logic := '0';  -- a broken beat ended the frame after it
+    signal abort_r  : std_logic;         -- it aborts the frame
+    signal broken_r : std_logic;         -- a broken beat ended the frame after it
     signal offset_r : unsigned(OFFSET_BITS-1 downto 0) := (others => '0');  -- the window's first lane
     signal left_r   : count_t := (others => '0');                           -- its bytes from there on
 
@@ -193,7 +194,8 @@ begin
 
   begin
 
-    breaks <= is_broken_beat(s_axis_tkeep, s_axis_tlast);
+    -- The last beat of an aborted frame may be empty.
+    breaks <= is_broken_beat(s_axis_tkeep, s_axis_tlast) and not (s_axis_tlast and s_axis_tuser(0));
 
     count_entering : process (s_axis_tkeep, starting_r, breaks)
       variable kept : count_t;
@@ -224,8 +226,7 @@ begin
       end if;
     end process follow_frame;
 
-    entering_keep(0)  <= breaks;
-    entering_user     <= starting_r & std_logic_vector(resize(entering, 7));
+    entering_user     <= breaks & s_axis_tuser & starting_r & std_logic_vector(resize(entering, 7));
     entering_valid    <= s_axis_tvalid and not cutting_r;
     entering_last     <= s_axis_tlast or breaks;
     s_axis_tready_out <= slice_ready or cutting_r;
@@ -233,29 +234,32 @@ begin
 
     u_slice : entity firm.firm_axis_register_slice
       generic map (
-        WIDTH => WIDTH
+        WIDTH     => WIDTH,
+        USER_BITS => 10
       )
       port map (
         clk           => clk,
         rst_n         => rst_n,
         s_axis_tdata  => s_axis_tdata,
-        s_axis_tkeep  => entering_keep,
+        s_axis_tkeep  => s_axis_tkeep,
         s_axis_tuser  => entering_user,
         s_axis_tvalid => entering_valid,
         s_axis_tlast  => entering_last,
         s_axis_tready => slice_ready,
         m_axis_tdata  => next_tdata,
-        m_axis_tkeep  => next_keep,
+        m_axis_tkeep  => open,
         m_axis_tuser  => next_user,
         m_axis_tvalid => next_tvalid,
         m_axis_tlast  => next_tlast,
         m_axis_tready => move
       );
 
-    next_first  <= next_user(7);
-    next_broken <= next_keep(0);
+    next_first <= next_user(7);
     -- Without a beat, the number may be unknown in simulation.
     next_bytes <= to_01(resize(unsigned(next_user(6 downto 0)), COUNT_BITS));
+
+    is_aborted <= abort_r when last_r = '1' else next_user(8);
+    is_broken  <= broken_r when last_r = '1' else next_user(9);
 
     both_beats <= next_tdata(WIDTH-9 downto 0) & tdata_r;
     window     <= bytes_from(both_beats, offset_r);
@@ -279,8 +283,6 @@ begin
       end if;
     end process show_count;
 
-    is_broken <= broken_r when last_r = '1' else next_tvalid and next_broken;
-
     wanted   <= unsigned(take);
     exceeds  <= is_less(left_r, wanted);
     empties  <= not is_less(wanted, left_r);
@@ -301,7 +303,9 @@ begin
     move_beat : process (clk)
     begin
       if rising_edge(clk) and move = '1' then
-        tdata_r <= next_tdata;
+        tdata_r  <= next_tdata;
+        abort_r  <= next_user(8);
+        broken_r <= next_user(9);
       end if;
     end process move_beat;
 
@@ -332,7 +336,6 @@ begin
             end if;
             filled_r <= next_tvalid and not uses_up;
             last_r   <= next_tlast and next_tvalid;
-            broken_r <= next_broken;
           end if;
         end if;
       end if;
