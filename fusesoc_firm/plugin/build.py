@@ -12,8 +12,9 @@ from pathlib import Path
 
 from fusesoc_firm.building.cluster import build_on
 from fusesoc_firm.building.plan import Build, Plan
-from fusesoc_firm.building.pool import Limits, Outcome, Pool
-from fusesoc_firm.building.process import save_time
+from fusesoc_firm.building.pool import Limits, Outcome, Pool, ignore
+from fusesoc_firm.building.process import run_all, save_time
+from fusesoc_firm.building.steps import Steps
 from fusesoc_firm.plugin.answer import answer_from_store
 from fusesoc_firm.plugin.batch import prepare
 from fusesoc_firm.plugin.generators import GENERATORS
@@ -28,7 +29,8 @@ _LAUNCHER = "EDALIZE_LAUNCHER"
 class How:
     """The options of builds: the folders, the last step, the number of parallel builds (0: one per core), a cluster.
 
-    After a failure, `is_failing_fast` skips the other builds.
+    After a failure, `is_failing_fast` skips the other builds. With `steps`, builds run as actions; the other options
+    for the folders and the last step are then not used.
     """
 
     is_clean: bool = False
@@ -39,6 +41,7 @@ class How:
     cluster: str = ""
     is_failing_fast: bool = False
     limits: Limits = field(default_factory=Limits)
+    steps: Steps | None = None
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class Listener:
 
     tell: Callable[[str], None]
     progress: Callable[[str], None]
-    begin: Callable[[Build, int], None]
+    begin: Callable[[Build, int], None] = ignore
 
 
 def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
@@ -67,7 +70,9 @@ def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, 
 
 
 def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
-    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
+    # A step of an action should depend on few of our files.
+    ours = ("fusesoc_firm.tools.launcher",) if how.steps else ("fusesoc_firm.cli", "tool")
+    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", *ours]))
     if how.is_locked:
         for core in dict.fromkeys(build.core for build in plan.builds):
             check_locked(core)
@@ -90,7 +95,8 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
         save_time(_answer)
     options += ["--setup", "--build"] * how.is_build_only
     words = (*options, *plan.options.options())
-    yield from Pool(words, jobs, listener.tell, how.limits, listener.begin).run(plan)
+    pool = Pool(words, jobs, listener.tell, how.limits, listener.begin, how.steps or run_all)
+    yield from pool.run(plan)
 
 
 def _generators_run_here() -> bool:
