@@ -34,6 +34,8 @@ entity firm_axis_trim is
     last  : in  std_logic;
     valid : in  std_logic;
     ready : out std_logic;
+    -- `ready` of a piece that is not `last`: it depends on neither of them, and is known earlier.
+    piece_ready : out std_logic;
 
     -- Bytes were offered beyond the end of the frame, or it ended with more than SLACK bytes missing; both are a cycle
     -- late. `is_closed`: the frame was cut, so the rest of what is offered is dropped.
@@ -94,6 +96,8 @@ begin
   ends    <= closed_r or open_r or (near_r and not room(COUNT_BITS-1));
   free    <= m_ready or not valid_r;
   ready   <= free and (ends or not last);
+
+  piece_ready <= free;
 
   announced <= std_logic_vector(not left_r);
   is_closed <= closed_r;
