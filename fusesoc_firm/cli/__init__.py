@@ -18,6 +18,7 @@ from fusesoc_firm.cli.init import add_init
 from fusesoc_firm.cli.live import add_live
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
+from fusesoc_firm.cli.query import add_query
 from fusesoc_firm.cli.replay import add_replay
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.sim import add_sim
@@ -36,7 +37,7 @@ GROUPS = {
     "start": ("init", "system"),
     "run": ("sim", "live", "replay"),
     "look": ("message", "trace", "why", "graph"),
-    "build": ("build", "affected", "lock", "cache", "path"),
+    "build": ("build", "query", "affected", "lock", "cache", "path"),
 }
 
 
@@ -111,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     add_build(commands)
     add_replay(commands)
     add_project(commands)
+    add_query(commands)
     add_why(commands)
     add_cache(commands)
     add_tool(commands)

@@ -22,6 +22,7 @@ entity firm_axis_window is
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -29,8 +30,9 @@ entity firm_axis_window is
     -- The next bytes of the frame from lane 0 up; lanes from `available` on are undefined.
     window    : out std_logic_vector(WIDTH-1 downto 0);
     available : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
-    -- The frame ends with the available bytes, which may be none.
-    is_last : out std_logic;
+    -- The frame ends with the available bytes, which may be none; with it, whether the frame was aborted.
+    is_last    : out std_logic;
+    is_aborted : out std_logic;
     -- For a reader whose `take` is a register: the first `take` bytes are available; and if so, the frame ends with
     -- them. Both are a cycle late for bytes that reach into the frame's last beat, which keeps the paths short.
     shown : out std_logic;
@@ -72,6 +74,7 @@ begin
     window        <= s_axis_tdata;
     available(0)  <= s_axis_tvalid and not skipping_r;
     is_last       <= s_axis_tvalid and s_axis_tlast and not skipping_r;
+    is_aborted    <= s_axis_tuser(0);
     shown         <= (s_axis_tvalid and not skipping_r) or not take(0);
     ends          <= s_axis_tlast and take(0);
     s_axis_tready <= dropping or (take_valid and take(0));
@@ -143,12 +146,12 @@ begin
 
     signal starting_r    : std_logic;  -- the next beat to enter is the first of a frame
     signal entering      : count_t;    -- the bytes of the beat that enters
-    signal entering_user : std_logic_vector(7 downto 0);
+    signal entering_user : std_logic_vector(8 downto 0);
 
-    -- The beat after the window's first one. In `tuser`, the slice carries the number of its bytes, and whether it is
-    -- the first of a frame.
+    -- The beat after the window's first one. In `tuser`, the slice carries the number of its bytes, whether it is the
+    -- first of a frame, and whether it aborts the frame.
     signal next_tdata  : std_logic_vector(WIDTH-1 downto 0);
-    signal next_user   : std_logic_vector(7 downto 0);
+    signal next_user   : std_logic_vector(8 downto 0);
     signal next_tvalid : std_logic;
     signal next_tlast  : std_logic;
     signal next_first  : std_logic;
@@ -158,6 +161,7 @@ begin
     signal filled_r : std_logic := '0';  -- the beat is valid
     signal tdata_r  : std_logic_vector(WIDTH-1 downto 0);
     signal last_r   : std_logic := '0';
+    signal abort_r  : std_logic;         -- it aborts the frame
     signal offset_r : unsigned(OFFSET_BITS-1 downto 0) := (others => '0');  -- the window's first lane
     signal left_r   : count_t := (others => '0');                           -- its bytes from there on
 
@@ -203,12 +207,13 @@ begin
       end if;
     end process mark_first;
 
-    entering_user <= starting_r & std_logic_vector(resize(entering, 7));
+    entering_user <= s_axis_tuser & starting_r & std_logic_vector(resize(entering, 7));
     s_axis_tready <= s_axis_tready_out;
 
     u_slice : entity firm.firm_axis_register_slice
       generic map (
-        WIDTH => WIDTH
+        WIDTH     => WIDTH,
+        USER_BITS => 9
       )
       port map (
         clk           => clk,
@@ -230,6 +235,8 @@ begin
     next_first <= next_user(7);
     -- Without a beat, the number may be unknown in simulation.
     next_bytes <= to_01(resize(unsigned(next_user(6 downto 0)), COUNT_BITS));
+
+    is_aborted <= abort_r when last_r = '1' else next_user(8);
 
     both_beats <= next_tdata(WIDTH-9 downto 0) & tdata_r;
     window     <= bytes_from(both_beats, offset_r);
@@ -274,6 +281,7 @@ begin
     begin
       if rising_edge(clk) and move = '1' then
         tdata_r <= next_tdata;
+        abort_r <= next_user(8);
       end if;
     end process move_beat;
 

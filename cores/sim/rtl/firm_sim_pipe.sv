@@ -23,6 +23,7 @@ module firm_sim_pipe #(
   // To the system.
   output reg  [WIDTH-1:0]   m_axis_tdata,
   output reg  [WIDTH/8-1:0] m_axis_tkeep,
+  output wire [0:0]         m_axis_tuser,
   output reg                m_axis_tvalid,
   output reg                m_axis_tlast,
   input  wire               m_axis_tready,
@@ -30,6 +31,7 @@ module firm_sim_pipe #(
   // From the system.
   input  wire [WIDTH-1:0]   s_axis_tdata,
   input  wire [WIDTH/8-1:0] s_axis_tkeep,
+  input  wire [0:0]         s_axis_tuser,
   input  wire [7:0]         s_axis_tid,
   input  wire               s_axis_tvalid,
   input  wire               s_axis_tlast,
@@ -82,6 +84,8 @@ module firm_sim_pipe #(
   reg [WIDTH-1:0]   held_tdata;
   reg [LANES-1:0]   held_tkeep;
   reg [7:0]         held_tid;
+
+  assign m_axis_tuser = 1'b0;
 
   // ------------------------------------------------------------------ faults
 

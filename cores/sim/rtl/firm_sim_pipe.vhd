@@ -31,6 +31,7 @@ entity firm_sim_pipe is
     -- To the system.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
@@ -38,6 +39,7 @@ entity firm_sim_pipe is
     -- From the system.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tid    : in  std_logic_vector(7 downto 0);
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
@@ -290,6 +292,7 @@ begin
       m_axis_tdata  <= tdata after HOLD;
       m_axis_tkeep  <= tkeep after HOLD;
       m_axis_tvalid <= '1' after HOLD;
+      m_axis_tuser  <= "0" after HOLD;
       m_axis_tlast  <= '0' after HOLD;
       if sending.bytes'length - bytes_sent <= LANES then
         m_axis_tlast <= '1' after HOLD;
