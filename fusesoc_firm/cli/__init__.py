@@ -25,6 +25,7 @@ from fusesoc_firm.cli.sim import add_sim
 from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.status import add_status
 from fusesoc_firm.cli.system import add_system
+from fusesoc_firm.cli.test import add_test
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.node.options import remappings
@@ -37,7 +38,7 @@ GROUPS = {
     "start": ("init", "system"),
     "run": ("sim", "live", "replay"),
     "look": ("message", "trace", "why", "graph"),
-    "build": ("build", "query", "affected", "lock", "cache", "path"),
+    "build": ("build", "test", "query", "affected", "lock", "cache", "path"),
 }
 
 
@@ -110,6 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     add_status(commands)
     add_scheduler(commands)
     add_build(commands)
+    add_test(commands)
     add_replay(commands)
     add_project(commands)
     add_query(commands)

@@ -105,7 +105,7 @@ def read_note(root: str, name: str) -> dict[str, Any] | None:
     note = _plain(read(root, name))
     if not isinstance(note, dict) or not {"key", "facts", *_WORDS} <= note.keys():
         return None
-    is_good = _is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and _are_facts(note["facts"])
+    is_good = is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and _are_facts(note["facts"])
     return note if is_good else None
 
 
@@ -181,7 +181,8 @@ def _are_printable(values: list[object]) -> bool:
     return all(isinstance(value, str) and value.isprintable() for value in values)
 
 
-def _is_digest(text: object) -> bool:
+def is_digest(text: object) -> bool:
+    """Return whether a value is a SHA-256 in hexadecimal digits."""
     return isinstance(text, str) and len(text) == _DIGEST_DIGITS and _DIGITS.issuperset(text)
 
 
@@ -198,13 +199,13 @@ def _lengths(listed: object) -> dict[str, int] | None:
     for item in listed if isinstance(listed, list) else [None]:
         if not isinstance(item, list) or len(item) != _FILE_PARTS or type(item[1]) is not int or item[1] < 0:
             return None
-        if not _is_path(item[0]) or item[0] in lengths:
+        if not is_path(item[0]) or item[0] in lengths:
             return None
         lengths[item[0]] = item[1]
     return lengths if lengths.keys().isdisjoint(_folders(lengths)) else None
 
 
-def _is_path(path: object) -> bool:
+def is_path(path: object) -> bool:
     """Return whether a value is a relative path that leads directly to a file below its base folder."""
     if not isinstance(path, str):
         return False
