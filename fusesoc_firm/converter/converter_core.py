@@ -1,4 +1,4 @@
-"""The generator `firm`: a core with the converters of messages and the packages of their constants."""
+"""The generator `firm`, which generates a core with message converters and the packages of the messages' constants."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class Selection:
 def order_of_message(
     text: str, direction: str, width: int, library: MessageLibrary, selection: Selection | None = None
 ) -> Order:
-    """Return an order for one message, or for the messages that the ends of a service or an action exchange.
+    """Return an order for one message, or for all messages of a service or an action.
 
     `direction` is a key of `ENTITIES`, or "both". `selection` selects fields and requires a single message. May raise
     `InputError`.

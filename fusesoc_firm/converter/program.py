@@ -124,7 +124,7 @@ class Close:
 
 @dataclass(frozen=True)
 class Tail:
-    """The length of the rest of the payload; it skips an empty rest."""
+    """The length of the rest of the payload. An empty rest is skipped."""
 
 
 @dataclass(frozen=True)

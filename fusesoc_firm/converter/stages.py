@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> str:
-    """Return a message, or the messages of a service or action, at one of `STAGES`, without a final newline.
+    """Return the text of a message, or of the messages of a service or action, at one of `STAGES`; no final newline.
 
     `width` is the width of the converters' stream in bits. May raise `InputError`.
     """

@@ -154,7 +154,7 @@ class MessageLibrary:
         return self._store.text(name).encode()
 
     def files(self, names: Iterable[MessageName]) -> list[Input]:
-        """Return the files of these messages, in the order of names; messages in a distribution have no files.
+        """Return the files of these messages, sorted by message name; messages in a distribution have no files.
 
         For a bag, the result contains only the part that defines the message.
         """

@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from fusesoc_firm.frame.faults import Fault
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.node import HardwareListener, OpenTransport
 from fusesoc_firm.node.transport.transport import Transport, TransportError
@@ -87,7 +88,10 @@ def read_status(transport: Transport) -> Status:
 
 
 def status_text(status: Status, names: Sequence[str] = ()) -> str:
-    """Return the status as text; `names` are the channels' blocks, the subscribers first."""
+    """Return the status as text, with the texts of the counted codes.
+
+    `names` are the channels' blocks, the subscribers first.
+    """
     subscribers, publishers = (status.field("shape", name) for name in ("subscribers", "publishers"))
     channels = [f"subscriber[{number}]" for number in range(subscribers)]
     channels += [f"publisher[{number}]" for number in range(publishers)]
@@ -101,12 +105,18 @@ def status_text(status: Status, names: Sequence[str] = ()) -> str:
         lines.append(
             f"{name:{width}}  {words['signature']:08x}  {words['frames']:9}  {words['longest_wait']:6} cycles  {faults}"
         )
-    return "\n".join(lines)
+    counted = sorted({fault for channel in channels for fault in _counts(status, channel)})
+    return "\n".join(lines + [f"code {fault.value}: {fault.text}" for fault in counted])
 
 
 def _faults(status: Status, channel: str) -> list[str]:
-    counts = {code: status.words[f"{channel}.faults[{code - 1}]"] for code in range(1, 13)}
-    return [f"{count} of code {code}" for code, count in counts.items() if count]
+    return [f"{count} of code {fault.value}" for fault, count in _counts(status, channel).items()]
+
+
+def _counts(status: Status, channel: str) -> dict[Fault, int]:
+    """Return the count of each fault of a channel that is not zero."""
+    counts = {fault: status.words[f"{channel}.faults[{fault - 1}]"] for fault in Fault}
+    return {fault: count for fault, count in counts.items() if count}
 
 
 def _events(status: Status, shown: Mapping[str, str], channels: Sequence[str]) -> str:

@@ -159,7 +159,7 @@ class _Reader:
 
 
 def _value(text: str, type_: WireType) -> bool | int | float:
-    """Return the value of a text. Raise `ValueError`, with the legal values, for an illegal text."""
+    """Return the value of a text. Raise `ValueError`, with the legal values, if the text is illegal."""
     if type_.code == "?":
         return _boolean(text)
     return _float(text, type_) if type_.code in "fd" else _integer(text, type_)

@@ -139,3 +139,4 @@ def test_a_status_with_faults_is_text() -> None:
     text = status_text(read_status(Hardware(words)), ["left", "right"])
     assert "last fault: code 2 of right" in text
     assert "left   00000000         13      14 cycles  1 of code 1, 2 of code 2" in text
+    assert "code 1: the length is not that of the message\n" in text

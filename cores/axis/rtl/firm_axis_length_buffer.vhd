@@ -10,6 +10,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_fault_pkg.all;
 
 entity firm_axis_length_buffer is
   generic (
@@ -52,7 +53,6 @@ architecture rtl of firm_axis_length_buffer is
   -- The beat after those that contain bytes of the length, counted from 0.
   constant PAST_LENGTH  : positive := (HEADER_BYTES - 1) / LANES + 1;
   constant QUEUE_DEPTH  : positive := 16;
-  constant OVER_BUFFER  : std_logic_vector(3 downto 0) := "0110";
 
   type memory_t is array (natural range 0 to DEPTH-1) of std_logic_vector(WORD_BITS-1 downto 0);
   signal memory        : memory_t;

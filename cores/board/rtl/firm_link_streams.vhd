@@ -9,6 +9,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_fault_pkg.all;
 
 entity firm_link_streams is
   generic (
@@ -67,9 +68,6 @@ architecture rtl of firm_link_streams is
   -- The counts of one byte and of zero bytes.
   constant ONE        : std_logic_vector(COUNT_BITS-1 downto 0) := (0 => '1', others => '0');
   constant NONE       : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
-
-  constant TOO_LONG       : std_logic_vector(3 downto 0) := "0111";
-  constant WRONG_CHECKSUM : std_logic_vector(3 downto 0) := "1100";
 
   constant CHECKSUM_BYTES : positive := 4;
 
@@ -209,7 +207,7 @@ begin
   end process count;
 
   link_error      <= is_broken or is_missing or is_refused;
-  link_error_code <= TOO_LONG when is_refused = '1' else WRONG_CHECKSUM;
+  link_error_code <= TOO_LONG when is_refused = '1' else BAD_CHECKSUM;
   good_frames     <= std_logic_vector(good_r);
   broken_frames   <= std_logic_vector(broken_r);
   lost_frames     <= std_logic_vector(missing_r);

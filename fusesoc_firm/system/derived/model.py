@@ -197,7 +197,7 @@ class Link:
 
 
 class StatusAccess(Enum):
-    """The access to the registers of a system's status."""
+    """How the registers of a system's status are accessed."""
 
     FRAMES = "frames"
     AXI_LITE = "axi_lite"

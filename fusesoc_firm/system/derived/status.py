@@ -1,4 +1,4 @@
-"""The access to the registers of a system's status: the specification's `status`."""
+"""How the status registers of a system are accessed: the key `status` of the specification."""
 
 from __future__ import annotations
 
