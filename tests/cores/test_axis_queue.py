@@ -57,9 +57,7 @@ def test_nothing_is_lost_but_what_is_counted(
     library: Library, tmp_path: Path, width: int, overflow: str, stops: tuple[int, int]
 ) -> None:
     source, sink = stops
-    model, _ = _run(
-        library, tmp_path, overflow, WIDTH=width, SOURCE_PERCENT=source, SINK_PERCENT=sink, STOP_PERCENT=2
-    )
+    model, _ = _run(library, tmp_path, overflow, WIDTH=width, SOURCE_PERCENT=source, SINK_PERCENT=sink, STOP_PERCENT=2)
     assert (model.dropped > 0) == (overflow != "block")
 
 
@@ -86,9 +84,7 @@ def test_any_size(library: Library, tmp_path: Path, number: int) -> None:
 
 @pytest.mark.parametrize("overflow", OVERFLOWS)
 @pytest.mark.parametrize("longest", [1, 8])
-def test_with_room_a_beat_enters_in_every_cycle(
-    library: Library, tmp_path: Path, longest: int, overflow: str
-) -> None:
+def test_with_room_a_beat_enters_in_every_cycle(library: Library, tmp_path: Path, longest: int, overflow: str) -> None:
     """Short frames fill the places while a long one leaves, so there are many places."""
     model, cycles = _run(library, tmp_path, overflow, FRAMES=16, LONGEST=longest)
     assert model.dropped == 0

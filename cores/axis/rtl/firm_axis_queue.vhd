@@ -12,6 +12,7 @@ library ieee;
 use ieee.std_logic_1164.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_fault_pkg.all;
 
 entity firm_axis_queue is
   generic (
@@ -29,30 +30,31 @@ entity firm_axis_queue is
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
     -- Errors of the subscriber after the queue, and of this entity: code 11 for each dropped frame.
     s_frame_error      : in  std_logic                    := '0';
-    s_frame_error_code : in  std_logic_vector(3 downto 0) := (others => '0');
+    s_frame_error_code : in  fault_t                      := NO_FAULT;
     frame_error        : out std_logic;
-    frame_error_code   : out std_logic_vector(3 downto 0)
+    frame_error_code   : out fault_t
   );
 end entity firm_axis_queue;
 
 architecture rtl of firm_axis_queue is
 
   constant LANES     : positive := WIDTH/8;
-  constant WORD_BITS : positive := WIDTH + LANES + 1;
+  constant WORD_BITS : positive := WIDTH + LANES + 2;
   constant DEPTH     : positive := FRAMES * BEATS;
-  constant DROPPED   : std_logic_vector(3 downto 0) := "1011";
   -- Items of a list; one that is never used spares a memory of one word.
   constant ITEMS : positive := max(2, FRAMES);
   -- Errors that a subscriber may report of frames that have left.
@@ -84,17 +86,17 @@ architecture rtl of firm_axis_queue is
   signal skipping_r  : std_logic;                       -- its remaining beats are discarded
   signal running_r   : std_logic;
 
-  signal ready     : std_logic;
-  signal keep_beat : std_logic;
-  signal is_end    : std_logic;  -- this beat is the last one that is kept
-  signal arrived   : std_logic;
-  signal refuse    : std_logic;  -- the arriving frame is dropped
-  signal replace   : std_logic;  -- the oldest waiting frame is dropped
-  signal need      : std_logic;  -- the next frame has no place yet
-  signal is_unused : std_logic;  -- a place has never been used
-  signal is_free   : std_logic;  -- a place has become free
+  signal ready      : std_logic;
+  signal keep_beat  : std_logic;
+  signal is_end     : std_logic;  -- this beat is the last one that is kept
+  signal arrived    : std_logic;
+  signal refuse     : std_logic;  -- the arriving frame is dropped
+  signal replace    : std_logic;  -- the oldest waiting frame is dropped
+  signal need       : std_logic;  -- the next frame has no place yet
+  signal is_unused  : std_logic;  -- a place has never been used
+  signal is_free    : std_logic;  -- a place has become free
   signal is_waiting : std_logic;  -- a frame waits
-  signal take_free : std_logic;
+  signal take_free  : std_logic;
 
   -- The frame that leaves.
   signal leaving_r    : address_t;                      -- its place
@@ -157,11 +159,11 @@ begin
   is_end    <= '1' when s_axis_tlast = '1' or position_r = BEATS-1 else '0';
   arrived   <= keep_beat and is_end;
 
-  is_unused <= '1' when unused_r /= DEPTH else '0';
-  is_free   <= '1' when free_count_r /= 0 else '0';
+  is_unused  <= '1' when unused_r /= DEPTH else '0';
+  is_free    <= '1' when free_count_r /= 0 else '0';
   is_waiting <= '1' when waiting_count_r /= 0 else '0';
-  need      <= arrived or not has_place_r;
-  take_free <= need and is_free and not is_unused;
+  need       <= arrived or not has_place_r;
+  take_free  <= need and is_free and not is_unused;
 
   drop_oldest_frame : if DROP_OLDEST generate
     replace <= s_axis_tvalid and is_waiting and not (has_place_r or skipping_r or is_unused or is_free or start);
@@ -228,7 +230,7 @@ begin
   begin
     if rising_edge(clk) then
       if keep_beat = '1' then
-        memory(write_r) <= is_end & s_axis_tkeep & s_axis_tdata;
+        memory(write_r) <= is_end & s_axis_tuser & s_axis_tkeep & s_axis_tdata;
       end if;
       if read_beat = '1' then
         word_r <= memory(read_address);
@@ -332,6 +334,7 @@ begin
   s_axis_tready <= ready;
   m_axis_tdata  <= word_r(WIDTH-1 downto 0);
   m_axis_tkeep  <= word_r(WIDTH+LANES-1 downto WIDTH);
+  m_axis_tuser  <= word_r(WIDTH+LANES downto WIDTH+LANES);
   m_axis_tlast  <= word_r(WORD_BITS-1);
   m_axis_tvalid <= valid_r;
 

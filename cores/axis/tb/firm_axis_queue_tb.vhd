@@ -56,16 +56,6 @@ architecture simulation of firm_axis_queue_tb is
   signal frame_error      : std_logic;
   signal frame_error_code : std_logic_vector(3 downto 0);
 
-  shared variable random_1 : positive := SEED;
-  shared variable random_2 : positive := 2;
-
-  impure function drawn(bound : positive) return natural is
-    variable draw : real;
-  begin
-    uniform(random_1, random_2, draw);
-    return natural(floor(draw * real(bound)));
-  end function drawn;
-
   -- The bytes of a beat count upwards from a random one.
   function word_of(number : natural) return std_logic_vector is
     variable word : std_logic_vector(WIDTH-1 downto 0);
@@ -132,6 +122,15 @@ begin
     variable left_beats : natural := 0;
     variable quiet_for  : natural := 0;
     variable is_stopped : boolean := false;
+    variable random_1   : positive := SEED;
+    variable random_2   : positive := 2;
+
+    impure function drawn(bound : positive) return natural is
+      variable draw : real;
+    begin
+      uniform(random_1, random_2, draw);
+      return natural(floor(draw * real(bound)));
+    end function drawn;
 
     procedure put(value : integer) is
     begin
