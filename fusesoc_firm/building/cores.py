@@ -129,6 +129,13 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
     )
 
 
+def target_calls(core: str, target: str) -> list[tuple[str, GeneratorCall]]:
+    """Return the generator calls of a core's target, each with the requesting core. May raise `InputError`."""
+    fusesoc, top = _found(core)
+    cores = solved(fusesoc, top, target)
+    return [(str(item.name), call) for item, flags in cores for call in calls_of(item, flags)]
+
+
 def configuration() -> Any:
     """Return FuseSoC's configuration for the current folder, as the command `fusesoc` reads it."""
     from fusesoc.config import Config

@@ -13,6 +13,11 @@ from fusesoc_firm.building.folder_lock import FolderLock
 from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
+TESTS = ("sim", "test")
+"""The beginnings of the names of tests."""
+# The simulators of Edalize's tool interface.
+_SIMULATORS = frozenset("ghdl icarus isim modelsim questaformal rivierapro vcs verilator vunit xcelium xsim".split())
+
 
 @dataclass(frozen=True)
 class Build:
@@ -78,22 +83,72 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
 
     Raise `InputError` with all unknown cores and targets.
     """
+    fusesoc = _loaded(build_root)
+    faults = Diagnostics()
+    names = [name for core in cores if (name := _full_name(fusesoc, core, targets, faults))]
+    builds = [
+        Build(name, target, _work_root(fusesoc, name, flags))
+        for name, target in dict.fromkeys(product(names, targets))
+        if (flags := _flags(fusesoc, name, target, faults))
+    ]
+    faults.raise_if_any()
+    return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds))
+
+
+def plan_tests(cores: Sequence[str], targets: Sequence[str] = (), build_root: Path | None = None) -> Plan:
+    """Return a plan of the tests of cores: their targets named `sim*` and `test*` that simulate.
+
+    Without names of cores, the plan contains the cores below the current folder. `targets` selects some of the tests.
+    Raise `InputError` for unknown cores, and for named cores without these tests.
+    """
+    fusesoc = _loaded(build_root)
+    faults = Diagnostics()
+    names = [name for core in cores if (name := _full_name(fusesoc, core, (), faults))]
+    builds: list[Build] = []
+    for name in dict.fromkeys(names if cores else _cores_here(fusesoc)):
+        tests = _tests(fusesoc, name)
+        chosen = [test for test in tests if test in targets or not targets]
+        if cores and not (chosen if not targets else {*targets} <= {*tests}):
+            missing = [target for target in targets if target not in tests]
+            what = f"no test '{missing[0]}'" if missing else "no tests"
+            faults.error(f"{name} has {what}", hint=f"its tests: {', '.join(tests) or 'none'}")
+        builds += [Build(name, test, _work_root(fusesoc, name, tests[test])) for test in chosen]
+    faults.raise_if_any()
+    return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds))
+
+
+def _loaded(build_root: Path | None) -> Any:
+    """Return a FuseSoC instance with its libraries, with FuseSoC's configuration for the current folder."""
     from fusesoc.fusesoc import Fusesoc
 
     config = configuration()
     # All builds would share a single work root.
     config.args_work_root = None
     config.args_build_root = str(Path(build_root or config.build_root).absolute())
-    fusesoc = Fusesoc(config)
-    faults = Diagnostics()
-    names = [name for core in cores if (name := _full_name(fusesoc, core, targets, faults))]
-    builds = [
-        Build(name, target, Path(fusesoc.get_work_root(fusesoc.get_core(name), flags)))
-        for name, target in dict.fromkeys(product(names, targets))
-        if (flags := _flags(fusesoc, name, target, faults))
-    ]
-    faults.raise_if_any()
-    return Plan(fusesoc, Path(config.build_root), tuple(builds))
+    return Fusesoc(config)
+
+
+def _work_root(fusesoc: Any, name: str, flags: Mapping[str, Any]) -> Path:
+    return Path(fusesoc.get_work_root(fusesoc.get_core(name), flags))
+
+
+def _cores_here(fusesoc: Any) -> list[str]:
+    """Return the names of the cores whose files are below the current folder, sorted."""
+    here, cores = Path.cwd().resolve(), fusesoc.get_cores()
+    return sorted(name for name in cores if Path(cores[name].core_file).resolve().is_relative_to(here))
+
+
+def _tests(fusesoc: Any, name: str) -> dict[str, dict[str, Any]]:
+    """Return the tests of a core with their flags."""
+    core = fusesoc.get_core(name)
+    found: dict[str, dict[str, Any]] = {}
+    for target in core.get_data({}).targets:
+        if target.startswith(TESTS):
+            flags = {**core.get_flags(target), "target": target}
+            flow = core.get_flow(flags)
+            if flow == "sim" or (not flow and flags.get("tool") in _SIMULATORS):
+                found[target] = flags
+    return found
 
 
 def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnostics) -> str | None:
@@ -112,7 +167,7 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
         return str(fusesoc.get_core(families[0] if families else core).name)
     except (DependencyError, SyntaxError):
         fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
-        listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if fitting else ""
+        listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if targets and fitting else ""
         faults.error(f"unknown core '{core}'", hint=listed or "'fusesoc core list' lists all cores")
         return None
 

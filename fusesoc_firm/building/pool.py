@@ -13,7 +13,7 @@ from multiprocessing.process import BaseProcess
 
 from fusesoc_firm.building.folder_lock import BEAT_SECONDS, FolderLock
 from fusesoc_firm.building.plan import Build, Plan
-from fusesoc_firm.building.process import build_in_this_process, last_lines
+from fusesoc_firm.building.process import Run, build_in_this_process, last_lines, run_all
 
 _POLL_SECONDS = 0.2
 # The time in seconds between the request to end and the kill.
@@ -44,11 +44,15 @@ class _Running:
 
 @dataclass(frozen=True)
 class Pool:
-    """A runner of at most `jobs` parallel builds with the options of `fusesoc run`; `tell` reports waiting builds."""
+    """A runner of at most `jobs` parallel builds with the options of `fusesoc run`; `tell` reports waiting builds.
+
+    `run_build` runs one build in a process of its own.
+    """
 
     options: tuple[str, ...]
     jobs: int
     tell: Callable[[str], None]
+    run_build: Run = run_all
 
     def run(self, plan: Plan) -> Iterator[Outcome]:
         """Yield the outcome of each build as it finishes. On exit, end all started processes."""
@@ -81,7 +85,7 @@ class Pool:
 
     def _start(self, plan: Plan, build: Build, lock: FolderLock, alive: tuple[int, int]) -> _Running:
         process = multiprocessing.get_context("fork").Process(
-            target=build_in_this_process, args=(plan.fusesoc, build, self.options, alive)
+            target=build_in_this_process, args=(plan.fusesoc, build, self.options, alive, self.run_build)
         )
         process.start()
         return _Running(build, lock, process, time.monotonic(), time.monotonic())

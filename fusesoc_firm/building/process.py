@@ -22,7 +22,13 @@ Answer = Callable[[list[str]], bool]
 """A function that answers the generator call with this command line, or returns False to leave it to FuseSoC."""
 
 
-def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], alive: tuple[int, int]) -> None:
+Run = Callable[[Any, Build, tuple[str, ...]], None]
+"""A function that runs a build with a FuseSoC instance and the options of `fusesoc run`; it exits after a failure."""
+
+
+def build_in_this_process(
+    fusesoc: Any, build: Build, options: tuple[str, ...], alive: tuple[int, int], run: Run
+) -> None:
     """Run a build with the options of `fusesoc run`, and exit with its status.
 
     `alive` is a pipe that ends when the parent ends, once this process has closed the pipe's other end.
@@ -31,12 +37,14 @@ def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], 
     os.close(alive[1])
     threading.Thread(target=_end_with, args=(alive[0],), daemon=True).start()
     build.log.parent.mkdir(parents=True, exist_ok=True)
-    log = build.log.open("w", buffering=1, encoding="utf-8", errors="backslashreplace")
+    build.log.unlink(missing_ok=True)
+    # Started programs append to the same file.
+    log = build.log.open("a", buffering=1, encoding="utf-8", errors="backslashreplace")
     for stream in (1, 2):
         os.dup2(log.fileno(), stream)
     # Line buffering keeps the order with the output of started programs.
     sys.stdout = sys.stderr = log
-    _run(fusesoc, build, options)
+    run(fusesoc, build, options)
 
 
 def save_time(answer: Answer) -> None:
@@ -68,7 +76,13 @@ def _answering(launcher: Any, answer: Answer) -> type:
     return Launcher
 
 
-def _run(fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
+def set_up(fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
+    """Set up a build in an empty folder, with FuseSoC; exit after a failure."""
+    run_all(fusesoc, build, ("--setup", "--clean", *options))
+
+
+def run_all(fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
+    """Run a build with FuseSoC: all steps, unless the options select some; exit after a failure."""
     from fusesoc.fusesoc import Fusesoc
     from fusesoc.main import parse_args
 

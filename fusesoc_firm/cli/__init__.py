@@ -18,12 +18,14 @@ from fusesoc_firm.cli.init import add_init
 from fusesoc_firm.cli.live import add_live
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
+from fusesoc_firm.cli.query import add_query
 from fusesoc_firm.cli.replay import add_replay
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.sim import add_sim
 from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.status import add_status
 from fusesoc_firm.cli.system import add_system
+from fusesoc_firm.cli.test import add_test
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.node.options import remappings
@@ -36,7 +38,7 @@ GROUPS = {
     "start": ("init", "system"),
     "run": ("sim", "live", "replay"),
     "look": ("message", "trace", "why", "graph"),
-    "build": ("build", "affected", "lock", "cache", "path"),
+    "build": ("build", "test", "query", "affected", "lock", "cache", "path"),
 }
 
 
@@ -109,8 +111,10 @@ def _parser() -> argparse.ArgumentParser:
     add_status(commands)
     add_scheduler(commands)
     add_build(commands)
+    add_test(commands)
     add_replay(commands)
     add_project(commands)
+    add_query(commands)
     add_why(commands)
     add_cache(commands)
     add_tool(commands)

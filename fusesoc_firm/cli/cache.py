@@ -1,12 +1,13 @@
-"""`firm cache`: the store of generated cores."""
+"""`firm cache`: the store of generated cores, also as a server for other machines."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from typing import Any
 
-from fusesoc_firm.cli.common import command
+from fusesoc_firm.cli.common import command, natural
 from fusesoc_firm.text.diagnostics import fail
 
 _UNIT = 1024
@@ -14,7 +15,7 @@ _UNIT = 1024
 
 def add_cache(commands: Any) -> None:
     """Declare the command and its actions."""
-    cache = command(commands, "cache", "show, clean or verify the store of generated cores", "firm cache show")
+    cache = command(commands, "cache", "show, clean, verify or serve the store of generated cores", "firm cache show")
     actions = cache.add_subparsers(title="actions", metavar="ACTION", required=True)
     show = command(
         actions, "show", "print the store's folder and its contents", "firm cache show --entries", _show_cache
@@ -40,6 +41,18 @@ def add_cache(commands: Any) -> None:
         "firm cache verify",
         _verify_cache,
     )
+    serve = command(
+        actions,
+        "serve",
+        "serve the store to other machines, as a remote store; clients with the token in FUSESOC_FIRM_REMOTE_TOKEN may"
+        " write",
+        "FUSESOC_FIRM_REMOTE_TOKEN=... firm cache serve --host 10.0.0.1",
+        _serve_cache,
+    )
+    serve.add_argument(
+        "--host", default="127.0.0.1", help="the address to listen on; 0.0.0.0 for all (default: this machine only)"
+    )
+    serve.add_argument("--port", type=natural, default=8099, help="the port; 0 for any free one (default: 8099)")
 
 
 def _size(text: str) -> int:
@@ -61,6 +74,8 @@ def _show_cache(arguments: argparse.Namespace) -> None:
     print(f"size     {_shown(store.size())} of {_shown(store.limit)}")
     if not store.is_writable():
         print("rights   read-only: new results are not cached")
+    if store.remote:
+        print(f"remote   {store.remote.url}, {'read and write' if store.remote.is_writable else 'read-only'}")
     for file in entries if arguments.entries else ():
         used = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.used))
         entry = read_entry(str(store.root), file.name)
@@ -92,6 +107,22 @@ def _verify_cache(_: argparse.Namespace) -> None:
         entries = "1 entry was" if len(damaged) == 1 else f"{len(damaged)} entries were"
         fail(f"{entries} damaged and removed:\n{files}")
     print(f"{store.root}: all entries are intact")
+
+
+def _serve_cache(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.store.remote import TOKEN
+    from fusesoc_firm.store.server import Server
+    from fusesoc_firm.store.store import default_store
+
+    token = os.environ.get(TOKEN, "")
+    try:
+        server = Server(default_store(), arguments.host, arguments.port, token)
+    except (OSError, OverflowError) as error:
+        fail(f"cannot listen on {arguments.host} port {arguments.port}: {getattr(error, 'strerror', None) or error}")
+    rights = "clients with the token may write" if token else f"read-only; {TOKEN} lets clients with this token write"
+    print(f"{server.url} serves {server.store.root}; {rights}", flush=True)
+    with server:
+        server.serve_forever()
 
 
 def _shown(size: float) -> str:

@@ -11,12 +11,12 @@ from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
 # Names that the templates declare or use; the port of a field with one of these names has a different name.
 _TAKEN = """
-    clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
-    m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
+    clk rst_n s_axis_tdata s_axis_tkeep s_axis_tuser s_axis_tvalid s_axis_tlast s_axis_tready
+    m_axis_tdata m_axis_tkeep m_axis_tuser m_axis_tvalid m_axis_tlast m_axis_tready
     segment_valid msg_valid msg_ready frame_error frame_error_code
     id code_t no_fault bad_length short_frame long_frame bad_encoding no_length frame_beats first_position last_position
-    position_t position_r position_last next_position broken ended complete beyond is_first is_waiting is_told
-    match match_r compare fault ready beat store fields_r frame check follow receive send
+    position_t position_r position_last withdrawn next_position broken ended complete beyond is_first is_waiting is_told
+    broken_beat are_ones match match_r compare fault ready beat store fields_r frame check follow receive send
     u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
     std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
 """.split()

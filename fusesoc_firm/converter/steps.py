@@ -146,7 +146,8 @@ def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
 
 
 def digit_rows(digits: str) -> list[str]:
-    """The rows of a table with one digit for each step."""
+    """The rows of a descending table with one digit for each step."""
+    digits = digits[::-1]
     return [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
 
 
@@ -177,7 +178,8 @@ def step_classes(sets: Sequence[Context]) -> list[Context]:
 
 
 def number_rows(numbers: Sequence[int]) -> list[str]:
-    """The rows of a table with one number for each step."""
+    """The rows of a descending table with one number for each step."""
+    numbers = numbers[::-1]
     rows = [numbers[start : start + _NUMBERS_IN_A_ROW] for start in range(0, len(numbers), _NUMBERS_IN_A_ROW)]
     return [", ".join(map(str, row)) for row in rows]
 

@@ -112,7 +112,7 @@ class _Subscriber:
             "end_step": len(self.steps) - 1,
             "step_bits": (len(self.steps) - 1).bit_length(),
             "trailing_bits": self.frame.trailing_bytes.bit_length(),
-            "first_phase": -len(self.frame.prefix) % _LARGEST_ALIGNMENT,
+            "first_gap": len(self.frame.prefix) % _LARGEST_ALIGNMENT,
             **self._tables(),
             **self._kinds(),
             **self._checks(),
@@ -147,7 +147,7 @@ class _Subscriber:
             "targets": number_rows([self._target(*choice) for choice in self._choices]),
             "largest_number": max(self.lanes, *last_beats),
             "beat_bits": max(1, max(last_beats).bit_length()),
-            "last_beats": number_rows(last_beats),
+            "second_last_beats": number_rows([max(0, beat - 1) for beat in last_beats]),
             "first_bytes": number_rows([min(size, self.lanes) for size in sizes]),
             "last_bytes": number_rows(last_bytes),
         }

@@ -13,7 +13,8 @@ from pathlib import Path
 from fusesoc_firm.building.cluster import build_on
 from fusesoc_firm.building.plan import Plan
 from fusesoc_firm.building.pool import Outcome, Pool
-from fusesoc_firm.building.process import save_time
+from fusesoc_firm.building.process import run_all, save_time
+from fusesoc_firm.building.steps import Steps
 from fusesoc_firm.plugin.answer import answer_from_store
 from fusesoc_firm.plugin.batch import prepare
 from fusesoc_firm.plugin.generators import GENERATORS
@@ -26,7 +27,10 @@ _LAUNCHER = "EDALIZE_LAUNCHER"
 
 @dataclass(frozen=True)
 class How:
-    """The options of builds: the folders, the last step, the number of parallel builds (0: one per core), a cluster."""
+    """The options of builds: the folders, the last step, the number of parallel builds (0: one per core), a cluster.
+
+    With `steps`, builds run as actions; the other options for the folders and the last step are then not used.
+    """
 
     is_clean: bool = False
     is_setup_only: bool = False
@@ -34,6 +38,7 @@ class How:
     is_locked: bool = False
     jobs: int = 0
     cluster: str = ""
+    steps: Steps | None = None
 
 
 def build(
@@ -44,7 +49,9 @@ def build(
     `tell` is called for builds that wait, and `progress` during generation. May raise `InputError`, also for
     differences from a core's lock file.
     """
-    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
+    # A step of an action should depend on few of our files.
+    ours = ("fusesoc_firm.tools.launcher",) if how.steps else ("fusesoc_firm.cli", "tool")
+    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", *ours]))
     if how.is_locked:
         for core in dict.fromkeys(build.core for build in plan.builds):
             check_locked(core)
@@ -64,7 +71,7 @@ def build(
                 progress(f"generated {number} of {len(calls)}")
         save_time(_answer)
     options += ["--setup", "--build"] * how.is_build_only
-    yield from Pool(tuple(options), jobs, tell).run(plan)
+    yield from Pool(tuple(options), jobs, tell, how.steps or run_all).run(plan)
 
 
 def _generators_run_here() -> bool:

@@ -13,7 +13,10 @@ from fusesoc_firm.building.cores import (
     core_graph,
     dependencies,
     project_cores,
+    target_calls,
 )
+from fusesoc_firm.building.query import Answer
+from fusesoc_firm.plugin.answer import Basis, load, obtain
 from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES
 from fusesoc_firm.plugin.lock_file import Lock, check_lock, lock_of, lock_path, lock_text, read_lock
 from fusesoc_firm.request.calls import make_request
@@ -40,6 +43,19 @@ def affected_since(revision: str) -> dict[str, str]:
     """Return the cores that edits since a revision affect, each with the reason. May raise `InputError`."""
     changed = dict.fromkeys(path.resolve() for path in changed_files(revision, Path.cwd()))
     return affected(project_cores(), _touched(changed))
+
+
+def generated_files(core: str, target: str) -> Answer:
+    """Return the files of the cores that our generators write for a target. May raise `InputError`.
+
+    Missing files are generated into the store. The files of other generators are unknown and shown as `-`.
+    """
+    rows, edges = [], []
+    for requesting, call in target_calls(core, target):
+        names = _generated_names(call)
+        rows += [(call.vlnv, call.generator, name) for name in names or ["-"]]
+        edges += [(requesting, call.vlnv), *((call.vlnv, name) for name in names)]
+    return Answer(("core", "generator", "file"), tuple(rows), tuple(edges))
 
 
 def check_locked(core: str) -> Path:
@@ -91,6 +107,13 @@ def _requests(core: ProjectCore) -> Iterator[LoadedRequest]:
     for call in core.calls:
         if call.generator != MESSAGES and (request := _request(call)):
             yield GENERATORS[request.command].load(request)
+
+
+def _generated_names(call: GeneratorCall) -> list[str]:
+    if (request := _request(call)) is None:
+        return []
+    generator, basis = GENERATORS[request.command], Basis("")
+    return [*obtain(load(request, generator, basis), generator, basis)[1].files]
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:

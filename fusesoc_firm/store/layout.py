@@ -5,10 +5,13 @@
     <root>/v4/<first two digits>/<key>.entry                 generated files
     <root>/v4/<first two digits>/<digest of a call>.call     the facts that determine a call's key, and the key
     <root>/v4/<first two digits>/<key>.lock                  held while an entry is built
+    <root>/v4/<first two digits>/<key>.ac                    what `firm cache serve` serves under /ac/
+    <root>/v4/<first two digits>/<SHA-256>.cas               what it serves under /cas/
+    <root>/v4/<first two digits>/<digest>.remark             the last failure of a remote store
 
 Each file except the lock begins with a line that contains the SHA-256 of the rest. A single rename creates the file, so
 it is either complete or missing. In an entry, a line of JSON (the request, names and lengths) and the contents follow;
-in other files, JSON follows.
+in a `.call`, JSON follows, and in other files any data.
 
 Anyone who can write to the store can write files with correct digests. A file with unexpected content therefore counts
 as damaged, like a file with a wrong digest. Examples are data of other types, and names that lead out of the output
@@ -32,13 +35,15 @@ if TYPE_CHECKING:
     from typing import Any
 
 LAYOUT = "v4"
-ENTRY, CALL, LOCK = ".entry", ".call", ".lock"
-KEPT = (ENTRY, CALL)
+ENTRY, CALL, LOCK, REMARK = ".entry", ".call", ".lock", ".remark"
+ACTION, CONTENT = ".ac", ".cas"
+KEPT = (ENTRY, CALL, ACTION, CONTENT)
 """The endings of the files that are kept; the least recently used files are removed first."""
 
-# The size limits for plain data and for all other files, since each file is read in one piece.
-_MOST_PLAIN_BYTES = 2**24
-_MOST_BYTES = 2**30
+MOST_PLAIN_BYTES = 2**24
+MOST_BYTES = 2**30
+"""The size limits for plain data and for all other files, since each file is read in one piece."""
+
 # The limits that file systems impose.
 _LONGEST_NAME_BYTES, _LONGEST_PATH_BYTES = 255, 4000
 _DIGITS = frozenset("0123456789abcdef")
@@ -74,24 +79,45 @@ def write_json(root: str, name: str, data: object) -> None:
     write(root, name, json.dumps(data).encode())
 
 
-def write_entry(root: str, name: str, about: Mapping[str, str], files: Mapping[str, bytes]) -> None:
-    """Write generated files to the store, with a description of the request. May raise `OSError`."""
+def entry_data(about: Mapping[str, str], files: Mapping[str, bytes]) -> bytes:
+    """Return the data of an entry: a description of the request, and generated files."""
     header = {"about": dict(about), "files": [[path, len(content)] for path, content in files.items()]}
-    write(root, name, b"".join([json.dumps(header).encode(), b"\n", *files.values()]))
+    return b"".join([json.dumps(header).encode(), b"\n", *files.values()])
+
+
+def read(root: str, name: str) -> bytes | None:
+    """Return the data in a file after the digest, or None if the file is missing or damaged."""
+    found = shared_files.read(root, name, _most(name))
+    if found is None:
+        return None
+    said, _, data = found.partition(b"\n")
+    return data if digest(data).encode() == said else None
+
+
+def read_content(root: str, name: str) -> bytes | None:
+    """Return the data in a file that is named after the data's digest, or None if it is missing or damaged."""
+    data = read(root, name)
+    return data if data is not None and name == place(digest(data), CONTENT) else None
 
 
 def read_note(root: str, name: str) -> dict[str, Any] | None:
     """Return a call's note: `key`, `facts`, `name`, `core` and `marks`, or None if the note is missing or damaged."""
-    note = _plain(_read(root, name))
+    note = _plain(read(root, name))
     if not isinstance(note, dict) or not {"key", "facts", *_WORDS} <= note.keys():
         return None
-    is_good = _is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and _are_facts(note["facts"])
+    is_good = is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and _are_facts(note["facts"])
     return note if is_good else None
 
 
 def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] | None:
     """Return an entry's request description and files, in order of generation, or None if it is missing or damaged."""
-    line, _, contents = (_read(root, name) or b"").partition(b"\n")
+    data = read(root, name)
+    return None if data is None else entry_in(data)
+
+
+def entry_in(data: bytes) -> tuple[dict[str, str], dict[str, bytes]] | None:
+    """Return the description and files in an entry's data, in order of generation, or None if the data are illegal."""
+    line, _, contents = data.partition(b"\n")
     header = _plain(line)
     about = header.get("about") if isinstance(header, dict) else None
     if not isinstance(header, dict) or not isinstance(about, dict) or not _are_printable([*about.values()]):
@@ -108,8 +134,9 @@ def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] 
 
 def is_whole(root: str, name: str) -> bool:
     """Return whether a stored file is undamaged."""
-    reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, CALL: read_note}
-    return reads[name[name.rindex(".") :]](root, name) is not None
+    kind = name[name.rindex(".") :]
+    reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, CALL: read_note, CONTENT: read_content}
+    return reads.get(kind, read)(root, name) is not None
 
 
 def mark_used(root: str, *names: str) -> None:
@@ -132,22 +159,13 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _read(root: str, name: str) -> bytes | None:
-    """Return the data in a file after the digest, or None if the file is missing or damaged."""
-    found = shared_files.read(root, name, _most(name))
-    if found is None:
-        return None
-    said, _, data = found.partition(b"\n")
-    return data if digest(data).encode() == said else None
-
-
 def _most(name: str) -> int:
-    return _MOST_BYTES if name.endswith(ENTRY) else _MOST_PLAIN_BYTES
+    return MOST_BYTES if name.endswith((ENTRY, CONTENT)) else MOST_PLAIN_BYTES
 
 
 def _plain(data: bytes | None) -> object:
     """Return the data in a JSON text, or None if the text is invalid or nested too deeply."""
-    if not data or len(data) > _MOST_PLAIN_BYTES:
+    if not data or len(data) > MOST_PLAIN_BYTES:
         return None
     try:
         return json.loads(data)
@@ -163,7 +181,8 @@ def _are_printable(values: list[object]) -> bool:
     return all(isinstance(value, str) and value.isprintable() for value in values)
 
 
-def _is_digest(text: object) -> bool:
+def is_digest(text: object) -> bool:
+    """Return whether a value is a SHA-256 in hexadecimal digits."""
     return isinstance(text, str) and len(text) == _DIGEST_DIGITS and _DIGITS.issuperset(text)
 
 
@@ -180,13 +199,13 @@ def _lengths(listed: object) -> dict[str, int] | None:
     for item in listed if isinstance(listed, list) else [None]:
         if not isinstance(item, list) or len(item) != _FILE_PARTS or type(item[1]) is not int or item[1] < 0:
             return None
-        if not _is_path(item[0]) or item[0] in lengths:
+        if not is_path(item[0]) or item[0] in lengths:
             return None
         lengths[item[0]] = item[1]
     return lengths if lengths.keys().isdisjoint(_folders(lengths)) else None
 
 
-def _is_path(path: object) -> bool:
+def is_path(path: object) -> bool:
     """Return whether a value is a relative path that leads directly to a file below its base folder."""
     if not isinstance(path, str):
         return False

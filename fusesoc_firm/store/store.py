@@ -31,6 +31,7 @@ from pathlib import Path
 from fusesoc_firm.store import layout, shared_files
 from fusesoc_firm.store.layout import CALL, ENTRY, KEPT, LAYOUT, LOCK, digest, digest_of, place
 from fusesoc_firm.store.own_code import IMPORTED
+from fusesoc_firm.store.remote import Remote, remote_store
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.file_lock import take
 from fusesoc_firm.text.files import TEMPORARY
@@ -77,10 +78,14 @@ class StoredFile:
 
 @dataclass(frozen=True)
 class Store:
-    """A store of at most about `limit` bytes in the folder `root`, which is created by the first write."""
+    """A store of at most about `limit` bytes in the folder `root`, which is created by the first write.
+
+    Entries that are missing here are obtained from the `remote` store, and built entries are written to both.
+    """
 
     root: Path
     limit: int
+    remote: Remote | None = None
 
     def obtain(self, key: Key, build: Callable[[], Files], is_current: Callable[[], bool] = lambda: True) -> Entry:
         """Return the files for a key: undamaged files from the store or, after a miss, the files from `build`.
@@ -94,11 +99,14 @@ class Store:
             return Entry(files, True)
         with self._lock(key):
             # Another process may have built the entry while this one waited for the lock.
-            if (files := self._find(key)) is not None:
+            if (files := self._find(key)) is not None or (files := self._fetch(key)) is not None:
                 return Entry(files, True)
             files = build()
             if is_current():
-                self._keep(key, files)
+                data = layout.entry_data(key.about, files)
+                self._keep(key, data)
+                if self.remote:
+                    self.remote.put_entry(key.digest, data)
         return Entry(files, False)
 
     def note(self, call: str, note: Mapping[str, object]) -> None:
@@ -178,16 +186,27 @@ class Store:
                     shared_files.remove(self._root, name)
             os.close(handle)
 
-    def _keep(self, key: Key, files: Files) -> None:
+    def _fetch(self, key: Key) -> Files | None:
+        """Return the files for a key from the remote store, and keep them in this one."""
+        if self.remote is None or (data := self.remote.entry(key.digest)) is None:
+            return None
+        if (found := layout.entry_in(data)) is None:
+            self.remote.tell_damage(key.digest)
+            return None
+        self._keep(key, data)
+        return found[1]
+
+    def _keep(self, key: Key, data: bytes) -> None:
         try:
-            layout.write_entry(self._root, place(key.digest, ENTRY), key.about, files)
-            self._shrink_if_needed()
+            layout.write(self._root, place(key.digest, ENTRY), data)
+            self.shrink_if_needed()
         except OSError as error:
             # Users of a read-only store expect this failure, and `firm cache show` reports it.
             if self.is_writable():
                 print(f"warning: results cannot be cached in the store {self.root}: {error.strerror}", file=sys.stderr)
 
-    def _shrink_if_needed(self) -> None:
+    def shrink_if_needed(self) -> None:
+        """Remove old files if the store exceeds its limit, and abandoned temporary files. May raise `OSError`."""
         if self.size() > self.limit:
             self.shrink(int(self.limit * _KEPT_OF_LIMIT))
         for name, status in self._listed():
@@ -214,14 +233,15 @@ class Store:
 
 
 def default_store(environment: Mapping[str, str] = os.environ) -> Store:
-    """Return the store selected by the environment variables. Raise `InputError` if the limit is not a size."""
+    """Return the store selected by the environment variables. Raise `InputError` if a value is illegal."""
     limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
         fail(
             f"FUSESOC_FIRM_CACHE_SIZE is '{limit}', which is not a size",
             hint="legal: a number of bytes, such as 4096, 500M or 2G",
         )
-    return Store(Path(layout.default_root(environment)), size)
+    root = layout.default_root(environment)
+    return Store(Path(root), size, remote_store(environment, root))
 
 
 def parse_size(text: str) -> int | None:

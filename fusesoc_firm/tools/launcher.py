@@ -78,7 +78,7 @@ def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
 def starts_everything() -> bool:
     """Return whether this package's launcher starts the build's programs; another launcher may find other programs."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
-    return not words or words[-1] == "tool"
+    return not words or words[-1] in {"tool", __name__}
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -74,6 +74,20 @@ def test_lengths_are_right_and_long_frames_dropped(
     assert set(re.findall(r"code (\d+)", output)) == {"6"}
 
 
+@pytest.mark.parametrize("width", [8, 32, 512])
+def test_aborted_frames_are_dropped(library: Library, tmp_path: Path, width: int) -> None:
+    """Between frames that are right, of which some leave while the aborted one enters."""
+    depth = 30
+    source = random.Random(SEED + 2)
+    frames = [frame for frame in _frames(width, depth) if frame.beats(width) < depth]
+    aborted = {number for number in range(len(frames) - 1) if source.random() < 0.4}
+    write_stimulus(tmp_path / "stimulus.txt", (frame.to_bytes() for frame in frames), aborted)
+    kept = [(number, frame.to_bytes()) for number, frame in enumerate(frames) if number not in aborted]
+    write_expected(tmp_path / "expected.txt", kept)
+    for stalls in (0, 40):
+        _run(library, tmp_path, WIDTH=width, DEPTH=depth, SEED=SEED, STALL_PERCENT=stalls, SINK_STALL_PERCENT=stalls)
+
+
 def test_errors_of_the_publisher_are_passed_on(library: Library, tmp_path: Path) -> None:
     _write(tmp_path, [Frame(1, bytes(100)), Frame(2, bytes(20))], 8, 64)
     expected = tmp_path / "expected.txt"

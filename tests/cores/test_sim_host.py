@@ -29,6 +29,10 @@ EXPECTED = """\
 """
 
 
+ANNOUNCEMENTS = "expected '! id_error <pulses>', '! frame_error <pulses>' or '! aborted <id> <code>'"
+ABORTED = "expected '! aborted 7 10', the frame's id and the code of aborted frames"
+
+
 @pytest.fixture(scope="module", params=SIMULATORS)
 def host(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     return bench(
@@ -218,6 +222,26 @@ def test_announced_errors_are_no_faults(host: Bench, tmp_path: Path) -> None:
         assert _run(host, tmp_path, expected=f"{EXPECTED}! {name} 2\n", FAULT=fault).exit_code != 0
 
 
+def test_aborted_frames_pass_in_both_directions(host: Bench, tmp_path: Path) -> None:
+    """Those received are written as they can be expected; their bytes and length may be any."""
+    stimulus = STIMULUS + "> broken\n  01 ff000000 aa bb\n! aborted 1 10\n> next\n  01 01000000 cc\n"
+    expected = EXPECTED + "< broken\n  01\n! aborted 1 10\n< next\n  01 01000000 cc\n"
+    for stall in (0, 40):
+        result = _run(host, tmp_path, stimulus, expected, STALL_PERCENT=stall, WIDTH=16)
+        assert result.exit_code == 0, result.output
+        assert result.output.splitlines()[-1] == "PASS 4/4"
+        assert "< id 01\n  01ff000000aabb\n! aborted 1 10\n< id 01\n" in (tmp_path / "received.txt").read_text()
+
+
+def test_a_frame_that_is_aborted_or_not_is_told_apart(host: Bench, tmp_path: Path) -> None:
+    result = _run(host, tmp_path, f"{STIMULUS}! aborted 1 10\n", SEED=SEED)
+    assert result.exit_code != 0
+    assert "is aborted after 8 bytes" in result.output
+    result = _run(host, tmp_path, expected=f"{EXPECTED}! aborted 1 10\n", SEED=SEED)
+    assert result.exit_code != 0
+    assert "is not aborted" in result.output
+
+
 def test_ten_faults_are_printed_and_the_rest_counted(host: Bench, tmp_path: Path) -> None:
     stimulus = "> a\n  00 14000000" + "00" * 20
     expected = "< @0 a\n  00 14000000" + "01" * 20
@@ -238,6 +262,7 @@ def test_ten_faults_are_printed_and_the_rest_counted(host: Bench, tmp_path: Path
         ("> a\n  000\n", "stimulus.txt:2: the line ends with half a byte"),
         ("> a\n  00 ..\n", "stimulus.txt:2: '..' is legal only in an expected frame, after the id"),
         (">a\n  00\n", "stimulus.txt:1: a blank is missing after the first character"),
+        ("> a\n  00\n! id_error 1\n", "stimulus.txt:3: expected '! aborted <id> <code>'"),
     ],
 )
 def test_an_ill_formed_stimulus_file_is_refused(host: Bench, tmp_path: Path, stimulus: str, message: str) -> None:
@@ -257,8 +282,10 @@ def test_an_ill_formed_stimulus_file_is_refused(host: Bench, tmp_path: Path, sti
         ("< a\n  00 000000ff\n", "expected.txt:3: the frame before this line announces more than 2 GiB"),
         ("< @x a\n  00 00000000\n", "expected.txt:1: '@' must be followed by the number of a stimulus frame"),
         ("< a\n  .. 00000000\n", "expected.txt:2: '..' is legal only in an expected frame, after the id"),
-        ("! id_errors 1\n", "expected.txt:1: expected '! id_error <pulses>' or '! frame_error <pulses>'"),
-        ("! id_error -1\n", "expected.txt:1: expected '! id_error <pulses>' or '! frame_error <pulses>'"),
+        *((line, f"expected.txt:1: {ANNOUNCEMENTS}") for line in ("! id_errors 1\n", "! id_error -1\n")),
+        ("! aborted 1 10\n", "expected.txt:1: '! aborted' must follow a frame"),
+        ("< a\n! aborted 1 10\n", "expected.txt:2: the frame before this line has no bytes"),
+        *((f"< a\n  07\n! aborted {line}\n", f"expected.txt:3: {ABORTED}") for line in ("6 10", "7 9", "7", "7 x")),
     ],
 )
 def test_an_ill_formed_expected_file_is_refused(host: Bench, tmp_path: Path, expected: str, message: str) -> None:

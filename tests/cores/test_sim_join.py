@@ -56,6 +56,20 @@ def run(joiner: Bench, folder: Path, bursts: list[bytes], whole: list[tuple[int,
     return joiner.run(folder, **{"SEED": SEED, **generics}).output
 
 
+def test_an_aborted_frame_ends_in_any_burst(joiner: Bench, tmp_path: Path) -> None:
+    """The burst that is aborted ends its publisher's frame, and no other one."""
+    stimulus = (
+        "> first part\n  01 08000000 aa bb\n> other\n  02 04000000 11 22\n> aborted\n  01 cc\n! aborted 1 10\n"
+        "> next\n  01 01000000 dd\n> rest of the other\n  02 33 44\n"
+    )
+    (tmp_path / "stimulus.txt").write_text(stimulus, encoding="ascii")
+    expected = "< a\n  01\n! aborted 1 10\n< next\n  01 01000000 dd\n< other\n  02 04000000 11223344\n"
+    (tmp_path / "expected.txt").write_text(expected, encoding="ascii")
+    result = joiner.run(tmp_path, WIDTH=8)
+    assert result.exit_code == 0, result.output
+    assert "  0108000000aabbcc\n! aborted 1 10\n" in (tmp_path / "received.txt").read_text()
+
+
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
 @pytest.mark.parametrize("stall", [0, 50])

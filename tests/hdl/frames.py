@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,9 +34,13 @@ def random_frames(ids: Sequence[int], count: int, longest: int, seed: int) -> li
     return [Frame(source.choice(ids), source.randbytes(source.randint(0, longest))) for _ in range(count)]
 
 
-def write_stimulus(path: Path, frames: Iterable[bytes]) -> None:
-    """A stimulus file; frame n has the label `frame n`."""
-    path.write_text("".join(f"> frame {n}\n{_hex_lines(frame)}" for n, frame in enumerate(frames)), encoding="ascii")
+def write_stimulus(path: Path, frames: Iterable[bytes], aborted: Collection[int] = ()) -> None:
+    """A stimulus file; frame n has the label `frame n`, and is aborted if n is in `aborted`."""
+    text = "".join(
+        f"> frame {n}\n{_hex_lines(frame)}" + (f"! aborted {frame[0]} 10\n" if n in aborted else "")
+        for n, frame in enumerate(frames)
+    )
+    path.write_text(text, encoding="ascii")
 
 
 def write_expected(path: Path, frames: Iterable[tuple[int, bytes]], id_errors: int = 0) -> None:

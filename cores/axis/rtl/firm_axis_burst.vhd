@@ -27,12 +27,14 @@ entity firm_axis_burst is
     source        : in  std_logic_vector(index_bits(SOURCES)-1 downto 0);
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic
@@ -54,6 +56,7 @@ architecture rtl of firm_axis_burst is
 
   signal held_tdata_r  : std_logic_vector(WIDTH-1 downto 0);
   signal held_tkeep_r  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal held_tuser_r  : std_logic_vector(0 downto 0);
   signal held_tlast_r  : std_logic;
   signal held_source_r : std_logic_vector(INDEX_BITS_USED-1 downto 0);
   signal held_r        : std_logic;
@@ -125,6 +128,7 @@ begin
       if taken = '1' then
         held_tdata_r  <= s_axis_tdata;
         held_tkeep_r  <= s_axis_tkeep;
+        held_tuser_r  <= s_axis_tuser;
         held_tlast_r  <= s_axis_tlast;
         held_source_r <= source;
       end if;
@@ -133,13 +137,15 @@ begin
 
   m_axis_tvalid_out <= held_r and (resume_r or held_tlast_r or s_axis_tvalid);
 
-  send : process (held_tdata_r, held_tkeep_r, held_source_r, resume_r)
+  send : process (held_tdata_r, held_tkeep_r, held_tuser_r, held_source_r, resume_r)
   begin
     m_axis_tdata <= held_tdata_r;
     m_axis_tkeep <= held_tkeep_r;
+    m_axis_tuser <= held_tuser_r;
     if resume_r = '1' then
       m_axis_tdata(7 downto 0) <= std_logic_vector(resize(unsigned(held_source_r), 8));
       m_axis_tkeep             <= (others => '1');
+      m_axis_tuser             <= "0";
     end if;
   end process send;
 

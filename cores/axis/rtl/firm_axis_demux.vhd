@@ -20,6 +20,7 @@ entity firm_axis_demux is
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -27,6 +28,7 @@ entity firm_axis_demux is
     -- Shared by all destinations.
     m_axis_tdata : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser : out std_logic_vector(0 downto 0);
     m_axis_tlast : out std_logic;
     -- One bit per destination.
     m_axis_tvalid : out std_logic_vector(DESTINATIONS-1 downto 0);
@@ -115,6 +117,7 @@ begin
   s_axis_tready <= s_axis_tready_out;
   m_axis_tdata  <= s_axis_tdata;
   m_axis_tkeep  <= s_axis_tkeep;
+  m_axis_tuser  <= s_axis_tuser;
   m_axis_tlast  <= s_axis_tlast;
   m_axis_tvalid <= decode(index, valid, DESTINATIONS);
 

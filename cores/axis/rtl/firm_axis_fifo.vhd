@@ -19,12 +19,14 @@ entity firm_axis_fifo is
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic
@@ -34,7 +36,7 @@ end entity firm_axis_fifo;
 architecture rtl of firm_axis_fifo is
 
   constant KEEP_BITS : positive := WIDTH/8;
-  constant WORD_BITS : positive := WIDTH + KEEP_BITS + 1;
+  constant WORD_BITS : positive := WIDTH + KEEP_BITS + 2;
 
   type memory_t is array (natural range 0 to DEPTH-1) of std_logic_vector(WORD_BITS-1 downto 0);
   signal memory        : memory_t;
@@ -73,7 +75,7 @@ begin
   begin
     if rising_edge(clk) then
       if write_beat = '1' then
-        memory(write_index_r) <= s_axis_tlast & s_axis_tkeep & s_axis_tdata;
+        memory(write_index_r) <= s_axis_tlast & s_axis_tuser & s_axis_tkeep & s_axis_tdata;
       end if;
       if read_beat = '1' then
         word_r <= memory(read_index_r);
@@ -126,6 +128,7 @@ begin
   s_axis_tready <= ready_r;
   m_axis_tdata  <= word_r(WIDTH-1 downto 0);
   m_axis_tkeep  <= word_r(WIDTH+KEEP_BITS-1 downto WIDTH);
+  m_axis_tuser  <= word_r(WIDTH+KEEP_BITS downto WIDTH+KEEP_BITS);
   m_axis_tlast  <= word_r(WORD_BITS-1);
   m_axis_tvalid <= valid_r;
 

@@ -22,15 +22,17 @@ entity firm_axis_length_buffer is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- Frames of five bytes or more: id, four ignored bytes, payload.
+    -- Frames of five bytes or more: id, four ignored bytes, payload. An aborted frame is dropped.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
@@ -62,8 +64,10 @@ architecture rtl of firm_axis_length_buffer is
   signal room_r        : std_logic;                 -- there is room for a beat
   signal beats_r       : natural range 0 to DEPTH;  -- of the entering frame
   signal dropping_r    : std_logic;                 -- the entering frame is too long
+  signal begin_index_r : natural range 0 to DEPTH-1;  -- its first beat
 
   signal take_beat : std_logic;
+  signal aborted   : std_logic;  -- the entering beat aborts its frame
   signal too_long  : std_logic;  -- the entering beat fills the memory, and is not the frame's last
 
   -- A frame that has just arrived, for one cycle or until the queue takes its length.
@@ -109,6 +113,7 @@ begin
   enter         <= (room_r or dropping_r) and (queue_ready or not ended_r);
   s_axis_tready <= enter;
   take_beat     <= s_axis_tvalid and enter and not dropping_r;
+  aborted       <= take_beat and s_axis_tlast and s_axis_tuser(0);
   too_long      <= '1' when take_beat = '1' and s_axis_tlast = '0' and beats_r = DEPTH-1 else '0';
 
   access_memory : process (clk)
@@ -129,6 +134,7 @@ begin
     if rising_edge(clk) then
       if rst_n = '0' then
         write_index_r <= 0;
+        begin_index_r <= 0;
         read_index_r  <= 0;
         level_r       <= 0;
         room_r        <= '0';
@@ -138,6 +144,10 @@ begin
         level := level_r;
         if too_long = '1' then
           level := 0;
+        elsif aborted = '1' and read_beat = '0' then
+          level := level_r - beats_r;
+        elsif aborted = '1' then
+          level := level_r - beats_r - 1;
         elsif take_beat = '1' and read_beat = '0' then
           level := level_r + 1;
         elsif take_beat = '0' and read_beat = '1' then
@@ -153,7 +163,12 @@ begin
           write_index_r <= next_index(write_index_r);
           beats_r       <= beats_r + 1;
           if s_axis_tlast = '1' or too_long = '1' then
-            beats_r <= 0;
+            beats_r       <= 0;
+            begin_index_r <= next_index(write_index_r);
+          end if;
+          if aborted = '1' then
+            write_index_r <= begin_index_r;
+            begin_index_r <= begin_index_r;
           end if;
         end if;
         if too_long = '1' then
@@ -191,7 +206,7 @@ begin
       if rst_n = '0' then
         ended_r <= '0';
       elsif ended_r = '0' or queue_ready = '1' then
-        ended_r <= take_beat and s_axis_tlast;
+        ended_r <= take_beat and s_axis_tlast and not aborted;
       end if;
     end if;
   end process end_frame;
@@ -256,6 +271,7 @@ begin
   end process fill_in;
 
   m_axis_tkeep  <= word_r(WIDTH+LANES-1 downto WIDTH);
+  m_axis_tuser  <= "0";
   m_axis_tlast  <= word_r(WORD_BITS-1);
   m_axis_tvalid <= valid_r;
 

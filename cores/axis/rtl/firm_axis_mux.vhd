@@ -19,12 +19,14 @@ entity firm_axis_mux is
     -- Source 0 is in the lowest bits.
     s_axis_tdata  : in  std_logic_vector(SOURCES*WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(SOURCES*(WIDTH/8)-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(SOURCES-1 downto 0) := (others => '0');
     s_axis_tvalid : in  std_logic_vector(SOURCES-1 downto 0);
     s_axis_tlast  : in  std_logic_vector(SOURCES-1 downto 0);
     s_axis_tready : out std_logic_vector(SOURCES-1 downto 0);
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic
@@ -87,6 +89,18 @@ begin
       words_in => s_axis_tlast,
       index    => source,
       word     => chosen_tlast
+    );
+
+  u_select_tuser : entity firm.firm_axis_select
+    generic map (
+      WORDS   => SOURCES,
+      WIDTH   => 1,
+      DECODED => true
+    )
+    port map (
+      words_in => s_axis_tuser,
+      index    => source,
+      word     => m_axis_tuser
     );
 
   u_select_tvalid : entity firm.firm_axis_select

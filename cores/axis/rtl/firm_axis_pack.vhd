@@ -22,12 +22,16 @@ entity firm_axis_pack is
     data  : in  std_logic_vector(WIDTH-1 downto 0);
     count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     -- The frame ends with these bytes, or with earlier ones if `count` is 0. A frame without any byte is not sent.
+    -- `abort` marks the end of a broken frame, which is not sent if it fits a beat of
+    -- several bytes.
     last  : in  std_logic;
+    abort : in  std_logic := '0';
     valid : in  std_logic;
     ready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic
@@ -47,6 +51,7 @@ architecture rtl of firm_axis_pack is
 
   signal beat_data  : std_logic_vector(WIDTH-1 downto 0);
   signal beat_keep  : std_logic_vector(LANES-1 downto 0);
+  signal beat_abort : std_logic_vector(0 downto 0);
   signal beat_last  : std_logic;
   signal beat_valid : std_logic;
 
@@ -61,6 +66,7 @@ begin
 
     signal waiting_r : std_logic;  -- rest_r holds a byte
     signal ended_r   : std_logic;  -- and it is a frame's last one
+    signal abort_r   : std_logic;  -- and the frame is aborted
     signal shown     : std_logic;
 
   begin
@@ -79,6 +85,7 @@ begin
         elsif advance = '1' then
           waiting_r <= (valid and count(0)) or (waiting_r and not shown);
           ended_r   <= valid and count(0) and last;
+          abort_r   <= abort;
         end if;
       end if;
     end process hold_byte;
@@ -87,6 +94,7 @@ begin
     beat_keep  <= "1";
     beat_valid <= shown;
     beat_last  <= ended_r or not count(0);
+    beat_abort(0) <= abort_r when ended_r = '1' else abort and not count(0);
 
   end generate byte_wide;
 
@@ -125,6 +133,8 @@ begin
 
     signal waiting_r : count_t;                          -- the bytes in rest_r, from lane 0 up
     signal tail_r    : std_logic;                        -- they end a frame
+    signal abort_r   : std_logic;                        -- with an abort
+    signal begun_r   : std_logic;                        -- a beat of their frame has left
     signal shift_r   : unsigned(SHIFT_BITS-1 downto 0);  -- the lane that the next byte gets
 
     signal turned   : std_logic_vector(WIDTH-1 downto 0);  -- the input in the lanes where it belongs
@@ -149,6 +159,7 @@ begin
     end generate fill_lanes;
 
     beat_last  <= tail_r;
+    beat_abort(0) <= tail_r and abort_r;
     beat_valid <= tail_r or overflow;
 
     move_bytes : process (clk)
@@ -169,6 +180,7 @@ begin
           waiting_r <= (others => '0');
           tail_r    <= '0';
           shift_r   <= (others => '0');
+          begun_r   <= '0';
         elsif advance = '1' then
           waiting_r <= filled(COUNT_BITS-1 downto 0);
           if overflow = '1' then
@@ -176,9 +188,16 @@ begin
           end if;
           shift_r <= filled(SHIFT_BITS-1 downto 0);
           tail_r  <= '0';
-          if valid = '1' and last = '1' and filled /= 0 then
+          abort_r <= abort;
+          begun_r <= begun_r or overflow;
+          if valid = '1' and last = '1' then
             shift_r <= (others => '0');
-            tail_r  <= '1';
+            begun_r <= '0';
+            if abort = '1' and begun_r = '0' and overflow = '0' then
+              waiting_r <= (others => '0');
+            elsif filled /= 0 then
+              tail_r <= '1';
+            end if;
           end if;
         end if;
       end if;
@@ -198,12 +217,13 @@ begin
         rst_n         => rst_n,
         s_axis_tdata  => beat_data,
         s_axis_tkeep  => beat_keep,
+        s_axis_tuser  => beat_abort,
         s_axis_tvalid => beat_valid,
         s_axis_tlast  => beat_last,
         s_axis_tready => advance,
         m_axis_tdata  => m_axis_tdata,
         m_axis_tkeep  => m_axis_tkeep,
-        m_axis_tuser  => open,
+        m_axis_tuser  => m_axis_tuser,
         m_axis_tid    => open,
         m_axis_tvalid => m_axis_tvalid,
         m_axis_tlast  => m_axis_tlast,

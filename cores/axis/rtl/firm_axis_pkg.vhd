@@ -30,11 +30,18 @@ package firm_axis_pkg is
   -- `word` if `enable` is '1', else zeros. ORs of such words select one of them in parallel.
   function gated(word : std_logic_vector; enable : std_logic) return std_logic_vector;
 
+  -- `left` minus `right`, of equal lengths, modulo 2**length. As LUTs, since Yosys makes a carry chain of `-`, which is
+  -- slower at few bits.
+  function difference(left, right : std_logic_vector) return std_logic_vector;
+
   -- '1' if all bits are. A comparison with a constant would be limited to 32 bits, and give a warning for unknown bits.
   function are_ones(bits : std_logic_vector) return std_logic;
 
   -- The number of ones in a contiguous `keep` of a stream, which has 1 to 64 bits.
   function lanes_kept(keep : std_logic_vector) return std_logic_vector;
+
+  -- '1' if a beat breaks the rules of frames: it has a gap or no bytes, or it is neither full nor the last one.
+  function is_broken_beat(keep : std_logic_vector; last : std_logic) return std_logic;
 
   -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one
   -- AND.
@@ -114,6 +121,17 @@ package body firm_axis_pkg is
     return count;
   end function lanes_kept;
 
+  function is_broken_beat(keep : std_logic_vector; last : std_logic) return std_logic is
+    variable lanes   : std_logic_vector(keep'length-1 downto 0);
+    variable has_gap : std_logic := '0';
+  begin
+    lanes := keep;
+    for lane in 1 to lanes'high loop
+      has_gap := has_gap or (lanes(lane) and not lanes(lane-1));
+    end loop;
+    return has_gap or not lanes(0) or (not lanes(lanes'high) and not last);
+  end function is_broken_beat;
+
   function is_equal(index : std_logic_vector; value : natural) return std_logic is
     variable bits  : std_logic_vector(index'length-1 downto 0);
     variable equal : std_logic := '1';
@@ -143,6 +161,21 @@ package body firm_axis_pkg is
     end loop;
     return result;
   end function gated;
+
+  function difference(left, right : std_logic_vector) return std_logic_vector is
+    variable minuend    : std_logic_vector(left'length-1 downto 0);
+    variable subtrahend : std_logic_vector(left'length-1 downto 0);
+    variable result     : std_logic_vector(left'length-1 downto 0);
+    variable borrow     : std_logic := '0';
+  begin
+    minuend    := left;
+    subtrahend := right;
+    for place in result'reverse_range loop
+      result(place) := minuend(place) xor subtrahend(place) xor borrow;
+      borrow        := (not minuend(place) and (subtrahend(place) or borrow)) or (subtrahend(place) and borrow);
+    end loop;
+    return result;
+  end function difference;
 
   function are_ones(bits : std_logic_vector) return std_logic is
     variable all_are : std_logic := '1';

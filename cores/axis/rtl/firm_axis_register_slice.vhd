@@ -2,7 +2,8 @@
 -- Cuts every path of a stream at the full rate of a beat per cycle. All outputs are registered, including
 -- `s_axis_tready`. As this is a cycle late, a second register holds the beat that arrives when the output has just
 -- stalled. `m_axis_tid` is the frame's id, the lowest byte of its first beat, on every beat; to add it here needs
--- neither logic nor a second register. `tuser` carries any other data. Either costs nothing if left open.
+-- neither logic nor a second register. `tuser` carries any other data: with a frame, bit 0 of the last beat marks an
+-- aborted one. Either costs nothing if left open.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -10,7 +11,8 @@ use firm.firm_axis_pkg.all;
 
 entity firm_axis_register_slice is
   generic (
-    WIDTH : integer := 8
+    WIDTH     : integer := 8;
+    USER_BITS : integer := 1
   );
   port (
     clk   : in std_logic;
@@ -18,14 +20,14 @@ entity firm_axis_register_slice is
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
-    s_axis_tuser  : in  std_logic_vector(7 downto 0) := (others => '0');
+    s_axis_tuser  : in  std_logic_vector(USER_BITS-1 downto 0) := (others => '0');
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
-    m_axis_tuser  : out std_logic_vector(7 downto 0);
+    m_axis_tuser  : out std_logic_vector(USER_BITS-1 downto 0);
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
@@ -38,7 +40,7 @@ architecture rtl of firm_axis_register_slice is
   type beat_t is record
     tdata : std_logic_vector(WIDTH-1 downto 0);
     tkeep : std_logic_vector(WIDTH/8-1 downto 0);
-    tuser : std_logic_vector(7 downto 0);
+    tuser : std_logic_vector(USER_BITS-1 downto 0);
     tlast : std_logic;
   end record beat_t;
 
@@ -56,6 +58,9 @@ architecture rtl of firm_axis_register_slice is
 
 begin
 
+  assert USER_BITS >= 1
+    report "firm_axis_register_slice: USER_BITS is " & integer'image(USER_BITS) & "; legal: 1 or more"
+    severity failure;
   assert is_stream_width(WIDTH)
     report "firm_axis_register_slice: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;

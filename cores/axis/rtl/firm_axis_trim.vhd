@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes a frame exactly as long as its header announces: excess bytes are dropped, and a frame that ends early is
--- padded. It is placed before firm_axis_pack and has the same ports on both sides. Its output is a register; only
--- `m_ready` reaches `ready` in the same cycle. The remaining bytes are counted with 32 bits, but compared with few:
--- they are less than two beats if they were before the previous piece, or they are enough for any piece.
+-- Watches that a frame is as long as its header announces. A frame that is shorter or longer, or whose source reports a
+-- fault, ends with an abort at once, and the rest of what is offered is dropped. It is placed before firm_axis_pack and
+-- has the same ports on both sides. Its output is a register; only `m_ready` reaches `ready` in the same cycle. The
+-- remaining bytes are counted with 32 bits, but compared with few: they are less than two beats if they were before the
+-- previous piece, or they are enough for any piece.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -12,7 +13,7 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_trim is
   generic (
     WIDTH : integer := 8;
-    -- The number of padding bytes that is not a fault.
+    -- The number of bytes that padding may add.
     SLACK : natural := 0
   );
   port (
@@ -27,23 +28,27 @@ entity firm_axis_trim is
     header    : in  std_logic;
     announced : out std_logic_vector(31 downto 0);
 
-    -- As at firm_axis_pack, but `last` comes without bytes: the frame ends before it. The lanes of `data` then pad a
-    -- frame that is too short, and must be zeros.
+    -- As at firm_axis_pack, but `last` comes without bytes: the frame ends before it. The lanes of `data` are then its
+    -- padding, and must be zeros. `abort` comes with `last`. A pulse of `fault` aborts the frame, too; it comes after
+    -- the header and not after `last`.
     data  : in  std_logic_vector(WIDTH-1 downto 0);
     count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     last  : in  std_logic;
+    abort : in  std_logic := '0';
+    fault : in  std_logic := '0';
     valid : in  std_logic;
     ready : out std_logic;
 
-    -- Bytes were offered beyond the end of the frame, or it ended with more than SLACK bytes missing; both are a cycle
-    -- late. `is_closed`: the frame was cut, so the rest of what is offered is dropped.
-    is_cut    : out std_logic;
-    is_filled : out std_logic;
-    is_closed : out std_logic;
+    -- Bytes were offered beyond the frame's end, or it ended with more bytes missing than padding may add; both are a
+    -- cycle late. `is_closed`: the frame was aborted, so the rest of what is offered is dropped.
+    is_cut     : out std_logic;
+    is_lacking : out std_logic;
+    is_closed  : out std_logic;
 
     m_data  : out std_logic_vector(WIDTH-1 downto 0);
     m_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     m_last  : out std_logic;
+    m_abort : out std_logic;
     m_valid : out std_logic;
     m_ready : in  std_logic
   );
@@ -68,16 +73,21 @@ architecture rtl of firm_axis_trim is
   end function is_more;
 
   -- The negated number of remaining bytes, minus one: all ones means none.
-  signal left_r   : unsigned(31 downto 0) := (others => '1');
-  signal near_r   : std_logic;  -- less than two beats remained before the previous piece
-  signal closed_r : std_logic := '0';  -- the frame was cut
-  signal open_r   : std_logic;  -- no length is announced: the frame may have any length
+  signal left_r    : unsigned(31 downto 0) := (others => '1');
+  signal near_r    : std_logic;         -- less than two beats remained before the previous piece
+  signal open_r    : std_logic;         -- no length is announced: the frame may have any length
+  signal closed_r  : std_logic := '0';  -- the frame was aborted
+  signal failed_r  : std_logic := '0';  -- it waits to be aborted
+  signal is_failed : std_logic;
+  signal cut_r     : std_logic;
+  signal stuck_r   : std_logic;         -- the frame should end, but lacks a beat and more
 
   signal wanted  : count_t;
   signal room    : count_t;    -- the remaining bytes, if they are few
   signal exceeds : std_logic;  -- fewer bytes remain than are offered
   signal ends    : std_logic;  -- less than a beat remains: `last` can be taken
-  signal lacking : unsigned(32 downto 0);
+  signal sum     : unsigned(32 downto 0);
+  signal lacks   : std_logic;  -- more remains than padding
 
   signal valid_r : std_logic;
   signal free    : std_logic;  -- the output takes a piece
@@ -90,32 +100,38 @@ begin
 
   wanted  <= std_logic_vector(to_unsigned(LANES, COUNT_BITS)) when last = '1' else count;
   room    <= not std_logic_vector(left_r(COUNT_BITS-1 downto 0));
-  exceeds <= closed_r or (near_r and is_more(wanted, room));
+  exceeds <= near_r and is_more(wanted, room);
   ends    <= closed_r or open_r or (near_r and not room(COUNT_BITS-1));
+  sum     <= ('0' & left_r) + (SLACK + 1);
+  lacks   <= not (sum(32) or closed_r or open_r);
   free    <= m_ready or not valid_r;
   ready   <= free and (ends or not last);
 
   announced <= std_logic_vector(not left_r);
   is_closed <= closed_r;
 
+  -- All of these come a cycle after a piece that is not the frame's last one.
+  is_failed <= (fault or cut_r or stuck_r or failed_r) and not closed_r;
+
   hold_piece : process (clk)
   begin
     if rising_edge(clk) then
       if free = '1' then
         m_data  <= data;
-        m_last  <= last and ends;
+        m_last  <= (last and ends) or is_failed;
+        m_abort <= (last and (abort or lacks)) or is_failed;
         m_count <= wanted;
         if header = '0' and exceeds = '1' then
           m_count <= room;
         end if;
-        if header = '0' and (closed_r = '1' or (last = '1' and open_r = '1')) then
+        if header = '0' and (is_failed = '1' or abort = '1' or (last = '1' and open_r = '1')) then
           m_count <= (others => '0');
         end if;
       end if;
       if rst_n = '0' then
         valid_r <= '0';
       elsif free = '1' then
-        valid_r <= valid;
+        valid_r <= is_failed or (valid and (start or not closed_r));
       end if;
     end if;
   end process hold_piece;
@@ -126,26 +142,38 @@ begin
   begin
     if rising_edge(clk) and valid = '1' and free = '1' then
       if start = '1' then
-        left_r   <= not unsigned(length);
-        near_r   <= are_ones(not length(31 downto COUNT_BITS));
-        open_r   <= are_ones(length);
-        closed_r <= '0';
+        left_r <= not unsigned(length);
+        near_r <= are_ones(not length(31 downto COUNT_BITS));
+        open_r <= are_ones(length);
       elsif header = '0' then
-        left_r   <= left_r + unsigned(wanted);
-        near_r   <= are_ones(std_logic_vector(left_r(31 downto COUNT_BITS)));
-        closed_r <= exceeds;
+        left_r <= left_r + unsigned(wanted);
+        near_r <= are_ones(std_logic_vector(left_r(31 downto COUNT_BITS)));
       end if;
     end if;
   end process count_down;
 
-  lacking <= ('0' & left_r) + (SLACK + 1);
-
-  report_fault : process (clk)
+  follow_abort : process (clk)
   begin
     if rising_edge(clk) then
-      is_cut    <= valid and exceeds and not last and not header;
-      is_filled <= valid and last and not (lacking(32) or closed_r or open_r);
+      if rst_n = '0' then
+        closed_r <= '0';
+        failed_r <= '0';
+        cut_r    <= '0';
+        stuck_r  <= '0';
+      else
+        cut_r   <= valid and exceeds and not last and not header and not closed_r;
+        stuck_r <= valid and last and lacks and not ends;
+        if free = '1' then
+          failed_r <= '0';
+          closed_r <= is_failed or (closed_r and not (valid and start));
+        else
+          failed_r <= is_failed;
+        end if;
+      end if;
+      is_lacking <= valid and last and lacks and not is_failed;
     end if;
-  end process report_fault;
+  end process follow_abort;
+
+  is_cut <= cut_r;
 
 end architecture rtl;

@@ -29,6 +29,7 @@ architecture simulation of firm_axis_length_buffer_tb is
 
   signal in_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal in_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal in_tuser  : std_logic_vector(0 downto 0);
   signal in_tvalid : std_logic;
   signal in_tlast  : std_logic;
   signal in_tready : std_logic;
@@ -70,6 +71,7 @@ begin
       rst_n         => rst_n,
       m_axis_tdata  => in_tdata,
       m_axis_tkeep  => in_tkeep,
+      m_axis_tuser  => in_tuser,
       m_axis_tvalid => in_tvalid,
       m_axis_tlast  => in_tlast,
       m_axis_tready => in_tready,
@@ -92,6 +94,7 @@ begin
       rst_n              => rst_n,
       s_axis_tdata       => in_tdata,
       s_axis_tkeep       => in_tkeep,
+      s_axis_tuser       => in_tuser,
       s_axis_tvalid      => in_tvalid,
       s_axis_tlast       => in_tlast,
       s_axis_tready      => in_tready,

@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends frames from a file, cut into random pieces after their header, through the trimmer to a sink that stalls. The
 -- four bytes after a frame's first one are its announced length, which may differ from its real one. The output goes to
--- a file, one line per frame: the bytes in hex, then `cut` or `filled` if the trimmer reported it.
+-- a file, one line per frame: the bytes in hex; of an aborted frame, those of the header, `aborted`, and `cut` or
+-- `lacking` if the trimmer reported it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -37,21 +38,22 @@ architecture simulation of firm_axis_trim_tb is
   signal clk   : std_logic := '0';
   signal rst_n : std_logic := '0';
 
-  signal length    : std_logic_vector(31 downto 0)           := (others => '0');
-  signal start     : std_logic                               := '0';
-  signal header    : std_logic                               := '0';
-  signal announced : std_logic_vector(31 downto 0);
-  signal data      : std_logic_vector(WIDTH-1 downto 0)      := (others => '0');
-  signal count     : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
-  signal last      : std_logic                               := '0';
-  signal valid     : std_logic                               := '0';
-  signal ready     : std_logic;
-  signal is_cut    : std_logic;
-  signal is_filled : std_logic;
+  signal length     : std_logic_vector(31 downto 0)           := (others => '0');
+  signal start      : std_logic                               := '0';
+  signal header     : std_logic                               := '0';
+  signal announced  : std_logic_vector(31 downto 0);
+  signal data       : std_logic_vector(WIDTH-1 downto 0)      := (others => '0');
+  signal count      : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
+  signal last       : std_logic                               := '0';
+  signal valid      : std_logic                               := '0';
+  signal ready      : std_logic;
+  signal is_cut     : std_logic;
+  signal is_lacking : std_logic;
 
   signal m_data  : std_logic_vector(WIDTH-1 downto 0);
   signal m_count : std_logic_vector(COUNT_BITS-1 downto 0);
   signal m_last  : std_logic;
+  signal m_abort : std_logic;
   signal m_valid : std_logic;
   signal m_ready : std_logic := '0';
 
@@ -68,24 +70,25 @@ begin
       SLACK => SLACK
     )
     port map (
-      clk       => clk,
-      rst_n     => rst_n,
-      length    => length,
-      start     => start,
-      header    => header,
-      announced => announced,
-      data      => data,
-      count     => count,
-      last      => last,
-      valid     => valid,
-      ready     => ready,
-      is_cut    => is_cut,
-      is_filled => is_filled,
-      m_data    => m_data,
-      m_count   => m_count,
-      m_last    => m_last,
-      m_valid   => m_valid,
-      m_ready   => m_ready
+      clk        => clk,
+      rst_n      => rst_n,
+      length     => length,
+      start      => start,
+      header     => header,
+      announced  => announced,
+      data       => data,
+      count      => count,
+      last       => last,
+      valid      => valid,
+      ready      => ready,
+      is_cut     => is_cut,
+      is_lacking => is_lacking,
+      m_data     => m_data,
+      m_count    => m_count,
+      m_last     => m_last,
+      m_abort    => m_abort,
+      m_valid    => m_valid,
+      m_ready    => m_ready
     );
 
   send : process
@@ -191,9 +194,10 @@ begin
     file lines            : text open write_mode is TRIMMED_FILE;
     file wanted_file      : text open read_mode is existing(EXPECTED_FILE);
     variable bytes        : line;
+    variable header       : line;
     variable watch        : natural := 0;
     variable was_cut      : boolean := false;
-    variable was_filled   : boolean := false;
+    variable was_lacking  : boolean := false;
     variable random_1     : positive := SEED;
     variable random_2     : positive := 5;
     variable draw         : real;
@@ -208,8 +212,8 @@ begin
       wait until rising_edge(clk);
       watch := watch + 1;
       assert watch < WATCHDOG report "nothing comes" severity failure;
-      was_cut    := was_cut or is_cut = '1';
-      was_filled := was_filled or is_filled = '1';
+      was_cut     := was_cut or is_cut = '1';
+      was_lacking := was_lacking or is_lacking = '1';
       if m_valid = '1' and m_ready = '1' then
         watch := 0;
         for lane in 0 to to_integer(unsigned(m_count))-1 loop
@@ -217,16 +221,21 @@ begin
           write(bytes, to_hex(m_data(8*lane+7 downto 8*lane)));
         end loop;
         if m_last = '1' then
+          if m_abort = '1' then
+            header := new string'(bytes(1 to 2*HEADER_BYTES) & " aborted");
+            deallocate(bytes);
+            bytes := header;
+          end if;
           if was_cut then
             write(bytes, string'(" cut"));
           end if;
-          if was_filled then
-            write(bytes, string'(" filled"));
+          if was_lacking then
+            write(bytes, string'(" lacking"));
           end if;
           write_result(lines, wanted_file, EXPECTED_FILE, bytes);
           frames_taken <= frames_taken + 1;
-          was_cut    := false;
-          was_filled := false;
+          was_cut     := false;
+          was_lacking := false;
         end if;
       end if;
       wait until falling_edge(clk);

@@ -37,13 +37,15 @@ entity firm_link_streams is
     -- Frames to the system.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    -- Frames from the system.
+    -- Frames from the system. An aborted frame ends with a wrong checksum, so that the host drops it.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -93,13 +95,15 @@ architecture rtl of firm_link_streams is
   signal stored_valid : std_logic;
   signal stored_ready : std_logic;
 
-  signal window    : std_logic_vector(WIDTH-1 downto 0);
-  signal available : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal is_last   : std_logic;  -- the frame ends with the available bytes
-  signal has_byte  : std_logic;
-  signal take      : std_logic;
+  signal window     : std_logic_vector(WIDTH-1 downto 0);
+  signal available  : std_logic_vector(COUNT_BITS-1 downto 0);
+  signal is_last    : std_logic;  -- the frame ends with the available bytes
+  signal is_aborted : std_logic;
+  signal has_byte   : std_logic;
+  signal take       : std_logic;
 
   signal summing_r  : std_logic;                           -- the bytes of the checksum are sent
+  signal abort_r    : std_logic;                           -- of a frame that was aborted
   signal left_r     : natural range 0 to CHECKSUM_BYTES-1;  -- of them, after this one
   signal sum        : std_logic_vector(31 downto 0);
   signal sum_clear  : std_logic;
@@ -177,6 +181,7 @@ begin
       ready         => stored_ready,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tuser  => m_axis_tuser,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
       m_axis_tready => m_axis_tready
@@ -224,12 +229,14 @@ begin
       rst_n         => rst_n,
       s_axis_tdata  => s_axis_tdata,
       s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tuser  => s_axis_tuser,
       s_axis_tvalid => s_axis_tvalid,
       s_axis_tlast  => s_axis_tlast,
       s_axis_tready => s_axis_tready,
       window        => window,
       available     => available,
       is_last       => is_last,
+      is_aborted    => is_aborted,
       shown         => open,
       ends          => open,
       take_valid    => take,
@@ -239,7 +246,9 @@ begin
 
   has_byte   <= '0' when available = NONE else '1';
   send_valid <= has_byte or summing_r;
-  send_data  <= sum(7 downto 0) when summing_r = '1' else window(7 downto 0);
+  send_data  <= window(7 downto 0) when summing_r = '0' else
+                not sum(7 downto 0) when abort_r = '1' else
+                sum(7 downto 0);
   send_last  <= '1' when summing_r = '1' and left_r = 0 else '0';
   sent       <= send_valid and send_ready;
   take       <= has_byte and send_ready and not summing_r;
@@ -268,6 +277,7 @@ begin
         end if;
       elsif sent = '1' and is_last = '1' and available = ONE then
         summing_r <= '1';
+        abort_r   <= is_aborted;
         left_r    <= CHECKSUM_BYTES-1;
       end if;
       if rst_n = '0' then

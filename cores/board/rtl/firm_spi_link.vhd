@@ -35,6 +35,7 @@ entity firm_spi_link is
     -- Frames to the system.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
@@ -42,6 +43,7 @@ entity firm_spi_link is
     -- Frames from the system.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -205,11 +207,13 @@ begin
       tx_waiting      => waiting,
       m_axis_tdata    => m_axis_tdata,
       m_axis_tkeep    => m_axis_tkeep,
+      m_axis_tuser    => m_axis_tuser,
       m_axis_tvalid   => m_axis_tvalid,
       m_axis_tlast    => m_axis_tlast,
       m_axis_tready   => m_axis_tready,
       s_axis_tdata    => s_axis_tdata,
       s_axis_tkeep    => s_axis_tkeep,
+      s_axis_tuser    => s_axis_tuser,
       s_axis_tvalid   => s_axis_tvalid,
       s_axis_tlast    => s_axis_tlast,
       s_axis_tready   => s_axis_tready,

@@ -21,9 +21,10 @@ entity firm_manager is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- From the host.
+    -- From the host. In all streams of frames, `tuser(0)` on the last beat marks an aborted frame.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -31,6 +32,7 @@ entity firm_manager is
     -- To the host; `tid` is the id of the frame on every beat.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
@@ -39,6 +41,7 @@ entity firm_manager is
     -- To the subscribers: data for all, one bit each to select one.
     sub_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     sub_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    sub_axis_tuser  : out std_logic_vector(0 downto 0);
     sub_axis_tlast  : out std_logic;
     sub_axis_tvalid : out std_logic_vector(SUBSCRIBERS-1 downto 0);
     sub_axis_tready : in  std_logic_vector(SUBSCRIBERS-1 downto 0);
@@ -46,6 +49,7 @@ entity firm_manager is
     -- From the publishers; publisher 0 has the lowest bits.
     pub_axis_tdata  : in  std_logic_vector(PUBLISHERS*WIDTH-1 downto 0);
     pub_axis_tkeep  : in  std_logic_vector(PUBLISHERS*(WIDTH/8)-1 downto 0);
+    pub_axis_tuser  : in  std_logic_vector(PUBLISHERS-1 downto 0) := (others => '0');
     pub_axis_tvalid : in  std_logic_vector(PUBLISHERS-1 downto 0);
     pub_axis_tlast  : in  std_logic_vector(PUBLISHERS-1 downto 0);
     pub_axis_tready : out std_logic_vector(PUBLISHERS-1 downto 0);
@@ -66,18 +70,21 @@ architecture rtl of firm_manager is
 
   signal routed_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal routed_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal routed_tuser  : std_logic_vector(0 downto 0);
   signal routed_tvalid : std_logic;
   signal routed_tlast  : std_logic;
   signal routed_tready : std_logic;
 
   signal granted_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal granted_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal granted_tuser  : std_logic_vector(0 downto 0);
   signal granted_tvalid : std_logic;
   signal granted_tlast  : std_logic;
   signal granted_tready : std_logic;
 
   signal sent_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal sent_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal sent_tuser  : std_logic_vector(0 downto 0);
   signal sent_tvalid : std_logic;
   signal sent_tlast  : std_logic;
   signal sent_tready : std_logic;
@@ -102,11 +109,13 @@ begin
       rst_n         => rst_n,
       s_axis_tdata  => s_axis_tdata,
       s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tuser  => s_axis_tuser,
       s_axis_tvalid => s_axis_tvalid,
       s_axis_tlast  => s_axis_tlast,
       s_axis_tready => s_axis_tready,
       m_axis_tdata  => routed_tdata,
       m_axis_tkeep  => routed_tkeep,
+      m_axis_tuser  => routed_tuser,
       m_axis_tid    => open,
       m_axis_tvalid => routed_tvalid,
       m_axis_tlast  => routed_tlast,
@@ -123,11 +132,13 @@ begin
       rst_n         => rst_n,
       s_axis_tdata  => routed_tdata,
       s_axis_tkeep  => routed_tkeep,
+      s_axis_tuser  => routed_tuser,
       s_axis_tvalid => routed_tvalid,
       s_axis_tlast  => routed_tlast,
       s_axis_tready => routed_tready,
       m_axis_tdata  => sub_axis_tdata,
       m_axis_tkeep  => sub_axis_tkeep,
+      m_axis_tuser  => sub_axis_tuser,
       m_axis_tlast  => sub_axis_tlast,
       m_axis_tvalid => sub_axis_tvalid,
       m_axis_tready => sub_axis_tready,
@@ -144,11 +155,13 @@ begin
       enable        => sched_grant_valid,
       s_axis_tdata  => pub_axis_tdata,
       s_axis_tkeep  => pub_axis_tkeep,
+      s_axis_tuser  => pub_axis_tuser,
       s_axis_tvalid => pub_axis_tvalid,
       s_axis_tlast  => pub_axis_tlast,
       s_axis_tready => pub_axis_tready,
       m_axis_tdata  => granted_tdata,
       m_axis_tkeep  => granted_tkeep,
+      m_axis_tuser  => granted_tuser,
       m_axis_tvalid => granted_tvalid,
       m_axis_tlast  => granted_tlast,
       m_axis_tready => granted_tready
@@ -157,6 +170,7 @@ begin
   whole_frames : if not PREEMPTIVE generate
     sent_tdata     <= granted_tdata;
     sent_tkeep     <= granted_tkeep;
+    sent_tuser     <= granted_tuser;
     sent_tvalid    <= granted_tvalid;
     sent_tlast     <= granted_tlast;
     granted_tready <= sent_tready;
@@ -174,11 +188,13 @@ begin
         source        => sched_grant_select,
         s_axis_tdata  => granted_tdata,
         s_axis_tkeep  => granted_tkeep,
+        s_axis_tuser  => granted_tuser,
         s_axis_tvalid => granted_tvalid,
         s_axis_tlast  => granted_tlast,
         s_axis_tready => granted_tready,
         m_axis_tdata  => sent_tdata,
         m_axis_tkeep  => sent_tkeep,
+        m_axis_tuser  => sent_tuser,
         m_axis_tvalid => sent_tvalid,
         m_axis_tlast  => sent_tlast,
         m_axis_tready => sent_tready
@@ -194,11 +210,13 @@ begin
       rst_n         => rst_n,
       s_axis_tdata  => sent_tdata,
       s_axis_tkeep  => sent_tkeep,
+      s_axis_tuser  => sent_tuser,
       s_axis_tvalid => sent_tvalid,
       s_axis_tlast  => sent_tlast,
       s_axis_tready => sent_tready,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tuser  => m_axis_tuser,
       m_axis_tid    => out_tid,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,

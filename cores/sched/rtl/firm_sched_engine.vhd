@@ -146,7 +146,8 @@ begin
   -- Keys.
 
   timed : if not HAS_STAMPS generate
-    type offsets_t is array (natural range 0 to 2**ID_BITS-1) of key_t;
+    -- Descending, since an ascending index costs a subtraction in GHDL's netlist.
+    type offsets_t is array (natural range 2**ID_BITS-1 downto 0) of key_t;
 
     function offset_table return offsets_t is
       variable table : offsets_t;

@@ -38,6 +38,7 @@ module firm_sim_host #(
   // To the system.
   output reg  [WIDTH-1:0]   m_axis_tdata,
   output reg  [WIDTH/8-1:0] m_axis_tkeep,
+  output reg  [0:0]         m_axis_tuser,
   output reg                m_axis_tvalid,
   output reg                m_axis_tlast,
   input  wire               m_axis_tready,
@@ -45,6 +46,7 @@ module firm_sim_host #(
   // From the system.
   input  wire [WIDTH-1:0]   s_axis_tdata,
   input  wire [WIDTH/8-1:0] s_axis_tkeep,
+  input  wire [0:0]         s_axis_tuser,
   input  wire [7:0]         s_axis_tid,
   input  wire               s_axis_tvalid,
   input  wire               s_axis_tlast,
@@ -61,6 +63,7 @@ module firm_sim_host #(
   localparam FAULTS_SHOWN = 10;
   localparam HIGHEST_SEED = 2147483562;  // of math_real.uniform
   localparam HEADER_BYTES = 5;
+  localparam ABORTED      = 10;          // the code of aborted frames
   localparam LINE_BYTES   = 64;
   localparam NAME_BITS    = 8 * 1024;
 
@@ -84,6 +87,7 @@ module firm_sim_host #(
   integer next_of_id  [0:2*FRAMES-1];  // the next one with the same id
   integer first_cycle [0:FRAMES-1];    // cycles in which the first and the last beat of a stimulus were taken
   integer last_cycle  [0:FRAMES-1];
+  reg     is_aborted  [0:2*FRAMES-1];
   reg     is_received [0:2*FRAMES-1];
   integer first_of_id [0:255];         // the next expected one
   integer last_of_id  [0:255];
@@ -115,12 +119,13 @@ module firm_sim_host #(
   reg               tready, tvalid, tlast;
   reg [WIDTH-1:0]   tdata;
   reg [LANES-1:0]   tkeep;
+  reg               tuser;
   reg [7:0]         tid;
   reg               id_pulse;
   reg [ERRORS-1:0]  frame_pulses;
 
   // A beat that waited for `tready`, and that the stream from the system must still show.
-  reg               is_held, held_tlast;
+  reg               is_held, held_tlast, held_tuser;
   reg [WIDTH-1:0]   held_tdata;
   reg [LANES-1:0]   held_tkeep;
   reg [7:0]         held_tid;
@@ -194,6 +199,7 @@ module firm_sim_host #(
       cause[frame] = NONE;
       size[frame]  = 0;
       next_of_id[frame]  = NONE;
+      is_aborted[frame]  = 0;
       is_received[frame] = 0;
       header_masks       = 0;
       if (char >= 0 && char != BLANK && char != NEWLINE && char != RETURN) begin
@@ -220,7 +226,33 @@ module firm_sim_host #(
     end
   endtask
 
-  // The rest of `! id_error n` or `! frame_error n`.
+  // The rest of `! aborted id code`, from the id on: the last frame has this id and is aborted.
+  task abort_frame(input integer id);
+    integer code;
+    begin
+      code = NONE;
+      if (char == BLANK) begin
+        char = $fgetc(file);
+        read_number(code);
+      end
+      if (frame == NONE) begin
+        begin_form_fault;
+        $display("'! aborted' must follow a frame");
+        fail_form;
+      end else if (size[frame] == 0) begin
+        begin_form_fault;
+        $display("the frame before this line has no bytes");
+        fail_form;
+      end else if (id != {24'b0, header[7:0]} || code != ABORTED) begin
+        begin_form_fault;
+        $display("expected '! aborted %0d %0d', the frame's id and the code of aborted frames", header[7:0], ABORTED);
+        fail_form;
+      end
+      is_aborted[frame] = 1;
+    end
+  endtask
+
+  // The rest of `! id_error n`, `! frame_error n` or `! aborted id code`.
   task announce_errors;
     reg [8*12-1:0] word;
     integer        pulses;
@@ -240,13 +272,19 @@ module firm_sim_host #(
         char = $fgetc(file);
         read_number(pulses);
       end
-      if (pulses >= 0 && word == "id_error")
+      if (word == "aborted")
+        abort_frame(pulses);
+      else if (mark == ">") begin
+        begin_form_fault;
+        $display("expected '! aborted <id> <code>'");
+        fail_form;
+      end else if (pulses >= 0 && word == "id_error")
         announced_id_errors = pulses;
       else if (pulses >= 0 && word == "frame_error")
         announced_frame_errors = pulses;
       else begin
         begin_form_fault;
-        $display("expected '! id_error <pulses>' or '! frame_error <pulses>'");
+        $display("expected '! id_error <pulses>', '! frame_error <pulses>' or '! aborted <id> <code>'");
         fail_form;
       end
       skip_line;
@@ -310,7 +348,7 @@ module firm_sim_host #(
           $display("the frame before this line has no bytes");
           fail_form;
         end
-        if (mark == "<")
+        if (mark == "<" && !is_aborted[frame])
           check_length;
         if (mark == "<") begin
           if (first_of_id[header[7:0]] == NONE)
@@ -364,7 +402,7 @@ module firm_sim_host #(
           close_frame;
           char = $fgetc(file);
           start_frame;
-        end else if (char == "!" && mark == "<")
+        end else if (char == "!")
           announce_errors;
         else if (char == RETURN)
           char = $fgetc(file);
@@ -500,6 +538,7 @@ module firm_sim_host #(
       end
       m_axis_tvalid = 1;
       m_axis_tlast  = size[sending] - bytes_sent <= LANES;
+      m_axis_tuser  = m_axis_tlast && is_aborted[sending];
       is_offered    = 1;
     end
   endtask
@@ -508,6 +547,7 @@ module firm_sim_host #(
     begin
       m_axis_tdata  = {WIDTH{1'bx}};
       m_axis_tkeep  = {LANES{1'bx}};
+      m_axis_tuser  = 1'bx;
       m_axis_tlast  = 1'bx;
       m_axis_tvalid = 0;
     end
@@ -626,7 +666,9 @@ module firm_sim_host #(
         $fwrite(received_file, "%c%c", digit(got[7:4]), digit(got[3:0]));
       end
       if (receiving != NONE) begin
-        if (bytes_received < size[receiving]) begin
+        if (is_aborted[receiving])
+          idle_cycles = 0;
+        else if (bytes_received < size[receiving]) begin
           idle_cycles = 0;
           file        = expected_file;
           next_byte;
@@ -651,8 +693,18 @@ module firm_sim_host #(
       is_in_frame = 0;
       if (received_file != 0 && bytes_received > 0)
         $fwrite(received_file, "\n");
+      if (received_file != 0 && tuser && received_id != NONE)
+        $fwrite(received_file, "! aborted %0d %0d\n", received_id, ABORTED);
       if (receiving != NONE) begin
-        if (bytes_received < size[receiving]) begin
+        if (tuser && !is_aborted[receiving]) begin
+          begin_frame_fault;
+          if (is_shown)
+            $display("is aborted after %0d bytes", bytes_received);
+        end else if (!tuser && is_aborted[receiving]) begin
+          begin_frame_fault;
+          if (is_shown)
+            $display("is not aborted");
+        end else if (bytes_received < size[receiving] && !is_aborted[receiving]) begin
           begin_frame_fault;
           if (is_shown)
             $display("ends after %0d bytes, expected %0d", bytes_received, size[receiving]);
@@ -724,7 +776,8 @@ module firm_sim_host #(
       begin_fault;
       if (is_shown)
         $display("s_axis_tvalid falls before s_axis_tready rises");
-    end else if (tdata !== held_tdata || tkeep !== held_tkeep || tid !== held_tid || tlast !== held_tlast) begin
+    end else if (tdata !== held_tdata || tkeep !== held_tkeep || tuser !== held_tuser || tid !== held_tid
+        || tlast !== held_tlast) begin
       begin_fault;
       if (is_shown)
         $display("the stream from the system changes before s_axis_tready rises");
@@ -746,6 +799,7 @@ module firm_sim_host #(
       is_held    = tvalid === 1'b1 && !is_accepting;
       held_tdata = tdata;
       held_tkeep = tkeep;
+      held_tuser = tuser;
       held_tid   = tid;
       held_tlast = tlast;
       draw_stall(is_stalled);
@@ -969,6 +1023,7 @@ module firm_sim_host #(
       tready       = m_axis_tready;
       tdata        = s_axis_tdata;
       tkeep        = s_axis_tkeep;
+      tuser        = s_axis_tuser === 1'b1;
       tid          = s_axis_tid;
       tvalid       = s_axis_tvalid;
       tlast        = s_axis_tlast;

@@ -41,6 +41,7 @@ entity firm_sim_host is
     -- To the system.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
@@ -48,6 +49,7 @@ entity firm_sim_host is
     -- From the system.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tid    : in  std_logic_vector(7 downto 0);
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
@@ -69,6 +71,11 @@ architecture simulation of firm_sim_host is
   constant HIGHEST_SEED  : positive := 2147483562;  -- of math_real.uniform
   constant NO_ID         : integer  := -1;
   constant LINE_BYTES    : positive := 64;
+
+  function percent_of(beats, cycles : natural) return string is
+  begin
+    return integer'image(beats) & " beats, " & integer'image(integer(100.0 * real(beats) / real(cycles))) & " %";
+  end function percent_of;
 
 begin
 
@@ -130,6 +137,7 @@ begin
     variable is_held    : boolean := false;
     variable held_tdata : std_logic_vector(s_axis_tdata'range);
     variable held_tkeep : std_logic_vector(s_axis_tkeep'range);
+    variable held_tuser : std_logic_vector(s_axis_tuser'range);
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
 
@@ -180,9 +188,13 @@ begin
       m_axis_tdata  <= tdata after HOLD;
       m_axis_tkeep  <= tkeep after HOLD;
       m_axis_tvalid <= '1' after HOLD;
+      m_axis_tuser  <= "0" after HOLD;
       m_axis_tlast  <= '0' after HOLD;
       if sending.size - bytes_sent <= LANES then
         m_axis_tlast <= '1' after HOLD;
+        if sending.is_aborted then
+          m_axis_tuser <= "1" after HOLD;
+        end if;
       end if;
       is_offered := true;
     end procedure offer_beat;
@@ -191,6 +203,7 @@ begin
     begin
       m_axis_tdata  <= (m_axis_tdata'range => 'X') after HOLD;
       m_axis_tkeep  <= (m_axis_tkeep'range => 'X') after HOLD;
+      m_axis_tuser  <= "X" after HOLD;
       m_axis_tlast  <= 'X' after HOLD;
       m_axis_tvalid <= '0' after HOLD;
     end procedure offer_nothing;
@@ -242,11 +255,7 @@ begin
         print("    < " & receiving.label_text.all);
         return;
       end if;
-      cause := stimulus.first;
-      for number in 1 to receiving.cause loop
-        exit when cause = null;
-        cause := cause.next_frame;
-      end loop;
+      find_frame(stimulus, receiving.cause, cause);
       if cause = null then
         print("    < " & receiving.label_text.all);
         frame_fault("caused by stimulus " & integer'image(receiving.cause) & ", which does not exist");
@@ -284,6 +293,10 @@ begin
     begin
       if RECEIVED_FILE /= "" and bytes_received > 0 then
         writeline(received, received_line);
+        if s_axis_tuser = "1" and received_id /= NO_ID then
+          write(received_line, "! aborted " & integer'image(received_id) & " 10");
+          writeline(received, received_line);
+        end if;
       end if;
     end procedure note_end;
 
@@ -330,7 +343,9 @@ begin
     begin
       note_byte(value);
       if receiving /= null then
-        if bytes_received < receiving.size then
+        if receiving.is_aborted then
+          idle_cycles := 0;
+        elsif bytes_received < receiving.size then
           idle_cycles := 0;
           compare_byte(value);
         elsif bytes_received = receiving.size then
@@ -347,7 +362,11 @@ begin
       if receiving = null then
         return;
       end if;
-      if bytes_received < receiving.size then
+      if s_axis_tuser = "1" and not receiving.is_aborted then
+        frame_fault("is aborted after " & integer'image(bytes_received) & " bytes");
+      elsif s_axis_tuser /= "1" and receiving.is_aborted then
+        frame_fault("is not aborted");
+      elsif bytes_received < receiving.size and not receiving.is_aborted then
         frame_fault("ends after " & integer'image(bytes_received) & " bytes, expected "
           & integer'image(receiving.size));
       end if;
@@ -407,7 +426,7 @@ begin
     begin
       if s_axis_tvalid /= '1' then
         fault("s_axis_tvalid falls before s_axis_tready rises");
-      elsif s_axis_tdata /= held_tdata or s_axis_tkeep /= held_tkeep
+      elsif s_axis_tdata /= held_tdata or s_axis_tkeep /= held_tkeep or s_axis_tuser /= held_tuser
             or s_axis_tid /= held_tid or s_axis_tlast /= held_tlast then
         fault("the stream from the system changes before s_axis_tready rises");
       end if;
@@ -427,6 +446,7 @@ begin
       is_held    := s_axis_tvalid = '1' and not is_accepting;
       held_tdata := s_axis_tdata;
       held_tkeep := s_axis_tkeep;
+      held_tuser := s_axis_tuser;
       held_tid   := s_axis_tid;
       held_tlast := s_axis_tlast;
       draw_stall(is_stalled);
@@ -508,11 +528,6 @@ begin
         fault(name & " pulsed " & integer'image(pulses) & " times, announced: " & integer'image(announced));
       end if;
     end procedure check_announced;
-
-    impure function percent_of(beats, cycles : natural) return string is
-    begin
-      return integer'image(beats) & " beats, " & integer'image(integer(100.0 * real(beats) / real(cycles))) & " %";
-    end function percent_of;
 
     procedure report_traffic is
       variable cycles : natural := 0;

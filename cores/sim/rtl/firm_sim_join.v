@@ -16,6 +16,7 @@ module firm_sim_join #(
   // Bursts; `tid` is the publisher's id.
   input  wire [WIDTH-1:0]   s_axis_tdata,
   input  wire [WIDTH/8-1:0] s_axis_tkeep,
+  input  wire [0:0]         s_axis_tuser,
   input  wire [7:0]         s_axis_tid,
   input  wire               s_axis_tvalid,
   input  wire               s_axis_tlast,
@@ -24,6 +25,7 @@ module firm_sim_join #(
   // Frames.
   output reg  [WIDTH-1:0]   m_axis_tdata,
   output reg  [WIDTH/8-1:0] m_axis_tkeep,
+  output reg  [0:0]         m_axis_tuser,
   output reg  [7:0]         m_axis_tid,
   output reg                m_axis_tvalid,
   output reg                m_axis_tlast,
@@ -38,6 +40,7 @@ module firm_sim_join #(
   reg [WIDTH-1:0]          tdata     [0:BEATS-1];
   reg [LANES-1:0]          tkeep     [0:BEATS-1];
   reg [7:0]                tid       [0:BEATS-1];
+  reg                      tuser     [0:BEATS-1];
   reg                      tlast     [0:BEATS-1];
   integer                  next_beat [0:BEATS-1];
   integer                  free;                   // those released by a frame
@@ -87,6 +90,7 @@ module firm_sim_join #(
       tdata[beat]     = s_axis_tdata;
       tkeep[beat]     = s_axis_tkeep;
       tid[beat]       = s_axis_tid;
+      tuser[beat]     = s_axis_tuser === 1'b1;
       tlast[beat]     = 0;
       next_beat[beat] = NONE;
       if (first[id] == NONE)
@@ -136,7 +140,9 @@ module firm_sim_join #(
       end else begin
         append_beat;
         count_bytes;
-        if (bytes[id] >= HEADER_BYTES && bytes[id] - HEADER_BYTES >= bits[39:8]) begin
+        if (s_axis_tlast === 1'b1 && s_axis_tuser === 1'b1)
+          pass_on;
+        else if (bytes[id] >= HEADER_BYTES && bytes[id] - HEADER_BYTES >= bits[39:8]) begin
           if (s_axis_tlast !== 1'b1)
             $fatal(1, "burst of id %0d continues after its frame", id);
           pass_on;
@@ -157,6 +163,7 @@ module firm_sim_join #(
           m_axis_tdata <= tdata[beat];
           m_axis_tkeep <= tkeep[beat];
           m_axis_tid   <= tid[beat];
+          m_axis_tuser <= tuser[beat];
           m_axis_tlast <= tlast[beat];
           first_whole     = next_beat[beat];
           next_beat[beat] = free;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Replaces the host's software behind a Manager with a preemptive scheduler: joins the bursts of each publisher to
 -- frames and forwards these in one piece each, in the order of their completion. Its memory is unbounded, and it is
--- ready when the entity after it is. An illegal burst ends the simulation. Simulation only.
+-- ready when the entity after it is. An aborted frame stays one. An illegal burst ends the simulation. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -19,6 +19,7 @@ entity firm_sim_join is
     -- Bursts; `tid` is the publisher's id.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tid    : in  std_logic_vector(7 downto 0);
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
@@ -27,6 +28,7 @@ entity firm_sim_join is
     -- Frames.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
@@ -44,6 +46,7 @@ architecture simulation of firm_sim_join is
   type beat_t is record
     tdata     : std_logic_vector(WIDTH-1 downto 0);
     tkeep     : std_logic_vector(WIDTH/8-1 downto 0);
+    tuser     : std_logic_vector(0 downto 0);
     tid       : std_logic_vector(7 downto 0);
     tlast     : std_logic;
     next_beat : beat_ptr_t;
@@ -133,11 +136,13 @@ begin
           fault(ID, "resumes a frame without a beat of it");
         end if;
       else
-        beat.first := new beat_t'(s_axis_tdata, s_axis_tkeep, s_axis_tid, '0', null);
+        beat.first := new beat_t'(s_axis_tdata, s_axis_tkeep, s_axis_tuser, s_axis_tid, '0', null);
         beat.last  := beat.first;
         append(frames(ID).beats, beat);
         count_bytes(frames(ID));
-        if is_whole(ID) then
+        if s_axis_tlast = '1' and s_axis_tuser = "1" then
+          pass_on(ID);
+        elsif is_whole(ID) then
           if s_axis_tlast /= '1' then
             fault(ID, "continues after its frame");
           end if;
@@ -155,6 +160,7 @@ begin
         valid_r      <= '1';
         m_axis_tdata <= whole.first.tdata;
         m_axis_tkeep <= whole.first.tkeep;
+        m_axis_tuser <= whole.first.tuser;
         m_axis_tid   <= whole.first.tid;
         m_axis_tlast <= whole.first.tlast;
         shown        := whole.first;

@@ -21,6 +21,7 @@ package firm_sim_pkg is
     size        : natural;      -- bytes
     first_cycle : natural;      -- the host notes when the first and the last beat of a stimulus frame were taken
     last_cycle  : natural;
+    is_aborted  : boolean;      -- its last beat aborts it
     is_received : boolean;      -- set by the host
     next_frame  : frame_ptr_t;  -- in the order of the file
     next_of_id  : frame_ptr_t;  -- the next one with the same id
@@ -60,6 +61,9 @@ package firm_sim_pkg is
   --   assert endfile(wanted_file)                             -- at the end
   function existing(path : string) return string;
   procedure write_result(file results : text; file expected : text; path : in string; row : inout line);
+
+  -- Frame `number`, counted from 0, in the order of the file; null if there are fewer.
+  procedure find_frame(content : inout frame_file_t; number : in natural; frame : out frame_ptr_t);
 
 end package firm_sim_pkg;
 
@@ -327,9 +331,46 @@ package body firm_sim_pkg is
       end if;
     end if;
     if pulses < 0 then
-      fail_at(path, line_number, "expected '! id_error <pulses>' or '! frame_error <pulses>'");
+      fail_at(path, line_number, "expected '! id_error <pulses>', '! frame_error <pulses>' or '! aborted <id> <code>'");
     end if;
   end procedure announce_errors;
+
+  -- `! aborted id code`: the last frame has this id and is aborted.
+  procedure abort_frame(path : in string; line_number : in natural; text : in string; content : inout frame_file_t) is
+    constant ABORTED : string   := "! aborted ";
+    constant CODE    : positive := 10;
+    constant PLACE   : positive := next_word(text, ABORTED'length + 1);
+    variable id      : integer  := -1;
+  begin
+    if content.last = null then
+      fail_at(path, line_number, "'! aborted' must follow a frame");
+    elsif content.last.size = 0 then
+      fail_at(path, line_number, "the frame before this line has no bytes");
+    end if;
+    id := character'pos(content.last.bytes(1));
+    if parse_number(text, ABORTED'length + 1) /= id or parse_number(text, PLACE) /= CODE then
+      fail_at(path, line_number, "expected '! aborted " & integer'image(id) & " " & integer'image(CODE)
+              & "', the frame's id and the code of aborted frames");
+    end if;
+    content.last.is_aborted := true;
+  end procedure abort_frame;
+
+  -- A line that starts with '!'.
+  procedure read_announcement(path : in string; line_number : in natural; mark : in character; text : in string;
+    content : inout frame_file_t) is
+    constant ABORTED : string := "! aborted ";
+  begin
+    if text'length > ABORTED'length then
+      if text(ABORTED'range) = ABORTED then
+        abort_frame(path, line_number, text, content);
+        return;
+      end if;
+    end if;
+    if mark /= '<' then
+      fail_at(path, line_number, "expected '! aborted <id> <code>'");
+    end if;
+    announce_errors(path, line_number, text, content);
+  end procedure read_announcement;
 
   -- The last frame is complete: check it and append it to the others with its id.
   procedure close_frame(path : in string; line_number : in natural; mark : in character;
@@ -344,7 +385,7 @@ package body firm_sim_pkg is
     if content.last.size = 0 then
       fail_at(path, line_number, "the frame before this line has no bytes");
     end if;
-    if mark = '<' then
+    if mark = '<' and not content.last.is_aborted then
       if content.last.size < HEADER_BYTES then
         fail_at(path, line_number, "the frame before this line is shorter than id and length");
       end if;
@@ -386,8 +427,8 @@ package body firm_sim_pkg is
     elsif characters(1) = mark then
       close_frame(path, line_number, mark, content);
       start_frame(path, line_number, characters, content);
-    elsif characters(1) = '!' and mark = '<' then
-      announce_errors(path, line_number, characters, content);
+    elsif characters(1) = '!' then
+      read_announcement(path, line_number, mark, characters, content);
     elsif content.last = null then
       fail_at(path, line_number, "expected a label line, which starts with '" & mark & "'");
     else
@@ -428,5 +469,15 @@ package body firm_sim_pkg is
   begin
     read_frame_file(path, '<', content);
   end procedure read_expected_file;
+
+  procedure find_frame(content : inout frame_file_t; number : in natural; frame : out frame_ptr_t) is
+    variable found : frame_ptr_t := content.first;
+  begin
+    for passed in 1 to number loop
+      exit when found = null;
+      found := found.next_frame;
+    end loop;
+    frame := found;
+  end procedure find_frame;
 
 end package body firm_sim_pkg;

@@ -13,6 +13,7 @@ module firm_sim_join_tb;
   wire [WIDTH/8-1:0] burst_tkeep, frame_tkeep;
   wire               burst_tvalid, frame_tvalid;
   wire               burst_tlast, frame_tlast;
+  wire [0:0]         burst_tuser, frame_tuser;
   wire               burst_tready, frame_tready;
   wire [7:0]         frame_tid;
 
@@ -35,11 +36,13 @@ module firm_sim_join_tb;
     .rst_n(rst_n),
     .m_axis_tdata(burst_tdata),
     .m_axis_tkeep(burst_tkeep),
+    .m_axis_tuser(burst_tuser),
     .m_axis_tvalid(burst_tvalid),
     .m_axis_tlast(burst_tlast),
     .m_axis_tready(burst_tready),
     .s_axis_tdata(frame_tdata),
     .s_axis_tkeep(frame_tkeep),
+    .s_axis_tuser(frame_tuser),
     .s_axis_tid(frame_tid),
     .s_axis_tvalid(frame_tvalid),
     .s_axis_tlast(frame_tlast),
@@ -53,12 +56,14 @@ module firm_sim_join_tb;
     .rst_n(rst_n),
     .s_axis_tdata(burst_tdata),
     .s_axis_tkeep(burst_tkeep),
+    .s_axis_tuser(burst_tuser),
     .s_axis_tid(burst_tid),
     .s_axis_tvalid(burst_tvalid),
     .s_axis_tlast(burst_tlast),
     .s_axis_tready(burst_tready),
     .m_axis_tdata(frame_tdata),
     .m_axis_tkeep(frame_tkeep),
+    .m_axis_tuser(frame_tuser),
     .m_axis_tid(frame_tid),
     .m_axis_tvalid(frame_tvalid),
     .m_axis_tlast(frame_tlast),

@@ -21,6 +21,7 @@ architecture simulation of firm_sim_join_tb is
 
   signal burst_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal burst_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal burst_tuser  : std_logic_vector(0 downto 0);
   signal burst_tid    : std_logic_vector(7 downto 0);
   signal burst_tvalid : std_logic;
   signal burst_tlast  : std_logic;
@@ -28,6 +29,7 @@ architecture simulation of firm_sim_join_tb is
 
   signal frame_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal frame_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal frame_tuser  : std_logic_vector(0 downto 0);
   signal frame_tid    : std_logic_vector(7 downto 0);
   signal frame_tvalid : std_logic;
   signal frame_tlast  : std_logic;
@@ -40,6 +42,7 @@ begin
       WIDTH         => WIDTH,
       STIMULUS_FILE => STIMULUS_FILE,
       EXPECTED_FILE => EXPECTED_FILE,
+      RECEIVED_FILE => "received.txt",
       SEED          => SEED,
       STALL_PERCENT => STALL_PERCENT,
       WATCHDOG      => 200,
@@ -50,11 +53,13 @@ begin
       rst_n         => rst_n,
       m_axis_tdata  => burst_tdata,
       m_axis_tkeep  => burst_tkeep,
+      m_axis_tuser  => burst_tuser,
       m_axis_tvalid => burst_tvalid,
       m_axis_tlast  => burst_tlast,
       m_axis_tready => burst_tready,
       s_axis_tdata  => frame_tdata,
       s_axis_tkeep  => frame_tkeep,
+      s_axis_tuser  => frame_tuser,
       s_axis_tid    => frame_tid,
       s_axis_tvalid => frame_tvalid,
       s_axis_tlast  => frame_tlast,
@@ -84,12 +89,14 @@ begin
       rst_n         => rst_n,
       s_axis_tdata  => burst_tdata,
       s_axis_tkeep  => burst_tkeep,
+      s_axis_tuser  => burst_tuser,
       s_axis_tid    => burst_tid,
       s_axis_tvalid => burst_tvalid,
       s_axis_tlast  => burst_tlast,
       s_axis_tready => burst_tready,
       m_axis_tdata  => frame_tdata,
       m_axis_tkeep  => frame_tkeep,
+      m_axis_tuser  => frame_tuser,
       m_axis_tid    => frame_tid,
       m_axis_tvalid => frame_tvalid,
       m_axis_tlast  => frame_tlast,

@@ -10,12 +10,14 @@ module firm_sim_wire #(
 
   input  wire [WIDTH-1:0]   s_axis_tdata,
   input  wire [WIDTH/8-1:0] s_axis_tkeep,
+  input  wire [0:0]         s_axis_tuser,
   input  wire               s_axis_tvalid,
   input  wire               s_axis_tlast,
   output reg                s_axis_tready,
 
   output reg  [WIDTH-1:0]   m_axis_tdata,
   output reg  [WIDTH/8-1:0] m_axis_tkeep,
+  output wire [0:0]         m_axis_tuser,
   output reg  [7:0]         m_axis_tid,
   output reg                m_axis_tvalid,
   output reg                m_axis_tlast,
@@ -51,6 +53,8 @@ module firm_sim_wire #(
         id_r <= s_axis_tdata[7:0];
     end
   end
+
+  assign m_axis_tuser = s_axis_tuser;
 
   always @* begin : spoil
     reg is_third, is_fourth;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Reads and writes registers by frames, between the host and the Manager. A request is a frame from the host with the
 -- id 255 and eight bytes: an address, with bit 31 to write, and data. The answer has the same form, with the register's
--- word before the access. It leaves between two frames of the Manager. A frame with this id and another form is
--- dropped. All other frames pass unchanged.
+-- word before the access. It leaves between two frames of the Manager. A frame with this id that has another form or is
+-- aborted is dropped. All other frames pass unchanged.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -22,11 +22,13 @@ entity firm_status_frames is
     -- The host.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
@@ -35,11 +37,13 @@ entity firm_status_frames is
     -- The Manager.
     inner_s_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     inner_s_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    inner_s_axis_tuser  : out std_logic_vector(0 downto 0);
     inner_s_axis_tvalid : out std_logic;
     inner_s_axis_tlast  : out std_logic;
     inner_s_axis_tready : in  std_logic;
     inner_m_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     inner_m_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    inner_m_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     inner_m_axis_tid    : in  std_logic_vector(7 downto 0);
     inner_m_axis_tvalid : in  std_logic;
     inner_m_axis_tlast  : in  std_logic;
@@ -85,6 +89,7 @@ architecture rtl of firm_status_frames is
 
   signal in_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal in_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal in_tuser  : std_logic_vector(0 downto 0);
   signal in_tvalid : std_logic;
   signal in_tlast  : std_logic;
   signal in_tready : std_logic;
@@ -124,11 +129,13 @@ begin
       rst_n         => rst_n,
       s_axis_tdata  => s_axis_tdata,
       s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tuser  => s_axis_tuser,
       s_axis_tvalid => s_axis_tvalid,
       s_axis_tlast  => s_axis_tlast,
       s_axis_tready => s_axis_tready,
       m_axis_tdata  => in_tdata,
       m_axis_tkeep  => in_tkeep,
+      m_axis_tuser  => in_tuser,
       m_axis_tid    => open,
       m_axis_tvalid => in_tvalid,
       m_axis_tlast  => in_tlast,
@@ -144,6 +151,7 @@ begin
 
   inner_s_axis_tdata  <= in_tdata;
   inner_s_axis_tkeep  <= in_tkeep;
+  inner_s_axis_tuser  <= in_tuser;
   inner_s_axis_tvalid <= in_tvalid and is_clear and not is_status;
   inner_s_axis_tlast  <= in_tlast;
 
@@ -185,7 +193,7 @@ begin
           if in_tlast = '1' then
             place_r    <= FIRST_PLACE;
             is_wrong_r <= '0';
-            if is_wrong_r = '0' and place_r(BEATS-1) = '1' and in_tkeep = LAST_KEPT
+            if is_wrong_r = '0' and place_r(BEATS-1) = '1' and in_tkeep = LAST_KEPT and in_tuser = "0"
                and next_frame(39 downto 8) = LENGTH then
               state_r <= ASKS;
             end if;
@@ -243,15 +251,18 @@ begin
 
   out_tlast  <= place_r(BEATS-1) when is_sending = '1' else inner_m_axis_tlast;
 
-  choose_data : process (is_sending, frame_r, out_tlast, inner_m_axis_tdata, inner_m_axis_tkeep, inner_m_axis_tid)
+  choose_data : process (is_sending, frame_r, out_tlast, inner_m_axis_tdata, inner_m_axis_tkeep, inner_m_axis_tuser,
+                         inner_m_axis_tid)
   begin
     m_axis_tdata <= inner_m_axis_tdata;
     m_axis_tkeep <= inner_m_axis_tkeep;
+    m_axis_tuser <= inner_m_axis_tuser;
     m_axis_tid   <= inner_m_axis_tid;
     if is_sending = '1' then
       m_axis_tdata                       <= (others => '0');
       m_axis_tdata(BEAT_BITS-1 downto 0) <= frame_r(BEAT_BITS-1 downto 0);
       m_axis_tkeep                       <= ALL_KEPT;
+      m_axis_tuser                       <= "0";
       m_axis_tid                         <= STATUS_ID;
       if out_tlast = '1' then
         m_axis_tkeep <= LAST_KEPT;

@@ -17,7 +17,7 @@ from fusesoc_firm.system.derived.model import (
 from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
 from fusesoc_firm.system.hardware.crossings import port_of
 from fusesoc_firm.system.hardware.maps import port_map
-from fusesoc_firm.system.hardware.names import AXIS, Names, reset_of
+from fusesoc_firm.system.hardware.names import FRAME_WORDS, Names, reset_of
 from fusesoc_firm.system.written.specification import Pin
 
 ERROR_CODE_BITS = 4
@@ -52,7 +52,7 @@ def _queue(names: Names, converter: Converter, system: DerivedSystem) -> dict[st
         "frames": queue.frames,
         "beats": beats + (0 if lanes == ID_BYTES else 1),
         "drop": None if queue.overflow is Overflow.BLOCK else {"generic": queue.overflow.value.upper()},
-        **{word: names.frame(block, word) for word in (*AXIS, "error", "error_code")},
+        **{word: names.frame(block, word) for word in FRAME_WORDS},
         "id": converter.id,
         "out": error_of(converter, system),
     }
@@ -100,7 +100,7 @@ def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[s
         "width": system.width,
         "lanes": lanes,
         "depth": max(2, -(-(ID_BYTES + LENGTH_BYTES + converter.buffer) // lanes)),
-        **{word: names.frame(block, word) for word in (*AXIS, "error", "error_code")},
+        **{word: names.frame(block, word) for word in FRAME_WORDS},
         **_part_of_manager(converter, system.width),
         "out": error_of(converter, system),
     }

@@ -20,9 +20,10 @@ entity Point2AXIS is
     -- its handshake
     segment_valid    : in  std_logic_vector(0 downto 0);
     msg_ready        : out std_logic;
-    -- the frame
+    -- the frame; tuser aborts it if segment_valid falls before its last beat
     m_axis_tdata     : out std_logic_vector(7 downto 0);
     m_axis_tkeep     : out std_logic_vector(0 downto 0);
+    m_axis_tuser     : out std_logic_vector(0 downto 0);
     m_axis_tvalid    : out std_logic;
     m_axis_tlast     : out std_logic;
     m_axis_tready    : in  std_logic
@@ -46,6 +47,7 @@ begin
       msg_ready     => msg_ready,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tuser  => m_axis_tuser,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
       m_axis_tready => m_axis_tready

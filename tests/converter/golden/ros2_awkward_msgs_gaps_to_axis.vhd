@@ -29,9 +29,10 @@ entity awkward_msgs_gaps_to_axis is
     -- its handshake
     segment_valid    : in  std_logic_vector(0 downto 0);
     msg_ready        : out std_logic;
-    -- the frame
+    -- the frame; tuser aborts it if segment_valid falls before its last beat
     m_axis_tdata     : out std_logic_vector(7 downto 0);
     m_axis_tkeep     : out std_logic_vector(0 downto 0);
+    m_axis_tuser     : out std_logic_vector(0 downto 0);
     m_axis_tvalid    : out std_logic;
     m_axis_tlast     : out std_logic;
     m_axis_tready    : in  std_logic
@@ -48,6 +49,7 @@ architecture rtl of awkward_msgs_gaps_to_axis is
   -- The beat on m_axis.
   signal position_r    : unsigned(6 downto 0) := to_unsigned(FIRST_POSITION, 7);
   signal position_last : std_logic;
+  signal withdrawn     : std_logic;
 
 begin
 
@@ -81,6 +83,7 @@ begin
   frame(799 downto 736) <= last;
 
   position_last <= '1' when position_r = LAST_POSITION else '0';
+  withdrawn     <= '1' when position_r /= FIRST_POSITION and segment_valid(0) = '0' else '0';
 
   u_select : entity firm.firm_axis_select
     generic map (
@@ -93,18 +96,19 @@ begin
       word     => m_axis_tdata
     );
 
-  m_axis_tkeep  <= (others => '1');
-  m_axis_tvalid <= segment_valid(0);
-  m_axis_tlast  <= position_last;
-  msg_ready     <= segment_valid(0) and m_axis_tready and position_last;
+  m_axis_tkeep    <= (others => '1');
+  m_axis_tuser(0) <= withdrawn;
+  m_axis_tvalid   <= segment_valid(0) or withdrawn;
+  m_axis_tlast    <= position_last or withdrawn;
+  msg_ready       <= segment_valid(0) and m_axis_tready and position_last;
 
   send : process (clk)
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
         position_r <= to_unsigned(FIRST_POSITION, position_r'length);
-      elsif segment_valid(0) = '1' and m_axis_tready = '1' then
-        if position_last = '1' then
+      elsif (segment_valid(0) = '1' or withdrawn = '1') and m_axis_tready = '1' then
+        if position_last = '1' or withdrawn = '1' then
           position_r <= to_unsigned(FIRST_POSITION, position_r'length);
         else
           position_r <= position_r + 1;

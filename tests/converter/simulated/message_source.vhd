@@ -212,6 +212,7 @@ entity frame_sink is
     rst_n  : in  std_logic;
     tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    tuser  : in  std_logic_vector(0 downto 0);
     tvalid : in  std_logic;
     tlast  : in  std_logic;
     tready : out std_logic
@@ -278,6 +279,9 @@ begin
         if ready_r = '1' then
           beats := beats + 1;
           if tlast = '1' then
+            if tuser = "1" then
+              print("aborted");
+            end if;
             if text = null then
               print("frame ");
             else

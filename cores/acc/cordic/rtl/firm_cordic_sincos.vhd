@@ -48,7 +48,8 @@ architecture rtl of firm_cordic_sincos is
   -- Sign and one bit before the point: the vector's length is at most 1 plus rounding errors.
   subtype number_t is signed(INNER+1 downto 0);
   subtype angle_t is signed(INNER+2 downto 0);
-  type angles_t is array (natural range 0 to 2**COUNT_WIDTH-1) of angle_t;
+  -- Descending, since an ascending index costs a subtraction in GHDL's netlist.
+  type angles_t is array (natural range 2**COUNT_WIDTH-1 downto 0) of angle_t;
 
   function all_angles return angles_t is
     variable result : angles_t := (others => (others => '0'));

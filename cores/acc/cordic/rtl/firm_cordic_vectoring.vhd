@@ -58,7 +58,8 @@ architecture rtl of firm_cordic_vectoring is
   subtype scaled_t is signed(WIDTH downto 0);
   subtype count_t is unsigned(COUNT_WIDTH-1 downto 0);
   subtype angle_t is signed(FRACTION+2 downto 0);
-  type angles_t is array (natural range 0 to 2**COUNT_WIDTH-1) of angle_t;
+  -- Descending, since an ascending index costs a subtraction in GHDL's netlist.
+  type angles_t is array (natural range 2**COUNT_WIDTH-1 downto 0) of angle_t;
 
   function all_angles return angles_t is
     variable result : angles_t := (others => (others => '0'));
@@ -192,7 +193,7 @@ begin
           aligned_r   <= (others => '0');
           if signed(in_y) < 0 then
             angle_r <= -half_pi;
-          elsif signed(in_y) > 0 then
+          elsif signed(in_y) /= 0 then
             angle_r <= half_pi;
           end if;
         end if;

@@ -1,0 +1,242 @@
+"""Actions: steps whose results are stored and recalled.
+
+An action's key covers the step's command, the contents of its folder, and the variables of its environment. A stored
+record adds what the step was observed to use elsewhere: programs, libraries and headers of tools. A result is recalled
+if all of this is unchanged. Times are not compared.
+
+A result is stored only if the step succeeded, wrote to its own folder alone, used no network and read no files besides
+its inputs and the machine's tools. Some actions, which the key selects, run a second time: if an output differs byte
+for byte, the result is not stored.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+from fusesoc_firm.action import environment as variables
+from fusesoc_firm.action.contents import Contents
+from fusesoc_firm.action.observed import facts_of, hold
+from fusesoc_firm.action.places import Places, places_of
+from fusesoc_firm.action.results import Record, Results
+from fusesoc_firm.action.trace import Trace, can_trace, fix_addresses, traced
+from fusesoc_firm.action.tree import FILE, PROGRAM, Item, Tree, changed, in_order_of_time, key_of, removed, tree_of
+from fusesoc_firm.store.layout import digest_of
+
+TWICE = "FUSESOC_FIRM_ACTIONS_TWICE"
+"""The variable with N, if one in N actions is to run twice; 0 for none."""
+_FORMAT = 1
+_DEFAULT_TWICE = "32"
+# In a stored log, this text takes the place of the folder's path.
+_FOLDER_MARK = b"\0FOLDER\0"
+
+
+@dataclass(frozen=True)
+class Action:
+    """A step: its name, the arguments of Python for it, its folder, the content of the folder and the environment.
+
+    `declared` are inputs outside the folder; their contents are observed.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    folder: Path
+    inputs: Tree
+    environment: Mapping[str, str]
+    declared: tuple[str, ...] = ()
+
+    def key(self) -> str:
+        """Return the digest of everything that is known before the step runs."""
+        return digest_of(
+            {
+                "format": _FORMAT,
+                "arguments": self.arguments,
+                "inputs": key_of(self.inputs),
+                "environment": variables.key_of(self.environment),
+                "machine": platform.machine(),
+                "python": sys.version_info[:3],
+                "edalize": _version("edalize"),
+            }
+        )
+
+    @property
+    def search(self) -> str:
+        """The PATH of the step."""
+        return self.environment.get("PATH", os.defpath)
+
+
+@dataclass(frozen=True)
+class Done:
+    """A step that has run: the exit status, the seconds, the folder's content, and why its result was not stored."""
+
+    status: int
+    seconds: float
+    tree: Tree = field(repr=False)
+    fault: str = ""
+
+
+def look_up(action: Action, results: Results, contents: Contents) -> Record | None:
+    """Return the stored result of an action, or None if there is none that is still valid."""
+    record = results.record(action.key())
+    if record is None or record.place not in ("", str(action.folder)):
+        return None
+    return record if hold(record.facts, contents, action.search) else None
+
+
+def after(record: Record, inputs: Tree) -> dict[str, Item]:
+    """Return the content of a folder after the step with this result."""
+    gone = set(record.removed)
+    return dict(sorted((path, item) for path, item in {**inputs, **record.outputs}.items() if path not in gone))
+
+
+def log_of(record: Record, results: Results, folder: Path) -> bytes | None:
+    """Return the output of a step, as if it had run in `folder`, or None if it is no longer stored."""
+    text = results.content(record.log)
+    return None if text is None else text.replace(_FOLDER_MARK, os.fsencode(folder))
+
+
+def execute(action: Action, results: Results, contents: Contents, log: Path) -> Done:
+    """Run a step in its folder, which contains exactly the inputs; append its output to `log`, and store its result."""
+    return _Execution(action, results, contents, log).run()
+
+
+@dataclass
+class _Execution:
+    action: Action
+    results: Results
+    contents: Contents
+    log: Path
+
+    def run(self) -> Done:
+        action, started, key = self.action, time.monotonic(), self.action.key()
+        copy = _copy(action) if _runs_twice(key, action.environment) else None
+        begin = self.log.stat().st_size if self.log.exists() else 0
+        try:
+            status, trace = _run(action, self.log)
+            seconds = time.monotonic() - started
+            tree = tree_of(action.folder, self.contents)
+            if status:
+                return Done(status, seconds, tree)
+            fault = _fault(action, trace) or (self._difference(copy, tree) if copy else "")
+        finally:
+            if copy:
+                shutil.rmtree(copy, ignore_errors=True)
+        if fault or trace is None:
+            return Done(0, seconds, tree, fault)
+        try:
+            record = self._record(tree, begin, seconds, trace)
+            self.results.keep_record(key, record)
+        except OSError as error:
+            return Done(0, seconds, tree, f"the store {self.results.root} cannot be written: {error.strerror}")
+        return Done(0, seconds, tree)
+
+    def _record(self, tree: Tree, begin: int, seconds: float, trace: Trace) -> Record:
+        """Store the outputs, and return the record of the step. May raise `OSError`."""
+        action = self.action
+        outputs = changed(action.inputs, tree)
+        place = os.fsencode(action.folder)
+        is_bound = False
+        for path, item in outputs.items():
+            if item.kind in {FILE, PROGRAM}:
+                data = (action.folder / path).read_bytes()
+                self.results.keep_content(data)
+                is_bound = is_bound or place in data
+        with self.log.open("rb") as output:
+            output.seek(begin)
+            text = self.results.keep_content(output.read().replace(place, _FOLDER_MARK))
+        facts = facts_of(_places(action).outside(trace), self.contents, action.search)
+        ordered = {path: outputs[path] for path in in_order_of_time(action.folder, outputs)}
+        gone = removed(action.inputs, tree)
+        return Record(tuple(facts), ordered, tuple(gone), text, seconds, str(action.folder) if is_bound else "")
+
+    def _difference(self, copy: Path, tree: Tree) -> str:
+        """Run a step again on a copy of its inputs, in the same folder; return which outputs differ, or nothing."""
+        action = self.action
+        first = action.folder.with_name(f"{action.folder.name}.first")
+        shutil.rmtree(first, ignore_errors=True)
+        action.folder.rename(first)
+        try:
+            copy.rename(action.folder)
+            _run(action, Path(os.devnull))
+            names = _differing(tree, tree_of(action.folder, self.contents))
+        finally:
+            shutil.rmtree(action.folder, ignore_errors=True)
+            first.rename(action.folder)
+        return f"a second run writes other bytes to {', '.join(names)}" if names else ""
+
+
+def _run(action: Action, log: Path) -> tuple[int, Trace | None]:
+    """Run a step; return the exit status and, if it can be observed here, the trace."""
+    temporary = _temporary(action)
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir(parents=True)
+    environment = {**variables.of_step(action.environment), "TMPDIR": str(temporary)}
+    command = [sys.executable, *action.arguments]
+    fix_addresses()
+    try:
+        with log.open("ab") as output:
+            if can_trace():
+                return traced(command, action.folder, environment, output)
+            done = subprocess.run(
+                command,
+                cwd=action.folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                check=False,
+            )
+            return done.returncode, None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _fault(action: Action, trace: Trace | None) -> str:
+    """Return why the result of a step cannot be stored, or an empty text."""
+    if trace is None:
+        return "its use of files cannot be observed: 'strace' is not installed, or not permitted here"
+    places = _places(action)
+    return places.fault(places.outside(trace))
+
+
+def _differing(one: Tree, other: Tree) -> list[str]:
+    """Return the paths whose contents differ, apart from time stamps."""
+    return sorted(
+        path for path in {*one, *other} if path not in one or path not in other or one[path].key != other[path].key
+    )
+
+
+def _copy(action: Action) -> Path:
+    """Return a copy of a step's folder beside it."""
+    copy = action.folder.with_name(f"{action.folder.name}.again")
+    shutil.rmtree(copy, ignore_errors=True)
+    shutil.copytree(action.folder, copy, symlinks=True)
+    return copy
+
+
+def _runs_twice(key: str, environment: Mapping[str, str]) -> bool:
+    every = environment.get(TWICE) or _DEFAULT_TWICE
+    return every.isdigit() and int(every) > 0 and int(key[:8], 16) % int(every) == 0
+
+
+def _places(action: Action) -> Places:
+    return places_of(action.folder, _temporary(action), action.environment, action.declared)
+
+
+def _temporary(action: Action) -> Path:
+    """Return the folder for temporary files: always the same, since its path may be in an output."""
+    return action.folder.with_name(f"{action.folder.name}.tmp")
+
+
+@cache
+def _version(package: str) -> str:
+    return version(package)

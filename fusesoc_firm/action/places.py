@@ -1,0 +1,123 @@
+"""The places that a step may use: its own folder, the machine's tools, and the caches that these tools keep."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fusesoc_firm.action.trace import Trace
+from fusesoc_firm.store.own_code import PACKAGE
+
+# The state of the machine, which is not recorded.
+_MACHINE = ("/dev", "/etc", "/proc", "/run", "/sys")
+_TOOLS = ("/bin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/opt", "/sbin", "/usr")
+# Devices without a state; a write to /proc changes only the process itself.
+_WRITABLE = ("/dev/full", "/dev/null", "/dev/pts", "/dev/tty", "/dev/zero", "/proc")
+_BYTE_CODE = "/__pycache__"
+# Parts of this package that take part in a step. Other parts are only read to describe a build in its manifest.
+_OURS = tuple(f"{PACKAGE}/{part}" for part in ("action/backend.py", "text", "tools"))
+
+
+@dataclass(frozen=True)
+class Places:
+    """The folder of a step, the folder for its temporary files, and the places of tools and of their caches."""
+
+    folder: str
+    temporary: str
+    tools: tuple[str, ...]
+    caches: tuple[str, ...] = ()
+    declared: frozenset[str] = field(default_factory=frozenset)
+
+    def outside(self, trace: Trace) -> Trace:
+        """Return what a step used outside its folder, without what is not recorded."""
+        apart = (self.folder, self.temporary, *self.caches, *_MACHINE)
+
+        def kept(paths: Iterable[str]) -> set[str]:
+            return {
+                path
+                for path in paths
+                if not _is_below(path, apart) and (_is_below(path, _OURS) or not _is_below(path, (str(PACKAGE),)))
+            }
+
+        return Trace(
+            kept(trace.programs) | kept(_interpreters(trace.programs)),
+            kept(trace.read),
+            # A file that a step finds in a folder above its own and reads is not an input.
+            {path for path in kept(trace.listed) if not _is_below(self.folder, (path,))},
+            kept(trace.asked),
+            {path for path in trace.written if not self._may_be_written(path)},
+            trace.network,
+        )
+
+    def fault(self, outside: Trace) -> str:
+        """Return why a step with this use of places outside its folder is not cached, or an empty text."""
+        if outside.written:
+            return f"it writes {min(outside.written)}, outside its folder"
+        if outside.network:
+            return "it uses the network"
+        undeclared = [path for path in outside.read | outside.programs if not self._is_known(path)]
+        return f"it reads {min(undeclared)}, which is not an input of its core" if undeclared else ""
+
+    def _is_known(self, path: str) -> bool:
+        return path in self.declared or _is_below(path, self.tools) or _is_below(os.path.realpath(path), self.tools)
+
+    def _may_be_written(self, path: str) -> bool:
+        is_byte_code = _BYTE_CODE in path and self._is_known(path)
+        return is_byte_code or _is_below(path, (self.folder, self.temporary, *self.caches, *_WRITABLE))
+
+
+def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], declared: Iterable[str] = ()) -> Places:
+    """Return the places of a step with this environment; `declared` are input files outside its folder."""
+    home = environment.get("HOME", os.path.expanduser("~"))
+    caches = environment.get("XDG_CACHE_HOME") or os.path.join(home, ".cache")
+    return Places(
+        os.path.abspath(folder),
+        os.path.abspath(temporary),
+        tuple(dict.fromkeys((*_TOOLS, *_of_python(), *_of_path(environment.get("PATH", os.defpath), home)))),
+        (
+            environment.get("CCACHE_DIR") or os.path.join(caches, "ccache"),
+            os.path.join(home, ".ccache"),
+            os.path.join(caches, "YoWASP"),
+        ),
+        frozenset(map(os.path.realpath, declared)),
+    )
+
+
+def _of_python() -> tuple[str, ...]:
+    """Return the folders of this Python, its packages, this package and its parts in Edalize's name space."""
+    return (sys.prefix, sys.base_prefix, str(PACKAGE), str(PACKAGE.parent / "edalize"), *_packages())
+
+
+def _packages() -> tuple[str, ...]:
+    return tuple(path for path in sys.path if os.path.basename(path) in ("site-packages", "dist-packages"))
+
+
+def _of_path(search: str, home: str) -> tuple[str, ...]:
+    """Return the installations whose programs are on the path: the parent of a folder `bin`, else the folder itself."""
+    found = []
+    for folder in filter(os.path.isabs, search.split(os.pathsep)):
+        above, name = os.path.split(os.path.normpath(folder))
+        is_whole = name in ("bin", "sbin") and above not in ("/", os.path.normpath(home))
+        found.append(above if is_whole else os.path.normpath(folder))
+    return tuple(found)
+
+
+def _interpreters(programs: Iterable[str]) -> set[str]:
+    """Return the interpreters of scripts, which the kernel starts."""
+    found = set()
+    for path in programs:
+        try:
+            with open(path, "rb") as file:
+                line = file.readline(256)
+        except OSError:
+            continue
+        if line.startswith(b"#!") and (words := line[2:].split()):
+            found.add(os.fsdecode(words[0]))
+    return found
+
+
+def _is_below(path: str, folders: Iterable[str]) -> bool:
+    return any(path == folder or path.startswith(f"{folder}/") for folder in folders)

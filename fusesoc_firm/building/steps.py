@@ -1,0 +1,166 @@
+"""Run a build as actions: FuseSoC's setup, then Edalize's build and run, each answered from the store if possible.
+
+The setup always runs in an empty folder, so that a step sees its inputs alone: outputs of earlier builds, such as units
+that a GHDL library still contains, do not take part. Outputs of a recalled step are written to the folder only if a
+later step runs or the caller wants them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.action.action import Action, after, execute, log_of, look_up
+from fusesoc_firm.action.contents import Contents
+from fusesoc_firm.action.results import Record, Results, default_results
+from fusesoc_firm.action.tree import Tree, tree_of
+from fusesoc_firm.building.plan import Build
+from fusesoc_firm.building.process import set_up
+from fusesoc_firm.text.files import write_whole
+
+CACHED, RAN, FAILED = "cached", "ran", "failed"
+_EDAM = ".eda.yml"
+_BACKEND = ("-m", "fusesoc_firm.action.backend")
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of a build: its name, `cached`, `ran` or `failed`, the seconds, and why the result is not stored.
+
+    The seconds of a cached step are those of the run that was stored.
+    """
+
+    name: str
+    state: str
+    seconds: float
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How a build runs as actions: the names of its steps after the setup, and whether their outputs are wanted.
+
+    With `is_rerun`, steps run although their results are stored.
+    """
+
+    names: tuple[str, ...]
+    has_outputs: bool = True
+    is_rerun: bool = False
+
+    def __call__(self, fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
+        """Set a build up and run its steps; leave the report, and exit with status 1 if a step fails."""
+        report_of(build).unlink(missing_ok=True)
+        results = default_results()
+        contents = results.contents()
+        set_up(fusesoc, build, options)
+        run = _Run(build, _backend(fusesoc, build), results, contents, partial(set_up, fusesoc, build, options))
+        is_good = run.all(self.names, is_rerun=self.is_rerun, has_outputs=self.has_outputs)
+        contents.save()
+        results.shrink_if_needed()
+        write_whole(report_of(build), json.dumps([asdict(step) for step in run.steps]).encode())
+        if not is_good:
+            sys.exit(1)
+
+
+def report_of(build: Build) -> Path:
+    """Return the file with the steps of a build."""
+    return build.work_root.with_name(f"{build.work_root.name}.steps")
+
+
+def steps_of(build: Build) -> tuple[Step, ...]:
+    """Return the steps that a build ran or recalled, or nothing if the build ended before its first step."""
+    try:
+        return tuple(Step(**item) for item in json.loads(report_of(build).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return ()
+
+
+def action_of(step: str, build: Build, backend: tuple[str, str], inputs: Tree) -> Action:
+    """Return the action of a build's step; `backend` is `flow` or `tool` with its name in Edalize."""
+    edam = next(path for path in inputs if path.endswith(_EDAM) and "/" not in path)
+    arguments = (*_BACKEND, step, *backend, edam)
+    return Action(step, arguments, build.work_root, inputs, os.environ)
+
+
+def recorded(
+    names: tuple[str, ...], act: Callable[[str, Tree], Action], inputs: Tree, results: Results, contents: Contents
+) -> list[tuple[Action, Record]]:
+    """Return the stored results of a build's first steps, up to the first step without one."""
+    found: list[tuple[Action, Record]] = []
+    tree = inputs
+    for name in names:
+        action = act(name, tree)
+        record = look_up(action, results, contents)
+        if record is None:
+            break
+        found.append((action, record))
+        tree = after(record, tree)
+    return found
+
+
+@dataclass
+class _Run:
+    build: Build
+    backend: tuple[str, str]
+    results: Results
+    contents: Contents
+    set_up: Callable[[], None]
+    steps: list[Step] = field(default_factory=list)
+
+    def all(self, names: tuple[str, ...], *, is_rerun: bool, has_outputs: bool) -> bool:
+        """Recall the first steps, and run the others; return whether all succeeded."""
+        inputs = tree_of(self.build.work_root, self.contents)
+        known = [] if is_rerun else recorded(names, self._action, inputs, self.results, self.contents)
+        if (has_outputs or len(known) < len(names)) and not self._restored(known):
+            # An output is no longer stored; the folder may contain others.
+            self.set_up()
+            known = []
+        tree = inputs
+        for action, record in known:
+            self._show(record)
+            self.steps.append(Step(action.name, CACHED, record.seconds))
+            tree = after(record, tree)
+        return all(self._runs(name) for name in names[len(known) :])
+
+    def _runs(self, name: str) -> bool:
+        """Run a step; return whether it succeeded."""
+        action = self._action(name, tree_of(self.build.work_root, self.contents))
+        done = execute(action, self.results, self.contents, self.build.log)
+        self.steps.append(Step(name, FAILED if done.status else RAN, done.seconds, done.fault))
+        if done.fault:
+            print(f"{self.build}: the step '{name}' is not cached: {done.fault}", flush=True)
+        return done.status == 0
+
+    def _action(self, name: str, tree: Tree) -> Action:
+        return action_of(name, self.build, self.backend, tree)
+
+    def _restored(self, known: list[tuple[Action, Record]]) -> bool:
+        """Write the outputs of recalled steps to the folder; return False if one is no longer stored."""
+        for action, record in known:
+            if log_of(record, self.results, action.folder) is None:
+                return False
+            if not self.results.restore(action.folder, record.outputs):
+                return False
+            for path in record.removed:
+                with suppress(OSError):
+                    (action.folder / path).unlink()
+        return True
+
+    def _show(self, record: Record) -> None:
+        text = log_of(record, self.results, self.build.work_root) or b""
+        print(text.decode(errors="backslashreplace"), end="", flush=True)
+
+
+def _backend(fusesoc: Any, build: Build) -> tuple[str, str]:
+    """Return `flow` or `tool`, and the name of the build's flow or tool in Edalize."""
+    core = fusesoc.get_core(build.core)
+    flags: Mapping[str, Any] = {**core.get_flags(build.target), "target": build.target}
+    flow = core.get_flow(flags)
+    return ("flow", str(flow)) if flow else ("tool", str(flags["tool"]))

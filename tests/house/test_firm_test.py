@@ -1,0 +1,210 @@
+"""`firm test` on a small library of somebody else: three simulators, by flows and by tools, run and cached."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.action.trace import can_trace, traced
+from tests.hdl.ghdl import REPOSITORY
+
+pytestmark = pytest.mark.skipif(not can_trace(), reason="strace is not installed or not permitted")
+
+CORES = """\
+CAPI=2:
+name: acme:m:counter:1.0
+filesets:
+  rtl: {files: [counter.vhd: {file_type: vhdlSource-93}]}
+  bench: {files: [bench.vhd: {file_type: vhdlSource-93}]}
+  data: {files: [limit.txt: {file_type: user, copyto: limit.txt}]}
+targets:
+  default: {filesets: [rtl]}
+  sim: {filesets: [rtl, bench, data], toplevel: bench, flow: sim, flow_options: {tool: ghdl}}
+  test_old: {filesets: [rtl, bench, data], toplevel: bench, default_tool: ghdl}
+  simple: {filesets: [rtl], toplevel: counter, flow: lint, flow_options: {tool: verilator}}
+---
+CAPI=2:
+name: acme:m:gate:1.0
+filesets:
+  rtl: {files: [gate.v: {file_type: verilogSource}]}
+targets:
+  default: {filesets: [rtl]}
+  sim_icarus: {filesets: [rtl], toplevel: gate, flow: sim, flow_options: {tool: icarus}}
+  sim_verilator:
+    filesets: [rtl]
+    toplevel: gate
+    flow: sim
+    flow_options: {tool: verilator, mode: cc, verilator_options: [--main, --timing]}
+"""
+FILES = {
+    "fusesoc.conf": "[main]\nignored_dirs = build\n[library.acme]\nlocation = .\n",
+    "counter/counter.vhd": """\
+entity counter is
+  port (clk : in bit; value : out integer);
+end entity;
+architecture rtl of counter is
+  signal count : integer := 0;
+begin
+  count <= count + 1 when clk'event and clk = '1';
+  value <= count;
+end architecture;
+""",
+    "counter/bench.vhd": """\
+use std.textio.all;
+entity bench is
+end entity;
+architecture simulation of bench is
+  signal clk : bit;
+  signal value : integer;
+begin
+  dut : entity work.counter port map (clk, value);
+  process
+    file limits : text open read_mode is "limit.txt";
+    variable words : line;
+    variable limit : integer;
+  begin
+    readline(limits, words);
+    read(words, limit);
+    for edge in 1 to 10 loop
+      clk <= '1';
+      wait for 1 ns;
+      clk <= '0';
+      wait for 1 ns;
+    end loop;
+    assert value <= limit report "too high" severity failure;
+    report "counted";
+    wait;
+  end process;
+end architecture;
+""",
+    "counter/limit.txt": "10\n",
+    "gate/gate.v": """\
+module gate;
+  initial begin
+    $display("open");
+    $finish;
+  end
+endmodule
+""",
+}
+TOOLS = {"make", "ghdl", "ghdl-mcode", "iverilog", "vvp", "verilator", "verilator_bin", "g++", "vgate", "sh"}
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Path:
+    folder = tmp_path / "library"
+    for name, text in FILES.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    for text in CORES.split("---\n"):
+        name = text.split(":")[4]
+        (folder / name / f"{name}.core").write_text(text)
+    return folder
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "fusesoc_firm.cli", "test", *arguments]
+
+
+def environment(library: Path, **variables: str) -> dict[str, str]:
+    own = {
+        "PYTHONPATH": str(REPOSITORY),
+        "FUSESOC_FIRM_CACHE": str(library.parent / "store"),
+        "FUSESOC_FIRM_ACTIONS_TWICE": "0",
+    }
+    return {**os.environ, **own, **variables}
+
+
+def run(library: Path, *arguments: str, **variables: str) -> tuple[int, str]:
+    done = subprocess.run(
+        command(*arguments),
+        cwd=library,
+        env=environment(library, **variables),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def results(text: str) -> dict[str, str]:
+    return dict(re.findall(r"^acme:m:\w+:1\.0 +(\w+) +(\w+) ", text, re.MULTILINE))
+
+
+def test_unchanged_tests_start_no_tool(library: Path) -> None:
+    tests = ["sim", "sim_icarus", "sim_verilator", "test_old"]
+    status, text = run(library)
+    assert (status, sorted(results(text).items())) == (0, [(test, "passed") for test in tests]), text
+    log = library / "build" / "acme_m_counter_1.0" / "sim.log"
+    first = log.read_text()
+    assert "counted" in first
+    with (library / "output").open("wb") as output:
+        status, trace = traced(command(), library, environment(library), output)
+    text = (library / "output").read_text()
+    assert (status, sorted(results(text).items())) == (0, [(test, "cached") for test in tests]), text
+    assert not {Path(path).name.lower() for path in trace.programs} & TOOLS
+    # The log of the simulation is in the log of the recalled build.
+    assert first[first.index("Entering") :] in log.read_text()
+    assert re.search(r"4 tests in [\d.]+ s: 4 cached, 0 passed, 0 failed; [\d.]+ s saved", text)
+
+
+def test_second_runs_of_steps_write_the_same_bytes(library: Path) -> None:
+    """GHDL writes times into its libraries, and Icarus Verilog addresses into its programs."""
+    for expected in ("passed", "cached"):
+        status, text = run(library, "--target", "sim", "sim_icarus", FUSESOC_FIRM_ACTIONS_TWICE="1")
+        assert (status, results(text)) == (0, {"sim": expected, "sim_icarus": expected}), text
+
+
+def test_an_edit_runs_its_dependents_and_a_failure_is_not_cached(library: Path) -> None:
+    cores = ("acme:m:counter", "--target", "sim", "test_old")
+    assert run(library, *cores)[0] == 0
+    (library / "counter" / "limit.txt").write_text("5\n")
+    for _ in range(2):
+        status, text = run(library)
+        assert status == 1
+        assert results(text)["sim"] == results(text)["test_old"] == "failed"
+        assert "too high" in text
+    assert results(text)["sim_icarus"] == "cached"
+    (library / "counter" / "limit.txt").write_text("10\n")
+    shutil.rmtree(library / "build")
+    status, text = run(library, *cores)
+    assert (status, set(results(text).values())) == (0, {"cached"})
+    assert set(results(run(library, *cores, "--rerun")[1]).values()) == {"passed"}
+
+
+def test_what_is_not_cached_is_reported(library: Path) -> None:
+    """A test bench that reads a file that is not in its core."""
+    bench = library / "counter" / "bench.vhd"
+    bench.write_text(bench.read_text().replace('"limit.txt"', f'"{library}/counter/limit.txt"'))
+    for _ in range(2):
+        status, text = run(library, "acme:m:counter", "--target", "sim")
+        assert (status, results(text)) == (0, {"sim": "passed"})
+        line = "'run' of acme:m:counter:1.0 sim is not cached: it reads {}, which is not an input of its core"
+        assert line.format(library / "counter" / "limit.txt") in text.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("acme:m:nothing",), "unknown core 'acme:m:nothing'"),
+        (("acme:m:gate", "--target", "sim"), "acme:m:gate:1.0 has no test 'sim'"),
+        (("acme:m:counter", "--target", "simple"), "its tests: sim, test_old"),
+    ],
+)
+def test_unknown_tests_are_reported(library: Path, arguments: tuple[str, ...], message: str) -> None:
+    status, text = run(library, *arguments)
+    assert status == 1
+    assert message in text
+
+
+def test_a_folder_without_tests(tmp_path: Path) -> None:
+    (tmp_path / "library").mkdir()
+    status, text = run(tmp_path / "library")
+    assert status == 1
+    assert "no core below this folder has a test" in text
