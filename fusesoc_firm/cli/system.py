@@ -125,10 +125,12 @@ def _add_node_options(node: argparse.ArgumentParser) -> None:
 
 
 def _check_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.views.show import counts
+    from fusesoc_firm.system.views.show import counts, default_lengths
 
     system = load(arguments).system
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
+    for line in default_lengths(system):
+        print(line)
 
 
 def _show_system(arguments: argparse.Namespace) -> None:
