@@ -55,7 +55,7 @@ def _test(arguments: argparse.Namespace) -> None:
 
     from fusesoc_firm.building.plan import plan_tests
     from fusesoc_firm.building.steps import Steps, steps_of
-    from fusesoc_firm.plugin.build import How, build
+    from fusesoc_firm.plugin.build import How, Listener, build
 
     # Test processes are forked, which is safe only without other threads, such as tqdm's monitor.
     tqdm.monitor_interval = 0
@@ -67,8 +67,8 @@ def _test(arguments: argparse.Namespace) -> None:
     how = How(is_locked=arguments.locked, jobs=arguments.jobs or 0, steps=steps)
     outcomes = []
     bar = tqdm(total=len(plan.builds), unit="test", disable=None, file=sys.stderr)
-    tell = partial(bar.write, file=sys.stderr)
-    with bar, closing(build(plan, how, tell, bar.set_postfix_str)) as found:
+    listener = Listener(partial(bar.write, file=sys.stderr), bar.set_postfix_str)
+    with bar, closing(build(plan, how, listener)) as found:
         for outcome in found:
             outcomes.append(outcome)
             bar.set_postfix_str(str(outcome.build), refresh=False)

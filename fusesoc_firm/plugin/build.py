@@ -7,12 +7,12 @@ import shlex
 import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from fusesoc_firm.building.cluster import build_on
-from fusesoc_firm.building.plan import Plan
-from fusesoc_firm.building.pool import Outcome, Pool
+from fusesoc_firm.building.plan import Build, Plan
+from fusesoc_firm.building.pool import Limits, Outcome, Pool, ignore
 from fusesoc_firm.building.process import run_all, save_time
 from fusesoc_firm.building.steps import Steps
 from fusesoc_firm.plugin.answer import answer_from_store
@@ -29,7 +29,8 @@ _LAUNCHER = "EDALIZE_LAUNCHER"
 class How:
     """The options of builds: the folders, the last step, the number of parallel builds (0: one per core), a cluster.
 
-    With `steps`, builds run as actions; the other options for the folders and the last step are then not used.
+    After a failure, `is_failing_fast` skips the other builds. With `steps`, builds run as actions; the other options
+    for the folders and the last step are then not used.
     """
 
     is_clean: bool = False
@@ -38,17 +39,37 @@ class How:
     is_locked: bool = False
     jobs: int = 0
     cluster: str = ""
+    is_failing_fast: bool = False
+    limits: Limits = field(default_factory=Limits)
     steps: Steps | None = None
 
 
-def build(
-    plan: Plan, how: How, tell: Callable[[str], None], progress: Callable[[str], None]
-) -> Generator[Outcome, None, None]:
+@dataclass(frozen=True)
+class Listener:
+    """The functions that are called for builds that wait, during generation, and with each started try of a build."""
+
+    tell: Callable[[str], None]
+    progress: Callable[[str], None]
+    begin: Callable[[Build, int], None] = ignore
+
+
+def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
     """Yield the outcome of each build as it finishes. On exit, end all started processes.
 
-    `tell` is called for builds that wait, and `progress` during generation. May raise `InputError`, also for
-    differences from a core's lock file.
+    May raise `InputError`, also for differences from a core's lock file.
     """
+    waiting = dict.fromkeys(plan.builds)
+    with closing(_build(plan, how, listener)) as outcomes:
+        for outcome in outcomes:
+            del waiting[outcome.build]
+            yield outcome
+            if how.is_failing_fast and not outcome.is_good:
+                break
+    for rest in waiting:
+        yield Outcome(rest, False, 0, is_skipped=True)
+
+
+def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
     # A step of an action should depend on few of our files.
     ours = ("fusesoc_firm.tools.launcher",) if how.steps else ("fusesoc_firm.cli", "tool")
     os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", *ours]))
@@ -58,6 +79,8 @@ def build(
     options = ["--setup"] * how.is_setup_only + ["--clean"] * how.is_clean
     if how.cluster:
         options += ["--build-only"] * how.is_build_only + ["--build-root", str(plan.build_root)]
+        options += [f"--timeout={how.limits.seconds:g}"] * bool(how.limits.seconds)
+        options += [f"--retries={how.limits.retries}", *plan.options.command_line()]
         with cluster_workers(how.cluster) as workers:
             yield from build_on(workers, plan, options)
         return
@@ -68,10 +91,12 @@ def build(
         calls = plan.generator_calls()
         with closing(prepare(calls, jobs)) as steps:
             for number, _ in enumerate(steps, start=1):
-                progress(f"generated {number} of {len(calls)}")
+                listener.progress(f"generated {number} of {len(calls)}")
         save_time(_answer)
     options += ["--setup", "--build"] * how.is_build_only
-    yield from Pool(tuple(options), jobs, tell, how.steps or run_all).run(plan)
+    words = (*options, *plan.options.options())
+    pool = Pool(words, jobs, listener.tell, how.limits, listener.begin, how.steps or run_all)
+    yield from pool.run(plan)
 
 
 def _generators_run_here() -> bool:
