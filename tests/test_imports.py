@@ -26,7 +26,7 @@ ALLOWED: dict[str, str] = {
     "netlist": "text tools",
     "scheduling": "text tools",
     "action": "store text",
-    "building": "action request text tools",
+    "building": "action request store text tools",
     "system": "converter frame message request scheduling store text tools",
     "verify": "converter frame message request text tools",
     "bags": "frame message system text",

@@ -51,11 +51,36 @@ def add_build(commands: Any) -> None:
     build.add_argument(
         "--build-root", type=Path, metavar="DIR", help="folder for the builds (default: FuseSoC's build folder)"
     )
+    build.add_argument(
+        "--cached",
+        action="store_true",
+        help="take the results of steps with unchanged inputs from the store; each build starts in an empty folder",
+    )
     build.add_argument("--clean", action="store_true", help="empty each build folder first")
     build.add_argument("--locked", action="store_true", help="report differences from each core's lock file as errors")
 
 
+def _build_cached(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.building.plan import make_plan
+    from fusesoc_firm.building.steps import Steps
+    from fusesoc_firm.cli.cached import Words, report, run_cached
+    from fusesoc_firm.plugin.build import How
+
+    if arguments.setup or arguments.cluster:
+        fail("--cached cannot be combined with --setup or --cluster", hint="a setup is not cached")
+    started = time.monotonic()
+    steps = Steps(("build",) if arguments.build_only else ("build", "run"))
+    how = How(is_locked=arguments.locked, jobs=arguments.jobs or 0, steps=steps)
+    words = Words("build", "ok", ("build", arguments.cores, arguments.targets, steps.names))
+    make = partial(make_plan, arguments.cores, arguments.targets, arguments.build_root)
+    report(words, run_cached(words, make, how, arguments.build_root), time.monotonic() - started)
+
+
 def _build(arguments: argparse.Namespace) -> None:
+    if arguments.cached:
+        _build_cached(arguments)
+        return
+
     from tqdm import tqdm
 
     from fusesoc_firm.building.plan import make_plan
