@@ -28,13 +28,16 @@ ALLOWED: dict[str, str] = {
     "action": "store text",
     "building": "action request store text tools",
     "system": "converter frame message request scheduling store text tools",
+    "accelerator": "converter system text tools",
     "verify": "converter frame message request text tools",
     "bags": "frame message system text",
     "simulation": "bags converter frame message request store system text tools",
     "node": "frame message request simulation system text tools",
     "plugin": "building converter message node request simulation store system text tools",
     "replay": "bags frame message node simulation system text",
-    "cli": "building converter message node plugin replay scheduling simulation store system text tools verify",
+    "cli": (
+        "accelerator building converter message node plugin replay scheduling simulation store system text tools verify"
+    ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
 STOREYS = {

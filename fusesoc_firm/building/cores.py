@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from fusesoc_firm.request.core_reader import CoreFile, read_core
@@ -143,15 +144,19 @@ def configuration() -> Any:
     return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
 
 
-def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, Any]]]:
+def solved(
+    fusesoc: Any, top: Any, target: str, further: Mapping[str, Any] = MappingProxyType({})
+) -> list[tuple[Any, Mapping[str, Any]]]:
     """Return all cores of a target with their flags, each after its dependencies, so that the core itself is last.
+
+    `further` flags are added to those of the target.
 
     Raise `InputError` if the target or a dependency is missing.
     """
     from fusesoc.coremanager import DependencyError
 
     try:
-        flags = {**top.get_flags(target), "target": target}
+        flags = {**top.get_flags(target), "target": target, **further}
         cores = fusesoc.cm.get_depends(top.name, {**flags, "is_toplevel": True})
     except DependencyError as error:
         fail(f"{top.name} has an unknown dependency: {error.value}")

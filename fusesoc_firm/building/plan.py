@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.building.cores import calls_of, configuration, solved
 from fusesoc_firm.building.folder_lock import FolderLock
+from fusesoc_firm.building.run_options import RunOptions
+from fusesoc_firm.building.selection import Selection, is_pattern, matching
 from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 TESTS = ("sim", "test")
 """The beginnings of the names of tests."""
+_COLONS_WITH_VERSION = 3
 # The simulators of Edalize's tool interface.
 _SIMULATORS = frozenset("ghdl icarus isim modelsim questaformal rivierapro vcs verilator vunit xcelium xsim".split())
 
@@ -43,11 +46,17 @@ class Build:
 
 @dataclass(frozen=True)
 class Plan:
-    """A list of builds, and a FuseSoC instance with its libraries loaded."""
+    """A list of builds, and a FuseSoC instance with its libraries loaded.
+
+    `solver` is the instance that finds dependencies: another one if mappings or a lock file apply, since FuseSoC
+    accepts these only once, and each build applies them.
+    """
 
     fusesoc: Any = field(repr=False)
     build_root: Path
     builds: tuple[Build, ...]
+    options: RunOptions = field(default_factory=RunOptions)
+    solver: Any = field(default=None, repr=False)
 
     def generator_calls(self) -> list[GeneratorCall]:
         """Return the generator calls of all builds, each once. Raise `InputError` if a dependency is missing."""
@@ -75,7 +84,8 @@ class Plan:
                         lock.release()
 
     def _cores(self, build: Build) -> list[tuple[Any, Mapping[str, Any]]]:
-        return solved(self.fusesoc, self.fusesoc.get_core(build.core), build.target)
+        fusesoc = self.solver or self.fusesoc
+        return solved(fusesoc, fusesoc.get_core(build.core), build.target, self.options.use_flags())
 
 
 def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | None = None) -> Plan:
@@ -83,16 +93,28 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
 
     Raise `InputError` with all unknown cores and targets.
     """
-    fusesoc = _loaded(build_root)
+    return select_plan(Selection(tuple(cores), tuple(targets)), RunOptions(), build_root)
+
+
+def select_plan(selection: Selection, options: RunOptions, build_root: Path | None = None) -> Plan:
+    """Return a plan of the selected builds. Raise `InputError` with all faults of the selection."""
+    fusesoc = _fusesoc(options, build_root)
     faults = Diagnostics()
-    names = [name for core in cores if (name := _full_name(fusesoc, core, targets, faults))]
+    flags = options.use_flags()
+    chosen = dict.fromkeys(
+        (name, target)
+        for core, targets in selection.parts()
+        for name in _names(fusesoc, core, targets, faults)
+        if selection.affected is None or name in selection.affected
+        for target in _targets(fusesoc, name, targets, selection.is_where_present, faults)
+    )
     builds = [
-        Build(name, target, _work_root(fusesoc, name, flags))
-        for name, target in dict.fromkeys(product(names, targets))
-        if (flags := _flags(fusesoc, name, target, faults))
+        Build(name, target, _work_root(fusesoc, name, known))
+        for name, target in chosen
+        if (known := _flags(fusesoc, name, target, flags, faults))
     ]
     faults.raise_if_any()
-    return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds))
+    return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds), options, _solver(options, build_root))
 
 
 def plan_tests(cores: Sequence[str], targets: Sequence[str] = (), build_root: Path | None = None) -> Plan:
@@ -101,7 +123,7 @@ def plan_tests(cores: Sequence[str], targets: Sequence[str] = (), build_root: Pa
     Without names of cores, the plan contains the cores below the current folder. `targets` selects some of the tests.
     Raise `InputError` for unknown cores, and for named cores without these tests.
     """
-    fusesoc = _loaded(build_root)
+    fusesoc = _fusesoc(RunOptions(), build_root)
     faults = Diagnostics()
     names = [name for core in cores if (name := _full_name(fusesoc, core, (), faults))]
     builds: list[Build] = []
@@ -117,15 +139,61 @@ def plan_tests(cores: Sequence[str], targets: Sequence[str] = (), build_root: Pa
     return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds))
 
 
-def _loaded(build_root: Path | None) -> Any:
+def _fusesoc(options: RunOptions, build_root: Path | None) -> Any:
     """Return a FuseSoC instance with its libraries, with FuseSoC's configuration for the current folder."""
     from fusesoc.fusesoc import Fusesoc
 
     config = configuration()
+    options.configure(config)
     # All builds would share a single work root.
     config.args_work_root = None
     config.args_build_root = str(Path(build_root or config.build_root).absolute())
     return Fusesoc(config)
+
+
+def _solver(options: RunOptions, build_root: Path | None) -> Any:
+    """Return a FuseSoC instance to which mappings and a lock file apply, or None without these."""
+    if not options.mappings and not options.lock_file:
+        return None
+    fusesoc = _fusesoc(options, build_root)
+    try:
+        fusesoc.cm.db.mapping_set(options.mappings)
+        if options.lock_file:
+            if not options.lock_file.is_file():
+                fail(f"there is no lock file {options.lock_file}")
+            fusesoc.cm.db.load_lockfile(options.lock_file, disable_store=True)
+    except (RuntimeError, SyntaxError) as error:
+        fail(str(error))
+    return fusesoc
+
+
+def _names(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnostics) -> list[str]:
+    """Return the full names of the cores that match a name or pattern; without a version, the newest of each."""
+    if not is_pattern(core):
+        return [name for name in [_full_name(fusesoc, core, targets, faults)] if name]
+    if not (found := matching(sorted(fusesoc.get_cores()), core)):
+        faults.error(f"no core matches '{core}'", hint="'fusesoc core list' lists all cores")
+    has_version = core.count(":") == _COLONS_WITH_VERSION
+    families = dict.fromkeys(name if has_version else name.rpartition(":")[0] for name in found)
+    return [str(fusesoc.get_core(family).name) for family in families]
+
+
+def _targets(
+    fusesoc: Any, name: str, patterns: Sequence[str], is_where_present: bool, faults: Diagnostics
+) -> list[str]:
+    """Return the targets of a core that match the patterns; targets without wildcards are checked later."""
+    known = [
+        target
+        for target in fusesoc.get_core(name).get_data({}).targets
+        if _flags(fusesoc, name, target, {}, Diagnostics())
+    ]
+    found: list[str] = []
+    for pattern in patterns:
+        fitting = [target for target in known if fnmatchcase(target, pattern)]
+        if not fitting and is_pattern(pattern) and not is_where_present:
+            faults.error(f"no target of {name} matches '{pattern}'", hint=f"its targets: {', '.join(known) or 'none'}")
+        found += fitting or ([] if is_where_present or is_pattern(pattern) else [pattern])
+    return found
 
 
 def _work_root(fusesoc: Any, name: str, flags: Mapping[str, Any]) -> Path:
@@ -172,14 +240,16 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
         return None
 
 
-def _flags(fusesoc: Any, name: str, target: str, faults: Diagnostics) -> dict[str, Any] | None:
-    """Return the flags of a target; if the target cannot be built, add a fault and return None."""
+def _flags(
+    fusesoc: Any, name: str, target: str, further: Mapping[str, Any], faults: Diagnostics
+) -> dict[str, Any] | None:
+    """Return the flags of a target and `further` ones; if the target cannot be built, add a fault and return None."""
     core = fusesoc.get_core(name)
     known = core.get_data({}).targets
     if target not in known:
         faults.error(f"{name} has no target '{target}'", hint=f"its targets: {', '.join(known) or 'none'}")
         return None
-    flags = {**core.get_flags(target), "target": target}
+    flags = {**core.get_flags(target), "target": target, **further}
     if not core.get_flow(flags) and "tool" not in flags:
         faults.error(
             f"target '{target}' of {name} cannot be built", hint="the target has neither 'flow' nor 'default_tool'"

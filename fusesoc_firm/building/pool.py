@@ -25,17 +25,42 @@ SHOWN_LINES = 20
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a build: success, the duration in seconds and, after a failure, the last lines of the log."""
+    """The result of a build: success, the duration of the last try in seconds, and the number of tries.
+
+    `last_lines` are those of the log of the last failed try. A skipped build was not started.
+    """
 
     build: Build
     is_good: bool
     seconds: float
     last_lines: tuple[str, ...] = ()
+    tries: int = 1
+    is_skipped: bool = False
+
+    @property
+    def result(self) -> str:
+        """`ok`, `flaky` for a success after failed tries, `failed` or `skipped`."""
+        if self.is_skipped:
+            return "skipped"
+        return ("ok" if self.tries == 1 else "flaky") if self.is_good else "failed"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of each build: the time of a try in seconds (0: unlimited), and the number of further tries."""
+
+    seconds: float = 0
+    retries: int = 0
+
+
+def ignore(_build: Build, _try: int) -> None:
+    """Ignore the start of a build."""
 
 
 @dataclass
 class _Running:
     build: Build
+    number: int
     lock: FolderLock
     process: BaseProcess
     started: float
@@ -44,14 +69,17 @@ class _Running:
 
 @dataclass(frozen=True)
 class Pool:
-    """A runner of at most `jobs` parallel builds with the options of `fusesoc run`; `tell` reports waiting builds.
+    """A runner of at most `jobs` parallel builds with the options of `fusesoc run`.
 
-    `run_build` runs one build in a process of its own.
+    `tell` reports waiting builds, and `begin` receives each started build with the number of its try. `run_build` runs
+    one build in a process of its own.
     """
 
     options: tuple[str, ...]
     jobs: int
     tell: Callable[[str], None]
+    limits: Limits = Limits()
+    begin: Callable[[Build, int], None] = ignore
     run_build: Run = run_all
 
     def run(self, plan: Plan) -> Iterator[Outcome]:
@@ -59,18 +87,27 @@ class Pool:
         waiting = {build: FolderLock(build.lock) for build in plan.builds}
         running: list[_Running] = []
         told: set[Build] = set()
+        failed: dict[Build, Outcome] = {}
         alive = os.pipe()
         try:
             while waiting or running:
                 for build, lock in list(waiting.items())[: self.jobs]:
                     if len(running) < self.jobs and self._take(build, lock, told):
                         del waiting[build]
-                        running.append(self._start(plan, build, lock, alive))
+                        number = failed[build].tries + 1 if build in failed else 1
+                        running.append(self._start(plan, build, number, lock, alive))
+                        self.begin(build, number)
                 wait([item.process.sentinel for item in running], _POLL_SECONDS)
                 for item in [*running]:
-                    if item.process.exitcode is not None or not _holds(item):
-                        running.remove(item)
-                        yield _finish(item)
+                    if item.process.exitcode is None and not self._is_late(item) and _holds(item):
+                        continue
+                    running.remove(item)
+                    outcome = self._finish(item, failed.get(item.build))
+                    if outcome.is_good or item.number > self.limits.retries:
+                        yield outcome
+                    else:
+                        failed[item.build] = outcome
+                        waiting[item.build] = item.lock
         finally:
             _end(running)
             for end in alive:
@@ -83,12 +120,33 @@ class Pool:
             told.add(build)
         return owner is None
 
-    def _start(self, plan: Plan, build: Build, lock: FolderLock, alive: tuple[int, int]) -> _Running:
+    def _is_late(self, item: _Running) -> bool:
+        return 0 < self.limits.seconds < time.monotonic() - item.started
+
+    def _start(self, plan: Plan, build: Build, number: int, lock: FolderLock, alive: tuple[int, int]) -> _Running:
         process = multiprocessing.get_context("fork").Process(
             target=build_in_this_process, args=(plan.fusesoc, build, self.options, alive, self.run_build)
         )
         process.start()
-        return _Running(build, lock, process, time.monotonic(), time.monotonic())
+        return _Running(build, number, lock, process, time.monotonic(), time.monotonic())
+
+    def _finish(self, item: _Running, former: Outcome | None) -> Outcome:
+        """End a build, and return its outcome; `former` is that of the try before."""
+        status, is_late = item.process.exitcode, self._is_late(item)
+        _end([item])
+        seconds = time.monotonic() - item.started
+        if status == 0:
+            return Outcome(item.build, True, seconds, former.last_lines if former else (), item.number)
+        lines = last_lines(item.build.log, SHOWN_LINES)
+        if status is None and is_late:
+            lines.append(f"ended at the time limit of {self.limits.seconds:g} s")
+        elif status is None:
+            lines = [
+                f"another machine took over {item.build.work_root} because this build had shown no activity for a while"
+            ]
+        elif status < 0:
+            lines.append(f"ended by {signal.Signals(-status).name}")
+        return Outcome(item.build, False, seconds, tuple(lines), item.number)
 
 
 def _holds(item: _Running) -> bool:
@@ -97,22 +155,6 @@ def _holds(item: _Running) -> bool:
         return True
     item.beaten = time.monotonic()
     return item.lock.beat()
-
-
-def _finish(item: _Running) -> Outcome:
-    status = item.process.exitcode
-    _end([item])
-    seconds = time.monotonic() - item.started
-    if status == 0:
-        return Outcome(item.build, True, seconds)
-    lines = last_lines(item.build.log, SHOWN_LINES)
-    if status is None:
-        lines = [
-            f"another machine took over {item.build.work_root} because this build had shown no activity for a while"
-        ]
-    elif status < 0:
-        lines.append(f"ended by {signal.Signals(-status).name}")
-    return Outcome(item.build, False, seconds, tuple(lines))
 
 
 def _end(items: list[_Running]) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.building.plan import Build
+from fusesoc_firm.building.run_options import split
 
 Answer = Callable[[list[str]], bool]
 """A function that answers the generator call with this command line, or returns False to leave it to FuseSoC."""
@@ -87,7 +88,8 @@ def run_all(fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
     from fusesoc.main import parse_args
 
     Fusesoc.init_logging(False, True)
-    arguments = parse_args(["run", *options, f"--target={build.target}", build.core])
+    words, backend = split(options)
+    arguments = parse_args(["run", *words, f"--target={build.target}", build.core, *backend])
     arguments.func(fusesoc, arguments)
 
 

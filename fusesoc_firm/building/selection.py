@@ -1,16 +1,37 @@
 """The selection of cores and targets by patterns.
 
 A pattern of a core is a name in FuseSoC: `vendor:library:name`, with a version or without, or the name alone. Each part
-may contain the wildcards `*`, `?` and `[...]` of file names.
+may contain the wildcards `*`, `?` and `[...]` of file names. Targets of one core follow its name, as in
+`acme:m:one@sim,lint`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 _WILDCARDS = frozenset("*?[")
 _ALL_PARTS = 4
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The builds that a user selects.
+
+    `targets` are those of all cores without targets of their own. With `is_where_present`, a core without a target is
+    skipped. `affected` are the only cores that may be selected, or None for all.
+    """
+
+    cores: tuple[str, ...]
+    targets: tuple[str, ...] = ()
+    is_where_present: bool = False
+    affected: frozenset[str] | None = None
+
+    def parts(self) -> list[tuple[str, tuple[str, ...]]]:
+        """Return each pattern of cores with its patterns of targets."""
+        found = [core.partition("@") for core in self.cores]
+        return [(core, tuple(own.split(",")) if mark else self.targets) for core, mark, own in found]
 
 
 def is_pattern(text: str) -> bool:

@@ -93,8 +93,9 @@ class Wishes:
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulation that can be run: its build, its simulator, and the options for FuseSoC after the core's name."""
+    """A simulation that can be run: its core, build and simulator, and FuseSoC's options after the core's name."""
 
+    core_file: Path
     build: Build
     simulator: str
     options: tuple[str, ...]
@@ -145,7 +146,8 @@ def simulation(core: str, folder: Path | None, wishes: Wishes) -> Simulation:
     """
     _add_libraries(core, folder)
     plan = make_plan([core], ["sim"])
-    targets = _targets(plan.fusesoc.get_core(plan.builds[0].core))
+    found = plan.fusesoc.get_core(plan.builds[0].core)
+    targets = _targets(found)
     target = next((name for name in targets if wishes.tool in ("", targets[name])), "")
     if not target:
         others = ", ".join(dict.fromkeys(targets.values()))
@@ -157,7 +159,8 @@ def simulation(core: str, folder: Path | None, wishes: Wishes) -> Simulation:
         fail(f"{SIMULATORS[tool].title} cannot write waves here", hint="add '--tool ghdl'")
     (build,) = plan.builds if target == "sim" else make_plan([core], [target]).builds
     waves = build.work_root / _WAVES if wishes.has_waves else None
-    return Simulation(build, tool, tuple(_options(wishes, reads_vhdl=SIMULATORS[tool].reads_vhdl)), waves)
+    options = tuple(_options(wishes, reads_vhdl=SIMULATORS[tool].reads_vhdl))
+    return Simulation(Path(found.core_file), build, tool, options, waves)
 
 
 def _options(wishes: Wishes, *, reads_vhdl: bool) -> Iterator[str]:

@@ -24,7 +24,7 @@ from fusesoc_firm.action.results import Record, Results, default_results
 from fusesoc_firm.action.tree import Tree, tree_of
 from fusesoc_firm.building.folder_lock import FolderLock
 from fusesoc_firm.building.plan import Build
-from fusesoc_firm.building.process import set_up
+from fusesoc_firm.building.process import run_all, set_up
 from fusesoc_firm.building.recall import Recall, observed
 from fusesoc_firm.text.files import write_whole
 
@@ -51,7 +51,7 @@ class Steps:
     """How a build runs as actions: the names of its steps after the setup, and whether their outputs are wanted.
 
     With `is_rerun`, steps run although their results are stored. `scan` is the state of FuseSoC's libraries for the
-    notes of `recall`.
+    notes of `recall`, and `flags` are the user's flags.
     """
 
     names: tuple[str, ...]
@@ -59,15 +59,26 @@ class Steps:
     is_rerun: bool = False
     recall: Recall | None = None
     scan: str = ""
+    flags: tuple[tuple[str, bool | str], ...] = ()
 
     def __call__(self, fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
         """Set a build up and run its steps; leave the report, and exit with status 1 if a step fails."""
         report_of(build).unlink(missing_ok=True)
+        if fusesoc.config.no_export:
+            # The sources are not in the build's folder, so no step could be cached.
+            run_all(fusesoc, build, ("--setup", "--build", *(("--run",) if "run" in self.names else ()), *options))
+            return
         results = default_results()
         contents = results.contents()
         with observed() as found:
             set_up(fusesoc, build, options)
-        run = _Run(build, _backend(fusesoc, build), results, contents, partial(set_up, fusesoc, build, options))
+        run = _Run(
+            build,
+            _backend(fusesoc, build, dict(self.flags)),
+            results,
+            contents,
+            partial(set_up, fusesoc, build, options),
+        )
         if self.recall:
             tree = tree_of(build.work_root, contents)
             self.recall.keep_setup(build, self.scan, found, run.backend, tree)
@@ -207,9 +218,9 @@ class _Run:
         print(text.decode(errors="backslashreplace"), end="", flush=True)
 
 
-def _backend(fusesoc: Any, build: Build) -> tuple[str, str]:
+def _backend(fusesoc: Any, build: Build, further: Mapping[str, Any]) -> tuple[str, str]:
     """Return `flow` or `tool`, and the name of the build's flow or tool in Edalize."""
     core = fusesoc.get_core(build.core)
-    flags: Mapping[str, Any] = {**core.get_flags(build.target), "target": build.target}
+    flags: Mapping[str, Any] = {**core.get_flags(build.target), "target": build.target, **further}
     flow = core.get_flow(flags)
     return ("flow", str(flow)) if flow else ("tool", str(flags["tool"]))

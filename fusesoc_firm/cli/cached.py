@@ -40,7 +40,7 @@ def run_cached(words: Words, make: Callable[[], Plan], how: How, build_root: Pat
     from fusesoc_firm.action.results import default_results
     from fusesoc_firm.building.cores import configuration
     from fusesoc_firm.building.recall import Recall
-    from fusesoc_firm.plugin.build import recall_or_build
+    from fusesoc_firm.plugin.build import Listener, recall_or_build
 
     # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
     tqdm.monitor_interval = 0
@@ -49,8 +49,8 @@ def run_cached(words: Words, make: Callable[[], Plan], how: How, build_root: Pat
     recall = Recall(results, results.contents(), words.options, root)
     outcomes = []
     bar = tqdm(unit=words.unit, disable=None, file=sys.stderr)
-    tell = partial(bar.write, file=sys.stderr)
-    with bar, closing(recall_or_build(recall, make, how, tell, bar.set_postfix_str)) as found:
+    listener = Listener(partial(bar.write, file=sys.stderr), bar.set_postfix_str)
+    with bar, closing(recall_or_build(recall, make, how, listener)) as found:
         for bar.total, outcome in found:
             outcomes.append(outcome)
             bar.set_postfix_str(str(outcome.build), refresh=False)
@@ -66,7 +66,7 @@ def report(words: Words, outcomes: Sequence[Outcome], seconds: float) -> None:
     steps = [steps_of(outcome.build) for outcome in outcomes]
 
     for outcome in outcomes:
-        if not outcome.is_good:
+        if not outcome.is_good and not outcome.is_skipped:
             print(f"{outcome.build} failed; the last lines of {shown(outcome.build.log)}")
             print(*(f"    {line}" for line in outcome.last_lines), sep="\n")
     rows = [("core", words.column, "result", "seconds", "log")]
@@ -99,6 +99,6 @@ def report(words: Words, outcomes: Sequence[Outcome], seconds: float) -> None:
 
 
 def _result(words: Words, outcome: Outcome, steps: Sequence[Step]) -> str:
-    if not outcome.is_good:
-        return "failed"
+    if outcome.is_skipped or not outcome.is_good:
+        return outcome.result
     return "cached" if steps and all(step.state == "cached" for step in steps) else words.good

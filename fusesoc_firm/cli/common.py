@@ -94,6 +94,22 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
     return loaded
 
 
+def check_sources(loaded: LoadedSystem, spec: Path) -> None:
+    """Compare a system's accelerators with their interfaces, and print the warnings. May raise `InputError`."""
+    from fusesoc_firm.accelerator.check import check_accelerators
+    from fusesoc_firm.accelerator.unit import Libraries
+    from fusesoc_firm.building.sources import vhdl_sources
+    from fusesoc_firm.system.message_sources import core_of
+
+    def libraries() -> Libraries:
+        core = core_of(spec)
+        found = vhdl_sources(str(core.data.get("name", "")), core.path.parent) if core else None
+        return Libraries(found.files, found.options, found.is_complete) if found else Libraries()
+
+    for warning in check_accelerators(loaded, libraries):
+        print(warning, file=sys.stderr)
+
+
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     """Return the folders of message cores that FuseSoC finds from the current folder. May raise `InputError`."""
     # FuseSoC is imported only when it is needed.

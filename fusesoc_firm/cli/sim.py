@@ -9,11 +9,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import command, natural
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.cli.common import check_sources, command, core_folders, natural
+from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
     from fusesoc_firm.building.simulation import Message, Report, Simulation
+    from fusesoc_firm.system.system_core import LoadedSystem
+    from fusesoc_firm.text.diagnostics import SourceRef
 
 _MOST_MESSAGES, _MOST_LINES = 10, 30
 _NARROWEST = 60
@@ -25,7 +28,7 @@ _NOISE = re.compile(
     r"|\S+ -m fusesoc_firm\.cli tool "
 )
 # A place in a file that FuseSoC copied into the build folder.
-_COPY = re.compile(r"^src/[^/\s]+/([^\s:]+)(?=:\d+:\d+: )")
+_COPY = re.compile(r"(?<!\S)src/[^/\s]+/(?P<path>[^\s:]+):(?P<line>\d+)\b")
 
 
 def add_sim(commands: Any) -> None:
@@ -56,15 +59,15 @@ def add_sim(commands: Any) -> None:
 
 def _sim(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.building.simulation import Wishes, simulation
-    from fusesoc_firm.text.outputs import shown
 
     core, folder = _core(arguments.system)
     wishes = Wishes(arguments.tool or "", arguments.seed, arguments.waves, arguments.options)
     chosen = simulation(core, folder, wishes)
+    loaded = _checked(chosen)
     report = _run(chosen, is_verbose=arguments.verbose, is_quiet=arguments.quiet)
     if not report.verdict:
         if not arguments.verbose:
-            _print_errors(chosen.build.log, chosen.build.work_root, folder)
+            _print_errors(chosen, folder, loaded)
         fail("the simulation did not run to its end", hint=f"the whole output: {shown(chosen.build.log)}")
     if not arguments.quiet:
         if not arguments.verbose:
@@ -75,6 +78,23 @@ def _sim(arguments: argparse.Namespace) -> None:
     print(report.verdict, flush=True)
     if not report.is_good or report.status:
         sys.exit(1)
+
+
+def _checked(chosen: Simulation) -> LoadedSystem | None:
+    """Return the simulated system, of which the accelerators have been checked. Raise `InputError` with their faults.
+
+    Other faults in the specification are left to the simulation, and the result is None.
+    """
+    from fusesoc_firm.system.message_sources import load_beside, spec_of
+
+    try:
+        spec = spec_of(chosen.core_file)
+        loaded = load_beside(Path(shown(spec)), core_folders=core_folders) if spec else None
+    except InputError:
+        return None
+    if spec and loaded:
+        check_sources(loaded, spec)
+    return loaded
 
 
 def _run(chosen: Simulation, *, is_verbose: bool, is_quiet: bool) -> Report:
@@ -118,22 +138,45 @@ def _core(system: str | None) -> tuple[str, Path | None]:
     return str(core.data.get("name", "")), path.parent
 
 
-def _print_errors(log: Path, work_root: Path, folder: Path | None) -> None:
-    """Print the lines of the log from the first error on, or its last lines; copies are named after their originals."""
-    lines = [line for line in log.read_text(encoding="utf-8").splitlines() if not _NOISE.match(line)]
+def _print_errors(chosen: Simulation, folder: Path | None, loaded: LoadedSystem | None) -> None:
+    """Print the lines of the log from the first error on, or its last lines.
+
+    Copies are named after their originals. A line of a generated file is followed by its line of the specification.
+    """
+    lines = [line for line in chosen.build.log.read_text(encoding="utf-8").splitlines() if not _NOISE.match(line)]
     first = next((number for number, line in enumerate(lines) if _ERROR.search(line)), max(0, len(lines) - _MOST_LINES))
     for line in lines[first : first + _MOST_LINES]:
-        print(_COPY.sub(lambda match: _original(match, work_root, folder), line), file=sys.stderr)
+        place = _COPY.search(line)
+        original = _original(place, chosen.build.work_root, folder) if place else None
+        named = (
+            f"{line[: place.start()]}{original}:{place['line']}{line[place.end() :]}" if place and original else line
+        )
+        print(named, file=sys.stderr)
+        if place and not original and loaded and (source := _origin(place, chosen.build.work_root, loaded)):
+            print(f"      = this generated line belongs to {source}", file=sys.stderr)
 
 
-def _original(copy: re.Match[str], work_root: Path, folder: Path | None) -> str:
-    """Return the path of the user's file with the content of a copy, or the copy's path if there is no such file."""
-    parts = Path(copy[1]).parts
-    for number in range(len(parts) if folder else 0):
+def _original(copy: re.Match[str], work_root: Path, folder: Path | None) -> Path | None:
+    """Return the path of the user's file with the content of a copy."""
+    parts = Path(copy["path"]).parts
+    content = _content(copy, work_root)
+    for number in range(len(parts) if folder and content is not None else 0):
         path = Path(folder or "", *parts[number:])
-        if path.is_file() and path.read_bytes() == (work_root / copy[0]).read_bytes():
-            return str(path)
-    return copy[0]
+        if path.is_file() and path.read_bytes() == content:
+            return path
+    return None
+
+
+def _content(copy: re.Match[str], work_root: Path) -> bytes | None:
+    path = work_root / copy[0].rpartition(":")[0]
+    return path.read_bytes() if path.is_file() else None
+
+
+def _origin(copy: re.Match[str], work_root: Path, loaded: LoadedSystem) -> SourceRef | None:
+    from fusesoc_firm.accelerator.origin import origin
+
+    lines = (_content(copy, work_root) or b"").decode(errors="replace").splitlines()
+    return origin(loaded, Path(copy["path"]).stem, lines, int(copy["line"]))
 
 
 def _print_report(chosen: Simulation, report: Report) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import add_picture, add_sources, command, core_folders, load
+from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load
 from fusesoc_firm.node.languages import LANGUAGES, Place
 
 
@@ -127,7 +127,9 @@ def _add_node_options(node: argparse.ArgumentParser) -> None:
 def _check_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.views.show import counts
 
-    system = load(arguments).system
+    loaded = load(arguments)
+    check_sources(loaded, arguments.spec)
+    system = loaded.system
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
 
 

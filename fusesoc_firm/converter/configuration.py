@@ -25,8 +25,7 @@ SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
 # VHDL counts the bits of a publisher's frame, including up to three bytes before the frame, up to 2**31-1.
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
-# After a fault, the position holds its code.
-_CODE_BITS = 2
+_CODE_BITS = 4
 # The number of a literal's bytes on each line.
 _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
@@ -50,12 +49,18 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
     stream = Stream(width)
     windows = windows_of(frame.fields)
     stores = stores_of(stream, windows)
+    is_byte_wide, checks_encoding = stream.lanes == 1, frame.checked_prefix > 0
+    code_bits = 3 if checks_encoding and not is_byte_wide else 2
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
     return {
         **_common(frame, stream, entity or subscriber_entity(frame), "out"),
         **store_configuration(stores),
-        "position_bits": max(_CODE_BITS, stream.beat(ends[-1]).bit_length()),
-        "is_byte_wide": stream.lanes == 1,
+        "position_bits": max(code_bits, stream.beat(ends[-1]).bit_length()),
+        "code_bits": code_bits,
+        "code_zeros": "0" * (_CODE_BITS - code_bits),
+        # The code whose low bits are zero; every beat of an 8-bit stream is full.
+        "zero_code": "BROKEN_BEAT" if not is_byte_wide else "BAD_ENCODING" if checks_encoding else None,
+        "is_byte_wide": is_byte_wide,
         "fields": _field_slices(frame, stream, stores),
         "has_trailing": frame.trailing_bytes > 0,
         "lengths": frame.trailing_bytes + 1,
@@ -188,11 +193,18 @@ def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
     With only one legal length, `number` is None.
     """
     lane = stream.lane(last_byte)
+    below = lane - 1 if lane > 0 else None
+    above = lane + 2 if lane + 2 < stream.lanes else None
     return {
         "number": number,
         "beat": is_beat(stream.beat(last_byte), stream.beat(last_byte)),
         "lane": lane,
         "is_last_lane": lane + 1 == stream.lanes,
+        # The highest lane before `lane`, and the lowest one after its neighbour.
+        "below": below,
+        "above": above,
+        "has_others": [{}] if below is not None or above is not None else [],
+        "has_both": [{}] if below is not None and above is not None else [],
     }
 
 

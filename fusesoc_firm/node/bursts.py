@@ -26,6 +26,10 @@ class BurstError(ValueError):
     """A burst that a Manager never sends; the received part of the burst's frame is dropped."""
 
 
+class AbortedFrameError(BurstError):
+    """The hardware aborted a frame, whose received part is dropped."""
+
+
 @dataclass(frozen=True)
 class JoinedFrame:
     """A complete frame: the id of its publisher and its payload."""
@@ -56,13 +60,16 @@ class BurstJoiner:
         """Return the ids of incomplete frames in ascending order."""
         return tuple(sorted(self._begun))
 
-    def push(self, burst: bytes, tid: int | None = None) -> JoinedFrame | None:
+    def push(self, burst: bytes, tid: int | None = None, *, is_aborted: bool = False) -> JoinedFrame | None:
         """Take a burst and return the frame that it completes, if any.
 
-        `tid` is the stream's `tid`, if the transport has one; it must equal the id. May raise `BurstError`.
+        `tid` is the stream's `tid`, if the transport has one; it must equal the id. `is_aborted` if the burst aborts
+        its frame. May raise `BurstError`.
         """
         identifier = self._id(burst, tid)
         begun = self._begun.pop(identifier, None)
+        if is_aborted:
+            raise AbortedFrameError(f"the frame with id {identifier} was aborted")
         if begun is None:
             frame = bytearray(burst)
         else:

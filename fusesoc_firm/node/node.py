@@ -20,7 +20,7 @@ from functools import partial
 from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.bursts import BurstError, BurstJoiner, JoinedFrame
+from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.carrier import Carrier, CarrierError, Published, Taken
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
@@ -293,7 +293,12 @@ class Node:
 
     def _join(self, hardware: _Hardware, burst: Burst) -> None:
         try:
-            frame = hardware.joiner.push(burst.data, burst.tid)
+            frame = hardware.joiner.push(burst.data, burst.tid, is_aborted=burst.is_aborted)
+        except AbortedFrameError as error:
+            hardware.first_cycles.pop(burst.data[0], None)
+            self.statistics.faults += 1
+            self._report(f"the hardware ended a frame: {error}")
+            return
         except BurstError as error:
             self.statistics.faults += 1
             self._report(f"the hardware sent an invalid burst: {error}")

@@ -7,12 +7,12 @@ import shlex
 import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fusesoc_firm.building.cluster import build_on
 from fusesoc_firm.building.plan import Build, Plan
-from fusesoc_firm.building.pool import Outcome, Pool
+from fusesoc_firm.building.pool import Limits, Outcome, Pool, ignore
 from fusesoc_firm.building.process import run_all, save_time
 from fusesoc_firm.building.recall import Recall, note_call, observed
 from fusesoc_firm.building.steps import Steps
@@ -30,7 +30,8 @@ _LAUNCHER = "EDALIZE_LAUNCHER"
 class How:
     """The options of builds: the folders, the last step, the number of parallel builds (0: one per core), a cluster.
 
-    With `steps`, builds run as actions; the other options for the folders and the last step are then not used.
+    After a failure, `is_failing_fast` skips the other builds. With `steps`, builds run as actions; the other options
+    for the folders and the last step are then not used.
     """
 
     is_clean: bool = False
@@ -39,17 +40,37 @@ class How:
     is_locked: bool = False
     jobs: int = 0
     cluster: str = ""
+    is_failing_fast: bool = False
+    limits: Limits = field(default_factory=Limits)
     steps: Steps | None = None
 
 
-def build(
-    plan: Plan, how: How, tell: Callable[[str], None], progress: Callable[[str], None]
-) -> Generator[Outcome, None, None]:
+@dataclass(frozen=True)
+class Listener:
+    """The functions that are called for builds that wait, during generation, and with each started try of a build."""
+
+    tell: Callable[[str], None]
+    progress: Callable[[str], None]
+    begin: Callable[[Build, int], None] = ignore
+
+
+def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
     """Yield the outcome of each build as it finishes. On exit, end all started processes.
 
-    `tell` is called for builds that wait, and `progress` during generation. May raise `InputError`, also for
-    differences from a core's lock file.
+    May raise `InputError`, also for differences from a core's lock file.
     """
+    waiting = dict.fromkeys(plan.builds)
+    with closing(_build(plan, how, listener)) as outcomes:
+        for outcome in outcomes:
+            del waiting[outcome.build]
+            yield outcome
+            if how.is_failing_fast and not outcome.is_good:
+                break
+    for rest in waiting:
+        yield Outcome(rest, False, 0, is_skipped=True)
+
+
+def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
     _set_launcher(how)
     if how.is_locked:
         for core in dict.fromkeys(build.core for build in plan.builds):
@@ -57,6 +78,8 @@ def build(
     options = ["--setup"] * how.is_setup_only + ["--clean"] * how.is_clean
     if how.cluster:
         options += ["--build-only"] * how.is_build_only + ["--build-root", str(plan.build_root)]
+        options += [f"--timeout={how.limits.seconds:g}"] * bool(how.limits.seconds)
+        options += [f"--retries={how.limits.retries}", *plan.options.command_line()]
         with cluster_workers(how.cluster) as workers:
             yield from build_on(workers, plan, options)
         return
@@ -67,14 +90,16 @@ def build(
         calls = plan.generator_calls()
         with closing(prepare(calls, jobs)) as steps:
             for number, _ in enumerate(steps, start=1):
-                progress(f"generated {number} of {len(calls)}")
+                listener.progress(f"generated {number} of {len(calls)}")
         save_time(_answer)
     options += ["--setup", "--build"] * how.is_build_only
-    yield from Pool(tuple(options), jobs, tell, how.steps or run_all).run(plan)
+    words = (*options, *plan.options.options())
+    pool = Pool(words, jobs, listener.tell, how.limits, listener.begin, how.steps or run_all)
+    yield from pool.run(plan)
 
 
 def recall_or_build(
-    recall: Recall, make: Callable[[], Plan], how: How, tell: Callable[[str], None], progress: Callable[[str], None]
+    recall: Recall, make: Callable[[], Plan], how: How, listener: Listener
 ) -> Generator[tuple[int, Outcome], None, None]:
     """Yield the number of builds and the outcome of each build, as it finishes: recalled if possible, else built.
 
@@ -99,7 +124,7 @@ def recall_or_build(
         plan = make()
     steps = replace(how.steps, recall=recall, scan=recall.keep_builds(plan.builds, found))
     rest = tuple(item for item in plan.builds if item not in done)
-    for outcome in build(replace(plan, builds=rest), replace(how, steps=steps), tell, progress):
+    for outcome in build(replace(plan, builds=rest), replace(how, steps=steps), listener):
         yield len(plan.builds), outcome
 
 

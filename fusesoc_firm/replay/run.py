@@ -188,7 +188,7 @@ class SystemRun:
 
     def _receive(self, burst: Burst, cause: Cause) -> None:
         try:
-            frame = self._joiner.push(burst.data, burst.tid)
+            frame = self._joiner.push(burst.data, burst.tid, is_aborted=burst.is_aborted)
             if frame is None:
                 return
             publisher = self.system.publishers[frame.id]

@@ -44,6 +44,12 @@ def core_of(spec: Path) -> CoreFile | None:
     return None
 
 
+def spec_of(core: Path) -> Path | None:
+    """Return the specification of the system that a core file generates, or None. May raise `InputError`."""
+    made = read_core(core).parameters(_INSTANCE).get("spec")
+    return core.parent / str(made) if made else None
+
+
 def sources_of(
     spec: Path, paths: Sequence[Path] = (), distro: str | None = None, core_folders: CoreFolders = no_core_folders
 ) -> MessageSources:

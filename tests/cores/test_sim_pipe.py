@@ -20,6 +20,7 @@ from tests.hdl.frames import random_frames
 
 SEED = 20240611
 EVERY_BYTE = bytes(range(256))
+VERSION = b"V\2"
 FRAME = b"\x07\x04\x00\x00\x00\x00\x0a\xff\x0d"
 
 
@@ -111,6 +112,15 @@ def test_a_run_ends_with_the_cycle_in_which_something_happens(bench: PipeBench) 
         assert (simulator.run(10), simulator.quiet) == ([], 10)
 
 
+def test_an_aborted_frame_is_a_burst_that_aborts(bench: PipeBench) -> None:
+    with bench.start(16, STALL_PERCENT=30, SEED=SEED) as simulator:
+        simulator.request(FRAME)
+        simulator.request(FRAME[:3], is_aborted=True)
+        simulator.request(FRAME)
+        bursts = [event for event in run_to_rest(simulator) if isinstance(event, Burst)]
+    assert [(burst.data, burst.is_aborted) for burst in bursts] == [(FRAME, False), (FRAME[:3], True), (FRAME, False)]
+
+
 def test_pulses_of_errors(bench: PipeBench) -> None:
     with bench.start(FAULT="id_pulse") as simulator:
         simulator.request(FRAME)
@@ -187,14 +197,14 @@ def test_what_happened_in_the_cycle_of_a_fault_is_reported(bench: PipeBench) -> 
     status, reports, printed = ended(bench, requests, 16, "wrong_tid")
     assert status != 0
     assert "s_axis_tid changes within a burst" in printed
-    assert reports == b"T" + (1).to_bytes(8, "little") + (3).to_bytes(8, "little")
+    assert reports == VERSION + b"T" + (1).to_bytes(8, "little") + (3).to_bytes(8, "little")
 
 
 @pytest.mark.parametrize(
     ("requests", "message"),
     [
-        (b"X", "unknown request 88; legal: F, R, Q"),
-        (b"\x00", "unknown request 0; legal: F, R, Q"),
+        (b"X", "unknown request 88; legal: F, A, R, Q"),
+        (b"\x00", "unknown request 0; legal: F, A, R, Q"),
         (b"R\x01\x00", "the requests end within a request"),
         (b"F\x04\x00\x00\x00abc", "the requests end within a request"),
         (b"F\x00\x00\x00\x00", "the requested frame has no bytes"),
@@ -207,13 +217,13 @@ def test_a_broken_request_ends_it(bench: PipeBench, requests: bytes, message: st
     assert status != 0
     assert message in printed
     # What was right before is answered.
-    assert reports == b"S" + (2).to_bytes(8, "little") + (2).to_bytes(4, "little")
+    assert reports == VERSION + b"S" + (2).to_bytes(8, "little") + (2).to_bytes(4, "little")
 
 
 def test_the_end_of_the_requests_is_an_end(bench: PipeBench) -> None:
-    assert ended(bench, b"")[:2] == (0, b"")
-    assert ended(bench, b"Q")[:2] == (0, b"S" + bytes(12))
-    assert ended(bench, b"QR\x05\x00\x00\x00")[:2] == (0, b"S" + bytes(12))
+    assert ended(bench, b"")[:2] == (0, VERSION)
+    assert ended(bench, b"Q")[:2] == (0, VERSION + b"S" + bytes(12))
+    assert ended(bench, b"QR\x05\x00\x00\x00")[:2] == (0, VERSION + b"S" + bytes(12))
 
 
 def test_without_pipes_it_says_so(bench: PipeBench) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -11,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 from fusesoc import edalizer
@@ -41,6 +43,11 @@ if act == "stay":
     child = subprocess.Popen(["sleep", "600"])
     open(os.path.join(call["files_root"], "processes"), "a").write(f"{os.getpid()} {child.pid}\\n")
     child.wait()
+if act == "once":
+    mark = os.path.join(call["files_root"], "mark")
+    if not os.path.exists(mark):
+        open(mark, "w").close()
+        sys.exit("not yet")
 open("made.core", "w").write(f"CAPI=2:\\nname: {call['vlnv']}\\ntargets: {{default: {{}}}}\\n")
 """
 ACTOR_CORE = """\
@@ -53,12 +60,13 @@ CORE = """\
 CAPI=2:
 name: me:project:NAME:1.0
 filesets:
-  base: {depend: ["me:project:actor", "robot:firm:generators"]}
+  base: {depend: ["me:project:actor", "robot:firm:generators", "mine ? (me:project:nothing)"]}
   bench: {files: [bench.vhd: {file_type: vhdlSource-93}]}
 generate:
   good: {generator: actor, parameters: {act: nothing}}
   bad: {generator: actor, parameters: {act: fail}}
   long: {generator: actor, parameters: {act: stay}}
+  once: {generator: actor, parameters: {act: once}}
   pose: {generator: firm, parameters: {message: geometry_msgs/Pose, ros: 2}, position: prepend}
   twist: {generator: firm, parameters: {message: geometry_msgs/Twist, ros: 2}, position: prepend}
 targets:
@@ -66,6 +74,7 @@ targets:
   good: {filesets: [base], generate: [good], toplevel: x, flow: generic, flow_options: {tool: ghdl}}
   bad: {filesets: [base], generate: [bad], toplevel: x, flow: generic, flow_options: {tool: ghdl}}
   long: {filesets: [base], generate: [long], toplevel: x, flow: generic, flow_options: {tool: ghdl}}
+  once: {filesets: [base], generate: [once], toplevel: x, flow: generic, flow_options: {tool: ghdl}}
   old: {filesets: [base], generate: [good], toplevel: x, default_tool: ghdl}
   sim: {filesets: [base, bench], generate: [pose, twist], toplevel: bench, flow: sim, flow_options: {tool: ghdl}}
 """
@@ -146,7 +155,7 @@ def test_every_target_of_every_core_has_its_place(project: Path) -> None:
         assert row[:3] + row[4:] == [f"me:project:{core}:1.0", target, "ok", log]
         assert f"INFO: Generating me:project:{core}-good:1.0" in (project / log).read_text().splitlines()
         assert (place(project, core, folder) / f"me_project_{core}_1.0.eda.yml").is_file()
-    assert re.fullmatch(r"4 builds in \d+\.\d s", out[-1])
+    assert re.fullmatch(r"4 builds in \d+\.\d s: 4 ok", out[-1])
     # A work root in FuseSoC's configuration would be shared by all builds.
     assert not (project / "nowhere").exists()
     assert not list((project / "build").rglob("*.lock*"))
@@ -244,6 +253,134 @@ def test_killed_it_leaves_nothing_behind_that_hinders(project: Path, staying: su
     core.write_text(core.read_text().replace("act: stay", "act: nothing"))
     assert build(project, "one", "--target", "long", "--setup")[0] == 0
     assert not lock.exists()
+
+
+def results(out: list[str]) -> dict[str, str]:
+    """The result of each build in the table."""
+    rows = [line.split() for line in out if line.startswith("me:project:")]
+    return {f"{row[0].split(':')[2]} {row[1]}": row[2] for row in rows if len(row) in (4, 5)}
+
+
+def test_patterns_and_targets_of_one_core(project: Path) -> None:
+    status, out, _ = build(project, "me:project:*", "--target", "goo*", "old", "--where-present", "--setup")
+    assert (status, results(out)) == (0, dict.fromkeys(["one good", "one old", "two good", "two old"], "ok"))
+    status, out, _ = build(project, "one@good", "tw?", "--target", "old", "--setup")
+    assert (status, results(out)) == (0, dict.fromkeys(["one good", "two old"], "ok"))
+    # Without --where-present, every core must have every target.
+    status, out, err = build(project, "me:project:*", "me:none:*", "--target", "good", "x*", "--setup")
+    assert (status, out) == (1, [])
+    assert "error: no core matches 'me:none:*'" in err
+    assert "error: me:project:actor:1.0 has no target 'good'" in err
+    assert "error: no target of me:project:one:1.0 matches 'x*'" in err
+    assert build(project, "one")[2][0] == "error: no target of one is selected"
+    assert build(project, "--target", "good")[2][0] == "error: no core is selected"
+
+
+def test_only_affected_cores(project: Path) -> None:
+    def git(*words: str) -> None:
+        command = ["git", "-c", "user.name=me", "-c", "user.email=me", *words]
+        subprocess.run(command, cwd=project, check=True, capture_output=True)
+
+    git("init")
+    git("add", ".")
+    git("commit", "-m", "all")
+    options = ("--affected-since", "HEAD", "--target", "good", "--setup")
+    status, out, _ = build(project, *options)
+    assert (status, results(out)) == (0, {})
+    (project / "two.core").write_text(f"{(project / 'two.core').read_text()}# edited\n")
+    status, out, _ = build(project, *options)
+    assert (status, results(out)) == (0, {"two good": "ok"})
+    status, out, _ = build(project, "one", *options)
+    assert (status, results(out)) == (0, {})
+
+
+def test_reports_for_programs(project: Path) -> None:
+    reports = ("--events", "events.jsonl", "--junit", "junit.xml")
+    status, _, _ = build(project, "one@good,bad,once", "--retries", "1", "--jobs", "1", "--setup", *reports)
+    assert status == 1
+    events = [json.loads(line) for line in (project / "events.jsonl").read_text().splitlines()]
+    assert [event["event"] for event in events[:2]] == ["plan", "start"]
+    assert events[0]["builds"][1] == {
+        "core": "me:project:one:1.0",
+        "target": "bad",
+        "log": str(place(project, "one", "bad.log")),
+    }
+    starts = [(event["target"], event["number"]) for event in events if event["event"] == "start"]
+    assert sorted(starts) == [("bad", 1), ("bad", 2), ("good", 1), ("once", 1), ("once", 2)]
+    ends = {event["target"]: (event["result"], event["tries"]) for event in events if event["event"] == "end"}
+    assert ends == {"good": ("ok", 1), "bad": ("failed", 2), "once": ("flaky", 2)}
+    assert {**events[-1], "time": 0} == {
+        "event": "summary",
+        "time": 0,
+        "builds": 3,
+        "ok": 1,
+        "flaky": 1,
+        "failed": 1,
+        "skipped": 0,
+    }
+    (suite,) = ET.parse(project / "junit.xml").getroot()
+    assert [suite.get(name) for name in ("tests", "failures", "skipped")] == ["3", "1", "0"]
+    cases = {case.get("name"): [child.tag for child in case] for case in suite}
+    assert cases == {"good": [], "bad": ["failure"], "once": ["system-out"]}
+    (failure,) = suite.iter("failure")
+    assert "no such luck" in str(failure.text)
+
+
+def test_flaky_builds_are_reported(project: Path) -> None:
+    status, out, _ = build(project, "one", "--target", "once", "--retries", "2", "--setup")
+    assert (status, results(out)) == (0, {"one once": "flaky"})
+    assert out[0].startswith("me:project:one:1.0 once failed in try 1; the last lines of ")
+    assert re.fullmatch(r"1 builds in \d+\.\d s: 1 flaky", out[-1])
+
+
+def test_the_first_failure_ends_all(project: Path) -> None:
+    status, out, err = build(project, "one@bad,long", "two@good", "--fail-fast", "--jobs", "2", "--setup")
+    assert status == 1
+    assert err[-1] == "error: 1 of 3 builds failed"
+    found = results(out)
+    assert found.pop("one bad") == "failed"
+    assert out[-2].split()[2] in ("skipped", "ok")
+    assert "1 failed" in out[-1] and "skipped" in out[-1]
+    assert not any(map(is_running, processes(project)))
+
+
+def test_a_time_limit(project: Path) -> None:
+    status, out, _ = build(project, "one", "--target", "long", "--timeout", "2", "--setup")
+    assert (status, results(out)) == (1, {"one long": "failed"})
+    assert "    ended at the time limit of 2 s" in out
+    assert not any(map(is_running, processes(project)))
+
+
+def test_the_options_of_fusesoc_run(project: Path) -> None:
+    """Flags, tools and the backend's arguments reach FuseSoC."""
+    status, _, err = build(project, "one", "--target", "good", "--setup", "--flag=mine")
+    assert status == 1
+    assert err == ["error: me:project:one:1.0 has an unknown dependency: one"]
+    status, out, _ = build(project, "one", "--target", "old", "--setup", "--tool", "icarus", "--flag=-mine")
+    assert (status, results(out)) == (0, {"one old": "ok"})
+    assert (place(project, "one", "old-icarus") / "me_project_one_1.0.eda.yml").is_file()
+    options = ("one", "--target", "sim", "--build-only", "--backend=--ghdl_unknown=5")
+    status, _, _ = build(project, *options)
+    assert status == 1
+    assert "unrecognized arguments: --ghdl_unknown=5" in place(project, "one", "sim.log").read_text()
+
+
+def test_mappings_and_a_lock_file(project: Path) -> None:
+    """Both apply to the search for dependencies, too."""
+    (project / "other.core").write_text("CAPI=2:\nname: me:project:other:1.0\ntargets: {default: {}}\n")
+    core = project / "one.core"
+    core.write_text(core.read_text().replace("mine ? (me:project:nothing)", "me:project:nothing"))
+    (project / "map.core").write_text(
+        "CAPI=2:\nname: me:project:map:1.0\nmapping: {me:project:nothing: me:project:other}\n"
+    )
+    options = ("one", "--target", "good", "--setup")
+    assert build(project, *options)[0] == 1
+    status, out, _ = build(project, *options, "--mapping", "me:project:map:1.0")
+    assert (status, results(out)) == (0, {"one good": "ok"})
+    (project / "f.lock").write_text("cores: [{name: 'me:project:actor:1.0'}]\nlockfile_version: 1\n")
+    status, out, _ = build(project, *options, "--mapping", "me:project:map:1.0", "--lockfile", "f.lock")
+    assert (status, results(out)) == (0, {"one good": "ok"})
+    assert build(project, *options, "--lockfile", "none.lock")[2][0] == "error: there is no lock file none.lock"
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
-// Speaks for firm/bursts.hpp: `joiner PUBLISHERS WIDTH LONGEST`, then a line for each `push TID HEX` (TID may be `-`) and
-// `close`; each line of input gives one of output.
+// Speaks for firm/bursts.hpp: `joiner PUBLISHERS WIDTH LONGEST`, then a line for each `push TID HEX` (TID may be `-`),
+// `abort TID HEX` and `close`; each line of input gives one of output.
 #include <firm/bursts.hpp>
 
 #include <cstdio>
@@ -21,8 +21,8 @@ static std::string answer(firm::BurstJoiner& joiner, std::istringstream& words, 
   }
   std::string tid, burst;
   words >> tid >> burst;
-  const auto frame =
-      joiner.push(from_hex(burst), tid == "-" ? std::nullopt : std::optional<std::uint8_t>(std::stoul(tid)));
+  const auto frame = joiner.push(
+      from_hex(burst), tid == "-" ? std::nullopt : std::optional<unsigned>(std::stoul(tid)), command == "abort");
   std::ostringstream text;
   if (frame) {
     text << "frame " << unsigned{frame->id} << " ";

@@ -76,7 +76,7 @@ class Simulator:
     def leave(self, now: int) -> bytes:
         _, _, burst = heapq.heappop(self.events)
         cycles = (now - self.beats(burst) + 1).to_bytes(8, "little") + now.to_bytes(8, "little")
-        return b"B" + burst[:1] + cycles + len(burst).to_bytes(4, "little") + burst
+        return b"B" + burst[:1] + bytes(2) + cycles + len(burst).to_bytes(4, "little") + burst
 
     def misbehave(self) -> bytes:
         """What goes wrong now, if it is not the end."""
@@ -85,7 +85,7 @@ class Simulator:
         if self.fault == "kill":
             os.kill(os.getpid(), signal.SIGKILL)
         if self.fault == "cut":
-            os.write(4, b"B\0" + bytes(16) + (100).to_bytes(4, "little") + b"half")
+            os.write(4, b"B" + bytes(19) + (100).to_bytes(4, "little") + b"half")
             sys.exit(4)
         if self.fault == "hang":
             time.sleep(1000)
@@ -93,8 +93,8 @@ class Simulator:
             "garbage": b"\xff" * 100,
             "unsent": (b"T" + bytes(16)) * 100,
             "backwards": b"S" + bytes(12),
-            "long": b"B\0" + bytes(16) + b"\xff" * 4,
-            "error": b"E\1\0" + self.cycle.to_bytes(8, "little") + b"E\xff\xff" + self.cycle.to_bytes(8, "little"),
+            "long": b"B" + bytes(19) + b"\xff" * 4,
+            "error": b"E\1\0" + self.cycle.to_bytes(8, "little") + b"I" + self.cycle.to_bytes(8, "little"),
         }.get(self.fault, b"")
 
     def standing(self) -> bytes:
@@ -113,6 +113,7 @@ def main() -> None:
     arguments = parser.parse_args()
     simulator = Simulator(arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at)
     with open(3, "rb") as requests, open(4, "wb") as reports:
+        reports.write(b"V\2")
         while (letter := requests.read(1)) not in (b"", b"Q"):
             number = int.from_bytes(requests.read(4), "little")
             if letter == b"F":

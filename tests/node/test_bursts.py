@@ -36,7 +36,7 @@ def _python_answers(lines: Sequence[str]) -> list[str]:
                 answers.append("closed")
             else:
                 tid, burst = words[0], bytes.fromhex("".join(words[1:]))
-                frame = joiner.push(burst, None if tid == "-" else int(tid))
+                frame = joiner.push(burst, None if tid == "-" else int(tid), is_aborted=command == "abort")
                 begun = " ".join(["unfinished", *map(str, joiner.unfinished)])
                 answers.append(f"frame {frame.id} {frame.payload.hex()}" if frame else begun)
         except ValueError as error:
@@ -122,6 +122,19 @@ def test_what_no_manager_sends_is_an_error(driver: Driver, bursts: list[str], me
     # The frame is dropped; the next one of that id is received.
     lines += ["push - 0101000000aa"]
     assert _python_answers(lines)[-1] == "frame 1 aa"
+    assert driver.answers(lines) == _python_answers(lines)
+
+
+def test_an_aborted_frame_is_dropped(driver: Driver) -> None:
+    """Whether it has begun or not, and however many bytes came; frames of other ids stay."""
+    lines = ["joiner 4 32 1000", "push - 02040000", "push - 01040000", "abort - 0100000000aabbccdd", "abort - 03"]
+    lines += ["push - 0101000000aa", "push - 0200000000aabbccdd"]
+    assert _python_answers(lines)[3:] == [
+        "error: the frame with id 1 was aborted",
+        "error: the frame with id 3 was aborted",
+        "frame 1 aa",
+        "frame 2 aabbccdd",
+    ]
     assert driver.answers(lines) == _python_answers(lines)
 
 

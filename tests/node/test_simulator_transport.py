@@ -21,6 +21,7 @@ import os, struct, sys, time
 requests, reports = open(3, "rb"), open(4, "wb")
 cycle = quiet = 0
 frames = []
+reports.write(b"V\\2")
 def say(*parts):
     reports.write(b"".join(parts))
 while kind := requests.read(1):
@@ -32,7 +33,7 @@ while kind := requests.read(1):
         if b"garbage" in frames[-1]:
             say(b"!!!!")
         if b"half" in frames[-1]:
-            say(b"B\\0", bytes(16), (100).to_bytes(4, "little"), b"half a burst")
+            say(b"B\\0\\0\\0", bytes(16), (100).to_bytes(4, "little"), b"half a burst")
             reports.flush()
             os.kill(os.getpid(), 9)
     elif kind == b"R":
@@ -41,7 +42,8 @@ while kind := requests.read(1):
             cycle, quiet = cycle + left, quiet + left
         elif frames and left:
             frame = frames.pop(0)
-            say(b"T", struct.pack("<QQ", cycle, cycle), b"B\\7", struct.pack("<QQI", cycle, cycle, len(frame)), frame)
+            say(b"T", struct.pack("<QQ", cycle, cycle))
+            say(b"B\\7\\0\\0", struct.pack("<QQI", cycle, cycle, len(frame)), frame)
             cycle, quiet = cycle + 1, 0
         else:
             cycle, quiet = cycle + left, quiet + left

@@ -54,7 +54,7 @@ class Model:
     def send(self, publisher: int, data: bytes, first: int) -> int:
         """Send a burst from cycle `first` on; return its last cycle."""
         last = first + -(-len(data) // self.lanes) - 1
-        self.report(last, b"B" + le(publisher, 1) + le(first, 8) + le(last, 8) + le(len(data), 4) + data)
+        self.report(last, b"B" + le(publisher, 2) + le(0, 1) + le(first, 8) + le(last, 8) + le(len(data), 4) + data)
         return last
 
     def take(self, frame: bytes) -> None:
@@ -96,7 +96,7 @@ class Model:
             self.send(subscriber, frames[0] + bytes(9), last + 20)
             self.send(200, le(200, 1) + frames[0][1:], last + 60)
         elif kind == "unknown":
-            self.report(last, b"E" + le(65535, 2) + le(last, 8))
+            self.report(last, b"I" + le(last, 8))
 
     def run(self, cycles: int) -> bytes:
         """Run to the end of `cycles`, or of a cycle with reports; return these reports and the report of standstill."""
@@ -109,7 +109,7 @@ class Model:
             end = event + 1
             while self.queue and self.queue[0][0] == event:
                 data = heappop(self.queue)[2]
-                self.last_beat = max(self.last_beat, event if data[:1] != b"E" else 0)
+                self.last_beat = max(self.last_beat, event if data[:1] not in (b"E", b"I") else 0)
                 reports += data
         self.cycle = end
         return reports + b"S" + le(self.cycle, 8) + le(max(0, self.cycle - 1 - self.last_beat), 4)
@@ -117,6 +117,7 @@ class Model:
 
 def main(requests: BinaryIO, reports: BinaryIO) -> None:
     model = Model(int(sys.argv[1]), sys.argv[2:])
+    reports.write(b"V\2")
     while letter := requests.read(1):
         if letter == b"F":
             model.frames.append(requests.read(int.from_bytes(requests.read(4), "little")))

@@ -40,6 +40,9 @@ package firm_axis_pkg is
   -- The number of ones in a contiguous `keep` of a stream, which has 1 to 64 bits.
   function lanes_kept(keep : std_logic_vector) return std_logic_vector;
 
+  -- '1' if a beat breaks the rules of frames: it has a gap or no bytes, or it is neither full nor the last one.
+  function is_broken_beat(keep : std_logic_vector; last : std_logic) return std_logic;
+
   -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one
   -- AND.
   function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector;
@@ -117,6 +120,17 @@ package body firm_axis_pkg is
     end loop;
     return count;
   end function lanes_kept;
+
+  function is_broken_beat(keep : std_logic_vector; last : std_logic) return std_logic is
+    variable lanes   : std_logic_vector(keep'length-1 downto 0);
+    variable has_gap : std_logic := '0';
+  begin
+    lanes := keep;
+    for lane in 1 to lanes'high loop
+      has_gap := has_gap or (lanes(lane) and not lanes(lane-1));
+    end loop;
+    return has_gap or not lanes(0) or (not lanes(lanes'high) and not last);
+  end function is_broken_beat;
 
   function is_equal(index : std_logic_vector; value : natural) return std_logic is
     variable bits  : std_logic_vector(index'length-1 downto 0);

@@ -38,6 +38,8 @@ entity firm_axis_trim is
     fault : in  std_logic := '0';
     valid : in  std_logic;
     ready : out std_logic;
+    -- `ready` of a piece that is not `last`: it depends on neither of them, and is known earlier.
+    piece_ready : out std_logic;
 
     -- Bytes were offered beyond the frame's end, or it ended with more bytes missing than padding may add; both are a
     -- cycle late. `is_closed`: the frame was aborted, so the rest of what is offered is dropped.
@@ -106,6 +108,8 @@ begin
   lacks   <= not (sum(32) or closed_r or open_r);
   free    <= m_ready or not valid_r;
   ready   <= free and (ends or not last);
+
+  piece_ready <= free;
 
   announced <= std_logic_vector(not left_r);
   is_closed <= closed_r;

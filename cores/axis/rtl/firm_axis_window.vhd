@@ -4,6 +4,8 @@
 -- next one. One shifter of radix 4 joins the two: nothing else is between the registers and `window`, and no path leads
 -- from the stream to the window or from `take` to `s_axis_tready`. At any offset, a beat enters every cycle as long as
 -- all available bytes are taken. At 8 bits there is nothing to shift, and the window is the stream.
+-- A broken beat (see is_broken_beat) ends its frame without a byte; what follows it up to `tlast` does not enter. At 8
+-- bits every beat holds its byte, and `tkeep` is ignored.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -30,9 +32,11 @@ entity firm_axis_window is
     -- The next bytes of the frame from lane 0 up; lanes from `available` on are undefined.
     window    : out std_logic_vector(WIDTH-1 downto 0);
     available : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
-    -- The frame ends with the available bytes, which may be none; with it, whether the frame was aborted.
+    -- The frame ends with the available bytes, which may be none; with it, whether the frame was aborted, or ends there
+    -- because of a broken beat.
     is_last    : out std_logic;
     is_aborted : out std_logic;
+    is_broken  : out std_logic;
     -- For a reader whose `take` is a register: the first `take` bytes are available; and if so, the frame ends with
     -- them. Both are a cycle late for bytes that reach into the frame's last beat, which keeps the paths short.
     shown : out std_logic;
@@ -75,6 +79,7 @@ begin
     available(0)  <= s_axis_tvalid and not skipping_r;
     is_last       <= s_axis_tvalid and s_axis_tlast and not skipping_r;
     is_aborted    <= s_axis_tuser(0);
+    is_broken     <= '0';
     shown         <= (s_axis_tvalid and not skipping_r) or not take(0);
     ends          <= s_axis_tlast and take(0);
     s_axis_tready <= dropping or (take_valid and take(0));
@@ -144,14 +149,19 @@ begin
     -- A legal number, so that the assert above reports first.
     constant VOID : natural := max(0, VOID_LANES);
 
-    signal starting_r    : std_logic;  -- the next beat to enter is the first of a frame
-    signal entering      : count_t;    -- the bytes of the beat that enters
-    signal entering_user : std_logic_vector(8 downto 0);
+    signal starting_r     : std_logic;         -- the next beat to enter is the first of a frame
+    signal cutting_r      : std_logic := '0';  -- it follows a broken beat of its frame
+    signal entering       : count_t;           -- the bytes of the beat that enters
+    signal entering_user  : std_logic_vector(9 downto 0);
+    signal entering_valid : std_logic;
+    signal entering_last  : std_logic;
+    signal breaks         : std_logic;         -- it is broken
+    signal slice_ready    : std_logic;
 
     -- The beat after the window's first one. In `tuser`, the slice carries the number of its bytes, whether it is the
-    -- first of a frame, and whether it aborts the frame.
+    -- first of a frame, whether it aborts the frame, and whether it is broken.
     signal next_tdata  : std_logic_vector(WIDTH-1 downto 0);
-    signal next_user   : std_logic_vector(8 downto 0);
+    signal next_user   : std_logic_vector(9 downto 0);
     signal next_tvalid : std_logic;
     signal next_tlast  : std_logic;
     signal next_first  : std_logic;
@@ -162,6 +172,7 @@ begin
     signal tdata_r  : std_logic_vector(WIDTH-1 downto 0);
     signal last_r   : std_logic := '0';
     signal abort_r  : std_logic;         -- it aborts the frame
+    signal broken_r : std_logic;         -- a broken beat ended the frame after it
     signal offset_r : unsigned(OFFSET_BITS-1 downto 0) := (others => '0');  -- the window's first lane
     signal left_r   : count_t := (others => '0');                           -- its bytes from there on
 
@@ -183,7 +194,10 @@ begin
 
   begin
 
-    count_entering : process (s_axis_tkeep, starting_r)
+    -- The last beat of an aborted frame may be empty.
+    breaks <= is_broken_beat(s_axis_tkeep, s_axis_tlast) and not (s_axis_tlast and s_axis_tuser(0));
+
+    count_entering : process (s_axis_tkeep, starting_r, breaks)
       variable kept : count_t;
     begin
       kept     := unsigned(lanes_kept(s_axis_tkeep));
@@ -194,26 +208,34 @@ begin
           entering <= (others => '0');
         end if;
       end if;
+      if breaks = '1' then
+        entering <= (others => '0');
+      end if;
     end process count_entering;
 
-    mark_first : process (clk)
+    follow_frame : process (clk)
     begin
       if rising_edge(clk) then
         if rst_n = '0' then
           starting_r <= '1';
+          cutting_r  <= '0';
         elsif s_axis_tvalid = '1' and s_axis_tready_out = '1' then
           starting_r <= s_axis_tlast;
+          cutting_r  <= (cutting_r or breaks) and not s_axis_tlast;
         end if;
       end if;
-    end process mark_first;
+    end process follow_frame;
 
-    entering_user <= s_axis_tuser & starting_r & std_logic_vector(resize(entering, 7));
-    s_axis_tready <= s_axis_tready_out;
+    entering_user     <= breaks & s_axis_tuser & starting_r & std_logic_vector(resize(entering, 7));
+    entering_valid    <= s_axis_tvalid and not cutting_r;
+    entering_last     <= s_axis_tlast or breaks;
+    s_axis_tready_out <= slice_ready or cutting_r;
+    s_axis_tready     <= s_axis_tready_out;
 
     u_slice : entity firm.firm_axis_register_slice
       generic map (
         WIDTH     => WIDTH,
-        USER_BITS => 9
+        USER_BITS => 10
       )
       port map (
         clk           => clk,
@@ -221,9 +243,9 @@ begin
         s_axis_tdata  => s_axis_tdata,
         s_axis_tkeep  => s_axis_tkeep,
         s_axis_tuser  => entering_user,
-        s_axis_tvalid => s_axis_tvalid,
-        s_axis_tlast  => s_axis_tlast,
-        s_axis_tready => s_axis_tready_out,
+        s_axis_tvalid => entering_valid,
+        s_axis_tlast  => entering_last,
+        s_axis_tready => slice_ready,
         m_axis_tdata  => next_tdata,
         m_axis_tkeep  => open,
         m_axis_tuser  => next_user,
@@ -237,6 +259,7 @@ begin
     next_bytes <= to_01(resize(unsigned(next_user(6 downto 0)), COUNT_BITS));
 
     is_aborted <= abort_r when last_r = '1' else next_user(8);
+    is_broken  <= broken_r when last_r = '1' else next_user(9);
 
     both_beats <= next_tdata(WIDTH-9 downto 0) & tdata_r;
     window     <= bytes_from(both_beats, offset_r);
@@ -280,8 +303,9 @@ begin
     move_beat : process (clk)
     begin
       if rising_edge(clk) and move = '1' then
-        tdata_r <= next_tdata;
-        abort_r <= next_user(8);
+        tdata_r  <= next_tdata;
+        abort_r  <= next_user(8);
+        broken_r <= next_user(9);
       end if;
     end process move_beat;
 

@@ -194,7 +194,7 @@ begin
     file lines            : text open write_mode is TRIMMED_FILE;
     file wanted_file      : text open read_mode is existing(EXPECTED_FILE);
     variable bytes        : line;
-    variable header       : line;
+    variable remains      : line;
     variable watch        : natural := 0;
     variable was_cut      : boolean := false;
     variable was_lacking  : boolean := false;
@@ -222,9 +222,9 @@ begin
         end loop;
         if m_last = '1' then
           if m_abort = '1' then
-            header := new string'(bytes(1 to 2*HEADER_BYTES) & " aborted");
+            remains := new string'(bytes(1 to 2*HEADER_BYTES) & " aborted");
             deallocate(bytes);
-            bytes := header;
+            bytes := remains;
           end if;
           if was_cut then
             write(bytes, string'(" cut"));

@@ -79,6 +79,7 @@ begin
       window        => window,
       available     => available,
       is_last       => is_last,
+      is_broken     => open,
       shown         => shown,
       ends          => ends,
       take_valid    => take_valid,

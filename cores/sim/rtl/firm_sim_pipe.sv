@@ -23,7 +23,7 @@ module firm_sim_pipe #(
   // To the system.
   output reg  [WIDTH-1:0]   m_axis_tdata,
   output reg  [WIDTH/8-1:0] m_axis_tkeep,
-  output wire [0:0]         m_axis_tuser,
+  output reg  [0:0]         m_axis_tuser,
   output reg                m_axis_tvalid,
   output reg                m_axis_tlast,
   input  wire               m_axis_tready,
@@ -45,7 +45,8 @@ module firm_sim_pipe #(
   localparam HALF_PERIOD  = 5;
   localparam RESET_CYCLES = 8;
   localparam HIGHEST_SEED = 2147483562;  // of math_real.uniform
-  localparam NO_CONVERTER = 65535;
+  localparam MOST_ERRORS  = 65534;
+  localparam VERSION      = 2;           // of requests and reports
   localparam MOST_QUIET   = 2147483647;
 
   integer requests, reports;             // files
@@ -60,6 +61,8 @@ module firm_sim_pipe #(
   // The stream to the system: the frames that wait to be offered.
   reg [7:0]  bytes [$];
   integer    sizes [$];
+  reg        aborts [$];
+  reg        is_aborted;                 // the frame being sent
   integer    sending;                    // the size of the frame being sent; 0 for none
   integer    bytes_sent;                 // of it, without the beat on offer
   reg        is_offered;
@@ -75,17 +78,16 @@ module firm_sim_pipe #(
   reg               tready, tvalid, tlast;
   reg [WIDTH-1:0]   tdata;
   reg [LANES-1:0]   tkeep;
+  reg               tuser;
   reg [7:0]         tid;
   reg               id_pulse;
   reg [ERRORS-1:0]  frame_pulses;
 
   // A beat that waited for `tready`, and that the stream from the system must still show.
-  reg               is_held, held_tlast;
+  reg               is_held, held_tlast, held_tuser;
   reg [WIDTH-1:0]   held_tdata;
   reg [LANES-1:0]   held_tkeep;
   reg [7:0]         held_tid;
-
-  assign m_axis_tuser = 1'b0;
 
   // ------------------------------------------------------------------ faults
 
@@ -157,7 +159,7 @@ module firm_sim_pipe #(
     end
   endtask
 
-  task read_frame;
+  task read_frame(input reg has_abort);
     integer   size, place;
     reg [7:0] value;
     begin
@@ -171,6 +173,7 @@ module firm_sim_pipe #(
         bytes.push_back(value);
       end
       sizes.push_back(size);
+      aborts.push_back(has_abort);
     end
   endtask
 
@@ -178,6 +181,14 @@ module firm_sim_pipe #(
     integer place;
     for (place = 0; place < size; place = place + 1)
       $fwrite(reports, "%c", number[8*place +: 8]);
+  endtask
+
+  task report_version;
+    begin
+      $fwrite(reports, "V");
+      write_number(VERSION, 1);
+      $fflush(reports);
+    end
   endtask
 
   task report_taken;
@@ -193,11 +204,21 @@ module firm_sim_pipe #(
     begin
       is_reported = 1;
       $fwrite(reports, "B%c", burst_tid);
+      write_number(0, 1);
+      write_number({63'b0, tuser}, 1);
       write_number(first_out, 8);
       write_number(cycle, 8);
       write_number({32'b0, burst.size()}, 4);
       while (burst.size() != 0)
         $fwrite(reports, "%c", burst.pop_front());
+    end
+  endtask
+
+  task report_id_error;
+    begin
+      is_reported = 1;
+      $fwrite(reports, "I");
+      write_number(cycle, 8);
     end
   endtask
 
@@ -232,6 +253,7 @@ module firm_sim_pipe #(
       end
       m_axis_tvalid = 1;
       m_axis_tlast  = sending - bytes_sent <= LANES;
+      m_axis_tuser  = m_axis_tlast && is_aborted;
       is_offered    = 1;
     end
   endtask
@@ -240,6 +262,7 @@ module firm_sim_pipe #(
     begin
       m_axis_tdata  = {WIDTH{1'bx}};
       m_axis_tkeep  = {LANES{1'bx}};
+      m_axis_tuser  = 1'bx;
       m_axis_tlast  = 1'bx;
       m_axis_tvalid = 0;
     end
@@ -273,8 +296,10 @@ module firm_sim_pipe #(
         end
       end
       if (!is_offered) begin
-        if (sending == 0 && sizes.size() != 0)
-          sending = sizes.pop_front();
+        if (sending == 0 && sizes.size() != 0) begin
+          sending    = sizes.pop_front();
+          is_aborted = aborts.pop_front();
+        end
         draw_stall(is_stalled);
         if (sending != 0 && !is_stalled)
           offer_beat;
@@ -352,7 +377,8 @@ module firm_sim_pipe #(
     if (tvalid !== 1'b1) begin
       $write("firm_sim_pipe: s_axis_tvalid falls before s_axis_tready rises");
       fail_in_cycle;
-    end else if (tdata !== held_tdata || tkeep !== held_tkeep || tid !== held_tid || tlast !== held_tlast) begin
+    end else if (tdata !== held_tdata || tkeep !== held_tkeep || tuser !== held_tuser || tid !== held_tid
+        || tlast !== held_tlast) begin
       $write("firm_sim_pipe: the stream from the system changes before s_axis_tready rises");
       fail_in_cycle;
     end
@@ -373,6 +399,7 @@ module firm_sim_pipe #(
       if (is_held) begin
         held_tdata = tdata;
         held_tkeep = tkeep;
+        held_tuser = tuser;
         held_tid   = tid;
         held_tlast = tlast;
       end
@@ -388,7 +415,7 @@ module firm_sim_pipe #(
     integer converter;
     begin
       if (id_pulse === 1'b1)
-        report_error(NO_CONVERTER);
+        report_id_error;
       else if (id_pulse !== 1'b0) begin
         $write("firm_sim_pipe: id_error is '%c'", level(id_pulse));
         fail_in_cycle;
@@ -411,6 +438,7 @@ module firm_sim_pipe #(
       tready       = m_axis_tready;
       tdata        = s_axis_tdata;
       tkeep        = s_axis_tkeep;
+      tuser        = s_axis_tuser === 1'b1;
       tid          = s_axis_tid;
       tvalid       = s_axis_tvalid;
       tlast        = s_axis_tlast;
@@ -450,7 +478,7 @@ module firm_sim_pipe #(
         stall_percent = STALL_PERCENT;
       if (WIDTH != 8 && WIDTH != 16 && WIDTH != 32 && WIDTH != 64 && WIDTH != 128 && WIDTH != 256 && WIDTH != 512)
         $fatal(1, "firm_sim_pipe: WIDTH is %0d; legal: 8, 16, 32, 64, 128, 256, 512", WIDTH);
-      if (ERRORS < 1 || ERRORS >= NO_CONVERTER)
+      if (ERRORS < 1 || ERRORS > MOST_ERRORS)
         $fatal(1, "firm_sim_pipe: ERRORS is %0d; legal: 1 to 65534", ERRORS);
       if (seed < 1 || seed > HIGHEST_SEED)
         $fatal(1, "firm_sim_pipe: SEED is %0d; legal: 1 to 2147483562", seed);
@@ -487,6 +515,7 @@ module firm_sim_pipe #(
   initial begin : host
     check_options;
     open_pipes;
+    report_version;
     reset_state;
     clk           = 0;
     rst_n         = 0;
@@ -499,14 +528,14 @@ module firm_sim_pipe #(
     request = $fgetc(requests);
     // The end of the requests has the same effect as Q.
     while (request >= 0) begin
-      if (request == "F")
-        read_frame;
+      if (request == "F" || request == "A")
+        read_frame(request == "A");
       else if (request == "R")
         run;
       else if (request == "Q")
         report_stand;
       else begin
-        $display("firm_sim_pipe: unknown request %0d; legal: F, R, Q", request);
+        $display("firm_sim_pipe: unknown request %0d; legal: F, A, R, Q", request);
         fail;
       end
       request = request == "Q" ? -1 : $fgetc(requests);

@@ -58,7 +58,9 @@ architecture simulation of firm_sim_pipe is
   constant RESET_CYCLES : positive := 8;
   constant HIGHEST_SEED : positive := 2147483562;  -- of math_real.uniform
   constant NO_ERRORS    : std_logic_vector(ERRORS-1 downto 0) := (others => '0');
-  constant NO_CONVERTER : natural  := 2**16 - 1;
+  constant MOST_ERRORS  : natural  := 2**16 - 2;
+  -- Of requests and reports.
+  constant VERSION      : natural  := 2;
 
   type level_t is array (boolean) of std_logic;
   constant LEVEL_OF : level_t := (false => '0', true => '1');
@@ -95,6 +97,7 @@ architecture simulation of firm_sim_pipe is
   type frame_ptr_t is access frame_t;
   type frame_t is record
     bytes      : line;
+    is_aborted : boolean;
     next_frame : frame_ptr_t;
   end record frame_t;
 
@@ -103,7 +106,7 @@ begin
   assert is_stream_width(WIDTH)
     report "firm_sim_pipe: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
-  assert ERRORS >= 1 and ERRORS < NO_CONVERTER
+  assert ERRORS >= 1 and ERRORS <= MOST_ERRORS
     report "firm_sim_pipe: ERRORS is " & integer'image(ERRORS) & "; legal: 1 to 65534"
     severity failure;
   assert SEED >= 1 and SEED <= HIGHEST_SEED
@@ -142,6 +145,7 @@ begin
     variable is_held    : boolean := false;
     variable held_tdata : std_logic_vector(s_axis_tdata'range);
     variable held_tkeep : std_logic_vector(s_axis_tkeep'range);
+    variable held_tuser : std_logic_vector(s_axis_tuser'range);
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
 
@@ -205,7 +209,7 @@ begin
       number := sum;
     end procedure read_number;
 
-    procedure read_frame is
+    procedure read_frame(is_aborted : in boolean) is
       variable frame : frame_ptr_t;
       variable size  : natural;
     begin
@@ -213,8 +217,9 @@ begin
       if size = 0 then
         fail("the requested frame has no bytes");
       end if;
-      frame       := new frame_t;
-      frame.bytes := new string(1 to size);
+      frame            := new frame_t;
+      frame.bytes      := new string(1 to size);
+      frame.is_aborted := is_aborted;
       for place in 1 to size loop
         read_byte(frame.bytes(place));
       end loop;
@@ -241,6 +246,13 @@ begin
       write_number(number.high, 5);
     end procedure write_cycle;
 
+    procedure report_version is
+    begin
+      write(reports, 'V');
+      write_number(VERSION, 1);
+      flush_all_files(0);
+    end procedure report_version;
+
     procedure report_taken is
     begin
       is_reported := true;
@@ -254,6 +266,8 @@ begin
       is_reported := true;
       write(reports, 'B');
       write(reports, to_character(burst_tid));
+      write_number(0, 1);
+      write_number(boolean'pos(s_axis_tuser = "1"), 1);
       write_cycle(first_out);
       write_cycle(cycle);
       write_number(burst_size, 4);
@@ -261,6 +275,13 @@ begin
         write(reports, burst(place));
       end loop;
     end procedure report_burst;
+
+    procedure report_id_error is
+    begin
+      is_reported := true;
+      write(reports, 'I');
+      write_cycle(cycle);
+    end procedure report_id_error;
 
     procedure report_error(converter : in natural) is
     begin
@@ -296,6 +317,9 @@ begin
       m_axis_tlast  <= '0' after HOLD;
       if sending.bytes'length - bytes_sent <= LANES then
         m_axis_tlast <= '1' after HOLD;
+        if sending.is_aborted then
+          m_axis_tuser <= "1" after HOLD;
+        end if;
       end if;
       is_offered := true;
     end procedure offer_beat;
@@ -304,6 +328,7 @@ begin
     begin
       m_axis_tdata  <= (m_axis_tdata'range => 'X') after HOLD;
       m_axis_tkeep  <= (m_axis_tkeep'range => 'X') after HOLD;
+      m_axis_tuser  <= "X" after HOLD;
       m_axis_tlast  <= 'X' after HOLD;
       m_axis_tvalid <= '0' after HOLD;
     end procedure offer_nothing;
@@ -413,7 +438,7 @@ begin
     begin
       if s_axis_tvalid /= '1' then
         fail_in_cycle("s_axis_tvalid falls before s_axis_tready rises");
-      elsif s_axis_tdata /= held_tdata or s_axis_tkeep /= held_tkeep
+      elsif s_axis_tdata /= held_tdata or s_axis_tkeep /= held_tkeep or s_axis_tuser /= held_tuser
             or s_axis_tid /= held_tid or s_axis_tlast /= held_tlast then
         fail_in_cycle("the stream from the system changes before s_axis_tready rises");
       end if;
@@ -423,6 +448,7 @@ begin
     begin
       held_tdata := s_axis_tdata;
       held_tkeep := s_axis_tkeep;
+      held_tuser := s_axis_tuser;
       held_tid   := s_axis_tid;
       held_tlast := s_axis_tlast;
     end procedure hold_beat;
@@ -454,7 +480,7 @@ begin
     procedure watch_errors is
     begin
       if id_error = '1' then
-        report_error(NO_CONVERTER);
+        report_id_error;
       elsif id_error /= '0' then
         fail_in_cycle("id_error is " & std_logic'image(id_error));
       end if;
@@ -504,6 +530,7 @@ begin
   begin
     random_1 := SEED;
     open_pipes;
+    report_version;
     rst_n         <= '0';
     s_axis_tready <= '0';
     offer_nothing;
@@ -517,10 +544,11 @@ begin
     while request /= 'Q' and not endfile(requests) loop
       read(requests, request);
       case request is
-        when 'F'    => read_frame;
+        when 'F'    => read_frame(false);
+        when 'A'    => read_frame(true);
         when 'R'    => run;
         when 'Q'    => report_stand;
-        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, R, Q");
+        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, A, R, Q");
       end case;
     end loop;
     wait;

@@ -13,6 +13,7 @@ module firm_sim_pipe_tb;
   wire             clk, rst_n;
   wire [WIDTH-1:0] out_tdata, in_tdata;
   wire [LANES-1:0] out_tkeep, in_tkeep;
+  wire [0:0]       out_tuser, in_tuser;
   wire [7:0]       in_tid;
   wire             out_tvalid, out_tlast, out_tready;
   wire             in_tvalid, in_tlast, in_tready;
@@ -23,11 +24,13 @@ module firm_sim_pipe_tb;
     .rst_n(rst_n),
     .m_axis_tdata(out_tdata),
     .m_axis_tkeep(out_tkeep),
+    .m_axis_tuser(out_tuser),
     .m_axis_tvalid(out_tvalid),
     .m_axis_tlast(out_tlast),
     .m_axis_tready(out_tready),
     .s_axis_tdata(in_tdata),
     .s_axis_tkeep(in_tkeep),
+    .s_axis_tuser(in_tuser),
     .s_axis_tid(in_tid),
     .s_axis_tvalid(in_tvalid),
     .s_axis_tlast(in_tlast),
@@ -40,11 +43,13 @@ module firm_sim_pipe_tb;
     .clk(clk),
     .s_axis_tdata(out_tdata),
     .s_axis_tkeep(out_tkeep),
+    .s_axis_tuser(out_tuser),
     .s_axis_tvalid(out_tvalid),
     .s_axis_tlast(out_tlast),
     .s_axis_tready(out_tready),
     .m_axis_tdata(in_tdata),
     .m_axis_tkeep(in_tkeep),
+    .m_axis_tuser(in_tuser),
     .m_axis_tid(in_tid),
     .m_axis_tvalid(in_tvalid),
     .m_axis_tlast(in_tlast),

@@ -20,12 +20,14 @@ architecture simulation of firm_sim_pipe_tb is
 
   signal out_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal out_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal out_tuser  : std_logic_vector(0 downto 0);
   signal out_tvalid : std_logic;
   signal out_tlast  : std_logic;
   signal out_tready : std_logic;
 
   signal in_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal in_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal in_tuser  : std_logic_vector(0 downto 0);
   signal in_tid    : std_logic_vector(7 downto 0);
   signal in_tvalid : std_logic;
   signal in_tlast  : std_logic;
@@ -48,11 +50,13 @@ begin
       rst_n         => rst_n,
       m_axis_tdata  => out_tdata,
       m_axis_tkeep  => out_tkeep,
+      m_axis_tuser  => out_tuser,
       m_axis_tvalid => out_tvalid,
       m_axis_tlast  => out_tlast,
       m_axis_tready => out_tready,
       s_axis_tdata  => in_tdata,
       s_axis_tkeep  => in_tkeep,
+      s_axis_tuser  => in_tuser,
       s_axis_tid    => in_tid,
       s_axis_tvalid => in_tvalid,
       s_axis_tlast  => in_tlast,
@@ -70,11 +74,13 @@ begin
       clk           => clk,
       s_axis_tdata  => out_tdata,
       s_axis_tkeep  => out_tkeep,
+      s_axis_tuser  => out_tuser,
       s_axis_tvalid => out_tvalid,
       s_axis_tlast  => out_tlast,
       s_axis_tready => out_tready,
       m_axis_tdata  => in_tdata,
       m_axis_tkeep  => in_tkeep,
+      m_axis_tuser  => in_tuser,
       m_axis_tid    => in_tid,
       m_axis_tvalid => in_tvalid,
       m_axis_tlast  => in_tlast,

@@ -34,7 +34,9 @@ MOST_CYCLES = 2**31 - 1
 # Connect the pipes to the descriptors that a simulator expects. A shell cannot copy two-digit descriptors, but it can
 # open them by name.
 _SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
-_ID_ERROR = 65535
+PIPE_VERSION = 2
+"""The version of requests and reports."""
+
 _SHOWN_LINES = 20
 # A simulator normally ends immediately on request, or when its pipes close.
 _END_SECONDS = 10.0
@@ -73,6 +75,7 @@ class Simulator:
         """Start `command` in `folder`. May raise `TransportError`."""
         self.cycle = 0
         self.quiet = 0
+        self._has_version = False
         self._printed = tempfile.TemporaryFile()  # noqa: SIM115
         from_us, to_simulator = os.pipe()
         from_simulator, to_us = os.pipe()
@@ -101,11 +104,14 @@ class Simulator:
         """The id of the simulator's process."""
         return self._process.pid
 
-    def request(self, frame: bytes) -> None:
-        """Append a frame to the frames that wait to be sent to the system. May raise `TransportError`."""
+    def request(self, frame: bytes, *, is_aborted: bool = False) -> None:
+        """Append a frame to the frames that wait to be sent to the system. May raise `TransportError`.
+
+        If `is_aborted`, the last beat aborts the frame.
+        """
         if not 1 <= len(frame) <= MOST_CYCLES:
             raise ValueError(f"the frame has {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
-        self._write(b"F" + len(frame).to_bytes(4, "little"), frame)
+        self._write((b"A" if is_aborted else b"F") + len(frame).to_bytes(4, "little"), frame)
 
     def run(self, cycles: int) -> list[Event]:
         """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""
@@ -178,6 +184,8 @@ class Simulator:
 
     def _events(self) -> list[Event]:
         """Return all events up to the report at which the simulation stops."""
+        if not self._has_version:
+            self._check_version()
         events: list[Event] = []
         while (kind := self._read(1)) != b"S":
             events.append(self._event(kind))
@@ -185,15 +193,23 @@ class Simulator:
         self.quiet = self._number(4)
         return events
 
+    def _check_version(self) -> None:
+        found = self._read(2)
+        if found[:1] != b"V" or found[1] != PIPE_VERSION:
+            says = f"version {found[1]}" if found[:1] == b"V" else f"0x{found.hex()} instead of its version"
+            self._fail(f"the simulator sent {says}; version {PIPE_VERSION} is needed, so build the simulator again")
+        self._has_version = True
+
     def _event(self, kind: bytes) -> Event:
         if kind == b"T":
             return Taken(self._number(8), self._number(8))
         if kind == b"B":
-            tid, first, last = self._number(1), self._number(8), self._number(8)
-            return Burst(self._read(self._number(4)), tid, first, last)
+            tid, end, first, last = self._number(2), self._number(1), self._number(8), self._number(8)
+            return Burst(self._read(self._number(4)), tid, first, last, is_aborted=bool(end))
         if kind == b"E":
-            converter = self._number(2)
-            return ErrorPulse(None if converter == _ID_ERROR else converter, self._number(8))
+            return ErrorPulse(self._number(2), self._number(8))
+        if kind == b"I":
+            return ErrorPulse(None, self._number(8))
         return self._fail(f"the simulator sent 0x{kind.hex()} instead of the start of a report")
 
     def _wait(self) -> int | None:

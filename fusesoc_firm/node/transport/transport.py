@@ -30,14 +30,15 @@ class LostFrameError(TransportError):
 class Burst:
     """The valid bytes (by `tkeep`) of the system's stream up to a `tlast`: a frame or a part of a frame.
 
-    `tid` is the stream's `tid`, if the transport carries it. For simulated hardware, the burst also contains the clk
-    cycles in which the first and the last beat were taken.
+    `tid` is the stream's `tid`, if the transport carries it. `is_aborted` if the burst aborts its frame. For simulated
+    hardware, the burst also contains the clk cycles in which the first and the last beat were taken.
     """
 
     data: bytes
     tid: int | None = None
     first_cycle: int | None = None
     last_cycle: int | None = None
+    is_aborted: bool = False
 
 
 class Transport(Protocol):

@@ -29,7 +29,8 @@ entity axis_to_geometry_msgs_quaternion is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
-    -- 4 its encoding is unknown; the code is valid while frame_error is high
+    -- 4 its encoding is unknown;
+    -- the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -37,15 +38,15 @@ end entity;
 
 architecture rtl of axis_to_geometry_msgs_quaternion is
 
-  subtype code_t is std_logic_vector(2 downto 0);
-  constant NO_FAULT     : code_t := "000";
-  constant BAD_LENGTH   : code_t := "001";
-  constant SHORT_FRAME  : code_t := "010";
-  constant LONG_FRAME   : code_t := "011";
+  subtype code_t is std_logic_vector(3 downto 0);
+  constant NO_FAULT     : code_t := "0000";
+  constant BAD_LENGTH   : code_t := "0001";
+  constant SHORT_FRAME  : code_t := "0010";
+  constant LONG_FRAME   : code_t := "0011";
   constant NO_LENGTH    : std_logic_vector(0 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's first beat. After a fault, the two low bits are its code. Then stores
-  -- may change, since their frame is lost.
+  -- The beat on s_axis, counted from the length's first beat. After a fault, its low bits are those of the code.
+  -- Then stores may change, since their frame is lost.
   subtype position_t is unsigned(5 downto 0);
   signal position_r     : position_t := (others => '0');
   signal next_position  : position_t;

@@ -8,6 +8,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.are_ones;
 
 entity axis_to_geometry_msgs_quaternion is
   port (
@@ -29,7 +31,8 @@ entity axis_to_geometry_msgs_quaternion is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
-    -- 4 its encoding is unknown; the code is valid while frame_error is high
+    -- 4 its encoding is unknown, 8 a beat is neither full nor the last one, is empty, or has gaps;
+    -- the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -37,16 +40,17 @@ end entity;
 
 architecture rtl of axis_to_geometry_msgs_quaternion is
 
-  subtype code_t is std_logic_vector(2 downto 0);
-  constant NO_FAULT     : code_t := "000";
-  constant BAD_LENGTH   : code_t := "001";
-  constant SHORT_FRAME  : code_t := "010";
-  constant LONG_FRAME   : code_t := "011";
-  constant BAD_ENCODING : code_t := "100";
+  subtype code_t is std_logic_vector(3 downto 0);
+  constant NO_FAULT     : code_t := "0000";
+  constant BAD_LENGTH   : code_t := "0001";
+  constant SHORT_FRAME  : code_t := "0010";
+  constant LONG_FRAME   : code_t := "0011";
+  constant BAD_ENCODING : code_t := "0100";
+  constant BROKEN_BEAT  : code_t := "1000";
   constant NO_LENGTH    : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's first beat. After a fault, the two low bits are its code. Then stores
-  -- may change, since their frame is lost.
+  -- The beat on s_axis, counted from the length's first beat. After a fault, its low bits are those of the code.
+  -- Then stores may change, since their frame is lost.
   subtype position_t is unsigned(2 downto 0);
   signal position_r     : position_t := (others => '0');
   signal next_position  : position_t;
@@ -101,9 +105,9 @@ begin
   msg_valid        <= complete_r;
   frame_error      <= ended_r;
   -- A wrong length is found a beat late, but is the frame's first fault.
-  frame_error_code <= '0' & BAD_LENGTH when match_r = NO_LENGTH
-                      else '0' & BAD_ENCODING when position_r(1 downto 0) = "00"
-                      else "00" & std_logic_vector(position_r(1 downto 0));
+  frame_error_code <= BAD_LENGTH when match_r = NO_LENGTH
+                      else BROKEN_BEAT when position_r(2 downto 0) = 0
+                      else "0" & std_logic_vector(position_r(2 downto 0));
 
   compare : process (position_r, is_first, s_axis_tdata, s_axis_tkeep, match_r)
   begin
@@ -152,6 +156,8 @@ begin
     fault <= NO_FAULT;
     if is_first = '0' and match_r = NO_LENGTH then
       fault <= BAD_LENGTH;
+    elsif s_axis_tlast = '0' and are_ones(s_axis_tkeep) = '0' then
+      fault <= BROKEN_BEAT;
     elsif is_first = '1' and s_axis_tkeep(5) = '1' and s_axis_tdata(47 downto 40) /= x"00" then
       fault <= BAD_ENCODING;
     elsif is_first = '1' and s_axis_tkeep(6) = '1' and s_axis_tdata(55 downto 48) /= x"01" then
@@ -161,24 +167,32 @@ begin
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(0) = '0' then
         fault <= SHORT_FRAME;
+      elsif are_ones(not s_axis_tkeep(7 downto 2)) = '0' then
+        fault <= BROKEN_BEAT;
       end if;
     elsif match_r(1) = '1' and position_r = 5 then
       if s_axis_tlast = '0' or s_axis_tkeep(2) = '1' then
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(1) = '0' then
         fault <= SHORT_FRAME;
+      elsif are_ones(s_axis_tkeep(0 downto 0)) = '0' or are_ones(not s_axis_tkeep(7 downto 3)) = '0' then
+        fault <= BROKEN_BEAT;
       end if;
     elsif match_r(2) = '1' and position_r = 5 then
       if s_axis_tlast = '0' or s_axis_tkeep(3) = '1' then
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(2) = '0' then
         fault <= SHORT_FRAME;
+      elsif are_ones(s_axis_tkeep(1 downto 0)) = '0' or are_ones(not s_axis_tkeep(7 downto 4)) = '0' then
+        fault <= BROKEN_BEAT;
       end if;
     elsif match_r(3) = '1' and position_r = 5 then
       if s_axis_tlast = '0' or s_axis_tkeep(4) = '1' then
         fault <= LONG_FRAME;
       elsif s_axis_tkeep(3) = '0' then
         fault <= SHORT_FRAME;
+      elsif are_ones(s_axis_tkeep(2 downto 0)) = '0' or are_ones(not s_axis_tkeep(7 downto 5)) = '0' then
+        fault <= BROKEN_BEAT;
       end if;
     elsif s_axis_tlast = '1' then
       fault <= SHORT_FRAME;
@@ -195,7 +209,7 @@ begin
       -- The first fault of a frame is the one reported.
       next_position <= position_r;
       if broken_r = '0' then
-        next_position <= resize(unsigned(fault(1 downto 0)), position_t'length);
+        next_position <= resize(unsigned(fault(2 downto 0)), position_t'length);
       end if;
       next_broken <= not s_axis_tlast;
       next_ended  <= s_axis_tlast;

@@ -26,7 +26,8 @@ entity axis_to_awkward_msgs_carry254 is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
-    -- 4 its encoding is unknown; the code is valid while frame_error is high
+    -- 4 its encoding is unknown;
+    -- the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -34,16 +35,16 @@ end entity;
 
 architecture rtl of axis_to_awkward_msgs_carry254 is
 
-  subtype code_t is std_logic_vector(2 downto 0);
-  constant NO_FAULT     : code_t := "000";
-  constant BAD_LENGTH   : code_t := "001";
-  constant SHORT_FRAME  : code_t := "010";
-  constant LONG_FRAME   : code_t := "011";
-  constant BAD_ENCODING : code_t := "100";
+  subtype code_t is std_logic_vector(3 downto 0);
+  constant NO_FAULT     : code_t := "0000";
+  constant BAD_LENGTH   : code_t := "0001";
+  constant SHORT_FRAME  : code_t := "0010";
+  constant LONG_FRAME   : code_t := "0011";
+  constant BAD_ENCODING : code_t := "0100";
   constant NO_LENGTH    : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's first beat. After a fault, the two low bits are its code. Then stores
-  -- may change, since their frame is lost.
+  -- The beat on s_axis, counted from the length's first beat. After a fault, its low bits are those of the code.
+  -- Then stores may change, since their frame is lost.
   subtype position_t is unsigned(8 downto 0);
   signal position_r     : position_t := (others => '0');
   signal next_position  : position_t;
@@ -85,7 +86,7 @@ begin
   segment_valid    <= (others => complete_r);
   msg_valid        <= complete_r;
   frame_error      <= ended_r;
-  frame_error_code <= '0' & BAD_ENCODING when position_r(1 downto 0) = "00"
+  frame_error_code <= BAD_ENCODING when position_r(1 downto 0) = 0
                       else "00" & std_logic_vector(position_r(1 downto 0));
 
   compare : process (position_r, is_first, s_axis_tdata, match_r)

@@ -1,4 +1,4 @@
-"""The subscriber of a message of variable size alone, and what must come out of it.
+"""A subscriber alone, and what must come out of it.
 
     bench = SubscriberBench(tmp_path)
     subscriber = bench.subscriber(frame, 8)
@@ -17,12 +17,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fusesoc_firm.converter.configuration import subscriber_entity
-from fusesoc_firm.converter.message_ports import message_ports, message_side
+from fusesoc_firm.converter.message_ports import message_ports, message_side, segment_count
 from fusesoc_firm.converter.program import has_bytes
-from fusesoc_firm.converter.variable_subscriber import (
-    VARIABLE_SUBSCRIBER_TEMPLATE,
-    variable_subscriber_configuration,
-)
+from fusesoc_firm.converter.sources import subscriber_source
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Path, Step
 from fusesoc_firm.text.render import render
@@ -30,6 +27,19 @@ from tests.hdl.ghdl import Generic, Library, core_files
 
 LENGTH_BYTES = 4
 _ZERO = {True: "(others => '0')", False: "'0'"}
+
+
+@dataclass(frozen=True)
+class Beat:
+    """A beat of a stream; bit k of `keep` is that of lane k."""
+
+    data: bytes
+    keep: int
+    is_last: bool
+
+    def row(self, width: int) -> str:
+        """The beat as the bench reads it."""
+        return f"{int.from_bytes(self.data, 'little'):0{width}b} {self.keep:0{width // 8}b} {int(self.is_last)}"
 
 
 @dataclass(frozen=True)
@@ -67,9 +77,8 @@ class Subscriber:
     def analyse(self) -> None:
         folder = self.library.directory / self.library.name
         folder.mkdir(exist_ok=True)
-        configuration = variable_subscriber_configuration(self.frame, self.width, self.entity)
         file = folder / f"{self.entity}.vhd"
-        file.write_text(render(VARIABLE_SUBSCRIBER_TEMPLATE, configuration), encoding="ascii")
+        file.write_text(render(*subscriber_source(self.frame, self.width, self.entity)), encoding="ascii")
         self.library.analyse([file])
         self.analyse_bench()
 
@@ -82,8 +91,11 @@ class Subscriber:
 
     def run(self, directory: pathlib.Path, frames: Sequence[bytes], **generics: Generic) -> list[str]:
         """What comes of the frames, given as all bytes behind their ids."""
-        rows = [row for frame in frames for row in self._beats(frame)]
-        (directory / "beats.txt").write_text("".join(f"{row}\n" for row in rows), encoding="ascii")
+        return self.run_beats(directory, [beat for frame in frames for beat in self.beats(frame)], **generics)
+
+    def run_beats(self, directory: pathlib.Path, beats: Sequence[Beat], **generics: Generic) -> list[str]:
+        """What comes of beats."""
+        (directory / "beats.txt").write_text("".join(f"{beat.row(self.width)}\n" for beat in beats), encoding="ascii")
         result = self.library.run(f"{self.entity}_tb", generics, directory=directory)
         assert result.exit_code == 0, result.output
         lines = result.output.splitlines()
@@ -124,26 +136,27 @@ class Subscriber:
                         last = "01" if number == len(elements) - 1 else "00"
                         yield " ".join([ports.name, *inner, "last", last])
 
-    def _beats(self, frame: bytes) -> Iterator[str]:
+    def beats(self, frame: bytes) -> list[Beat]:
+        """The beats of a frame, given as all bytes behind its id."""
         lanes = self.width // 8
         data = frame if lanes == 1 else b"\xee" + frame
-        for start in range(0, len(data), lanes):
-            beat = data[start : start + lanes]
-            bits = f"{int.from_bytes(beat, 'little'):0{self.width}b}"
-            keep = ("1" * len(beat)).rjust(lanes, "0")
-            yield f"{bits} {keep} {int(start + lanes >= len(data))}"
+        parts = [data[start : start + lanes] for start in range(0, len(data), lanes)]
+        return [
+            Beat(part, (1 << len(part)) - 1, is_last=number == len(parts)) for number, part in enumerate(parts, start=1)
+        ]
 
     def _configuration(self) -> dict[str, object]:
         side = message_side(self.frame)
         # In front of each port's name, so that no signal has the name of something else here.
         ports = message_ports(self.frame, self.width)
         top, inner = _scoped_ports(self.frame, side)
+        fields = [port.name for port in ports] if self.frame.is_fixed_size else ["payload_length", *top]
         return {
             "message": str(self.frame.message),
             "entity": f"{self.entity}_tb",
             "subscriber_entity": self.entity,
             "lanes": self.width // 8,
-            "segment_high": side.segments - 1,
+            "segment_high": segment_count(self.frame) - 1,
             "ports": [
                 {
                     "port": port.name,
@@ -167,7 +180,7 @@ class Subscriber:
                 }
                 for name, fields in inner
             ],
-            "fields": [{"signal": _signal(port)} for port in ["payload_length", *top]],
+            "fields": [{"signal": _signal(port)} for port in fields],
         }
 
 

@@ -41,7 +41,7 @@ architecture rtl of variants is
 """
 SIGNALS = """\
   signal data_{n}                     : std_logic_vector({width} - 1 downto 0);
-  signal keep_{n}, id_{n}             : std_logic_vector({width} / 8 - 1 downto 0);
+  signal keep_{n}                     : std_logic_vector({width} / 8 - 1 downto 0);
   signal valid_{n}, last_{n}, ready_{n} : std_logic;
   signal sub_valid_{n}, sub_ready_{n}   : std_logic;
   signal is_first_{n}, msg_valid_{n}    : std_logic;
@@ -57,15 +57,10 @@ INSTANCES = """\
   subscriber_{n} : entity work.{prefix}axis_to_geometry_msgs_point
     port map (clk => clk, rst_n => rst_n, x => x_{n}, y => y_{n}, z => z_{n}, segment_valid => open,
               msg_valid => msg_valid_{n}, msg_ready => '1', frame_error => open, frame_error_code => open,
-              s_axis_tdata => data_{n}, s_axis_tkeep => id_{n}, s_axis_tvalid => sub_valid_{n},
+              s_axis_tdata => data_{n}, s_axis_tkeep => keep_{n}, s_axis_tvalid => sub_valid_{n},
               s_axis_tlast => last_{n}, s_axis_tready => sub_ready_{n});
   sub_valid_{n} <= valid_{n} and not ({is_byte} and is_first_{n});
   ready_{n}     <= sub_ready_{n} or ({is_byte} and is_first_{n});
-  mask_{n} : process (keep_{n}, is_first_{n})
-  begin
-    id_{n}    <= keep_{n};
-    id_{n}(0) <= keep_{n}(0) and not (is_first_{n} and not {is_byte});
-  end process;
   count_{n} : process (clk)
   begin
     if rising_edge(clk) then

@@ -29,6 +29,12 @@ class BurstError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// The hardware aborted a frame, whose received part is dropped.
+class AbortedFrameError : public BurstError {
+ public:
+  using BurstError::BurstError;
+};
+
 // A complete frame: the id of its publisher and its payload.
 struct JoinedFrame {
   std::uint8_t id;
@@ -52,10 +58,14 @@ class BurstJoiner {
   }
 
   // Take a burst and return the frame that it completes, if any. `tid` is the stream's `tid`, if the transport has one;
-  // it must equal the id. Throws BurstError.
+  // it must equal the id. `is_aborted` if the burst aborts its frame. Throws BurstError.
   std::optional<JoinedFrame> push(const std::uint8_t* burst, std::size_t size,
-                                  std::optional<std::uint8_t> tid = std::nullopt) {
+                                  std::optional<unsigned> tid = std::nullopt, bool is_aborted = false) {
     const std::uint8_t id = checked_id(burst, size, tid);
+    if (is_aborted) {
+      begun_.erase(id);
+      throw AbortedFrameError("the frame with id " + std::to_string(id) + " was aborted");
+    }
     std::vector<std::uint8_t> frame;
     if (auto begun = begun_.find(id); begun != begun_.end()) {
       frame = std::move(begun->second);
@@ -81,8 +91,8 @@ class BurstJoiner {
   }
 
   std::optional<JoinedFrame> push(const std::vector<std::uint8_t>& burst,
-                                  std::optional<std::uint8_t> tid = std::nullopt) {
-    return push(burst.data(), burst.size(), tid);
+                                  std::optional<unsigned> tid = std::nullopt, bool is_aborted = false) {
+    return push(burst.data(), burst.size(), tid, is_aborted);
   }
 
   // The ids of incomplete frames in ascending order.
@@ -106,7 +116,7 @@ class BurstJoiner {
  private:
   static constexpr std::size_t kHeaderBytes = 5;  // the id and the length of the payload
 
-  std::uint8_t checked_id(const std::uint8_t* burst, std::size_t size, std::optional<std::uint8_t> tid) const {
+  std::uint8_t checked_id(const std::uint8_t* burst, std::size_t size, std::optional<unsigned> tid) const {
     if (size == 0) throw BurstError("the burst is empty");
     const unsigned id = burst[0];
     if (id >= publishers_) {

@@ -286,7 +286,7 @@ class Node {
     if (!burst.data.empty()) trace_.write("burst", burst.data[0], number, burst.data.size(), burst.cycles);
     std::optional<JoinedFrame> frame;
     try {
-      frame = joiner.push(burst.data, burst.tid);
+      frame = joiner.push(burst.data, burst.tid, burst.is_aborted);
     } catch (const BurstError& error) {
       note(error);
     }

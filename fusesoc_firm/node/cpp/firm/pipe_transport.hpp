@@ -94,7 +94,7 @@ class PipeTransport : public Transport {
   static constexpr int kRequests = 3;
   static constexpr int kReports = 4;
   static constexpr std::size_t kBufferBytes = 1 << 16;
-  static constexpr std::uint16_t kIdError = 65535;
+  static constexpr unsigned kVersion = 2;  // of requests and reports
 
   void throw_if_over() const {
     if (is_closing_) throw TransportError("the transport is closed");
@@ -111,6 +111,7 @@ class PipeTransport : public Transport {
         const auto begun = std::chrono::steady_clock::now();
         const std::uint64_t before = cycle_;
         if (!request()) fail_with_child();
+        if (place_ == 0) check_version();
         while (take_report()) {
         }
         adapt(cycle_ - before, std::chrono::steady_clock::now() - begun);
@@ -176,6 +177,15 @@ class PipeTransport : public Transport {
     return bytes;
   }
 
+  void check_version() {
+    const auto letter = static_cast<unsigned>(number(1)), version = static_cast<unsigned>(number(1));
+    if (letter == 'V' && version == kVersion) return;
+    char text[128];
+    std::snprintf(text, sizeof text, "the simulator sent 0x%02x%02x instead of version %u of its reports; build it again",
+                  letter, version, kVersion);
+    throw TransportError(text);
+  }
+
   // Take a report; return whether more follow.
   bool take_report() {
     const std::uint64_t place = place_;
@@ -190,6 +200,9 @@ class PipeTransport : public Transport {
       case 'E':
         take_error();
         return true;
+      case 'I':
+        take_id_error();
+        return true;
       case 'S':
         take_standing();
         return false;
@@ -197,7 +210,7 @@ class PipeTransport : public Transport {
         break;
     }
     char text[128];
-    std::snprintf(text, sizeof text, "byte %llu of the simulator's reports is 0x%02x; legal at the start of a report: T, B, E, S",
+    std::snprintf(text, sizeof text, "byte %llu of the simulator's reports is 0x%02x; legal at the start of a report: T, B, E, I, S",
                   static_cast<unsigned long long>(place), letter);
     throw TransportError(text);
   }
@@ -215,7 +228,8 @@ class PipeTransport : public Transport {
 
   void take_burst() {
     Burst burst;
-    burst.tid = static_cast<std::uint8_t>(number(1));
+    burst.tid = static_cast<unsigned>(number(2));
+    burst.is_aborted = number(1) != 0;
     burst.cycles = cycles();
     const std::uint64_t size = number(4);
     // A resumed burst has one beat more than its part of the frame.
@@ -233,7 +247,13 @@ class PipeTransport : public Transport {
 
   void take_error() {
     HardwareError error;
-    if (const auto converter = number(2); converter != kIdError) error.converter = static_cast<unsigned>(converter);
+    error.converter = static_cast<unsigned>(number(2));
+    error.cycle = number(8);
+    if (options_.on_error) options_.on_error(error);
+  }
+
+  void take_id_error() {
+    HardwareError error;
     error.cycle = number(8);
     if (options_.on_error) options_.on_error(error);
   }

@@ -42,8 +42,9 @@ struct Cycles {
 // tid, if the transport carries it; `cycles` is known only for simulated hardware.
 struct Burst {
   Bytes data;
-  std::optional<std::uint8_t> tid = std::nullopt;
+  std::optional<unsigned> tid = std::nullopt;
   std::optional<Cycles> cycles = std::nullopt;
+  bool is_aborted = false;  // it aborts its frame
 };
 
 // An error after which the transport continues.

@@ -1,0 +1,62 @@
+"""All accelerators of a system, read by GHDL or Yosys and compared with their interfaces."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from fusesoc_firm.accelerator.interface import compare
+from fusesoc_firm.accelerator.unit import Libraries, Reader
+from fusesoc_firm.accelerator.verilog import VerilogReader
+from fusesoc_firm.accelerator.vhdl import VhdlReader
+from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
+from fusesoc_firm.system.derived.model import AcceleratorType
+from fusesoc_firm.system.system_core import LoadedSystem, artifacts
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics
+from fusesoc_firm.tools.programs import find, ways
+
+_PROGRAMS = {"VHDL": "ghdl", "Verilog": "yosys"}
+
+
+def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries]) -> tuple[Diagnostic, ...]:
+    """Read the accelerators of a system and compare them with their interfaces; return the warnings.
+
+    `libraries` returns the files that accelerators in VHDL may use. If a program is missing, a warning says which
+    accelerators were not read. Raise `InputError` with all faults.
+    """
+    faults = Diagnostics()
+    with tempfile.TemporaryDirectory(prefix="firm_") as name:
+        for language, types in _by_language(loaded):
+            program = _PROGRAMS[language]
+            if path := find(program):
+                read = _reader(loaded, language, path, Path(name), libraries)
+                for type_ in types:
+                    _check(type_, loaded.folder, read, faults)
+            else:
+                names = ", ".join(str(type_.accelerator.name) for type_ in types)
+                faults.warn(f"not read, since {program} is not installed: {names}", hint=ways(program))
+    faults.raise_if_any()
+    return faults.warnings
+
+
+def _by_language(loaded: LoadedSystem) -> Iterator[tuple[str, list[AcceleratorType]]]:
+    for language in _PROGRAMS:
+        if types := [item for item in loaded.system.accelerator_types if item.accelerator.type == language]:
+            yield language, types
+
+
+def _reader(
+    loaded: LoadedSystem, language: str, program: Path, folder: Path, libraries: Callable[[], Libraries]
+) -> Reader:
+    if language == "Verilog":
+        return VerilogReader(program, folder).read
+    generated = artifacts(loaded)
+    packages = [item.text for item in generated if item.template == CONSTANTS_TEMPLATE]
+    return VhdlReader(program, folder, libraries, packages, {Path(item.path).stem for item in generated}).read
+
+
+def _check(type_: AcceleratorType, folder: Path, read: Reader, faults: Diagnostics) -> None:
+    paths = [folder / source for source in type_.accelerator.sources]
+    generics = ("width", "WIDTH") if type_.has_width else ()
+    compare(type_, read(paths, type_.entity, dict.fromkeys(generics, type_.width), faults), faults)

@@ -1,0 +1,58 @@
+"""A design unit that a tool has read: an entity or a module with its ports, and the faults in its files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+
+
+@dataclass(frozen=True)
+class UnitPort:
+    """A port; `direction` is `in`, `out` or another mode of the language.
+
+    `bits` is None if the tool does not know the width. `type` is the port's type if the language has types; a
+    `std_logic` has one bit. `is_optional` is set for a port with a default value.
+    """
+
+    name: str
+    place: SourceRef
+    direction: str
+    bits: int | None
+    type: str = ""
+    is_optional: bool = False
+
+
+@dataclass(frozen=True)
+class Unit:
+    """An entity or a module; `unset` are the places of generics without a value."""
+
+    name: str
+    place: SourceRef
+    ports: tuple[UnitPort, ...]
+    unset: dict[str, SourceRef] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Libraries:
+    """The VHDL files of other cores that the accelerators may use, each with its library, and GHDL's options.
+
+    With `is_complete`, a unit that is in none of these files and is not generated is a fault.
+    """
+
+    files: Sequence[tuple[Path, str]] = ()
+    options: Sequence[str] = ("--std=93",)
+    is_complete: bool = False
+
+
+# Returns the units of the files, and adds the faults in the files to the collector.
+Reader = Callable[[Sequence[Path], str, dict[str, int], Diagnostics], list[Unit]]
+
+
+def place(path: Path, line: int, column: int, width: int = 1) -> SourceRef:
+    """Return a place in a file; a column of 0 is the first character of the line."""
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    text = lines[line - 1] if 0 < line <= len(lines) else ""
+    return SourceRef(str(path), line, column or len(text) - len(text.lstrip()) + 1, text, width)

@@ -1,0 +1,115 @@
+"""Modules in Verilog as Yosys reads them."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.accelerator.unit import Unit, UnitPort, place
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+
+_ERROR = re.compile(r"(?P<file>.+?):(?P<line>\d+): ERROR: (?P<text>.+)")
+_IMPLICIT = re.compile(r"(?P<file>.+?):(?P<line>\d+): Warning: Identifier `\\(?P<name>.+)' is implicitly declared")
+_SOURCE = re.compile(r"(?P<file>.+):(?P<line>\d+)\.(?P<column>\d+)-")
+_SYSTEM_VERILOG = (".sv", ".svh")
+_INCLUDED = (".vh", ".svh")
+_DIRECTIONS = {"input": "in", "output": "out"}
+
+
+@dataclass(frozen=True)
+class VerilogReader:
+    """Yosys, with a folder for its output."""
+
+    yosys: Path
+    folder: Path
+
+    def read(self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics) -> list[Unit]:
+        """Return the modules of the files, the module `top` with the values of parameters; add all faults."""
+        read = self._reading(paths)
+        done = self._run(f"{read} {_quoted(_compiled(paths))}")
+        if done.returncode:
+            self._report(done.stderr, paths, faults)
+            return []
+        for line in done.stderr.splitlines():
+            if match := _IMPLICIT.match(line):
+                hint = "an undeclared name is a wire of 1 bit; declare it, or correct its name"
+                faults.warn(f"'{match['name']}' is not declared", _line(match), hint)
+        interfaces = f"{read} -lib {_quoted(_compiled(paths))}"
+        modules = self._modules(interfaces)
+        parameters = modules.get(top, {}).get("parameter_default_values", {})
+        given = " ".join(f"-chparam {name} {value}" for name, value in generics.items() if name in parameters)
+        if given:
+            modules[top] |= {"ports": self._modules(f"{interfaces}; hierarchy -top {top} {given}")[top]["ports"]}
+        return [_unit(name, module, paths[0]) for name, module in modules.items()]
+
+    def _reading(self, paths: Sequence[Path]) -> str:
+        folders = dict.fromkeys(f'-I"{path.parent}"' for path in paths if path.suffix.lower() in _INCLUDED)
+        is_system_verilog = any(path.suffix.lower() in _SYSTEM_VERILOG for path in paths)
+        return " ".join(["read_verilog", *(["-sv"] if is_system_verilog else []), *folders])
+
+    def _report(self, output: str, paths: Sequence[Path], faults: Diagnostics) -> None:
+        """Report Yosys' error, except in SystemVerilog, of which simulators know more than Yosys."""
+        match = next(filter(None, map(_ERROR.match, output.splitlines())), None)
+        if match and Path(match["file"]).suffix.lower() not in _SYSTEM_VERILOG:
+            faults.error(_readable(match["text"]), _line(match))
+
+    def _modules(self, script: str) -> dict[str, dict[str, Any]]:
+        result = self.folder / "modules.json"
+        done = self._run(f'{script}; write_json "{result}"')
+        modules = json.loads(result.read_text(encoding="utf-8"))["modules"] if done.returncode == 0 else {}
+        return {str(item["attributes"].get("hdlname", name)).lstrip("\\"): item for name, item in modules.items()}
+
+    def _run(self, script: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [self.yosys, "-q", "-p", script],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            stdin=subprocess.DEVNULL,
+            check=False,
+        )
+
+
+def _compiled(paths: Sequence[Path]) -> list[Path]:
+    return [path for path in paths if path.suffix.lower() not in _INCLUDED]
+
+
+def _quoted(paths: Sequence[Path]) -> str:
+    return " ".join(f'"{path}"' for path in paths)
+
+
+def _unit(name: str, module: Mapping[str, Any], path: Path) -> Unit:
+    nets = module.get("netnames", {})
+    return Unit(
+        name,
+        _declared(module["attributes"], path, 0),
+        tuple(
+            UnitPort(
+                port,
+                _declared(nets.get(port, {}).get("attributes", {}), path, len(port)),
+                _DIRECTIONS.get(item["direction"], item["direction"]),
+                len(item["bits"]),
+            )
+            for port, item in module["ports"].items()
+        ),
+    )
+
+
+def _declared(attributes: Mapping[str, Any], path: Path, width: int) -> SourceRef:
+    """Return the place that Yosys notes at a module or a net; without one, the beginning of the file."""
+    match = _SOURCE.match(str(attributes.get("src", "")))
+    return place(Path(match["file"]), int(match["line"]), int(match["column"]), width) if match else place(path, 1, 1)
+
+
+def _line(match: re.Match[str]) -> SourceRef:
+    return place(Path(match["file"]), int(match["line"]), 0)
+
+
+def _readable(text: str) -> str:
+    """Return a message of Yosys' parser without the names that tokens have inside the parser."""
+    return re.sub(r"\bTOK_(\w+)", lambda match: f"'{match[1].lower()}'", text)

@@ -1,0 +1,229 @@
+"""Entities in VHDL as GHDL reads them.
+
+GHDL analyses the files as a build does, and reports faults with their places. Ports are in GHDL's syntax tree of copies
+without architectures and without other libraries, so they are known even if an architecture has faults or uses units
+that are missing. (GHDL 2.0 cannot print the tree of a file that uses a library from a former analysis.) The ports of an
+entity that needs another library for its ports are unknown.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tempfile
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+from xml.etree.ElementTree import Element, fromstring
+
+from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, place
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+
+_MESSAGE = re.compile(r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?!warning|note)(?P<text>.+)")
+_MISSING_UNIT = re.compile(r'unit "(\w+)" not found in library|cannot find resource library')
+_ARCHITECTURE = re.compile(
+    r"^[ \t]*architecture\s+\w+\s+of\s+\w+\s+is\b.*?"
+    r"(?=^[ \t]*(?:architecture\s+\w+\s+of|library\s|entity\s+\w+\s+is|package\s|configuration\s+\w+\s+of)|\Z)",
+    re.IGNORECASE | re.MULTILINE | re.DOTALL,
+)
+# The context of units in other libraries than those of the language and the accelerator's own.
+_OTHER_LIBRARY = re.compile(r"^[ \t]*(library|use)\s+(?!ieee\b|std\b|work\b)[^;]*;", re.IGNORECASE | re.MULTILINE)
+_OPERATORS: dict[str, Callable[[int, int], int]] = {
+    "addition_operator": lambda left, right: left + right,
+    # GHDL's spelling.
+    "substraction_operator": lambda left, right: left - right,
+    "multiplication_operator": lambda left, right: left * right,
+    "division_operator": lambda left, right: left // right,
+    "exponentiation_operator": lambda left, right: left**right,
+}
+_BIT_TYPES = ("std_logic", "std_ulogic")
+
+
+@dataclass
+class VhdlReader:
+    """GHDL with a library in `folder`.
+
+    `packages` are the texts of generated packages, and `generated` the names of all generated units. `libraries`
+    returns the files that accelerators may use; it is called only if an accelerator cannot be analysed without them.
+    """
+
+    ghdl: Path
+    folder: Path
+    libraries: Callable[[], Libraries]
+    packages: Sequence[str]
+    generated: Container[str]
+    _known: Libraries = field(default_factory=Libraries)
+    _is_prepared: bool = False
+
+    def read(self, paths: Sequence[Path], _: str, generics: Mapping[str, int], faults: Diagnostics) -> list[Unit]:
+        """Return the entities of the files with the values of generics; add the faults of the first faulty file."""
+        messages = self._analysed(paths)
+        if messages and not self._is_prepared:
+            self._prepare()
+            messages = self._analysed(paths)
+        absent = [match[1] for text, _ in messages if (match := _MISSING_UNIT.match(text))]
+        # What is declared in a missing unit is unknown, too, so further messages say nothing.
+        if not absent or (self._known.is_complete and not any(name in self.generated for name in absent)):
+            for text, source in messages:
+                faults.error(text, source)
+        return self._entities(paths, generics) or self._entities(paths[-1:], generics)
+
+    def _prepare(self) -> None:
+        """Analyse the files that accelerators may use; their faults are not the accelerators'."""
+        self._is_prepared = True
+        self._known = self.libraries()
+        self._run("-a", self._packages())
+        for library, files in groupby(self._known.files, key=lambda item: item[1]):
+            self._run("-a", [path for path, _ in files], library)
+
+    def _analysed(self, paths: Sequence[Path]) -> list[tuple[str, SourceRef]]:
+        """Return GHDL's messages about the first file with faults."""
+        for path in paths:
+            if messages := list(_messages(self._run("-a", [path]).stderr)):
+                return [(text, place(path, line, column)) for text, line, column in messages]
+        return []
+
+    def _packages(self) -> list[Path]:
+        return [self._written(f"package_{number}.vhd", text) for number, text in enumerate(self.packages)]
+
+    def _written(self, name: str, text: str) -> Path:
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def _entities(self, paths: Sequence[Path], generics: Mapping[str, int]) -> list[Unit]:
+        copies = {self._copy(number, path): path for number, path in enumerate(paths)}
+        with tempfile.TemporaryDirectory(dir=self.folder) as empty:
+            done = self._started("--file-to-xml", [f"--workdir={empty}"], [*self._packages(), *copies])
+        # After a fault, GHDL prints nothing and returns 0.
+        if done.returncode or not done.stdout:
+            return []
+        tree = _Tree(fromstring(done.stdout), generics)
+        return [tree.entity(item, path) for copy, path in copies.items() for item in tree.entities(str(copy))]
+
+    def _copy(self, number: int, path: Path) -> Path:
+        text = path.read_text(encoding="utf-8", errors="replace")
+        return self._written(f"entities_{number}.vhd", _declarations(text))
+
+    def _run(self, command: str, paths: Sequence[Path], library: str = "work") -> subprocess.CompletedProcess[str]:
+        places = [f"--workdir={self.folder}", f"-P{self.folder}", f"--work={library}"]
+        return self._started(command, places, paths)
+
+    def _started(self, command: str, places: Sequence[str], paths: Sequence[Path]) -> subprocess.CompletedProcess[str]:
+        arguments: list[str | Path] = [self.ghdl, command, *self._known.options, *places, *paths]
+        return subprocess.run(
+            arguments, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False
+        )
+
+
+def _messages(output: str) -> Iterator[tuple[str, int, int]]:
+    """Yield GHDL's errors in a file with line and column; a line in parentheses continues the message before it."""
+    found: list[tuple[str, int, int]] = []
+    for match in filter(None, map(_MESSAGE.match, output.splitlines())):
+        if match["text"].startswith("(") and found:
+            found[-1] = (f"{found[-1][0]} {match['text']}", *found[-1][1:])
+        else:
+            found.append((match["text"], int(match["line"]), int(match["column"])))
+    yield from found
+
+
+def _declarations(text: str) -> str:
+    """Return a file without architectures and without other libraries; all lines keep their numbers."""
+    for pattern in (_ARCHITECTURE, _OTHER_LIBRARY):
+        text = pattern.sub(lambda match: "\n" * match[0].count("\n"), text)
+    return text
+
+
+class _Tree:
+    """GHDL's syntax tree of a file; an element refers to another one by its id."""
+
+    def __init__(self, root: Element, generics: Mapping[str, int]) -> None:
+        self._elements = {item.get("id", ""): item for item in root.iter()}
+        self._root = root
+        self._generics = generics
+
+    def entities(self, file: str) -> Iterator[Element]:
+        """Yield the entities in a file."""
+        for item in self._root.iter("library_unit"):
+            if item.get("kind") == "entity_declaration" and item.get("file") == file:
+                yield item
+
+    def entity(self, item: Element, path: Path) -> Unit:
+        """Return an entity, with places in the file `path`."""
+        generics = item.findall("generic_chain/el")
+        return Unit(
+            item.get("identifier", ""),
+            _place(item, path),
+            tuple(self._port(port, path) for port in item.findall("port_chain/el")),
+            {
+                generic.get("identifier", ""): _place(generic, path)
+                for generic in generics
+                if generic.find("default_value") is None and generic.get("identifier") not in self._generics
+            },
+        )
+
+    def _port(self, item: Element, path: Path) -> UnitPort:
+        type_ = self._follow(item.find("type"))
+        bits = 1 if self._type_name(type_) in _BIT_TYPES else self._bits(type_)
+        return UnitPort(
+            item.get("identifier", ""),
+            _place(item, path),
+            item.get("mode", ""),
+            bits,
+            self._type_name(type_),
+            is_optional=item.find("default_value") is not None,
+        )
+
+    def _type_name(self, type_: Element | None) -> str:
+        """Return the name of the type of an array, or the declared name of another type."""
+        while type_ is not None and type_.get("kind", "").startswith("array_subtype"):
+            type_ = self._follow(type_.find("parent_type"))
+        declaration = self._follow(type_.find("type_declarator")) if type_ is not None else None
+        return declaration.get("identifier", "") if declaration is not None else ""
+
+    def _bits(self, type_: Element | None) -> int | None:
+        """Return the number of elements of an array whose bounds are known."""
+        while type_ is not None and type_.find("index_constraint_list/el/range_constraint") is None:
+            type_ = self._follow(type_.find("parent_type"))
+        span = type_.find("index_constraint_list/el/range_constraint") if type_ is not None else None
+        if span is None:
+            return None
+        left, right = (self._value(span.find(f"{side}_limit_expr")) for side in ("left", "right"))
+        if left is None or right is None:
+            return None
+        return max(0, (left - right if span.get("direction") == "downto" else right - left) + 1)
+
+    def _value(self, item: Element | None) -> int | None:
+        """Return the value of an expression of literals, constants and generics; None if it is anything else."""
+        item = self._follow(item)
+        if item is None:
+            return None
+        kind = item.get("kind", "")
+        if kind == "integer_literal":
+            return int(item.get("value", "0"))
+        if kind in ("simple_name", "selected_name"):
+            return self._constant(self._follow(item.find("named_entity")))
+        if kind == "parenthesis_expression":
+            return self._value(item.find("expression"))
+        if kind in _OPERATORS:
+            left, right = self._value(item.find("left")), self._value(item.find("right"))
+            is_defined = left is not None and right is not None and (right > 0 or kind != "division_operator")
+            return _OPERATORS[kind](left or 0, right or 0) if is_defined else None
+        return None
+
+    def _constant(self, item: Element | None) -> int | None:
+        if item is None or item.get("kind") not in ("constant_declaration", "interface_constant_declaration"):
+            return None
+        if item.get("kind") == "interface_constant_declaration" and item.get("identifier") in self._generics:
+            return self._generics[item.get("identifier", "")]
+        return self._value(item.find("default_value"))
+
+    def _follow(self, item: Element | None) -> Element | None:
+        """Return the element that another element refers to, or the element itself."""
+        return self._elements.get(item.get("ref", "")) if item is not None and item.get("ref") else item
+
+
+def _place(item: Element, path: Path) -> SourceRef:
+    name = item.get("identifier", "")
+    return place(path, int(item.get("line", "1")), int(item.get("col", "1")), len(name))

@@ -1,0 +1,135 @@
+"""The options with which commands select builds, limit them, pass options to FuseSoC, and write reports."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fusesoc_firm.cli.common import natural, positive
+from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.building.pool import Limits
+    from fusesoc_firm.building.run_options import RunOptions
+    from fusesoc_firm.building.selection import Selection
+
+# Options of `fusesoc run` without attention of our own: with a value, and without.
+_VALUES = {"--filter": "apply a filter of FuseSoC; may be repeated", "--system-name": "another name for the system"}
+_SWITCHES = {
+    "--no-export": "use the sources in their folders, and do not copy them",
+    "--resolve-env-vars-early": "let FuseSoC resolve environment variables",
+    "--allow-additional-properties": "accept unknown keys in .core files",
+}
+
+
+def add_selection(parser: argparse.ArgumentParser) -> None:
+    """Add the cores and targets, for `selection_of`."""
+    parser.add_argument(
+        "cores",
+        metavar="CORE",
+        nargs="*",
+        help="a core's name in FuseSoC or a pattern such as 'acme:m:*', with targets of its own after @: CORE@sim,lint",
+    )
+    parser.add_argument(
+        "--target",
+        dest="targets",
+        metavar="NAME",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="the targets of all cores without targets of their own; may contain wildcards, such as 'sim*'",
+    )
+    parser.add_argument("--where-present", action="store_true", help="skip targets that a core does not have")
+    parser.add_argument(
+        "--affected-since",
+        metavar="REV",
+        help="only cores that edits since this revision affect; without CORE, all of them where the target is present",
+    )
+
+
+def selection_of(arguments: argparse.Namespace) -> Selection:
+    """Return the selection in the arguments. May raise `InputError`."""
+    from fusesoc_firm.building.selection import Selection
+
+    revision: str | None = arguments.affected_since
+    if not arguments.cores and revision is None:
+        fail("no core is selected", hint="name cores, or add --affected-since REV")
+    selection = Selection(tuple(arguments.cores) or ("*",), tuple(arguments.targets))
+    missing = [core for core, targets in selection.parts() if not targets]
+    if missing:
+        fail(f"no target of {missing[0]} is selected", hint=f"add --target NAME, or write {missing[0]}@NAME")
+    affected = None
+    if revision is not None:
+        from fusesoc_firm.plugin.project import affected_since
+
+        affected = frozenset(affected_since(revision))
+    is_where_present = arguments.where_present or not arguments.cores
+    return Selection(selection.cores, selection.targets, is_where_present, affected)
+
+
+def add_limits(parser: argparse.ArgumentParser) -> None:
+    """Add the reactions to failures, for `limits_of`."""
+    parser.add_argument("--fail-fast", action="store_true", help="after the first failure, end all builds")
+    parser.add_argument("--timeout", type=positive, metavar="SECONDS", help="the time limit of each build")
+    parser.add_argument(
+        "--retries",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="try a failed build up to N times more; a success after a failure is reported as flaky (default: 0)",
+    )
+
+
+def limits_of(arguments: argparse.Namespace) -> Limits:
+    """Return the limits of each build."""
+    from fusesoc_firm.building.pool import Limits
+
+    return Limits(arguments.timeout or 0, arguments.retries)
+
+
+def add_fusesoc(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `fusesoc run`, for `run_options_of`."""
+    group = parser.add_argument_group("options of 'fusesoc run'")
+    group.add_argument("--flag", action="append", default=[], help="a use flag; -FLAG clears it: --flag=-FLAG")
+    group.add_argument("--tool", default="", help="another tool for targets with 'default_tool'")
+    group.add_argument("--mapping", action="append", default=[], metavar="CORE", help="a core whose mapping applies")
+    group.add_argument("--lockfile", type=Path, metavar="FILE", help="FuseSoC's lock file, with versions of cores")
+    for name, text in _VALUES.items():
+        group.add_argument(name, action="append", default=[], metavar="NAME", help=text)
+    for name, text in _SWITCHES.items():
+        group.add_argument(name, action="store_true", help=text)
+    group.add_argument(
+        "--backend",
+        action="append",
+        default=[],
+        metavar="ARGUMENT",
+        help="an argument for the backend, which follows the core's name there: --backend=--SEED=5",
+    )
+
+
+def run_options_of(arguments: argparse.Namespace) -> RunOptions:
+    """Return the options of `fusesoc run` in the arguments."""
+    from fusesoc_firm.building.run_options import RunOptions
+
+    given = vars(arguments)
+    words = [f"{name}={value}" for name in _VALUES for value in given[_key(name)]]
+    words += [name for name in _SWITCHES if given[_key(name)]]
+    return RunOptions(
+        tuple(arguments.flag),
+        arguments.tool,
+        tuple(arguments.mapping),
+        arguments.lockfile,
+        tuple(words),
+        tuple(arguments.backend),
+    )
+
+
+def add_reports(parser: argparse.ArgumentParser) -> None:
+    """Add the reports, for `build_report.Report`."""
+    parser.add_argument("--events", type=Path, metavar="FILE", help="write a line of JSON for each event")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results in the format of JUnit, for CI")
+
+
+def _key(name: str) -> str:
+    return name.removeprefix("--").replace("-", "_")

@@ -1,0 +1,184 @@
+"""Mistakes in an accelerator's source, each reported with the user's file and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.accelerator.check import check_accelerators
+from fusesoc_firm.accelerator.unit import Libraries
+from fusesoc_firm.cli import main
+from fusesoc_firm.system.message_sources import load_beside
+from fusesoc_firm.text.diagnostics import Diagnostic, InputError
+
+_GENERIC = "generic (WIDTH : positive; LEVEL : natural);\n  port ("
+# A text of the source, its replacement, a text in the line that is reported, and a part of the message.
+VHDL = [
+    # names
+    ("entity img is", "entity image is", "entity image is", "the entity is 'image'"),
+    ("    in_height ", "    in_heigth ", "in_heigth", "port 'in_heigth' is not in the interface"),
+    ("    out_data ", "    result ", "entity img", "no port 'out_data' for std_msgs/UInt32.data"),
+    ("    clk   :", "    clock :", "clock", "port 'clock' is not in the interface"),
+    ("    rst_n : in  std_logic;\n", "", "entity img", "no port 'rst_n'"),
+    # missing and superfluous ports
+    (
+        "    in_width                       : in  std_logic_vector(31 downto 0);",
+        "",
+        "entity img is",
+        "entity 'img' has no port 'in_width' for sensor_msgs/Image.width",
+    ),
+    ("    in_msg_ready                   : out std_logic;\n", "", "entity img", "no port 'in_msg_ready'"),
+    ("    rst_n : in", "    enable : in std_logic;\n    rst_n : in", "enable", "port 'enable' is not in the interface"),
+    (
+        "    rst_n : in",
+        "    irq : out std_logic;\n    rst_n : in",
+        "irq",
+        "port 'irq' is not in the interface, and stays open",
+    ),
+    # widths
+    (
+        "in_height                      : in  std_logic_vector(31 downto 0)",
+        "in_height : in std_logic_vector(15 downto 0)",
+        "in_height",
+        "in_height has 16 bits, sensor_msgs/Image.height has 32",
+    ),
+    (
+        "in_step                        : in  std_logic_vector(31 downto 0)",
+        "in_step : in std_logic_vector(32 downto 1 + 0 * 7)",
+        "",
+        "",
+    ),
+    (
+        "in_segment_valid               : in  std_logic_vector(2 downto 0)",
+        "in_segment_valid : in std_logic_vector(1 downto 0)",
+        "in_segment_valid",
+        "in_segment_valid has 2 bits, sensor_msgs/Image has 3",
+    ),
+    (
+        "in_data_axis_tdata             : in  std_logic_vector(7 downto 0)",
+        "in_data_axis_tdata : in std_logic_vector(0 to 2 ** 5 - 1)",
+        "in_data_axis_tdata",
+        "in_data_axis_tdata has 32 bits, sensor_msgs/Image.data has 8",
+    ),
+    # directions
+    ("out_data                       : out", "out_data : in ", "out_data", "out_data is an input"),
+    ("in_width                       : in ", "in_width : out", "in_width", "in_width is an output"),
+    ("in_msg_ready                   : out", "in_msg_ready : buffer", "in_msg_ready", "in_msg_ready is an buffer"),
+    # types
+    (
+        "out_segment_valid              : out std_logic_vector(0 downto 0)",
+        "out_segment_valid : out std_logic",
+        "out_segment_valid",
+        "has the type std_logic, std_msgs/UInt32 needs std_logic_vector(0 downto 0)",
+    ),
+    (
+        "in_width                       : in  std_logic_vector(31 downto 0)",
+        "in_width : in integer",
+        "in_width",
+        "in_width has the type integer",
+    ),
+    (
+        "in_width                       : in  std_logic_vector(31 downto 0)",
+        "in_width : in bit_vector(31 downto 0)",
+        "in_width",
+        "in_width has the type bit_vector",
+    ),
+    ("in_msg_valid                   : in  std_logic;", "in_msg_valid : in boolean;", "in_msg_valid", "type boolean"),
+    ("std_logic;  -- all input", "std_logik;  -- all input", "std_logik", 'no declaration for "std_logik"'),
+    # generics
+    ("  port (", f"  {_GENERIC}", "LEVEL", "generic 'level' has no value"),
+    # syntax, names and types in the architecture
+    ("  is_there <= in_msg_valid;", "  is_there <= in_msg_valid", "is_there", "';' expected at end of signal"),
+    ("end entity;", "end entiti;", "end entiti", 'misspelling, "img" expected'),
+    ("      end if;\n    end if;", "      end if;", "end process", "'if' is expected instead of 'process'"),
+    ("  is_there <= in_msg_valid;", "  is_there <= in_msg_vald;", "in_msg_vald", 'no declaration for "in_msg_vald"'),
+    ("  in_msg_ready <= done;", "  in_msg_ready <= is_sent;", "<= is_sent;", "can't match 'is_sent'"),
+    ("  in_msg_ready <= done;", "  in_msg_valid <= done;", "in_msg_valid <= done", "can't be assigned"),
+    ("begin\n\n", "begin\n  u : entity work.adder;\n", "work.adder", 'unit "adder" not found'),
+    ("use ieee.std_logic_1164.all;", "use ieee.std_logic_1146.all;", "1146", 'unit "std_logic_1146" not found'),
+    ("architecture rtl of img", "architecture rtl of image", "of image", "entity 'image' was not analysed"),
+]
+VERILOG = [
+    ("module img ", "module image ", "module image", "the module is 'image'"),
+    ("[31:0] in_height", "[31:0] in_heigth", "in_heigth", "port 'in_heigth' is not in the interface"),
+    (
+        "[31:0] in_height",
+        "[15:0] in_height",
+        "in_height",
+        "in_height has 16 bits, sensor_msgs/Image.height has 32",
+    ),
+    ("input  wire [31:0] in_width", "output wire [31:0] in_width", "in_width", "in_width is an output"),
+    ("  input  wire        in_msg_valid,\n", "", "module img", "no port 'in_msg_valid' for sensor_msgs/Image"),
+    ("  input  wire rst_n,", "  input  wire rst_n,\n  input wire enable,", "enable", "port 'enable' is not in"),
+    ("  input  wire rst_n,", "  input  wire rst_n", "in_payload_length", "syntax error"),
+    ("  assign in_msg_ready = done;", "  assign in_msg_ready = done", "assign is_sent", "syntax error"),
+    ("in_msg_ready = done;", "in_msg_ready = dome;", "dome", "'dome' is not declared"),
+    ("endmodule", "", "", "syntax error"),
+]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def diagnostics(language: str, old: str, new: str, libraries: Libraries | None = None) -> list[Diagnostic]:
+    """The faults and warnings about a new project whose accelerator is changed at one place."""
+    arguments = ("--language", language, "--in", "sensor_msgs/Image", "--out", "std_msgs/UInt32")
+    assert main(["init", "img", *arguments]) == 0
+    (source,) = Path("img/rtl").iterdir()
+    text = source.read_text(encoding="utf-8")
+    assert old in text
+    source.write_text(text.replace(old, new, 1), encoding="utf-8")
+    loaded = load_beside(Path("img/img.yaml"))
+    try:
+        return list(check_accelerators(loaded, lambda: libraries or Libraries(is_complete=True)))
+    except InputError as error:
+        return list(error.diagnostics)
+
+
+def check(found: list[Diagnostic], file: str, where: str, message: str) -> None:
+    told = [item for item in found if message in item.message]
+    assert told, [str(item) for item in found]
+    assert told[0].source
+    assert told[0].source.file == file
+    assert where in told[0].source.text, str(told[0])
+
+
+@pytest.mark.parametrize(("old", "new", "where", "message"), VHDL)
+def test_a_mistake_in_vhdl(old: str, new: str, where: str, message: str) -> None:
+    found = diagnostics("vhdl", old, new)
+    if message:
+        check(found, "img/rtl/img.vhd", where, message)
+    else:
+        assert not found, [str(item) for item in found]
+
+
+@pytest.mark.parametrize(("old", "new", "where", "message"), VERILOG)
+def test_a_mistake_in_verilog(old: str, new: str, where: str, message: str) -> None:
+    check(diagnostics("verilog", old, new), "img/rtl/img.v", where, message)
+
+
+def test_what_a_missing_unit_declares_is_unknown() -> None:
+    """Without the files of other cores, faults that may follow from a missing package are not reported."""
+    old, new = "architecture rtl of img is", "use work.numbers.all;\narchitecture rtl of img is signal s : number;"
+    assert diagnostics("vhdl", old, new, Libraries()) == []
+
+
+def test_the_width_of_a_generic_is_known() -> None:
+    parts = ("in_data_axis_tdata             : in  std_logic_vector(7 downto 0)", "in_data_axis_tdata : in w")
+    new = parts[1].replace("in w", "in std_logic_vector(4 * WIDTH - 1 downto 0)")
+    assert main(["init", "img", "--in", "sensor_msgs/Image", "--out", "std_msgs/UInt32"]) == 0
+    source = Path("img/rtl/img.vhd")
+    text = source.read_text(encoding="utf-8").replace("  port (", "  generic (WIDTH : positive := 16);\n  port (", 1)
+    source.write_text(text.replace(parts[0], new), encoding="utf-8")
+    with pytest.raises(InputError, match=r"in_data_axis_tdata has 32 bits, sensor_msgs/Image\.data has 8"):
+        check_accelerators(load_beside(Path("img/img.yaml")), Libraries)
+
+
+def test_without_the_program_the_check_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fusesoc_firm.accelerator.check.find", lambda _: None)
+    (warning,) = diagnostics("vhdl", "img", "img")
+    assert "not read, since ghdl is not installed: img" in str(warning)

@@ -1,0 +1,66 @@
+"""What `firm sim` says about a faulty accelerator, and about faults that a tool finds in copies and generated files."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.building.plan import Build
+from fusesoc_firm.building.simulation import Simulation
+from fusesoc_firm.cli import main
+from fusesoc_firm.cli.sim import _print_errors
+from fusesoc_firm.system.message_sources import load_beside
+from fusesoc_firm.system.system_core import artifacts
+
+Captured = pytest.CaptureFixture[str]
+
+LOG = """\
+INFO: Building
+src/robot_sys_img_0.1.0/rtl/img.v:12: error: Unable to bind wire
+%Error: src/robot_sys_img_0.1.0/rtl/img.v:13:2: Cannot find file
+src/robot_sys_img-system_0.1.0/img_system.vhd:{line}:5: no declaration for "in_x"
+"""
+
+
+@pytest.fixture(autouse=True)
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("FUSESOC_CORES", "")
+    arguments = ("--language", "verilog", "--in", "geometry_msgs/Point", "--out", "geometry_msgs/Point")
+    assert main(["init", "img", *arguments]) == 0
+
+
+def test_a_faulty_accelerator_is_refused_before_the_build(capsys: Captured) -> None:
+    source = Path("img/rtl/img.v")
+    source.write_text(source.read_text(encoding="utf-8").replace("in_x", "in_xx", 1), encoding="utf-8")
+    assert main(["sim", "img/img.yaml"]) == 1
+    error = capsys.readouterr().err
+    assert "img/rtl/img.v:9:22: error: port 'in_xx' is not in the interface" in error
+    assert main(["system", "check", "img/img.yaml"]) == 1
+    assert capsys.readouterr().err == error
+
+
+def test_a_tools_messages_name_the_users_files(capsys: Captured) -> None:
+    loaded = load_beside(Path("img/img.yaml"))
+    top = artifacts(loaded)[-1].text
+    line = next(number for number, text in enumerate(top.splitlines(), 1) if text.startswith("  u_img : "))
+    work = Path("build/robot_sys_img_0.1.0/sim_icarus")
+    for name, text in (("-system_0.1.0/img_system.vhd", top), ("_0.1.0/rtl/img.v", "")):
+        path = work / f"src/robot_sys_img{name}"
+        path.parent.mkdir(parents=True)
+        path.write_text(text, encoding="utf-8")
+    shutil.copy("img/rtl/img.v", work / "src/robot_sys_img_0.1.0/rtl/img.v")
+    build = Build("robot:sys:img:0.1.0", "sim_icarus", work)
+    build.log.write_text(LOG.format(line=line), encoding="utf-8")
+    _print_errors(Simulation(Path("img/img.core"), build, "icarus", (), None), Path("img"), loaded)
+    place = next(block.name.source for block in loaded.specification.blocks if block.name == "img")
+    assert capsys.readouterr().err.splitlines() == [
+        "img/rtl/img.v:12: error: Unable to bind wire",
+        "%Error: img/rtl/img.v:13:2: Cannot find file",
+        f'src/robot_sys_img-system_0.1.0/img_system.vhd:{line}:5: no declaration for "in_x"',
+        f"      = this generated line belongs to {place}",
+    ]
