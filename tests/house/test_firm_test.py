@@ -189,7 +189,7 @@ def test_firm_build_restores_outputs(library: Path) -> None:
     content = program.read_bytes()
     assert is_recalled(library, *selected, name="build")
     shutil.rmtree(library / "build")
-    status, text = run(library, *selected, name="build")
+    status, text = run(library, *selected, name="build", PYTHONPROFILEIMPORTTIME="1")
     assert (status, results(text)) == (0, {"sim_icarus": "cached"}), text
     assert program.read_bytes() == content
     assert os.access(program, os.X_OK)
