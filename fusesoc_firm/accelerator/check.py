@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fusesoc_firm.accelerator.interface import compare
@@ -30,7 +31,7 @@ def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries])
         for language, types in _by_language(loaded):
             program = _PROGRAMS[language]
             if path := find(program):
-                read = _reader(loaded, language, path, Path(name), libraries)
+                read = _reader(loaded, types, path, Path(name), libraries)
                 for type_ in types:
                     _check(type_, loaded.folder, read, faults)
             else:
@@ -47,16 +48,29 @@ def _by_language(loaded: LoadedSystem) -> Iterator[tuple[str, list[AcceleratorTy
 
 
 def _reader(
-    loaded: LoadedSystem, language: str, program: Path, folder: Path, libraries: Callable[[], Libraries]
+    loaded: LoadedSystem,
+    types: Sequence[AcceleratorType],
+    program: Path,
+    folder: Path,
+    libraries: Callable[[], Libraries],
 ) -> Reader:
-    if language == "Verilog":
+    """Return the reader of accelerators in one language."""
+    if types[0].accelerator.type == "Verilog":
         return VerilogReader(program, folder).read
-    generated = artifacts(loaded)
-    packages = [item.text for item in generated if item.template == CONSTANTS_TEMPLATE]
-    return VhdlReader(program, folder, libraries, packages, {Path(item.path).stem for item in generated}).read
+
+    def complete() -> Libraries:
+        generated = artifacts(loaded)
+        packages = [item.text for item in generated if item.template == CONSTANTS_TEMPLATE]
+        return replace(libraries(), packages=packages, generated={Path(item.path).stem for item in generated})
+
+    sources = dict.fromkeys(path for type_ in types for path in _sources(type_, loaded.folder))
+    return VhdlReader(program, folder, complete, list(sources)).read
+
+
+def _sources(type_: AcceleratorType, folder: Path) -> list[Path]:
+    return [folder / source for source in type_.accelerator.sources]
 
 
 def _check(type_: AcceleratorType, folder: Path, read: Reader, faults: Diagnostics) -> None:
-    paths = [folder / source for source in type_.accelerator.sources]
     generics = ("width", "WIDTH") if type_.has_width else ()
-    compare(type_, read(paths, type_.entity, dict.fromkeys(generics, type_.width), faults), faults)
+    compare(type_, read(_sources(type_, folder), type_.entity, dict.fromkeys(generics, type_.width), faults), faults)

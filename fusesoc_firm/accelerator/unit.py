@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,20 +39,28 @@ class Unit:
 class Libraries:
     """The VHDL files of other cores that the accelerators may use, each with its library, and GHDL's options.
 
-    With `is_complete`, a unit that is in none of these files and is not generated is a fault.
+    `packages` are the texts of generated packages, and `generated` the names of all generated units. With
+    `is_complete`, a unit that is neither in one of the files nor generated is a fault.
     """
 
     files: Sequence[tuple[Path, str]] = ()
     options: Sequence[str] = ("--std=93",)
     is_complete: bool = False
+    packages: Sequence[str] = ()
+    generated: Container[str] = frozenset()
 
 
 # Returns the units of the files, and adds the faults in the files to the collector.
 Reader = Callable[[Sequence[Path], str, dict[str, int], Diagnostics], list[Unit]]
 
 
-def place(path: Path, line: int, column: int, width: int = 1) -> SourceRef:
-    """Return a place in a file; a column of 0 is the first character of the line."""
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+def lines_of(path: Path) -> list[str]:
+    """Return the lines of a source."""
+    return path.read_text(encoding="utf-8", errors="replace").splitlines()
+
+
+def place(path: Path, line: int, column: int, width: int = 1, lines: Sequence[str] | None = None) -> SourceRef:
+    """Return a place in a file with these `lines`; a column of 0 is the first character of the line."""
+    lines = lines_of(path) if lines is None else lines
     text = lines[line - 1] if 0 < line <= len(lines) else ""
     return SourceRef(str(path), line, column or len(text) - len(text.lstrip()) + 1, text, width)

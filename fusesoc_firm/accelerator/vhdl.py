@@ -11,13 +11,14 @@ from __future__ import annotations
 import re
 import subprocess
 import tempfile
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
-from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, place
+from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 _MESSAGE = re.compile(r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?!warning|note)(?P<text>.+)")
@@ -44,30 +45,39 @@ _BIT_TYPES = ("std_logic", "std_ulogic")
 class VhdlReader:
     """GHDL with a library in `folder`.
 
-    `packages` are the texts of generated packages, and `generated` the names of all generated units. `libraries`
-    returns the files that accelerators may use; it is called only if an accelerator cannot be analysed without them.
+    `libraries` returns the files that accelerators may use; it is called only if an accelerator cannot be analysed
+    without them. All accelerators in `sources` are read together first, which is enough if they have no faults.
     """
 
     ghdl: Path
     folder: Path
     libraries: Callable[[], Libraries]
-    packages: Sequence[str]
-    generated: Container[str]
+    sources: Sequence[Path]
     _known: Libraries = field(default_factory=Libraries)
     _is_prepared: bool = False
 
     def read(self, paths: Sequence[Path], _: str, generics: Mapping[str, int], faults: Diagnostics) -> list[Unit]:
         """Return the entities of the files with the values of generics; add the faults of the first faulty file."""
-        messages = self._analysed(paths)
+        messages = [] if self._is_faultless else self._analysed(paths)
         if messages and not self._is_prepared:
             self._prepare()
             messages = self._analysed(paths)
         absent = [match[1] for text, _ in messages if (match := _MISSING_UNIT.match(text))]
         # What is declared in a missing unit is unknown, too, so further messages say nothing.
-        if not absent or (self._known.is_complete and not any(name in self.generated for name in absent)):
+        if not absent or (self._known.is_complete and not any(name in self._known.generated for name in absent)):
             for text, source in messages:
                 faults.error(text, source)
-        return self._entities(paths, generics) or self._entities(paths[-1:], generics)
+        tree = self._all_entities or self._tree(paths) or self._tree(paths[-1:])
+        return [unit for path in paths for unit in tree.units(path, generics)] if tree else []
+
+    @cached_property
+    def _is_faultless(self) -> bool:
+        """Whether GHDL has nothing to say about all sources together."""
+        return not list(_messages(self._run("-a", self.sources).stderr))
+
+    @cached_property
+    def _all_entities(self) -> _Tree | None:
+        return self._tree(self.sources)
 
     def _prepare(self) -> None:
         """Analyse the files that accelerators may use; their faults are not the accelerators'."""
@@ -85,22 +95,22 @@ class VhdlReader:
         return []
 
     def _packages(self) -> list[Path]:
-        return [self._written(f"package_{number}.vhd", text) for number, text in enumerate(self.packages)]
+        return [self._written(f"package_{number}.vhd", text) for number, text in enumerate(self._known.packages)]
 
     def _written(self, name: str, text: str) -> Path:
         path = self.folder / name
         path.write_text(text, encoding="utf-8")
         return path
 
-    def _entities(self, paths: Sequence[Path], generics: Mapping[str, int]) -> list[Unit]:
+    def _tree(self, paths: Sequence[Path]) -> _Tree | None:
+        """Return GHDL's tree of the declarations in files; None if GHDL cannot analyse them."""
         copies = {self._copy(number, path): path for number, path in enumerate(paths)}
         with tempfile.TemporaryDirectory(dir=self.folder) as empty:
             done = self._started("--file-to-xml", [f"--workdir={empty}"], [*self._packages(), *copies])
         # After a fault, GHDL prints nothing and returns 0.
         if done.returncode or not done.stdout:
-            return []
-        tree = _Tree(fromstring(done.stdout), generics)
-        return [tree.entity(item, path) for copy, path in copies.items() for item in tree.entities(str(copy))]
+            return None
+        return _Tree(fromstring(done.stdout), {path: str(copy) for copy, path in copies.items()})
 
     def _copy(self, number: int, path: Path) -> Path:
         text = path.read_text(encoding="utf-8", errors="replace")
@@ -136,28 +146,30 @@ def _declarations(text: str) -> str:
 
 
 class _Tree:
-    """GHDL's syntax tree of a file; an element refers to another one by its id."""
+    """GHDL's syntax tree of files, of which `copies` names the copies; an element refers to another one by its id."""
 
-    def __init__(self, root: Element, generics: Mapping[str, int]) -> None:
+    def __init__(self, root: Element, copies: Mapping[Path, str]) -> None:
         self._elements = {item.get("id", ""): item for item in root.iter()}
         self._root = root
+        self._copies = copies
+        self._lines = {path: lines_of(path) for path in copies}
+        self._generics: Mapping[str, int] = {}
+
+    def units(self, path: Path, generics: Mapping[str, int]) -> Iterator[Unit]:
+        """Yield the entities of a file with the values of generics."""
         self._generics = generics
-
-    def entities(self, file: str) -> Iterator[Element]:
-        """Yield the entities in a file."""
         for item in self._root.iter("library_unit"):
-            if item.get("kind") == "entity_declaration" and item.get("file") == file:
-                yield item
+            if item.get("kind") == "entity_declaration" and item.get("file") == self._copies.get(path):
+                yield self._unit(item, path)
 
-    def entity(self, item: Element, path: Path) -> Unit:
-        """Return an entity, with places in the file `path`."""
+    def _unit(self, item: Element, path: Path) -> Unit:
         generics = item.findall("generic_chain/el")
         return Unit(
             item.get("identifier", ""),
-            _place(item, path),
+            self._place(item, path),
             tuple(self._port(port, path) for port in item.findall("port_chain/el")),
             {
-                generic.get("identifier", ""): _place(generic, path)
+                generic.get("identifier", ""): self._place(generic, path)
                 for generic in generics
                 if generic.find("default_value") is None and generic.get("identifier") not in self._generics
             },
@@ -168,7 +180,7 @@ class _Tree:
         bits = 1 if self._type_name(type_) in _BIT_TYPES else self._bits(type_)
         return UnitPort(
             item.get("identifier", ""),
-            _place(item, path),
+            self._place(item, path),
             item.get("mode", ""),
             bits,
             self._type_name(type_),
@@ -223,7 +235,6 @@ class _Tree:
         """Return the element that another element refers to, or the element itself."""
         return self._elements.get(item.get("ref", "")) if item is not None and item.get("ref") else item
 
-
-def _place(item: Element, path: Path) -> SourceRef:
-    name = item.get("identifier", "")
-    return place(path, int(item.get("line", "1")), int(item.get("col", "1")), len(name))
+    def _place(self, item: Element, path: Path) -> SourceRef:
+        name = item.get("identifier", "")
+        return place(path, int(item.get("line", "1")), int(item.get("col", "1")), len(name), self._lines[path])

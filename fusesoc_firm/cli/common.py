@@ -6,14 +6,14 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.system.system_core import LoadedSystem
-    from fusesoc_firm.text.diagnostics import SourceRef
+    from fusesoc_firm.text.diagnostics import Diagnostic, SourceRef
 
 Handler = Callable[[argparse.Namespace], None]
 
@@ -89,13 +89,18 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
     loaded = load_beside(
         arguments.spec, arguments.path, arguments.distro, needs_sources=needs_sources, core_folders=core_folders
     )
-    for warning in loaded.warnings:
-        print(warning, file=sys.stderr)
+    print_warnings(loaded.warnings)
     return loaded
 
 
-def check_sources(loaded: LoadedSystem, spec: Path) -> None:
-    """Compare a system's accelerators with their interfaces, and print the warnings. May raise `InputError`."""
+def print_warnings(warnings: Iterable[Diagnostic]) -> None:
+    """Print warnings on standard error."""
+    for warning in warnings:
+        print(warning, file=sys.stderr)
+
+
+def check_sources(loaded: LoadedSystem, spec: Path) -> tuple[Diagnostic, ...]:
+    """Compare a system's accelerators with their interfaces, and return the warnings. May raise `InputError`."""
     from fusesoc_firm.accelerator.check import check_accelerators
     from fusesoc_firm.accelerator.unit import Libraries
     from fusesoc_firm.building.sources import vhdl_sources
@@ -106,8 +111,7 @@ def check_sources(loaded: LoadedSystem, spec: Path) -> None:
         found = vhdl_sources(str(core.data.get("name", "")), core.path.parent) if core else None
         return Libraries(found.files, found.options, found.is_complete) if found else Libraries()
 
-    for warning in check_accelerators(loaded, libraries):
-        print(warning, file=sys.stderr)
+    return check_accelerators(loaded, libraries)
 
 
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:

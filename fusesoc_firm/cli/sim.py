@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import check_sources, command, core_folders, natural
+from fusesoc_firm.cli.common import check_sources, command, core_folders, natural, print_warnings
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.outputs import shown
 
@@ -93,7 +93,7 @@ def _checked(chosen: Simulation) -> LoadedSystem | None:
     except InputError:
         return None
     if spec and loaded:
-        check_sources(loaded, spec)
+        print_warnings(check_sources(loaded, spec))
     return loaded
 
 

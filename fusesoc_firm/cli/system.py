@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load
+from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load, print_warnings
 from fusesoc_firm.node.languages import LANGUAGES, Place
+from fusesoc_firm.text.diagnostics import Diagnostic, InputError
 
 
 def add_system(commands: Any) -> None:
@@ -28,9 +31,7 @@ def add_system(commands: Any) -> None:
         "firm system new robot.yaml",
         _new_system,
     )
-    check = command(
-        actions, "check", "report all faults in a specification", "firm system check robot.yaml", _check_system
-    )
+    check = command(actions, "check", "report all faults in a specification", "firm system check robot.yaml", _check)
     show = command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
     )
@@ -56,6 +57,8 @@ def add_system(commands: Any) -> None:
         "firm system report robot.yaml",
         _report_system,
     )
+    for parser in (check, show, report):
+        parser.add_argument("--json", action="store_true", help="print the result as JSON, for other programs")
     core = command(
         actions,
         "core",
@@ -124,11 +127,37 @@ def _add_node_options(node: argparse.ArgumentParser) -> None:
     node.add_argument("--ros", type=int, choices=(1, 2), help="fail unless the system uses this version of ROS")
 
 
+def _check(arguments: argparse.Namespace) -> None:
+    if arguments.json:
+        _check_as_json(arguments)
+    else:
+        _check_system(arguments)
+
+
+def _check_as_json(arguments: argparse.Namespace) -> None:
+    """Print whether a specification is valid, and all faults and warnings; exit with 1 if it is not valid."""
+    faults: Sequence[Diagnostic] = ()
+    warnings: Sequence[Diagnostic] = ()
+    try:
+        loaded = load(arguments)
+        warnings = loaded.warnings
+        warnings += check_sources(loaded, arguments.spec)
+    except InputError as error:
+        faults = error.diagnostics
+    _print_json({"valid": not faults, "diagnostics": [item.data() for item in (*faults, *warnings)]})
+    if faults:
+        sys.exit(1)
+
+
+def _print_json(data: object) -> None:
+    print(json.dumps(data, indent=2, ensure_ascii=False))
+
+
 def _check_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.views.show import counts
 
     loaded = load(arguments)
-    check_sources(loaded, arguments.spec)
+    print_warnings(check_sources(loaded, arguments.spec))
     system = loaded.system
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
 
@@ -137,7 +166,11 @@ def _show_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.views.show import derived_description
     from fusesoc_firm.text.yaml_text import yaml_dump
 
-    print(yaml_dump(derived_description(load(arguments).system)), end="")
+    description = derived_description(load(arguments).system)
+    if arguments.json:
+        _print_json(description)
+    else:
+        print(yaml_dump(description), end="")
 
 
 def _new_system(arguments: argparse.Namespace) -> None:
@@ -212,7 +245,11 @@ def _draw_system(arguments: argparse.Namespace) -> None:
 def _report_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.views.report import report
 
-    print(report(arguments.spec, load(arguments)), end="")
+    counted = report(arguments.spec, load(arguments))
+    if arguments.json:
+        _print_json({**asdict(counted), "generated": counted.generated, "ratio": counted.ratio})
+    else:
+        print(counted, end="")
 
 
 def _print_schema(_: argparse.Namespace) -> None:

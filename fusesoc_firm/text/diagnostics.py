@@ -71,6 +71,14 @@ class Diagnostic:
             lines.append(f"      = {_readable(self.hint)}")
         return "\n".join(lines)
 
+    def data(self) -> dict[str, str | int]:
+        """Return the fault or warning as plain data: severity, message and, if known, file, line, column and hint."""
+        severity = "warning" if self.is_warning else "error"
+        found: dict[str, str | int] = {"severity": severity, "message": _readable(self.message)}
+        if self.source:
+            found |= {"file": self.source.file, "line": self.source.line, "column": self.source.column}
+        return found | ({"hint": _readable(self.hint)} if self.hint else {})
+
 
 def _readable(text: str) -> str:
     """Return `text` for a terminal: control characters are escaped, and very long words are shortened."""

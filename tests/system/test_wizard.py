@@ -264,6 +264,6 @@ def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], messa
 
 def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
-    answers = ["robot", *[""] * 9, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "no", "yes", "a"]
-    with pytest.raises(InputError, match="answer 22: 'a' already exists"):
+    answers = ["robot", *[""] * 9, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "", "", "no", "yes", "a"]
+    with pytest.raises(InputError, match="answer 24: 'a' already exists"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)

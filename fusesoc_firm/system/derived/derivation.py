@@ -38,6 +38,7 @@ from fusesoc_firm.system.derived.model import (
 from fusesoc_firm.system.derived.partition import MOST_CONVERTERS, Parting, Parts, message_names
 from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
+from fusesoc_firm.system.derived.queue import queue_of
 from fusesoc_firm.system.derived.status import status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
@@ -95,7 +96,10 @@ def derive(
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
-    subscribers = _converters(parts, SUBSCRIBER, connections)
+    subscribers = tuple(
+        replace(item, queue=queue_of(parts.blocks[item.block], item.frame, faults))
+        for item in _converters(parts, SUBSCRIBER, connections)
+    )
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
     faults.raise_if_any()
@@ -252,8 +256,9 @@ class _Analysis:
                 source = value[0].source if isinstance(value, tuple) else value.source
                 message = f"'{key}' is legal only for converters, but '{block.name}' has a 'type'"
                 self.faults.error(message, source, _KINDS_OF_BLOCKS)
+        self._check_no_keys_of(SUBSCRIBER, block)
         if not any(item.is_software for item in self.specification.accelerators if item.name == block.type):
-            self._check_no_publisher_keys(block)
+            self._check_no_keys_of(PUBLISHER, block)
         if found := self.types.get(block.type):
             self.inputs[block.name] = found.inputs
             self.outputs[block.name] = found.outputs
@@ -272,16 +277,15 @@ class _Analysis:
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
-            if is_subscriber:
-                self._check_no_publisher_keys(block)
+            self._check_no_keys_of(PUBLISHER if is_subscriber else SUBSCRIBER, block)
             self.inputs[block.name] = () if is_subscriber else (MessageSide("", frame),)
             self.outputs[block.name] = (MessageSide("", frame),) if is_subscriber else ()
 
-    def _check_no_publisher_keys(self, block: Block) -> None:
-        for key in keys_only_of(Block, PUBLISHER):
+    def _check_no_keys_of(self, mode: str, block: Block) -> None:
+        for key in keys_only_of(Block, mode):
             if getattr(block, key) is not None:
-                message = f"'{key}' is legal only for publishers, but '{block.name}' is not a publisher"
-                self.faults.error(message, block.place(key), "a publisher is a block with 'mode: publisher'")
+                message = f"'{key}' is legal only for {mode}s, but '{block.name}' is not a {mode}"
+                self.faults.error(message, block.place(key), f"a {mode} is a block with 'mode: {mode}'")
 
     def _check_count(self, mode: str) -> None:
         blocks = self.specification.blocks

@@ -50,6 +50,23 @@ class End:
     prefix: str = ""
 
 
+class Overflow(Enum):
+    """What a full queue does with a further frame; a frame that has begun to leave is never dropped."""
+
+    BLOCK = "block"
+    DROP_NEWEST = "drop_newest"
+    DROP_OLDEST = "drop_oldest"
+
+
+@dataclass(frozen=True)
+class Queue:
+    """The queue of a subscriber: `frames` whole frames with payloads of at most `longest` bytes."""
+
+    frames: int
+    longest: int
+    overflow: Overflow = Overflow.BLOCK
+
+
 @dataclass(frozen=True)
 class Converter(Topic):
     """An instance of a converter; `id` counts subscribers and publishers separately, from 0, in the blocks' order."""
@@ -58,6 +75,7 @@ class Converter(Topic):
     suffix: str = ""
     buffer: int = 0
     software: End | None = None
+    queue: Queue | None = None
 
 
 class LengthSource(Enum):

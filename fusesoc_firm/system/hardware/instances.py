@@ -7,7 +7,13 @@ from typing import Any
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
-from fusesoc_firm.system.derived.model import AcceleratorBlock, AcceleratorType, Converter, DerivedSystem
+from fusesoc_firm.system.derived.model import (
+    AcceleratorBlock,
+    AcceleratorType,
+    Converter,
+    DerivedSystem,
+    Overflow,
+)
 from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
 from fusesoc_firm.system.hardware.crossings import port_of
 from fusesoc_firm.system.hardware.maps import port_map
@@ -20,7 +26,7 @@ INNER = "inner_"
 
 
 def subscriber_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the instance of a subscriber, from the Manager to its message side."""
+    """Return the instance of a subscriber, from the Manager to its message side, after its queue if it has one."""
     ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
     return {
         **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
@@ -28,6 +34,27 @@ def subscriber_instance(names: Names, converter: Converter, system: DerivedSyste
         "id": converter.id,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
         "error": error_of(converter, system),
+        "queue": _queue(names, converter, system) if converter.queue else None,
+    }
+
+
+def _queue(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return the queue before a subscriber, with the signals between queue and subscriber."""
+    assert converter.queue
+    block, lanes, queue = converter.block, system.width // 8, converter.queue
+    beats = -(-(ID_BYTES + LENGTH_BYTES + queue.longest) // lanes)
+    # The Manager removes a beat with only the id. One beat more than the longest frame shows that a frame is longer.
+    return {
+        "block": block,
+        "label": names.label(block, "queue"),
+        "width": system.width,
+        "lanes": lanes,
+        "frames": queue.frames,
+        "beats": beats + (0 if lanes == ID_BYTES else 1),
+        "drop": None if queue.overflow is Overflow.BLOCK else {"generic": queue.overflow.value.upper()},
+        **{word: names.frame(block, word) for word in FRAME_WORDS},
+        "id": converter.id,
+        "out": error_of(converter, system),
     }
 
 

@@ -52,7 +52,7 @@ AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
 OWN_RESET = "system_rst_n"
 # Low until all clock domains have been reset.
 RELEASED = "domains_rst_n"
-# Between a publisher and its buffer.
+# Between a publisher and its buffer, and between a queue and its subscriber.
 FRAME_WORDS = (*AXIS, "tuser", "error", "error_code")
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in FRAME_WORDS)
 
@@ -64,6 +64,7 @@ class Names:
         found = blocks(system)
         forks = [(item.source, fork) for item in system.connections for fork in forked(item)]
         buffered = [item.block for item in system.publishers if item.buffer]
+        queued = [item.block for item in system.subscribers if item.queue]
         labels: list[tuple[str, ...]] = [("u", block) for block, _ in found]
         labels += [("u", *_fork_key(end, fork, "fork")) for end, fork in forks]
         labels += [
@@ -72,6 +73,7 @@ class Names:
             if item.length and item.length.source is LengthSource.COMPUTED
         ]
         labels += [("u", block, "buffer") for block in buffered]
+        labels += [("u", block, "queue") for block in queued]
         synchronised = [(block.block, str(pin.name)) for block, pin in synchronised_pins(system)]
         labels += [("u", *pin, "sync") for pin in synchronised]
         labels += [("u", *_crossing_key(item, word)) for item in all_crossings(system) for word in item.instances()]
@@ -88,7 +90,7 @@ class Names:
         signals: list[tuple[str, ...]] = [
             _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
         ]
-        signals += [(block, "", word) for block in buffered for word in FRAME_SIGNALS]
+        signals += [(block, "", word) for block in (*queued, *buffered) for word in FRAME_SIGNALS]
         signals += [(*pin, "synced") for pin in synchronised]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
         signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
@@ -137,7 +139,7 @@ class Names:
         return self._labels["u", *_crossing_key(crossing, word)]
 
     def frame(self, block: str, signal: str) -> str:
-        """Return a signal between a publisher and its buffer."""
+        """Return a signal between a publisher and its buffer, or between a queue and its subscriber."""
         return self._signals[block, "", f"frame_{signal}"]
 
 

@@ -21,7 +21,7 @@ from ruamel.yaml.util import load_yaml_guess_indent
 from fusesoc_firm.system.written.specification import (
     ACCELERATOR,
     CONVERTER_KEYS,
-    PUBLISHER,
+    MODES,
     Accelerator,
     Block,
     Outgoing,
@@ -238,8 +238,8 @@ class _Draft:
         """Return whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
         if self.section is not Block or not entry.only_of:
             return True
-        if entry.only_of == PUBLISHER:
-            return bool(self.made.get("mode") == PUBLISHER)
+        if entry.only_of in MODES:
+            return bool(self.made.get("mode") == entry.only_of)
         return ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, name: str, entry: Key) -> bool:

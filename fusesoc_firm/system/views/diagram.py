@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, DerivedSystem
+from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, Converter, DerivedSystem
 from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.hardware.crossings import crossings
 from fusesoc_firm.text.diagnostics import fail
@@ -46,10 +46,16 @@ def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
     graph.node(f"{_MANAGER}_in", "Manager", shape="box")
     graph.node(f"{_MANAGER}_out", f"Manager\n{system.scheduling.policy}", shape="box")
     for converter in (*system.subscribers, *system.publishers):
-        label = f"{dot_text(converter.block)}\n{converter.frame.message}\n{converter.frame.ros.title}"
+        label = (
+            f"{dot_text(converter.block)}\n{converter.frame.message}\n{converter.frame.ros.title}{_queue(converter)}"
+        )
         graph.node(_node(converter.block), label, **_CONVERTER)
     for block in system.accelerators:
         graph.node(_node(block.block), _accelerator(block) + _differences(system, block), **_ACCELERATOR)
+
+
+def _queue(converter: Converter) -> str:
+    return f"\nqueue: {converter.queue.frames} frames" if converter.queue else ""
 
 
 def _accelerator(block: AcceleratorBlock) -> str:

@@ -18,6 +18,7 @@ from fusesoc_firm.system.derived.model import (
     MessageSide,
     PayloadLength,
     PublisherTimes,
+    Queue,
     Scheduling,
 )
 from fusesoc_firm.system.derived.python_function import function_name
@@ -179,7 +180,16 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
         **({"software": converter.software.block} if converter.software else {"topic": converter.name}),
         "id": converter.id,
         "payloadBytes": _payload_bytes(converter.frame),
+        **_queue(converter.queue),
     }
+
+
+def _queue(queue: Queue | None) -> dict[str, Any]:
+    """Return the queue of a subscriber, with the size of its memory in bytes of payload."""
+    if queue is None:
+        return {}
+    size = queue.frames * queue.longest
+    return {"queue": queue.frames, "overflow": queue.overflow.value, "queueBytes": size}
 
 
 def _payload_bytes(frame: Frame) -> int | str:

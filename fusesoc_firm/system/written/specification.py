@@ -43,6 +43,8 @@ LINKS = ("uart", "spi")
 # The accesses to the registers of a system's status, if it has one.
 NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
+# What a subscriber's full queue does with a further frame.
+BLOCK, DROP_NEWEST, DROP_OLDEST = OVERFLOWS = ("block", "drop_newest", "drop_oldest")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 # Whether the top level synchronises an input pin to its block's clock.
@@ -212,6 +214,14 @@ class Block(Section):
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     buffer: int | None = key(
         "bytes of the longest payload, for a publisher that stores frames", form="integer", only_of=PUBLISHER
+    )
+    queue: int | None = key(
+        "number of frames that are stored before a subscriber (default: none)", form="integer", only_of=SUBSCRIBER
+    )
+    overflow: Text | None = key(
+        "what a subscriber's full queue does: block the host, or drop a frame (default: block)",
+        choices=OVERFLOWS,
+        only_of=SUBSCRIBER,
     )
     period: Text | None = key(
         "time between a publisher's messages: cycles, a time such as 10 ms, or a rate such as 100 Hz",
