@@ -36,7 +36,8 @@ ALLOWED: dict[str, str] = {
     "plugin": "building converter message node request simulation store system text tools",
     "replay": "bags frame message node simulation system text",
     "cli": (
-        "accelerator building converter message node plugin replay scheduling simulation store system text tools verify"
+        "accelerator action building converter message node plugin replay scheduling simulation store system text"
+        " tools verify"
     ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
