@@ -2,7 +2,9 @@
 
 The author of a core may change its files, so these are not locked; everything from other sources is locked. `firm`
 checks a whole core against its lock file (`check_lock`). A generator checks only its own request (`check_request`),
-since it knows neither the other cores nor the programs of a target.
+since it knows neither the other cores nor the programs of a target. FuseSoC's `--lockfile` reads the list of cores, in
+which each version is fixed; the core itself and generated cores are in the list without a digest. FuseSoC would
+rewrite the file, without our parts, if a core were missing in the list.
 """
 
 from __future__ import annotations
@@ -25,13 +27,15 @@ from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 from fusesoc_firm.text.files import read_regular
 from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
-from fusesoc_firm.tools.programs import facts_of, installed_programs, packages
+from fusesoc_firm.tools.programs import debian_package, facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """Facts by kind (`messages`, `cores`, `tools`), by the item's name, and by the fact's name."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
 _HEAD = "# Written by 'firm lock', checked by 'firm lock --locked'. Keep this file under version control.\n"
+_FUSESOC_VERSION = 1
+"""The version of FuseSoC's format of lock files."""
 _WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
 
 
@@ -62,17 +66,22 @@ def lock_of(
     }
 
 
-def lock_text(lock: Lock) -> str:
-    """Return the text of the lock file."""
-    data = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
-    return _HEAD + yaml_dump(data)
+def lock_text(lock: Lock, others: Iterable[str] = ()) -> str:
+    """Return the text of a lock file; `others` are the cores without digests."""
+    data: dict[str, Any] = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
+    cores = [{"name": name, **facts} for name, facts in lock["cores"].items()]
+    data["cores"] = [*({"name": name} for name in dict.fromkeys(others) if name not in lock["cores"]), *cores]
+    return _HEAD + yaml_dump({"lockfile_version": _FUSESOC_VERSION, **data})
 
 
 def read_lock(path: Path) -> Lock:
     """Read a lock file. Raise `InputError` if it is unreadable or invalid."""
     try:
         data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
-        return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
+        listed = {str(core["name"]): {**core} for core in data["cores"]}
+        cores = {name: {"sha256": core["sha256"]} for name, core in listed.items() if "sha256" in core}
+        kinds = {**data, "cores": cores}
+        return {kind: {str(name): dict(facts) for name, facts in kinds[kind].items()} for kind in _WORDS}
     except OSError as error:
         fail(f"cannot read {path}: {error.strerror}", hint="run 'firm lock' to write the file")
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
@@ -180,7 +189,6 @@ def _digest(item: Input) -> str | None:
 def _tools() -> dict[str, dict[str, str]]:
     tools = packages(_PACKAGES)
     for program, path in installed_programs():
-        # Programs with equal versions on different machines count as equal.
-        if facts := {name: fact for name, fact in facts_of(program, path).items() if name != "sha256"}:
-            tools[program] = facts
+        package = debian_package(path)
+        tools[program] = facts_of(program, path) | ({"package": package} if package else {})
     return dict(sorted(tools.items()))

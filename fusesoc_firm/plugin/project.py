@@ -74,7 +74,8 @@ def write_lock(core: str) -> Path:
     """Write the named core's lock file, and return the file's path. May raise `InputError`."""
     found, depends = dependencies(core)
     path = lock_path(found)
-    write(path, lock_text(_used(found, depends)))
+    generated = (call.vlnv for item in (found, *depends) for call in item.calls)
+    write(path, lock_text(_used(found, depends), (found.vlnv, *generated)))
     return path
 
 

@@ -130,6 +130,21 @@ def facts_of(program: str, path: Path) -> dict[str, str]:
     return facts
 
 
+def debian_package(path: Path) -> str:
+    """Return the name and version of the Debian package that contains a program, or an empty text."""
+    if not (query := shutil.which("dpkg-query")):
+        return ""
+    # A package contains the program itself, and not the links to it; with merged /usr, it may be listed without /usr.
+    real = str(path.resolve())
+    for place in (real, real.removeprefix("/usr")):
+        found = subprocess.run([query, "-S", place], capture_output=True, text=True, errors="replace", check=False)
+        name = found.stdout.partition(":")[0]
+        if found.returncode == 0 and name:
+            form = ["-W", "-f=${Package} ${Version}", name.partition(",")[0]]
+            return subprocess.run([query, *form], capture_output=True, text=True, check=False).stdout.strip()
+    return ""
+
+
 def installed_programs() -> Iterator[tuple[str, Path]]:
     """Yield the known programs that are installed."""
     for program in PROGRAMS:

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import shutil
 import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.plugin.answer import main as generate
 from fusesoc_firm.store.own_code import PACKAGE
 from fusesoc_firm.tools.library_path import library_root
-from fusesoc_firm.tools.programs import Program
+from fusesoc_firm.tools.programs import Program, debian_package
 
 LEAF = """\
 CAPI=2:
@@ -244,9 +245,16 @@ def test_a_lock_names_messages_cores_and_tools(project: Path, capsys: Captured) 
     assert size["sha256"] == hashlib.sha256(b"uint8 a\n").hexdigest()
     assert size["signature"].startswith("RIHS01_")
     assert lock["messages"]["geometry_msgs/Point (ROS 2)"]["source"] == "rosbags ros2_jazzy"
-    assert {"me:p:branch:1.0", f"robot:axis:firm_axis:{__version__}"} <= lock["cores"].keys()
-    # The former is for a target that the core does not have, the latter is the core itself.
-    assert not {"me:p:leaf:1.0", "me:p:top:1.0"} & lock["cores"].keys()
+    cores = {core["name"]: core.get("sha256") for core in lock["cores"]}
+    assert {"me:p:branch:1.0", f"robot:axis:firm_axis:{__version__}"} <= cores.keys()
+    # It is for a target that the core does not have.
+    assert "me:p:leaf:1.0" not in cores
+    # The core's own files are not locked.
+    assert [name for name, digest in cores.items() if digest is None] == [
+        "me:p:top:1.0",
+        "me:p:top-size:1.0",
+        "me:p:top-foreign:1.0",
+    ]
     assert lock["tools"]["fusesoc"] == {"version": version("fusesoc")}
     assert locked(capsys) == []
 
@@ -302,7 +310,17 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     main(["lock", "me:p:top"])
     capsys.readouterr()
     install("GHDL 3.0.0")
-    assert locked(capsys) == ["tool ghdl: version is GHDL 3.0.0, but the lock file has GHDL 2.0.0"]
+    digest, version = locked(capsys)
+    assert digest.startswith("tool ghdl: sha256 is ")
+    assert version == "tool ghdl: version is GHDL 3.0.0, but the lock file has GHDL 2.0.0"
+    # Another build of the same version, and another package.
+    install("GHDL 2.0.0 # rebuilt")
+    (digest,) = locked(capsys)
+    assert digest.startswith("tool ghdl: sha256 is ")
+    install("GHDL 2.0.0")
+    assert locked(capsys) == []
+    monkeypatch.setattr("fusesoc_firm.plugin.lock_file.debian_package", lambda _: "ghdl 2.0.0-1")
+    assert locked(capsys) == ["tool ghdl: package is ghdl 2.0.0-1, but the lock file has None"]
     (project / "bin" / "ghdl").unlink()
     assert locked(capsys) == ["tool ghdl is locked, but not installed"]
     # Additional installed programs do not count as a difference, either.
@@ -315,11 +333,46 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     assert found.startswith("tool fusesoc-firm: sha256 is ")
 
 
-@pytest.mark.parametrize("text", ["", "[]", "messages: {}\n", "messages: {}\ncores: {a: 1}\ntools: {}\n", "{"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "messages: {}\n",
+        "messages: {}\ncores: {a: 1}\ntools: {}\n",
+        "messages: {}\ncores: [{a: 1}]\ntools: {}\n",
+        "{",
+    ],
+)
 def test_what_is_no_lock_file_is_a_fault(project: Path, capsys: Captured, text: str) -> None:
     assert "cannot read" in locked(capsys)[0]
     (project / "top/top.lock").write_text(text)
     assert "is not a lock file" in locked(capsys)[0]
+
+
+@pytest.mark.skipif(not shutil.which("dpkg-query"), reason="not a Debian system")
+def test_the_package_of_a_program() -> None:
+    shell = Path(str(shutil.which("sh")))
+    assert debian_package(shell).split()[0] in ("dash", "bash")
+    assert debian_package(Path("/nowhere/sh")) == ""
+
+
+def test_fusesoc_reads_its_part_of_a_lock_file(project: Path) -> None:
+    """The versions of the cores; and FuseSoC leaves the rest of the file alone."""
+    flow = "  setup: {filesets: [base], generate: [size], toplevel: x, flow: generic, flow_options: {tool: ghdl}}\n"
+    (project / "top/top.core").write_text(TOP.replace("me:p:tree", "me:p:other") + flow)
+    main(["lock", "me:p:top"])
+    lock = project / "top/top.lock"
+    before = lock.read_text()
+    assert "name: me:p:other:1.0\n" in before
+    (project / "newest.core").write_text(OTHER.replace("me:p:other:1.0", "me:p:other:2.0"))
+    fusesoc = "import sys; from fusesoc.main import main; sys.exit(main())"
+    run = [sys.executable, "-c", fusesoc, "run", "--setup", "--target=setup", "--lockfile=top/top.lock", "me:p:top"]
+    done = subprocess.run(run, cwd=project, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (edam,) = (project / "build").rglob("*.eda.yml")
+    assert [name for name in yaml.safe_load(edam.read_text())["cores"] if ":other:" in name] == ["me:p:other:1.0"]
+    assert lock.read_text() == before
 
 
 def test_what_a_dependency_has_generated_is_locked_too(project: Path, capsys: Captured) -> None:
