@@ -54,7 +54,7 @@ CALLS: Sequence[tuple[str, str, Mapping[str, object]]] = (
     ("quat2euler/quat2euler_hls", "system", {}),
     ("quat2euler/quat2euler_hls", "simulation", {}),
     ("mobile_robot/mobile_robot", "simulation", {"simulator": "icarus"}),
-    ("image_pipeline/image_pipeline", "system", {}),
+    ("image_pipeline/image_pipeline", "system", {"board": "zynq7000"}),
     ("multi_type/multi_type_verilog", "system", {}),
 )
 

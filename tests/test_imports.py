@@ -26,7 +26,7 @@ ALLOWED: dict[str, str] = {
     "netlist": "text tools",
     "scheduling": "text tools",
     "action": "store text",
-    "building": "action request text tools",
+    "building": "action request store text tools",
     "system": "converter frame message request scheduling store text tools",
     "accelerator": "converter system text tools",
     "verify": "converter frame message request text tools",
@@ -36,7 +36,8 @@ ALLOWED: dict[str, str] = {
     "plugin": "building converter message node request simulation store system text tools",
     "replay": "bags frame message node simulation system text",
     "cli": (
-        "accelerator building converter message node plugin replay scheduling simulation store system text tools verify"
+        "accelerator action building converter message node plugin replay scheduling simulation store system text"
+        " tools verify"
     ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.

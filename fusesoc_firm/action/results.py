@@ -2,6 +2,7 @@
 
     <root>/actions1/ac/<first two digits>/<key>        a record, as JSON after its own SHA-256
     <root>/actions1/cas/<first two digits>/<digest>    the content of an output or a log
+    <root>/actions1/notes/<first two digits>/<key>     plain data about a plan or a setup of FuseSoC, like a record
 
 The folders are those that remote caches of build tools use. The store has a size limit of its own, since binaries and
 bitstreams would push out generated cores. As in the store of generated cores, nothing that is read is trusted: a record
@@ -28,7 +29,7 @@ from fusesoc_firm.text.diagnostics import fail
 
 FOLDER_NAME = "actions1"
 LIMIT = "FUSESOC_FIRM_ACTIONS_SIZE"
-_AC, _CAS = f"{FOLDER_NAME}/ac", f"{FOLDER_NAME}/cas"
+_AC, _CAS, _NOTES = f"{FOLDER_NAME}/ac", f"{FOLDER_NAME}/cas", f"{FOLDER_NAME}/notes"
 _DEFAULT_LIMIT = "10G"
 _KEPT_OF_LIMIT = 0.8
 _MOST_BYTES = 2**31
@@ -66,17 +67,19 @@ class Results:
 
     def record(self, key: str) -> Record | None:
         """Return the record of an action, or None if it is missing or damaged."""
-        name = _place(_AC, key)
-        data = shared_files.read(str(self.root), name, _MOST_RECORD_BYTES)
-        said, _, text = (data or b"").partition(b"\n")
-        if data is None or digest(text).encode() != said:
-            return None
         try:
-            found = _record(json.loads(text))
-        except (ValueError, RecursionError, TypeError, LookupError):
+            return _record(self._plain(_place(_AC, key)))
+        except (ValueError, TypeError, LookupError):
             return None
-        layout.mark_used(str(self.root), name)
-        return found
+
+    def note(self, key: str) -> object:
+        """Return the plain data of a note, or None if it is missing or damaged."""
+        return self._plain(_place(_NOTES, key))
+
+    def keep_note(self, key: str, data: object) -> None:
+        """Store a note, if the store can be written."""
+        with suppress(OSError):
+            self._keep_plain(_place(_NOTES, key), data)
 
     def content(self, name: str) -> bytes | None:
         """Return the content with this digest, or None if it is missing or damaged."""
@@ -96,8 +99,7 @@ class Results:
             "seconds": record.seconds,
             "place": record.place,
         }
-        text = json.dumps(plain).encode()
-        shared_files.write_whole(str(self.root), _place(_AC, key), digest(text).encode() + b"\n" + text)
+        self._keep_plain(_place(_AC, key), plain)
 
     def keep_content(self, data: bytes) -> str:
         """Store a content and return its digest. May raise `OSError`."""
@@ -140,6 +142,21 @@ class Results:
         """Remove all results; return the number of removed bytes. May raise `OSError`."""
         return shared_files.remove(str(self.root), FOLDER_NAME)
 
+    def _plain(self, name: str) -> object:
+        data = shared_files.read(str(self.root), name, _MOST_RECORD_BYTES)
+        said, _, text = (data or b"").partition(b"\n")
+        if data is None or digest(text).encode() != said:
+            return None
+        layout.mark_used(str(self.root), name)
+        try:
+            return json.loads(text)
+        except (ValueError, RecursionError):
+            return None
+
+    def _keep_plain(self, name: str, data: object) -> None:
+        text = json.dumps(data).encode()
+        shared_files.write_whole(str(self.root), name, digest(text).encode() + b"\n" + text)
+
     def _restore(self, path: Path, item: Item, contents: Contents) -> bool:
         if item.kind == FOLDER:
             path.mkdir(parents=True, exist_ok=True)
@@ -165,7 +182,7 @@ class Results:
         """Return the name, the size and the time of last use of each file, the most recently used first."""
         found = [
             (name, status.st_size, status.st_mtime)
-            for part in (_AC, _CAS)
+            for part in (_AC, _CAS, _NOTES)
             for name, status in shared_files.listed(str(self.root), part)
             if stat.S_ISREG(status.st_mode)
         ]

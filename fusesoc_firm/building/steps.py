@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -21,8 +22,10 @@ from fusesoc_firm.action.action import Action, after, execute, log_of, look_up
 from fusesoc_firm.action.contents import Contents
 from fusesoc_firm.action.results import Record, Results, default_results
 from fusesoc_firm.action.tree import Tree, tree_of
+from fusesoc_firm.building.folder_lock import FolderLock
 from fusesoc_firm.building.plan import Build
-from fusesoc_firm.building.process import set_up
+from fusesoc_firm.building.process import run_all, set_up
+from fusesoc_firm.building.recall import Recall, observed
 from fusesoc_firm.text.files import write_whole
 
 CACHED, RAN, FAILED = "cached", "ran", "failed"
@@ -47,26 +50,83 @@ class Step:
 class Steps:
     """How a build runs as actions: the names of its steps after the setup, and whether their outputs are wanted.
 
-    With `is_rerun`, steps run although their results are stored.
+    With `is_rerun`, steps run although their results are stored. `scan` is the state of FuseSoC's libraries for the
+    notes of `recall`, and `flags` are the user's flags.
     """
 
     names: tuple[str, ...]
     has_outputs: bool = True
     is_rerun: bool = False
+    recall: Recall | None = None
+    scan: str = ""
+    flags: tuple[tuple[str, bool | str], ...] = ()
 
     def __call__(self, fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
         """Set a build up and run its steps; leave the report, and exit with status 1 if a step fails."""
         report_of(build).unlink(missing_ok=True)
+        if fusesoc.config.no_export:
+            # The sources are not in the build's folder, so no step could be cached.
+            run_all(fusesoc, build, ("--setup", "--build", *(("--run",) if "run" in self.names else ()), *options))
+            return
         results = default_results()
         contents = results.contents()
-        set_up(fusesoc, build, options)
-        run = _Run(build, _backend(fusesoc, build), results, contents, partial(set_up, fusesoc, build, options))
+        with observed() as found:
+            set_up(fusesoc, build, options)
+        run = _Run(
+            build,
+            _backend(fusesoc, build, dict(self.flags)),
+            results,
+            contents,
+            partial(set_up, fusesoc, build, options),
+        )
+        if self.recall:
+            tree = tree_of(build.work_root, contents)
+            self.recall.keep_setup(build, self.scan, found, run.backend, tree)
         is_good = run.all(self.names, is_rerun=self.is_rerun, has_outputs=self.has_outputs)
         contents.save()
         results.shrink_if_needed()
-        write_whole(report_of(build), json.dumps([asdict(step) for step in run.steps]).encode())
+        _report(build, run.steps)
         if not is_good:
             sys.exit(1)
+
+    def recalled(self, build: Build) -> float | None:
+        """Answer a whole build without a setup; return the seconds, or None if the build must run.
+
+        The log and the report are those of the stored steps. If outputs are wanted, they must be in the folder.
+        """
+        if self.recall is None or self.is_rerun:
+            return None
+        started, results, contents = time.monotonic(), self.recall.results, self.recall.contents
+        if (known := self.recall.setup(build, self.scan)) is None:
+            return None
+        backend, tree = known
+        found = recorded(
+            self.names, lambda name, inputs: action_of(name, build, backend, inputs), tree, results, contents
+        )
+        logs = [log for _, record in found if (log := log_of(record, results, build.work_root)) is not None]
+        if len(logs) < len(self.names) or (self.has_outputs and not _is_in_place(build, tree, found, contents)):
+            return None
+        lock = FolderLock(build.lock)
+        if lock.acquire():
+            return None
+        try:
+            build.log.write_bytes(b"".join(logs))
+            _report(build, [Step(action.name, CACHED, record.seconds) for action, record in found])
+        finally:
+            lock.release()
+        return time.monotonic() - started
+
+
+def _is_in_place(build: Build, tree: Tree, found: list[tuple[Action, Record]], contents: Contents) -> bool:
+    """Return whether a build's folder contains exactly its inputs and the outputs of its steps."""
+    expected = dict(tree)
+    for _, record in found:
+        expected = after(record, expected)
+    return build.work_root.is_dir() and tree_of(build.work_root, contents) == expected
+
+
+def _report(build: Build, steps: Sequence[Step]) -> None:
+    write_whole(report_of(build), json.dumps([asdict(step) for step in steps]).encode())
 
 
 def report_of(build: Build) -> Path:
@@ -158,9 +218,9 @@ class _Run:
         print(text.decode(errors="backslashreplace"), end="", flush=True)
 
 
-def _backend(fusesoc: Any, build: Build) -> tuple[str, str]:
+def _backend(fusesoc: Any, build: Build, further: Mapping[str, Any]) -> tuple[str, str]:
     """Return `flow` or `tool`, and the name of the build's flow or tool in Edalize."""
     core = fusesoc.get_core(build.core)
-    flags: Mapping[str, Any] = {**core.get_flags(build.target), "target": build.target}
+    flags: Mapping[str, Any] = {**core.get_flags(build.target), "target": build.target, **further}
     flow = core.get_flow(flags)
     return ("flow", str(flow)) if flow else ("tool", str(flags["tool"]))

@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,9 @@ from fusesoc_firm.cli.build_options import (
     selection_of,
 )
 from fusesoc_firm.cli.common import command, positive
+from fusesoc_firm.text.diagnostics import fail
+
+_NOT_CACHED = ("setup", "cluster", "events", "junit")
 
 
 def add_build(commands: Any) -> None:
@@ -45,6 +49,11 @@ def add_build(commands: Any) -> None:
     build.add_argument(
         "--build-root", type=Path, metavar="DIR", help="folder for the builds (default: FuseSoC's build folder)"
     )
+    build.add_argument(
+        "--cached",
+        action="store_true",
+        help="take the results of steps with unchanged inputs from the store; each build starts in an empty folder",
+    )
     build.add_argument("--clean", action="store_true", help="empty each build folder first")
     build.add_argument("--locked", action="store_true", help="report differences from each core's lock file as errors")
     add_limits(build)
@@ -52,7 +61,36 @@ def add_build(commands: Any) -> None:
     add_fusesoc(build)
 
 
+def _build_cached(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.building.plan import select_plan
+    from fusesoc_firm.building.steps import Steps
+    from fusesoc_firm.cli.cached import Words, report, run_cached
+    from fusesoc_firm.plugin.build import How
+
+    if others := [name for name in _NOT_CACHED if getattr(arguments, name)]:
+        fail(f"--cached cannot be combined with --{others[0]}")
+    started = time.monotonic()
+    selection, options = selection_of(arguments), run_options_of(arguments)
+    steps = Steps(("build",) if arguments.build_only else ("build", "run"), flags=tuple(options.use_flags().items()))
+    how = How(
+        is_locked=arguments.locked,
+        jobs=arguments.jobs or 0,
+        is_failing_fast=arguments.fail_fast,
+        limits=limits_of(arguments),
+        steps=steps,
+    )
+    affected = None if selection.affected is None else sorted(selection.affected)
+    chosen = (selection.cores, selection.targets, selection.is_where_present, affected)
+    words = Words("build", "ok", ("build", chosen, options.command_line(), steps.names))
+    make = partial(select_plan, selection, options, arguments.build_root)
+    report(words, run_cached(words, make, how, arguments.build_root), time.monotonic() - started)
+
+
 def _build(arguments: argparse.Namespace) -> None:
+    if arguments.cached:
+        _build_cached(arguments)
+        return
+
     from fusesoc_firm.building.plan import select_plan
     from fusesoc_firm.cli.build_report import Report
     from fusesoc_firm.plugin.build import How, Listener, build

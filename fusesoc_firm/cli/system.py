@@ -154,12 +154,14 @@ def _print_json(data: object) -> None:
 
 
 def _check_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.views.show import counts
+    from fusesoc_firm.system.views.show import counts, default_lengths
 
     loaded = load(arguments)
     print_warnings(check_sources(loaded, arguments.spec))
     system = loaded.system
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
+    for line in default_lengths(system):
+        print(line)
 
 
 def _show_system(arguments: argparse.Namespace) -> None:

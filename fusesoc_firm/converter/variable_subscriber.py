@@ -52,6 +52,7 @@ from fusesoc_firm.converter.storing import store_data, stored_slices
 from fusesoc_firm.converter.stream import Store, StoreMap, ranges, stores_of
 from fusesoc_firm.converter.stream import Stream as Lanes
 from fusesoc_firm.converter.vhdl import hexadecimal, within
+from fusesoc_firm.frame.length import longest_payload
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop, Path
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.render import Context
@@ -98,6 +99,7 @@ class _Subscriber:
         return {
             "message": str(self.frame.message),
             "middleware": self.frame.ros.title,
+            "longest": longest_payload(self.frame),
             "width": self.window.width,
             "lanes": self.lanes,
             "count_bits": self.lanes.bit_length(),
@@ -129,6 +131,10 @@ class _Subscriber:
                 {"step": place, "bit": bit}
                 for place, step in enumerate(self.steps)
                 if isinstance(step, Header | Block | Open) and (bit := self._segment_bit(step.completes))
+            ],
+            # A segment that the header completes.
+            "opens_at_once": [
+                {} for step in self.steps if isinstance(step, Header) and self._segment_bit(step.completes)
             ],
             "loops": [self._loop(place) for place, step in enumerate(self.steps) if isinstance(step, Close)],
         }

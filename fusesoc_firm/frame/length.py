@@ -13,6 +13,10 @@ from typing import Any
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad
 from fusesoc_firm.frame.values import MessageValue, part_of, units_of
 
+# The longest payload in bytes of messages without bounds, unless another one is given; and the hardware's limit.
+DEFAULT_LONGEST = 65_536
+MOST_BYTES = 2**30 - 1
+
 # The growth by a body of fixed size depends on the position modulo at most this number.
 _PERIOD = 8
 
@@ -88,6 +92,18 @@ def length_of(frame: Frame) -> Length:
     """Return the expression for the length of a frame's payload."""
     prefix = len(frame.prefix)
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes)]))
+
+
+def bounded_payload(frame: Frame) -> int | None:
+    """Return the longest payload in bytes, with what a writer may append; None if the message has no bounds."""
+    longest = length_of(frame).maximum
+    return None if longest is None else min(longest + frame.trailing_bytes, MOST_BYTES)
+
+
+def longest_payload(frame: Frame) -> int:
+    """Return the longest payload in bytes that a subscriber accepts unless it is told otherwise."""
+    bounded = bounded_payload(frame)
+    return DEFAULT_LONGEST if bounded is None else bounded
 
 
 def sent_length_of(frame: Frame) -> Length:

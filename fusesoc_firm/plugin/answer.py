@@ -26,8 +26,9 @@ from fusesoc_firm.request.calls import make_request, read_call
 from fusesoc_firm.request.core_reader import core_name
 from fusesoc_firm.request.request import LoadedRequest, Request, as_files
 from fusesoc_firm.request.requesting_core import find_requesting_core
-from fusesoc_firm.store import own_code
+from fusesoc_firm.store import layout, own_code
 from fusesoc_firm.store.facts import Fact, facts
+from fusesoc_firm.store.layout import CALL, default_root, read_note
 from fusesoc_firm.store.reads import Input, Reads, noted
 from fusesoc_firm.store.store import Entry, Files, Key, default_store, request_digest
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, fail
@@ -96,6 +97,12 @@ def answer_from_store(command: str, path: Path) -> bool:
     except (InputError, _NotStoredError):
         return False
     return True
+
+
+def noted_facts(command: str, path: Path) -> list[Fact] | None:
+    """Return the facts that determine the answer of an answered call, or None if they are not noted."""
+    note = read_note(default_root(), layout.place(call_digest(command, path.read_bytes()), CALL))
+    return None if note is None else [(kind, name, state) for kind, name, state in note["facts"]]
 
 
 def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only_looked_up: bool = False) -> None:

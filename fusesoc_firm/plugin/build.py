@@ -7,15 +7,16 @@ import shlex
 import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fusesoc_firm.building.cluster import build_on
 from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.pool import Limits, Outcome, Pool, ignore
 from fusesoc_firm.building.process import run_all, save_time
+from fusesoc_firm.building.recall import Recall, note_call, observed
 from fusesoc_firm.building.steps import Steps
-from fusesoc_firm.plugin.answer import answer_from_store
+from fusesoc_firm.plugin.answer import answer_from_store, noted_facts
 from fusesoc_firm.plugin.batch import prepare
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.plugin.project import check_locked
@@ -70,9 +71,7 @@ def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, 
 
 
 def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
-    # A step of an action should depend on few of our files.
-    ours = ("fusesoc_firm.tools.launcher",) if how.steps else ("fusesoc_firm.cli", "tool")
-    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", *ours]))
+    _set_launcher(how)
     if how.is_locked:
         for core in dict.fromkeys(build.core for build in plan.builds):
             check_locked(core)
@@ -99,6 +98,43 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
     yield from pool.run(plan)
 
 
+def recall_or_build(
+    recall: Recall, make: Callable[[], Plan], how: How, listener: Listener
+) -> Generator[tuple[int, Outcome], None, None]:
+    """Yield the number of builds and the outcome of each build, as it finishes: recalled if possible, else built.
+
+    `make` makes the plan of the command whose notes `recall` reads. `how.steps` are the steps. Raise `InputError` as
+    `make` and `build` do.
+    """
+    assert how.steps
+    _set_launcher(how)
+    recall.build_root.mkdir(parents=True, exist_ok=True)
+    done: set[Build] = set()
+    if not how.is_locked and not how.steps.is_rerun and (known := recall.builds()):
+        builds, scan = known
+        steps = replace(how.steps, recall=recall, scan=scan)
+        for item in builds:
+            if (seconds := steps.recalled(item)) is not None:
+                done.add(item)
+                yield len(builds), Outcome(item, True, seconds)
+        recall.contents.save()
+        if len(done) == len(builds):
+            return
+    with observed() as found:
+        plan = make()
+    steps = replace(how.steps, recall=recall, scan=recall.keep_builds(plan.builds, found))
+    rest = tuple(item for item in plan.builds if item not in done)
+    for outcome in build(replace(plan, builds=rest), replace(how, steps=steps), listener):
+        yield len(plan.builds), outcome
+
+
+def _set_launcher(how: How) -> None:
+    """Let this package start the programs of builds, unless another launcher is set."""
+    # A step of an action should depend on few of our files.
+    ours = ("fusesoc_firm.tools.launcher",) if how.steps else ("fusesoc_firm.cli", "tool")
+    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", *ours]))
+
+
 def _generators_run_here() -> bool:
     """Return whether generators run in the same Python as this process."""
     chosen = os.environ.get("FUSESOC_FIRM_PYTHON")
@@ -110,4 +146,7 @@ def _answer(line: Sequence[str]) -> bool:
     *_, script, path = line
     commands = {library_root() / "generators" / f"{name}_generator.py": name for name in GENERATORS}
     name = next((name for known, name in commands.items() if known.resolve() == Path(script).resolve()), None)
-    return name is not None and answer_from_store(name, Path(path))
+    if name is None or not answer_from_store(name, Path(path)):
+        return False
+    note_call(noted_facts(name, Path(path)))
+    return True

@@ -58,7 +58,18 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     if not stimuli:
         names = ", ".join(subscriber.block for subscriber in subscribers)
         fail(f"{path} contains no message for {names}")
+    for stimulus in stimuli:
+        _check_length(path, stimulus)
     return stimuli
+
+
+def _check_length(path: Path, stimulus: Stimulus) -> None:
+    longest, size = stimulus.subscriber.max_length, len(stimulus.payload)
+    if longest is not None and size > longest:
+        fail(
+            f"{path} contains a message of {size} bytes for {stimulus.subscriber.block}, which accepts {longest}",
+            hint=f"add 'maxLength: {size}' or more to the block",
+        )
 
 
 def _from_yaml(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:

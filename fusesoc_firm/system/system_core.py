@@ -23,8 +23,11 @@ from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.boards.block_design import (
     BLOCK_DESIGN_TEMPLATE,
     PACKAGE_TEMPLATE,
+    RECORDS_TEMPLATE,
     block_design_configuration,
     package_configuration,
+    records_configuration,
+    records_entity,
 )
 from fusesoc_firm.system.boards.board import (
     BOARD_TEMPLATE,
@@ -297,6 +300,8 @@ def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedF
         script = render(PACKAGE_TEMPLATE, package_configuration(type_, list(paths), system, board, clock))
         files[f"{function_name(type_)}.tcl"] = GeneratedFile(script, "user")
     files |= _clock_files(loaded, board, "xdc", "xdc", "/")
+    records = render(RECORDS_TEMPLATE, records_configuration(system))
+    files[f"{records_entity(system)}.vhd"] = GeneratedFile(records, VHDL)
     design = render(BLOCK_DESIGN_TEMPLATE, block_design_configuration(system, board, clock))
     files[f"{board_entity(system, board)}.tcl"] = GeneratedFile(design, "tclSource")
     return files

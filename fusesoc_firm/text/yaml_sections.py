@@ -46,7 +46,8 @@ class Key:
     `form` is "text", "integer", "texts" (a text or a list of texts), "section" or "sections" (a list); `type` is the
     type of a "section" or of each item in "sections". `aliases` are other spellings of the key. `choices` lists all
     legal values, if possible. A required key may be omitted if another key has the value in `unless`. If a section
-    describes several kinds of items, `only_of` limits the key to one kind. A text must satisfy the `rule`.
+    describes several kinds of items, `only_of` limits the key to one kind. A text must satisfy the `rule`. The wizard
+    does not ask for keys without `is_asked`.
     """
 
     meaning: str
@@ -59,6 +60,7 @@ class Key:
     section: type[Section] | None = None
     only_of: str = ""
     rule: TextRule = text_fault
+    is_asked: bool = True
 
     def is_needed(self, others: Mapping[str, object]) -> bool:
         """Return whether the key is required, given the values of the `others` as texts."""

@@ -17,6 +17,8 @@ from fusesoc_firm.text.render import render
 from tests.bench.designs import Converter, Design, Port, generate, is_field
 from tests.hdl.ghdl import Generic
 
+# More than the longest measured payload.
+_LONGEST_PAYLOAD = 2**24
 _HERE = Path(__file__).parent
 
 # The id that publishers send.
@@ -118,7 +120,8 @@ def subscriber_model(converter: Converter, folder: Path) -> Subscriber:
         "elements": [{"name": element, "fields": _shown(fields, owner, element)} for element in elements],
         "streams": [{"name": stream} for stream in streams],
     }
-    program = _build(design, "subscriber.cpp", configuration, {})
+    generics = {} if converter.frame().is_fixed_size else {"MAX_LENGTH": _LONGEST_PAYLOAD}
+    program = _build(design, "subscriber.cpp", configuration, generics)
     return Subscriber(program, converter.width, tuple(port.name for port in fields), streams)
 
 

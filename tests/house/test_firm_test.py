@@ -108,8 +108,8 @@ def library(tmp_path: Path) -> Path:
     return folder
 
 
-def command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "fusesoc_firm.cli", "test", *arguments]
+def command(*arguments: str, name: str = "test") -> list[str]:
+    return [sys.executable, "-m", "fusesoc_firm.cli", name, *arguments]
 
 
 def environment(library: Path, **variables: str) -> dict[str, str]:
@@ -121,9 +121,9 @@ def environment(library: Path, **variables: str) -> dict[str, str]:
     return {**os.environ, **own, **variables}
 
 
-def run(library: Path, *arguments: str, **variables: str) -> tuple[int, str]:
+def run(library: Path, *arguments: str, name: str = "test", **variables: str) -> tuple[int, str]:
     done = subprocess.run(
-        command(*arguments),
+        command(*arguments, name=name),
         cwd=library,
         env=environment(library, **variables),
         capture_output=True,
@@ -152,6 +152,50 @@ def test_unchanged_tests_start_no_tool(library: Path) -> None:
     # The log of the simulation is in the log of the recalled build.
     assert first[first.index("Entering") :] in log.read_text()
     assert re.search(r"4 tests in [\d.]+ s: 4 cached, 0 passed, 0 failed; [\d.]+ s saved", text)
+
+
+def is_recalled(library: Path, *arguments: str, name: str = "test") -> bool:
+    """Run a command; return whether everything was cached, and FuseSoC's reader of cores was not even imported."""
+    status, text = run(library, *arguments, name=name, PYTHONPROFILEIMPORTTIME="1")
+    assert status == 0, text
+    return set(results(text).values()) == {"cached"} and "fusesoc.coremanager" not in text
+
+
+def test_an_unchanged_command_is_recalled_without_a_setup(library: Path) -> None:
+    selected = ("acme:m:counter", "--target", "sim")
+    assert not is_recalled(library, *selected)
+    assert is_recalled(library, *selected)
+    # A removed folder of builds is not needed.
+    shutil.rmtree(library / "build")
+    assert is_recalled(library, *selected)
+    # After an edit of a source, or of a library by a new core, FuseSoC sets the build up again.
+    source = library / "counter" / "counter.vhd"
+    source.write_text(source.read_text() + "\n")
+    assert not is_recalled(library, *selected)
+    (library / "new").mkdir()
+    (library / "new" / "new.core").write_text("CAPI=2:\nname: acme:m:new:1.0\ntargets: {default: {}}\n")
+    assert not is_recalled(library, *selected)
+    assert is_recalled(library, *selected)
+    # Other options are another command.
+    assert not is_recalled(library, *selected, "--rerun")
+
+
+def test_firm_build_restores_outputs(library: Path) -> None:
+    selected = ("acme:m:gate", "--target", "sim_icarus", "--cached", "--build-only")
+    # The environment, which belongs to a command's note, is that of `is_recalled`.
+    status, text = run(library, *selected, name="build", PYTHONPROFILEIMPORTTIME="1")
+    assert (status, results(text)) == (0, {"sim_icarus": "ok"}), text
+    program = library / "build" / "acme_m_gate_1.0" / "sim_icarus" / "acme_m_gate_1.0"
+    content = program.read_bytes()
+    assert is_recalled(library, *selected, name="build")
+    shutil.rmtree(library / "build")
+    status, text = run(library, *selected, name="build", PYTHONPROFILEIMPORTTIME="1")
+    assert (status, results(text)) == (0, {"sim_icarus": "cached"}), text
+    assert program.read_bytes() == content
+    assert os.access(program, os.X_OK)
+    status, text = run(library, *selected, "--cluster", "tcp://x", name="build")
+    assert status == 1
+    assert "--cached cannot be combined" in text
 
 
 def test_second_runs_of_steps_write_the_same_bytes(library: Path) -> None:

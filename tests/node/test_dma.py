@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.node.bursts import AbortedFrameError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.transport.dma import (
     BUFFER,
     COMPLETE,
@@ -207,6 +208,21 @@ def test_frames_there_and_back(root: Path, engine: Engine, size: int) -> None:
     assert max(engine.parts) == (size or max(map(len, frames)))
     assert engine.resets == 2
     assert (root / "sys/class/u-dma-buf/udmabuf0/sync_mode").read_text() == "2"
+
+
+def test_a_record_aborts_a_frame(root: Path, engine: Engine) -> None:
+    """The part of the frame that was sent, then the record of the hardware; the next frame is whole."""
+    part, record, frame = b"\1\x64\0\0\0abc", b"\xff" * 5 + b"\1\x0a", pack_frame(1, b"de")
+    joiner = BurstJoiner(4, 8)
+    with DmaTransport(device(root)) as transport:
+        for burst in (part, record, frame):
+            transport.send(burst)
+        bursts = [transport.receive(60) for _ in range(3)]
+    assert bursts == [Burst(part), Burst(b"\1", is_aborted=True), Burst(frame)]
+    assert joiner.push(part) is None
+    with pytest.raises(AbortedFrameError, match="the frame with id 1 was aborted"):
+        joiner.push(b"\1", is_aborted=True)
+    assert joiner.push(frame) == JoinedFrame(1, b"de")
 
 
 def test_buffers_that_the_engine_keeps_hold_the_sender(root: Path, engine: Engine) -> None:

@@ -63,7 +63,12 @@ _TO_SUBSCRIBERS = Proof(
         Mutation(
             _DEMUX, "<= decode(index, valid, DESTINATIONS)", "<= (others => valid)", ("one_subscriber_at_a_time",)
         ),
-        Mutation(_DEMUX, "forward <= known_r and not first_r", "forward <= not first_r", ("no_beat_invented",)),
+        Mutation(
+            _DEMUX,
+            "forward <= known_r and not first_r",
+            "forward <= not first_r",
+            ("no_beat_invented", "no_refused_beat_leaves"),
+        ),
         Mutation(_DEMUX, "index   <= index_r;", "index   <= not index_r;", ("routed_by_id",)),
         Mutation(
             _DEMUX, "<= s_axis_tvalid and forward;", "<= s_axis_tvalid and forward and ready(0);", ("offered_unasked",)
@@ -86,6 +91,8 @@ _TO_HOST = Proof(
         _forgets_skid("in_order_unchanged"),
         _halves_rate("no_bubble"),
         _loses_id("tid_is_the_publisher"),
+        Mutation(_MANAGER, "sent_tuser     <= granted_tuser", 'sent_tuser     <= "1"', ("abort_ends_one_frame",)),
+        Mutation(_MANAGER, "sent_tuser     <= granted_tuser", 'sent_tuser     <= "0"', ("no_abort_lost",)),
     ),
 )
 

@@ -133,7 +133,8 @@ def test_every_key_of_the_grammar_is_asked_for(tmp_path: Path) -> None:
     asked = {question.name for question in answers.asked}
     for section in (Project, Accelerator, Block, Outgoing):
         for name, (_, entry) in keys_of(section).items():
-            assert name in asked or f"add to '{name}'" in asked or entry.form == "section", name
+            is_asked = name in asked or f"add to '{name}'" in asked or entry.form == "section"
+            assert is_asked is entry.is_asked, name
 
 
 def test_what_a_block_is_decides_what_is_asked(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ proc legal {value values} {
 
 # --- sources ---------------------------------------------------------------------------------------------------------
 
-# Ports by entity, each with direction (I or O) and bits where these are numbers; and what other entities instantiate.
+# Ports by entity, each with direction (I or O), bits where these are numbers, and whether it has a default; and what other entities instantiate.
 set entities {}
 set instantiated {}
 set labels {}
@@ -77,7 +77,8 @@ proc ports_of {text} {
     if {![regexp -nocase $form $declaration all names direction high]} continue
     foreach name [split $names ","] {
       set width [expr {$high eq "" ? 1 : $high + 1}]
-      dict set found [string tolower [string trim $name]] [list [expr {$direction eq "in" ? "I" : "O"}] $width]
+      set has_default [regexp {:=} $declaration]
+      dict set found [string tolower [string trim $name]] [list [expr {$direction eq "in" ? "I" : "O"}] $width $has_default]
     }
   }
   return $found

@@ -163,7 +163,7 @@ def test_clocks_widths_and_pins(tmp_path: Path, library: Path, board: str, clock
         f"processor/{pin}1 system/clk_fast 1",
         f"processor/{pin}2 system/clk_odd 1",
         "dma/m_axis_mm2s_tdata system/s_axis_tdata 512",
-        "system/m_axis_tkeep dma/s_axis_s2mm_tkeep 64",
+        "records/m_axis_tkeep dma/s_axis_s2mm_tkeep 64",
         "first_level system/first_level 12",
         "system/second_lamp second_lamp 1",
         "system/status_interrupt interrupts/In2 1",

@@ -377,7 +377,7 @@ proc is_connected {pin} { expr {[dict exists $::nets $pin] || $pin in [dict valu
 proc validate_module {cell} {
   dict for {name fact} [dict get $::entities [dict get $::cells $cell entity]] {
     if {[regexp {^(s_axi)_} $name all bus] && [dict exists $::links $cell/$bus]} continue
-    if {[lindex $fact 0] eq "I" && ![dict exists $::nets $cell/$name]} { wrong "input $cell/$name is not connected" }
+    if {[lindex $fact 0] eq "I" && ![lindex $fact 2] && ![dict exists $::nets $cell/$name]} { wrong "input $cell/$name is not connected" }
   }
 }
 proc validate_ip {cell} {

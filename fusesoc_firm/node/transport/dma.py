@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 from types import TracebackType
 
+from fusesoc_firm.node.transport.abort_record import burst_of
 from fusesoc_firm.node.transport.dma_device import DmaDevice
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 
@@ -177,7 +178,7 @@ class DmaTransport:
                 if (status := self._from_system.done(self._next_received)) is not None:
                     if self._take(status):
                         burst, self._burst = bytes(self._burst), bytearray()
-                        return Burst(burst)
+                        return burst_of(burst)
                     continue
                 self._check(FROM_SYSTEM)
                 rest = None if end is None else end - time.monotonic()

@@ -20,6 +20,7 @@ from fusesoc_firm.system.hardware.names import Names
 from fusesoc_firm.text.render import Context
 
 BLOCK_DESIGN_TEMPLATE = "board/block_design.tcl"
+RECORDS_TEMPLATE = "vhdl/abort_records.vhd"
 PACKAGE_TEMPLATE = "hls/package.tcl"
 
 # The width of a descriptor's length field in bits: the DMA engine's maximum (PG021).
@@ -28,12 +29,14 @@ _ADDRESS_BITS = 32
 # From the DMA engine's registers to those of the status; each have 64 KiB.
 _STATUS_OFFSET = 0x10000
 _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
+_STREAM_FROM_MANAGER = (*_STREAM, "tuser", "tid")
 # Parameters that Vivado infers from whole interface connections and from pins of known polarity.
 _FOUND_OUT = {"c_s_axis_s2mm_tdata_width", "C_AUX_RESET_HIGH"}
 # The clock pins of all cells other than the processor.
 _CLOCK_PINS = (
     *(f"dma/{name}_aclk" for name in ("s_axi_lite", "m_axi_sg", "m_axi_mm2s", "m_axi_s2mm")),
-    *("control/aclk", "memory/aclk", "reset/slowest_sync_clk", "system_reset/slowest_sync_clk", "system/clk"),
+    *("control/aclk", "memory/aclk", "reset/slowest_sync_clk", "system_reset/slowest_sync_clk"),
+    *("system/clk", "records/clk"),
 )
 
 
@@ -44,6 +47,7 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
     return {
         "design": board_entity(system, board),
         "system": system.entity,
+        "records": records_entity(system),
         "name": system.name,
         "board": board.name,
         "description": str(board.description),
@@ -68,6 +72,21 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
         "pins": _pins(system),
         "base": processor.base,
         "status": {"base": f"0x{int(processor.base, 16) + _STATUS_OFFSET:X}"} if _has_bus(system) else None,
+    }
+
+
+def records_entity(system: DerivedSystem) -> str:
+    """Return the name of the entity that turns aborts into records."""
+    return f"{system.entity}_records"
+
+
+def records_configuration(system: DerivedSystem) -> Context:
+    """Return the configuration of that entity."""
+    return {
+        "entity": records_entity(system),
+        "name": system.name,
+        "width": system.width,
+        "lanes": system.width // 8,
     }
 
 
@@ -144,7 +163,7 @@ def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, li
             *(("reset/interconnect_aresetn", f"{cell}/aresetn") for cell in ("control", "memory")),
             ("reset/peripheral_aresetn", "dma/axi_resetn"),
             ("dma/mm2s_prmry_reset_out_n", "system_reset/aux_reset_in"),
-            ("system_reset/peripheral_aresetn", "system/rst_n"),
+            *(("system_reset/peripheral_aresetn", f"{cell}/rst_n") for cell in ("system", "records")),
         ],
     )
     yield (
@@ -152,8 +171,10 @@ def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, li
         [
             *((f"dma/m_axis_mm2s_{name}", f"system/s_axis_{name}") for name in _STREAM),
             ("system/s_axis_tready", "dma/m_axis_mm2s_tready"),
-            *((f"system/m_axis_{name}", f"dma/s_axis_s2mm_{name}") for name in _STREAM),
-            ("dma/s_axis_s2mm_tready", "system/m_axis_tready"),
+            *((f"system/m_axis_{name}", f"records/s_axis_{name}") for name in _STREAM_FROM_MANAGER),
+            ("records/s_axis_tready", "system/m_axis_tready"),
+            *((f"records/m_axis_{name}", f"dma/s_axis_s2mm_{name}") for name in _STREAM),
+            ("dma/s_axis_s2mm_tready", "records/m_axis_tready"),
         ],
     )
     yield (

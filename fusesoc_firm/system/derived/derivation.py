@@ -24,6 +24,7 @@ from fusesoc_firm.system.derived.cpp_function import check_kernel
 from fusesoc_firm.system.derived.entities import check_entities
 from fusesoc_firm.system.derived.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.derived.link import link_of
+from fusesoc_firm.system.derived.longest import with_longest_payloads
 from fusesoc_firm.system.derived.model import (
     AcceleratorBlock,
     AcceleratorType,
@@ -59,7 +60,7 @@ from fusesoc_firm.system.written.specification import (
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.text.files import is_file
 from fusesoc_firm.text.naming import identifier
-from fusesoc_firm.text.yaml_sections import keys_only_of
+from fusesoc_firm.text.yaml_sections import keys_of, keys_only_of
 from fusesoc_firm.text.yaml_text import Text
 
 Libraries = Mapping[Middleware, MessageLibrary]
@@ -96,9 +97,9 @@ def derive(
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
+    subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), parts.blocks, faults)
     subscribers = tuple(
-        replace(item, queue=queue_of(parts.blocks[item.block], item.frame, faults))
-        for item in _converters(parts, SUBSCRIBER, connections)
+        replace(item, queue=queue_of(parts.blocks[item.block], item.frame, faults)) for item in subscribers
     )
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
@@ -251,9 +252,9 @@ class _Analysis:
         if are_known and block.type not in names:
             hint = nearest(block.type, names) or "add this accelerator to 'accelerators'"
             self.faults.error(f"unknown accelerator '{block.type}'", block.type.source, hint)
-        for key in keys_only_of(Block, CONVERTER):
-            if value := getattr(block, key):
-                source = value[0].source if isinstance(value, tuple) else value.source
+        for key, (field_name, entry) in keys_of(Block).items():
+            if entry.only_of == CONVERTER and (value := getattr(block, field_name)):
+                source = value[0].source if isinstance(value, tuple) else block.place(field_name)
                 message = f"'{key}' is legal only for converters, but '{block.name}' has a 'type'"
                 self.faults.error(message, source, _KINDS_OF_BLOCKS)
         self._check_no_keys_of(SUBSCRIBER, block)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.system.derived.model import Converter, Link, LinkKind, Scheduling
 from fusesoc_firm.system.written.specification import AXI_STREAM, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -53,9 +52,10 @@ def link_of(
 
 def _longest(subscribers: Iterable[Converter]) -> int:
     """Return the number of payload bytes in the longest frame from the host."""
-    payloads = [length_of(subscriber.frame).maximum for subscriber in subscribers]
-    bounded = max((payload for payload in payloads if payload is not None), default=0)
-    return max(bounded + _TRAILING_BYTES, _UNBOUNDED_BYTES if None in payloads else 0)
+    return max(
+        _UNBOUNDED_BYTES if item.has_default_length else item.max_length or item.frame.payload_bytes + _TRAILING_BYTES
+        for item in subscribers
+    )
 
 
 def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:

@@ -30,6 +30,8 @@ class Topic:
     block: str
     frame: Frame
     given_name: str = field(default="", kw_only=True)
+    # The longest payload that the hardware accepts, if it is limited.
+    max_length: int | None = field(default=None, kw_only=True)
 
     @property
     def ros_name(self) -> str:
@@ -69,11 +71,15 @@ class Queue:
 
 @dataclass(frozen=True)
 class Converter(Topic):
-    """An instance of a converter; `id` counts subscribers and publishers separately, from 0, in the blocks' order."""
+    """An instance of a converter; `id` counts subscribers and publishers separately, from 0, in the blocks' order.
+
+    With `has_default_length`, `max_length` is a default, since neither bounds nor the specification limit the payload.
+    """
 
     id: int
     suffix: str = ""
     buffer: int = 0
+    has_default_length: bool = False
     software: End | None = None
     queue: Queue | None = None
 

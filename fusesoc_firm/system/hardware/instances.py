@@ -32,6 +32,7 @@ def subscriber_instance(names: Names, converter: Converter, system: DerivedSyste
         **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
         "id": converter.id,
+        "max_length": converter.max_length,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
         "error": error_of(converter, system),
         "queue": _queue(names, converter, system) if converter.queue else None,

@@ -237,10 +237,10 @@ class _Draft:
     def has(self, entry: Key) -> bool:
         """Return whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
         if self.section is not Block or not entry.only_of:
-            return True
+            return entry.is_asked
         if entry.only_of in MODES:
-            return bool(self.made.get("mode") == entry.only_of)
-        return ("type" in self.made) is (entry.only_of == ACCELERATOR)
+            return entry.is_asked and self.made.get("mode") == entry.only_of
+        return entry.is_asked and ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, name: str, entry: Key) -> bool:
         """Return whether a key is mandatory; the keys of a converter are optional in a block's grammar."""

@@ -74,6 +74,16 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
     }
 
 
+def default_lengths(system: DerivedSystem) -> list[str]:
+    """Return a line for each subscriber whose longest payload is a default."""
+    return [
+        f"{item.block}: {item.frame.message} has no bounds and no 'maxLength'; payloads of more than"
+        f" {item.max_length} bytes are refused"
+        for item in system.subscribers
+        if item.has_default_length and item.software is None
+    ]
+
+
 def counts(system: DerivedSystem) -> str:
     """Return a phrase with the number of blocks of each kind in a system."""
     found = [

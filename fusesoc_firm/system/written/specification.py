@@ -212,6 +212,13 @@ class Block(Section):
     )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
+    max_length: int | None = key(
+        "bytes of a subscriber's longest payload, if the message has no bounds (default: 65536)",
+        name="maxLength",
+        form="integer",
+        only_of=CONVERTER,
+        is_asked=False,
+    )
     buffer: int | None = key(
         "bytes of the longest payload, for a publisher that stores frames", form="integer", only_of=PUBLISHER
     )

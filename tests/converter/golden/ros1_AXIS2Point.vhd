@@ -24,7 +24,8 @@ entity AXIS2Point is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
-    -- 4 its encoding is unknown; the code is valid while frame_error is high
+    -- 4 its encoding is unknown;
+    -- the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );

@@ -130,6 +130,7 @@ localparam INDEX_BITS = $clog2(`PUBLISHERS);
 (* hierconn *) wire                  \dut.parts_of_frames_u_burst.resume_r ;
 (* hierconn *) wire [`WIDTH-1:0]     \dut.parts_of_frames_u_burst.held_tdata_r ;
 (* hierconn *) wire [`WIDTH/8-1:0]   \dut.parts_of_frames_u_burst.held_tkeep_r ;
+(* hierconn *) wire                  \dut.parts_of_frames_u_burst.held_tuser_r ;
 (* hierconn *) wire                  \dut.parts_of_frames_u_burst.held_tlast_r ;
 (* hierconn *) wire [INDEX_BITS-1:0] \dut.parts_of_frames_u_burst.held_source_r ;
 (* hierconn *) wire                  \dut.parts_of_frames_u_burst.clearing_r ;
@@ -140,6 +141,7 @@ wire                    is_resumed  = \dut.parts_of_frames_u_burst.resume_r ;
 wire [7:0]              held_source = \dut.parts_of_frames_u_burst.held_source_r ;
 wire [PAYLOAD_BITS-1:0] held = {
     \dut.parts_of_frames_u_burst.held_tlast_r ,
+    \dut.parts_of_frames_u_burst.held_tuser_r ,
     \dut.parts_of_frames_u_burst.held_tkeep_r ,
     \dut.parts_of_frames_u_burst.held_tdata_r };
 

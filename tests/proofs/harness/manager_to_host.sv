@@ -32,6 +32,11 @@ always @(posedge clk) begin
 end
 wire is_marked_one = marked && ahead == 0 && m_axis_tvalid;
 
+// Aborts on their way to the host.
+reg [3:0] aborts;
+always @(posedge clk)
+    aborts <= rst_n ? aborts + (take && p_beat[ABORT_BIT]) - (give && m_axis_tuser) : 0;
+
 // Cycles on end in which the host was ready.
 reg [2:0] ready_cycles;
 always @(posedge clk) ready_cycles <= !rst_n || !m_axis_tready ? 0 : ready_cycles + (ready_cycles != 7);
@@ -42,6 +47,10 @@ always @* if (running) begin
 
     if (is_marked_one) in_order_unchanged: assert (m_beat == marked_beat);
     if (is_marked_one) tid_is_the_publisher: assert (m_axis_tid == marked_source);
+
+    // Each abort that is taken ends one frame at the host; nothing else does so.
+    if (m_axis_tvalid && m_axis_tuser) abort_ends_one_frame: assert (m_axis_tlast && aborts != 0);
+    no_abort_lost: assert (aborts <= inside);
 
     // No more is inside than the two beats of the register slice.
     no_beat_lost: assert (inside <= 2);
@@ -68,6 +77,9 @@ wire                    is_over   = has_newer ? newer[PAYLOAD_BITS-1] : older[PA
 
 always @* if (running) begin
     helper_inside: assert (inside == has_older + has_newer);
+    helper_aborts: assert (aborts == (has_older && older[ABORT_BIT]) + (has_newer && newer[ABORT_BIT]));
+    if (has_older) helper_older_end: assert (!older[ABORT_BIT] || older[PAYLOAD_BITS-1]);
+    if (has_newer) helper_newer_end: assert (!newer[ABORT_BIT] || newer[PAYLOAD_BITS-1]);
     helper_ids: assert ((!has_older || older_id < `PUBLISHERS) && (!has_older && is_over || newest_id < `PUBLISHERS));
     helper_begun: assert (begun == (is_over ? 0 : 1'b1 << newest_id));
     if (marked) begin

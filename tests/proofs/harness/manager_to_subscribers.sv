@@ -10,7 +10,7 @@ module manager_to_subscribers (input clk);
 
 (* anyseq *) wire mark;
 
-wire [PAYLOAD_BITS-1:0] given = {sub_axis_tlast, sub_axis_tkeep, sub_axis_tdata};
+wire [PAYLOAD_BITS-1:0] given = {sub_axis_tlast, sub_axis_tuser, sub_axis_tkeep, sub_axis_tdata};
 wire                    take  = s_axis_tvalid && s_axis_tready;
 wire                    give  = (sub_axis_tvalid & sub_axis_tready) != 0;
 
@@ -143,6 +143,11 @@ wire       newer_first = has_older ? older[PAYLOAD_BITS-1] : older_first;
 wire       newer_known = newer_first ? belongs_to_somebody(newer[`WIDTH-1:0]) : older_known;
 wire [7:0] newer_id    = newer_first ? newer[7:0] : older_id;
 wire       newer_goes  = has_newer && goes_on(newer_first, older_known, newer[`WIDTH-1:0]);
+
+always @* if (running) begin
+    // No beat of a frame for nobody is offered.
+    if (sub_axis_tvalid != 0) no_refused_beat_leaves: assert (older_goes);
+end
 
 always @* if (running) begin
     helper_inside: assert (inside == older_goes + newer_goes);

@@ -5,7 +5,7 @@
 
 (* anyseq *) wire mark;
 
-wire [PAYLOAD_BITS-1:0]    m_beat = {m_axis_tlast, m_axis_tkeep, m_axis_tdata};
+wire [PAYLOAD_BITS-1:0]    m_beat = {m_axis_tlast, m_axis_tuser, m_axis_tkeep, m_axis_tdata};
 wire                       give   = m_axis_tvalid && m_axis_tready;
 reg                        m_stalled;
 reg [PAYLOAD_BITS+8-1:0]   m_before;
@@ -20,6 +20,7 @@ wire [`PUBLISHERS-1:0]     granted = sched_grant_valid << sched_grant_select;
 wire [7:0]                 source  = sched_grant_select;
 wire [PAYLOAD_BITS-1:0]    p_beat  = {
     pub_axis_tlast[sched_grant_select],
+    pub_axis_tuser[sched_grant_select],
     pub_axis_tkeep[sched_grant_select*(`WIDTH/8) +: `WIDTH/8],
     pub_axis_tdata[sched_grant_select*`WIDTH +: `WIDTH]};
 wire                       p_last  = p_beat[PAYLOAD_BITS-1];

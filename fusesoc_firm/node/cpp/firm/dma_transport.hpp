@@ -164,7 +164,7 @@ class DmaTransport : public Transport {
     const Deadline deadline(timeout);
     while (!is_closed_) {
       if (const auto status = from_system_.done(receiving_)) {
-        if (take(*status)) return std::exchange(burst_, {});
+        if (take(*status)) return without_record(std::exchange(burst_, {}));
         continue;
       }
       check(dma::kS2mm, "S2MM");
@@ -248,6 +248,19 @@ class DmaTransport : public Transport {
     if ((status & dma::kEndOfFrame) == 0) return false;
     if (is_too_long_ && options_.on_error) options_.on_error({});
     return !is_too_long_;
+  }
+
+  // A record of the hardware becomes a burst that aborts the frame (cores/axis, firm_axis_abort_record): the id 255, a
+  // length that no frame has, the id of the frame, the code of the fault.
+  static Burst without_record(Burst burst) {
+    constexpr std::size_t kBytes = 7, kId = 5;
+    const auto& data = burst.data;
+    if (data.size() != kBytes || std::any_of(data.begin(), data.begin() + kId, [](auto byte) { return byte != 0xff; })) {
+      return burst;
+    }
+    burst.data = {data[kId]};
+    burst.is_aborted = true;
+    return burst;
   }
 
   void give_back(std::size_t index) {

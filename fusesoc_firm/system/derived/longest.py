@@ -1,0 +1,48 @@
+"""Determine the longest payload that each subscriber accepts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from dataclasses import replace
+
+from fusesoc_firm.frame.length import DEFAULT_LONGEST, MOST_BYTES, bounded_payload, length_of
+from fusesoc_firm.system.derived.model import Converter
+from fusesoc_firm.system.written.specification import PUBLISHER, Block
+from fusesoc_firm.text.diagnostics import Diagnostics
+
+
+def with_longest_payloads(
+    subscribers: tuple[Converter, ...], blocks: Mapping[str, Block], faults: Diagnostics
+) -> tuple[Converter, ...]:
+    """Return the subscribers, those of variable size with their longest payloads; note faults in `maxLength`."""
+    _check_keys(blocks, {item.block for item in subscribers if item.frame.is_fixed_size}, faults)
+    return tuple(
+        item if item.frame.is_fixed_size else _with_longest_payload(item, blocks[item.block], faults)
+        for item in subscribers
+    )
+
+
+def _check_keys(blocks: Mapping[str, Block], fixed: Set[str], faults: Diagnostics) -> None:
+    """Note a fault for each `maxLength` that limits nothing."""
+    for name, block in blocks.items():
+        if block.max_length is None:
+            continue
+        if name in fixed:
+            message = f"'{name}' has a 'maxLength', but {block.message} has a fixed size"
+            faults.error(message, block.place("max_length"), "remove the key: only messages of variable size need it")
+        elif block.mode == PUBLISHER:
+            message = f"'{name}' has a 'maxLength', which is legal only for subscribers"
+            faults.error(message, block.place("max_length"), "the key 'buffer' limits the payloads of a publisher")
+
+
+def _with_longest_payload(subscriber: Converter, block: Block, faults: Diagnostics) -> Converter:
+    bounded, given = bounded_payload(subscriber.frame), block.max_length
+    if given is None:
+        # Software of the system itself keeps its lengths.
+        default = DEFAULT_LONGEST if subscriber.software is None else MOST_BYTES
+        return replace(subscriber, max_length=bounded or default, has_default_length=bounded is None)
+    least, most = length_of(subscriber.frame).minimum, bounded or MOST_BYTES
+    if not least <= given <= most:
+        message = f"'maxLength' of '{subscriber.block}' cannot be {given} bytes for {subscriber.frame.message}"
+        faults.error(message, block.place("max_length"), f"legal here: {least} to {most}")
+    return replace(subscriber, max_length=given)
