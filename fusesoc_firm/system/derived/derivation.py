@@ -99,7 +99,7 @@ def derive(
     )
     subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), parts.blocks, faults)
     subscribers = tuple(
-        replace(item, queue=queue_of(parts.blocks[item.block], item.frame, faults)) for item in subscribers
+        replace(item, queue=queue_of(parts.blocks[item.block], item, faults)) for item in subscribers
     )
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)

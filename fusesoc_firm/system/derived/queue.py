@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from fusesoc_firm.frame.length import length_of
-from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.system.derived.model import Overflow, Queue
+from fusesoc_firm.system.derived.model import Converter, Overflow, Queue
 from fusesoc_firm.system.written.specification import BLOCK, Block
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 _MOST_FRAMES = 256
 _MOST_BYTES = 1 << 23
-# Bytes of the longest payload of a message without bounds.
-_UNBOUNDED = 65_536
 
 
-def queue_of(block: Block, frame: Frame, faults: Diagnostics) -> Queue | None:
-    """Return the queue of a subscriber, or None without one; note faults, and warn of a length that was assumed."""
+def queue_of(block: Block, subscriber: Converter, faults: Diagnostics) -> Queue | None:
+    """Return the queue of a subscriber with its longest payload, or None without one; note faults.
+
+    If the longest payload is a default, there is a warning about the memory.
+    """
     overflow = Overflow(str(block.overflow or BLOCK))
     if block.queue is None:
         if overflow is not Overflow.BLOCK:
@@ -33,13 +33,13 @@ def queue_of(block: Block, frame: Frame, faults: Diagnostics) -> Queue | None:
             f"legal here: {least} to {_MOST_FRAMES}" + ("; a frame that is leaving is not dropped" * (least > 1)),
         )
         return None
-    maximum = length_of(frame).maximum
-    queue = Queue(block.queue, _UNBOUNDED if maximum is None else maximum, overflow)
-    _check_size(block, frame, queue, faults, is_assumed=maximum is None)
+    longest = subscriber.max_length or length_of(subscriber.frame).minimum
+    queue = Queue(block.queue, longest, overflow)
+    _check_size(block, subscriber, queue, faults)
     return queue
 
 
-def _check_size(block: Block, frame: Frame, queue: Queue, faults: Diagnostics, *, is_assumed: bool) -> None:
+def _check_size(block: Block, subscriber: Converter, queue: Queue, faults: Diagnostics) -> None:
     size = queue.frames * queue.longest
     if size > _MOST_BYTES:
         faults.error(
@@ -47,9 +47,9 @@ def _check_size(block: Block, frame: Frame, queue: Queue, faults: Diagnostics, *
             block.place("queue"),
             f"legal here: up to {_MOST_BYTES:,}, for {queue.frames} payloads of {queue.longest:,} bytes",
         )
-    elif is_assumed:
+    elif subscriber.has_default_length:
         faults.warn(
             f"the queue of '{block.name}' takes {size:,} bytes of memory",
             block.place("queue"),
-            f"{frame.message} is unbounded; its payloads are assumed to have at most {queue.longest:,} bytes",
+            f"{subscriber.frame.message} is unbounded; add 'maxLength: <bytes of the longest payload>'",
         )
