@@ -88,7 +88,12 @@ def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], dec
 
 def _of_python() -> tuple[str, ...]:
     """Return the folders of this Python, its packages, this package and its parts in Edalize's name space."""
-    return (sys.prefix, sys.base_prefix, str(PACKAGE), str(PACKAGE.parent / "edalize"), *_packages())
+    return (sys.prefix, sys.base_prefix, str(PACKAGE), *_beside_package(), *_packages())
+
+
+def _beside_package() -> tuple[str, ...]:
+    """Return the parts of this package in Edalize's name space, and a checkout's description of the package."""
+    return tuple(str(PACKAGE.parent / name) for name in ("edalize", f"{PACKAGE.name}.egg-info"))
 
 
 def _packages() -> tuple[str, ...]:

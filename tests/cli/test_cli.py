@@ -354,7 +354,7 @@ def test_a_reader_that_leaves_early_is_no_fault() -> None:
 def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec, picture = tmp_path / "robot.yaml", tmp_path / "robot.dot"
     point = "geometry_msgs/Point"
-    answers = ["robot", *[""] * 9, "no", "sub", "", "ROS", "subscriber", point, *[""] * 3, "yes", "pub", "", "", "no"]
+    answers = ["robot", *[""] * 9, "no", "sub", "", "ROS", "subscriber", point, *[""] * 5, "yes", "pub", "", "", "no"]
     answers += ["yes", "pub", "", "ROS", "publisher", point, *[""] * 7, "no", "no"]
     monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
     assert f"{spec}: robot is valid: 1 subscriber" in out(capsys, "system", "new", str(spec))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -114,9 +115,9 @@ def test_frames_that_interrupt_each_other(tmp_path: Path, builds: Path, monkeypa
     bursts: list[bytes] = []
     push = BurstJoiner.push
 
-    def counted(joiner: BurstJoiner, burst: bytes, tid: int | None = None) -> JoinedFrame | None:
+    def counted(joiner: BurstJoiner, burst: bytes, *arguments: Any, **options: Any) -> JoinedFrame | None:
         bursts.append(burst)
-        return push(joiner, burst, tid)
+        return push(joiner, burst, *arguments, **options)
 
     monkeypatch.setattr(BurstJoiner, "push", counted)
     chance, type_ = random.Random(SEED), "geometry_msgs/msg/Vector3"
