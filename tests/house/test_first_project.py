@@ -56,7 +56,6 @@ def test_a_fault_in_the_model_and_in_the_accelerator(project: Path) -> None:
     done = firm(project, "sim")
     assert done.returncode == 1 and done.stdout == ""
     assert done.stderr.startswith("rtl/turn.vhd:") and 'no declaration for "in_q"' in done.stderr
-    assert "error: the simulation did not run to its end" in done.stderr
     model.write_text("def respond(:")
     done = firm(project, "sim")
     assert done.returncode == 1 and "model.py:1:" in done.stderr

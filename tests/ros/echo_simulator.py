@@ -10,6 +10,7 @@ def number(value: int, size: int) -> bytes:
 def main() -> None:
     cycle = 0
     with open(3, "rb") as requests, open(4, "wb") as reports:
+        reports.write(b"V" + number(2, 1))
         while (letter := requests.read(1)) not in (b"", b"Q"):
             size = int.from_bytes(requests.read(4), "little")
             if letter == b"R":
@@ -19,7 +20,7 @@ def main() -> None:
             else:
                 frame = requests.read(size)
                 beats = number(cycle, 8) + number(cycle + size, 8)
-                reports.write(b"T" + beats + b"B" + frame[:1] + beats + number(size, 4) + frame)
+                reports.write(b"T" + beats + b"B" + frame[:1] + bytes(2) + beats + number(size, 4) + frame)
                 cycle += size
 
 

@@ -46,7 +46,8 @@ project: {name: echo, width: 64}
 blocks:
   - {name: empty_in, middleware: ROS, mode: subscriber, message: std_msgs/Empty, outgoing: [{name: empty_out}]}
   - {name: empty_out, middleware: ROS, mode: publisher, message: std_msgs/Empty}
-  - {name: image_in, middleware: ROS, mode: subscriber, message: sensor_msgs/Image, outgoing: [{name: image_out}]}
+  - {name: image_in, middleware: ROS, mode: subscriber, message: sensor_msgs/Image,
+     maxLength: 8388608, outgoing: [{name: image_out}]}
   - {name: image_out, middleware: ROS, mode: publisher, message: sensor_msgs/Image}
 """
 
@@ -250,6 +251,7 @@ def test_an_image_of_six_megabytes_goes_through_hardware(workshop: Workshop) -> 
     """Through multi_type, where it is passed on as it comes, beside a topic of no bytes that goes straight through."""
     spec = workshop.specification("multi_type")
     text = re.sub(r",\s*buffer: 230500}", "}", spec.read_text(encoding="utf-8"))
+    text = text.replace("maxLength: 230500", "maxLength: 8388608")
     spec.write_text(text + ECHO.partition("blocks:\n")[2].partition("  - {name: image")[0], encoding="utf-8")
     transport = live_simulator(workshop, spec, "verilator")
     with Node(workshop.ros, workshop.program("multi_type"), transport, *PATIENT) as node, workshop.echo_peer() as peer:

@@ -29,7 +29,8 @@ blocks:
   - {name: empty_out, middleware: ROS, mode: publisher, message: std_msgs/Empty}
   - {name: text_in, middleware: ROS, mode: subscriber, message: std_msgs/String, outgoing: [{name: text_out}]}
   - {name: text_out, middleware: ROS, mode: publisher, message: std_msgs/String}
-  - {name: image_in, middleware: ROS, mode: subscriber, message: sensor_msgs/Image, outgoing: [{name: image_out}]}
+  - {name: image_in, middleware: ROS, mode: subscriber, message: sensor_msgs/Image,
+     maxLength: 8388608, outgoing: [{name: image_out}]}
   - {name: image_out, middleware: ROS, mode: publisher, message: sensor_msgs/Image}
 """
 FULL_HD = 1920 * 1080 * 3
