@@ -52,10 +52,12 @@ def test_a_fault_in_the_model_and_in_the_accelerator(project: Path) -> None:
     assert done.returncode == 1
     assert "fault in cycle" in done.stdout and done.stdout.splitlines()[-1] == "FAIL 0/3"
     assert firm(project, "sim", "-q").stdout == "FAIL 0/3\n"
-    source.write_text(source.read_text().replace("out_x <= in_x;", "out_x <= in_q;"))
+    right = source.read_text()
+    source.write_text(right.replace("out_x <= in_x;", "out_x <= in_q;"))
     done = firm(project, "sim")
     assert done.returncode == 1 and done.stdout == ""
     assert done.stderr.startswith("rtl/turn.vhd:") and 'no declaration for "in_q"' in done.stderr
+    source.write_text(right)
     model.write_text("def respond(:")
     done = firm(project, "sim")
     assert done.returncode == 1 and "model.py:1:" in done.stderr

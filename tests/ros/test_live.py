@@ -27,7 +27,8 @@ project: {name: echo, width: 512}
 blocks:
   - {name: empty_in, middleware: ROS, mode: subscriber, message: std_msgs/Empty, outgoing: [{name: empty_out}]}
   - {name: empty_out, middleware: ROS, mode: publisher, message: std_msgs/Empty}
-  - {name: text_in, middleware: ROS, mode: subscriber, message: std_msgs/String, outgoing: [{name: text_out}]}
+  - {name: text_in, middleware: ROS, mode: subscriber, message: std_msgs/String,
+     maxLength: 16384, outgoing: [{name: text_out}]}
   - {name: text_out, middleware: ROS, mode: publisher, message: std_msgs/String}
   - {name: image_in, middleware: ROS, mode: subscriber, message: sensor_msgs/Image,
      maxLength: 8388608, outgoing: [{name: image_out}]}
@@ -65,7 +66,8 @@ class Place:
         spec = specification("quat2euler", self.ros.version, folder)
         text = spec.read_text(encoding="utf-8")
         if "image_in" not in text:
-            text = text.replace("name: quat2euler\n", "name: quat2euler\n  width: 64\n", 1)
+            # At 64 bits, GHDL 2.0 crashes in one of its tables for ROS 2.
+            text = text.replace("name: quat2euler\n", "name: quat2euler\n  width: 32\n", 1)
             spec.write_text(text + self.spelled(ECHO).partition("blocks:\n")[2], encoding="utf-8")
         return spec
 
