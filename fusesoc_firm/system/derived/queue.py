@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.system.derived.model import Converter, Overflow, Queue
 from fusesoc_firm.system.written.specification import BLOCK, Block
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -33,7 +32,7 @@ def queue_of(block: Block, subscriber: Converter, faults: Diagnostics) -> Queue 
             f"legal here: {least} to {_MOST_FRAMES}" + ("; a frame that is leaving is not dropped" * (least > 1)),
         )
         return None
-    longest = subscriber.max_length or length_of(subscriber.frame).minimum
+    longest = subscriber.max_length or subscriber.frame.payload_bytes
     queue = Queue(block.queue, longest, overflow)
     _check_size(block, subscriber, queue, faults)
     return queue
