@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from contextlib import closing
 from functools import partial
@@ -93,8 +92,8 @@ def _build(arguments: argparse.Namespace) -> None:
 
     from fusesoc_firm.building.plan import select_plan
     from fusesoc_firm.cli.build_report import Report
+    from fusesoc_firm.cli.cached import print_failures
     from fusesoc_firm.plugin.build import How, Listener, build
-    from fusesoc_firm.store.store import default_store
 
     plan = select_plan(selection_of(arguments), run_options_of(arguments), arguments.build_root)
     how = How(
@@ -113,8 +112,5 @@ def _build(arguments: argparse.Namespace) -> None:
     with closing(report), closing(build(plan, how, listener)) as outcomes:
         for outcome in outcomes:
             report.end(outcome)
-    # The warnings of builds are in their logs.
-    remote = default_store().remote
-    for warning in remote.failures(started) if remote else ():
-        print(warning, file=sys.stderr)
+    print_failures(started)
     report.finish()

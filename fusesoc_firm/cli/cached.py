@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -33,6 +34,16 @@ class Words:
         return "test" if self.unit == "test" else "target"
 
 
+def print_failures(since: float) -> None:
+    """Print the warnings of builds about the remote store since a time in seconds since the epoch, once each."""
+    from fusesoc_firm.store.store import default_store
+
+    # The warnings of builds are in their logs.
+    remote = default_store().remote
+    for warning in remote.failures(since) if remote else ():
+        print(warning, file=sys.stderr)
+
+
 def run_cached(words: Words, make: Callable[[], Plan], how: How, build_root: Path | None) -> list[Outcome]:
     """Return the outcomes of the builds of a plan, sorted by core and target. May raise `InputError`."""
     from tqdm import tqdm
@@ -44,7 +55,7 @@ def run_cached(words: Words, make: Callable[[], Plan], how: How, build_root: Pat
 
     # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
     tqdm.monitor_interval = 0
-    results = default_results()
+    started, results = time.time(), default_results()
     root = Path(build_root or configuration().build_root).absolute()
     recall = Recall(results, results.contents(), words.options, root)
     outcomes = []
@@ -55,6 +66,7 @@ def run_cached(words: Words, make: Callable[[], Plan], how: How, build_root: Pat
             outcomes.append(outcome)
             bar.set_postfix_str(str(outcome.build), refresh=False)
             bar.update()
+    print_failures(started)
     return sorted(outcomes, key=lambda outcome: (outcome.build.core, outcome.build.target))
 
 
