@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from tests.node.drivers import C_FOLDER, HERE, Driver, compile_c_driver
