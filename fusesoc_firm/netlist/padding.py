@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 
 _TOKEN = re.compile(r"""--[^\n]*|"[^"\n]*"|(?<!\w)'.'|[A-Za-z]\w*|[();:]""")
+_BEGIN = "begin"
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,9 @@ def _after_begin(code: str, start: int) -> int | None:
             open_bodies += word == "is"
         elif word == "new" and before == "is":
             open_bodies -= 1
-        elif word == "begin" and not open_bodies:
+        elif word == _BEGIN and not open_bodies:
             return token.end()
-        elif word == "begin":
+        elif word == _BEGIN:
             open_bodies -= 1
         before = word
     return None
