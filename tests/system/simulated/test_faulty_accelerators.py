@@ -112,7 +112,7 @@ def _texts(folder: Path, width: int, fault: str, queue: int) -> GeneratedSystem:
         _converter("good_back", "publisher", POINT),
         _converter("bad_back", "publisher", "std_msgs/String"),
     ]
-    blocks = [block | ({"middleware": "ROS2"} if "mode" in block else {}) for block in blocks]
+    blocks = [block if block["name"] == "acc" else {**block, "middleware": "ROS2"} for block in blocks]
     project = {"name": "faulty", "width": width, "status": "frames", "watchdog": LIMIT}
     content = {"project": project, "accelerators": [source], "blocks": blocks}
     (folder / "faulty.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
