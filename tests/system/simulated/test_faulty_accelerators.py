@@ -51,6 +51,10 @@ def _converter(name: str, mode: str, message: str, **more: object) -> dict[str, 
     return {"name": name, "middleware": "ROS1", "mode": mode, "message": message, **more}
 
 
+def _ros2(name: str, mode: str, message: str, **more: object) -> dict[str, object]:
+    return _converter(name, mode, message, middleware="ROS2", **more)
+
+
 def _exchange(system: GeneratedSystem, ids: list[int], faults: int) -> int:
     """Send frames of these ids, and expect those of the good channel back; return the number of cycles."""
     source = random.Random(SEED)
@@ -104,15 +108,12 @@ def _texts(folder: Path, width: int, fault: str, queue: int) -> GeneratedSystem:
     }
     source = {"name": "falter", "type": "VHDL", "sources": "falter.vhd", "interface": interface}
     blocks = [
-        _converter("good", "subscriber", POINT, outgoing=[{"name": "good_back"}]),
-        _converter(
-            "bad", "subscriber", "std_msgs/UInt16", outgoing=[{"name": "acc"}], queue=queue, overflow="drop_newest"
-        ),
+        _ros2("good", "subscriber", POINT, outgoing=[{"name": "good_back"}]),
+        _ros2("bad", "subscriber", "std_msgs/UInt16", outgoing=[{"name": "acc"}], queue=queue, overflow="drop_newest"),
         {"name": "acc", "type": "falter", "outgoing": [{"name": "bad_back"}]},
-        _converter("good_back", "publisher", POINT),
-        _converter("bad_back", "publisher", "std_msgs/String"),
+        _ros2("good_back", "publisher", POINT),
+        _ros2("bad_back", "publisher", "std_msgs/String"),
     ]
-    blocks = [block if block["name"] == "acc" else {**block, "middleware": "ROS2"} for block in blocks]
     project = {"name": "faulty", "width": width, "status": "frames", "watchdog": LIMIT}
     content = {"project": project, "accelerators": [source], "blocks": blocks}
     (folder / "faulty.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
