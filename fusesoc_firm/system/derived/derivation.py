@@ -98,7 +98,7 @@ def derive(
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
-    subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), parts.blocks, faults)
+    subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), project, parts.blocks, faults)
     subscribers = tuple(replace(item, queue=queue_of(parts.blocks[item.block], item, faults)) for item in subscribers)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)

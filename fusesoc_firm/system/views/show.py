@@ -80,7 +80,7 @@ def default_lengths(system: DerivedSystem) -> list[str]:
         f"{item.block}: {item.frame.message} has no bounds and no 'maxLength'; payloads of more than"
         f" {item.max_length} bytes are refused"
         for item in system.subscribers
-        if item.has_default_length and item.software is None
+        if item.has_default_length and (system.link or item.software is None)
     ]
 
 
