@@ -31,6 +31,22 @@ def test_a_link_has_the_limit_of_its_subscribers(tmp_path: Path, project: str, l
     assert f"more than {longest} bytes" in default_lengths(system)[0]
 
 
+def test_a_publisher_sends_what_a_subscriber_may_be(tmp_path: Path) -> None:
+    text = converter("text", "subscriber", STRING, "back") + converter("back", "publisher", STRING)
+    image = converter("image", "subscriber", IMAGE, "shown").replace("outgoing", "maxLength: 500000, outgoing")
+    shown = converter("shown", "publisher", IMAGE)
+    system = derived(tmp_path, specification(text + image + shown))
+    assert [item.max_length for item in system.publishers] == [500000, 500000]
+    assert [line.split(":")[0] for line in default_lengths(system)] == ["text", "back", "shown"]
+    limited = (
+        text.replace("publisher", "publisher, maxLength: 70")
+        + image
+        + shown.replace("outgoing", "buffer: 9000, outgoing")
+    )
+    system = derived(tmp_path, specification(limited))
+    assert [item.max_length for item in system.publishers] == [70, None]
+
+
 def test_another_subscriber_does_not_raise_a_default(tmp_path: Path) -> None:
     text = converter("text", "subscriber", STRING, "back") + converter("back", "publisher", STRING)
     image = converter("image", "subscriber", IMAGE, "shown").replace("outgoing", "maxLength: 5000, outgoing")
