@@ -8,9 +8,9 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from fusesoc_firm.system.scaffold.python_skeleton import copied_fields
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.system.written.specification import SOFTWARE
-from fusesoc_firm.text.diagnostics import fail, nearest
+from fusesoc_firm.text.diagnostics import Diagnostic, InputError, fail, nearest
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.outputs import check_parent, write
 from fusesoc_firm.text.prompts import Asker, Question
@@ -167,7 +167,8 @@ def create(project: Project, folder: Path, known: Libraries, library: Path, path
 def new_folder(folder: Path) -> Iterator[Path]:
     """Return a folder to fill, which becomes `folder` if the context ends without an error.
 
-    Raise `InputError` if `folder` is not empty.
+    Raise `InputError` if `folder` is not empty. Faults in files that were written to the folder have no place, since
+    the files no longer exist.
     """
     check_parent(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -175,8 +176,17 @@ def new_folder(folder: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=".firm") as made:
         inner = Path(made) / folder.name
         inner.mkdir()
-        yield inner
+        try:
+            yield inner
+        except InputError as error:
+            raise InputError(_without_places_in(inner, error.diagnostics)) from None
         shutil.copytree(inner, folder, dirs_exist_ok=True)
+
+
+def _without_places_in(folder: Path, faults: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    for fault in faults:
+        is_inside = fault.source is not None and Path(fault.source.file).is_relative_to(folder)
+        yield replace(fault, source=None) if is_inside else fault
 
 
 def write_surroundings(folder: Path, name: str, library: Path) -> None:
