@@ -37,6 +37,7 @@ REASONS = {
     "converter/storing.py": {"is_beat": _CONDITION, "_is_used": _CONDITION},
     "converter/variable_publisher.py": {"_count": _OPERAND},
     "verify/loop.py": dict.fromkeys(("_element_gates", "_message_gate", "_segment_gate", "_gate_of"), _CONDITION),
+    "netlist/padding.py": {"text": "a statement on one line, whose length is taken off the columns of messages"},
     "netlist/lost_constants.py": {"types": _OPERAND},
     "netlist/verilog.py": {
         **dict.fromkeys(("_either", "_modulus"), "an expression"),

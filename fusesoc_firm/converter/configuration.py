@@ -49,18 +49,12 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
     stream = Stream(width)
     windows = windows_of(frame.fields)
     stores = stores_of(stream, windows)
-    is_byte_wide, checks_encoding = stream.lanes == 1, frame.checked_prefix > 0
-    code_bits = 3 if checks_encoding and not is_byte_wide else 2
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
     return {
         **_common(frame, stream, entity or subscriber_entity(frame), "out"),
         **store_configuration(stores),
-        "position_bits": max(code_bits, stream.beat(ends[-1]).bit_length()),
-        "code_bits": code_bits,
-        "code_zeros": "0" * (_CODE_BITS - code_bits),
-        # The code whose low bits are zero; every beat of an 8-bit stream is full.
-        "zero_code": "BROKEN_BEAT" if not is_byte_wide else "BAD_ENCODING" if checks_encoding else None,
-        "is_byte_wide": is_byte_wide,
+        "position_bits": max(_CODE_BITS, stream.beat(ends[-1]).bit_length()),
+        "is_byte_wide": stream.lanes == 1,
         "fields": _field_slices(frame, stream, stores),
         "has_trailing": frame.trailing_bytes > 0,
         "lengths": frame.trailing_bytes + 1,

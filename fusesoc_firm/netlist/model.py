@@ -14,6 +14,10 @@ class LostMemoryError(NetlistError):
     """An error because GHDL produced a wrong netlist, or crashed, while inferring memories."""
 
 
+class GrownTableError(NetlistError):
+    """An error because GHDL crashed when one of its tables grew (`padding`)."""
+
+
 @dataclass(frozen=True)
 class Net:
     """A net: its number, its width in bits, and its name, which need not be unique."""

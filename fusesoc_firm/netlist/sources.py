@@ -6,7 +6,7 @@
 * A quotient, remainder or comparison with an integer truncates the integer; numeric_std uses the whole integer.
 
 Our functions are declared as aliases in each architecture and package body, because these declarations hide the names
-that a use clause makes visible.
+that a use clause makes visible. A copy of the top unit may also contain a `Padding`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from fusesoc_firm.netlist.padding import Padding
 
 LIBRARY = "firm_numeric"
 _RESIZE = """
@@ -149,8 +151,6 @@ def _padded(text: str) -> str:
 
 _CONTEXT = _padded(f"library ieee, {LIBRARY};")
 _ALIASES = _padded("".join(_aliases()))
-# A line with an addition, and a line with a caret.
-_ADDED = re.compile(rf"^(.*{re.escape(_ALIASES)}.*)\n( *\^)$", re.MULTILINE)
 
 
 @dataclass
@@ -158,12 +158,14 @@ class Copies:
     """Copies of files in a folder, and the positions of added text."""
 
     folder: Path
+    padding: Padding
+    has_numbers: bool
     files: list[str] = field(default_factory=list)
     _added: list[Mapping[int, Sequence[tuple[int, int]]]] = field(default_factory=list)
 
     def write_package(self) -> Path:
         """Write the package with our functions, for the library `LIBRARY`; return the file's path."""
-        self.folder.mkdir()
+        self.folder.mkdir(exist_ok=True)
         package = self.folder / "numeric.vhd"
         package.write_text(_PACKAGE, encoding="latin-1")
         return package
@@ -174,9 +176,10 @@ class Copies:
 
     def _copy(self, file: str) -> str:
         text = Path(file).read_bytes().decode("latin-1")
-        changed, added = _changed(text)
+        changed, added = self._changed(text)
         if changed == text:
             return file
+        self.folder.mkdir(exist_ok=True)
         copy = self.folder / f"{len(self.files)}.vhd"
         self.files.append(file)
         self._added.append(added)
@@ -186,7 +189,10 @@ class Copies:
     def original(self, text: str) -> str:
         """Return GHDL's output with the names and columns in copies replaced by those in the original files."""
         place = re.compile(rf"{re.escape(str(self.folder))}/(\d+)\.vhd(?::(\d+):(\d+))?")
-        text = _ADDED.sub(lambda line: _without_added(*line.groups()), place.sub(self._place, text))
+        text = place.sub(self._place, text)
+        for added in filter(None, (_ALIASES, self._padding)):
+            with_mark = re.compile(rf"^(.*{re.escape(added)}.*)\n( *\^)$", re.MULTILINE)
+            text = with_mark.sub(lambda line: self._without_added(*line.groups()), text)
         return text.replace(f"{self.folder}/", "")
 
     def _place(self, found: re.Match[str]) -> str:
@@ -200,31 +206,43 @@ class Copies:
             column = max(start, column - length)
         return f"{file}:{line}:{column}"
 
+    @property
+    def _padding(self) -> str:
+        return _padded(self.padding.text)
 
-def _without_added(line: str, mark: str) -> str:
-    """Return a line that GHDL shows without our additions, and with the caret in the line below shifted."""
-    shorter = line.replace(_CONTEXT, "").replace(_ALIASES, "")
-    return f"{shorter}\n{mark[len(line) - len(shorter) :]}"
+    def _without_added(self, line: str, mark: str) -> str:
+        """Return a line that GHDL shows without our additions, and with the caret in the line below shifted."""
+        shorter = line
+        for added in filter(None, (_CONTEXT, _ALIASES, self._padding)):
+            shorter = shorter.replace(added, "")
+        return f"{shorter}\n{mark[len(line) - len(shorter) :]}"
+
+    def _changed(self, text: str) -> tuple[str, Mapping[int, Sequence[tuple[int, int]]]]:
+        """Return a text with our additions, and the column and length of each addition by line."""
+        code = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
+        added: dict[int, list[tuple[int, int]]] = defaultdict(list)
+        parts: list[str] = []
+        last = 0
+        for start, end, new in sorted(self._changes(code)):
+            parts += [text[last:start], new]
+            last = end
+            if start == end:
+                line = "".join(parts[:-1]).rpartition("\n")[2].expandtabs(_TAB)
+                added[text.count("\n", 0, start) + 1].append((len(line) + 1, len(new)))
+        return "".join([*parts, text[last:]]), added
+
+    def _changes(self, code: str) -> Iterator[tuple[int, int, str]]:
+        """Yield the start and the end of each part of the code to replace, and what replaces it."""
+        if self.has_numbers:
+            for place in _FULL_NAME.finditer(code):
+                yield place.start(), place.end(), " " * len(place[0])
+            for body in _BODY.finditer(code):
+                yield body.start(), body.start(), _CONTEXT
+                yield body.end(), body.end(), _ALIASES
+        if begin := self.padding.place(code):
+            yield begin, begin, self._padding
 
 
 def use_numbers(files: Iterable[str]) -> bool:
     """Return whether any of these files names a type with wrong functions."""
     return any(_TYPES.search(Path(file).read_bytes().decode("latin-1")) for file in files)
-
-
-def _changed(text: str) -> tuple[str, Mapping[int, Sequence[tuple[int, int]]]]:
-    """Return a text that uses our functions, and the column and length of each addition by line."""
-    code = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
-    added: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    parts: list[str] = []
-    last = 0
-    found = [(place.start(), place.end(), " " * len(place[0])) for place in _FULL_NAME.finditer(code)]
-    for body in _BODY.finditer(code):
-        found += [(body.start(), body.start(), _CONTEXT), (body.end(), body.end(), _ALIASES)]
-    for start, end, new in sorted(found):
-        parts += [text[last:start], new]
-        last = end
-        if start == end:
-            line = "".join(parts[:-1]).rpartition("\n")[2].expandtabs(_TAB)
-            added[text.count("\n", 0, start) + 1].append((len(line) + 1, len(new)))
-    return "".join([*parts, text[last:]]), added

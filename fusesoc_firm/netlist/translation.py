@@ -14,20 +14,23 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from fusesoc_firm.netlist import dump, lost_constants, verilog
 from fusesoc_firm.netlist.corrections import correct, doubts
 from fusesoc_firm.netlist.loops import loops
-from fusesoc_firm.netlist.model import LostMemoryError, Module, Modules, NetlistError
+from fusesoc_firm.netlist.model import GrownTableError, LostMemoryError, Module, Modules, NetlistError
+from fusesoc_firm.netlist.padding import Padding
 from fusesoc_firm.netlist.sources import LIBRARY, Copies, use_numbers
 from fusesoc_firm.tools.launcher import starts_everything
 from fusesoc_firm.tools.programs import explanation, missing
+
+_T = TypeVar("_T")
 
 _MODULE = r"^[ \t]*module\s+({name})\b"
 _DEFINITION = re.compile(r"^module (\S+)(.*?)^endmodule", re.MULTILINE | re.DOTALL)
@@ -49,11 +52,12 @@ _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned
 
 _CRASH = "GHDL Bug occurred"
 # The places in GHDL 2.0 where it crashes, with the input that causes each crash.
+_OF_TABLES = ("netlists.adb:774", "STORAGE_ERROR")
 _CRASHES = {
     "netlists-builders.adb:929": "\nA possible cause is an integer whose range contains only one number, such as "
     "`range 0 to N - 1` with N = 1: GHDL does not support integers without bits.",
     **dict.fromkeys(
-        ("netlists.adb:774", "STORAGE_ERROR"),
+        _OF_TABLES,
         "\nGHDL 2.0 crashes if one of its tables grows while some bits of a signal are assigned. To avoid the crash, "
         "add or remove an assignment before this place, or reorder the processes.",
     ),
@@ -63,6 +67,9 @@ _OF_MEMORIES = "netlists-memories.adb"
 # GHDL 2.0 accesses a table's old memory after the table has grown, so an assignment to some bits of a signal may be
 # lost. If the C library overwrites freed memory, GHDL crashes instead of writing a wrong netlist.
 _MEMORY = {"MALLOC_PERTURB_": "165"}
+
+# The numbers of additional assignments with which a translation is repeated after such a crash.
+_PADDINGS = (0, 1, 2, 3, 5, 8, 13)
 
 _GULP = 1 << 20
 _PAUSE = 0.005
@@ -130,14 +137,13 @@ def translate(translation: Translation, folder: Path) -> str:
         raise NetlistError(explanation(absent))
     output = Path(translation.output)
     output.unlink(missing_ok=True)
-    ghdl = _analysed(translation, folder)
     try:
-        netlist, warnings = _netlist(ghdl)
+        netlist, warnings = _padded(_netlist, translation, folder)
     except LostMemoryError as error:
         if _NO_MEMORIES in translation.options:
             raise
-        ghdl = replace(ghdl, translation=replace(translation, options=[*translation.options, _NO_MEMORIES]))
-        netlist, warnings = _netlist(ghdl)
+        registers = replace(translation, options=[*translation.options, _NO_MEMORIES])
+        netlist, warnings = _padded(_netlist, registers, folder)
         warnings = f"{error.args[0].replace('error', 'warning', 1)}{_WITHOUT_MEMORIES}\n{warnings}"
     part = output.with_name(f"{output.name}.part")
     part.write_text(netlist, encoding="utf-8")
@@ -150,19 +156,32 @@ def find_loops(translation: Translation, folder: Path) -> list[str]:
 
     Raises `NetlistError`.
     """
-    return loops(dump.read(_analysed(translation, folder).synthesise("dump")[0]))
+    return _padded(lambda ghdl: loops(dump.read(ghdl.synthesise("dump")[0])), translation, folder)
 
 
-def _analysed(translation: Translation, folder: Path) -> _Ghdl:
+def _padded(made: Callable[[_Ghdl], _T], translation: Translation, folder: Path) -> _T:
+    """Return what is made with GHDL; if a growing table makes GHDL crash, repeat it with other paddings."""
+    crash: GrownTableError | None = None
+    for assignments in _PADDINGS:
+        try:
+            return made(_analysed(translation, folder, Padding(translation.unit, assignments)))
+        except GrownTableError as error:
+            crash = crash or error
+    assert crash
+    raise crash
+
+
+def _analysed(translation: Translation, folder: Path, padding: Padding) -> _Ghdl:
     """Return GHDL with all files in its libraries, which are in the emptied `folder`."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    ghdl = _Ghdl(translation, folder, Copies(folder / "copies"))
-    if is_copied := use_numbers(chain.from_iterable(translation.libraries.values())):
+    has_numbers = use_numbers(chain.from_iterable(translation.libraries.values()))
+    ghdl = _Ghdl(translation, folder, Copies(folder / "copies", padding, has_numbers))
+    if has_numbers:
         ghdl.run("-a", f"--work={LIBRARY}", str(ghdl.copies.write_package()))
     for library, files in translation.libraries.items():
         if files:
-            ghdl.run("-i", f"--work={library}", *(ghdl.copies.copy(files) if is_copied else files))
+            ghdl.run("-i", f"--work={library}", *ghdl.copies.copy(files))
     ghdl.run("-m", f"--work={translation.library}", translation.unit)
     return ghdl
 
@@ -213,7 +232,7 @@ class _Ghdl:
             said = errors.read().decode("latin-1")
         if process.returncode:
             error = _errors(self.copies.original(printed + said))
-            raise LostMemoryError(error) if _OF_MEMORIES in error else NetlistError(error)
+            raise _kind(error)(error)
         return self.copies.original(printed), self.copies.original(said)
 
     def check_constants(self, widths: set[int]) -> str:
@@ -320,6 +339,13 @@ def _errors(text: str) -> str:
         )
     found = "\n".join(line for item in _messages(text) if not re.search(r":(note|warning):", item[0]) for line in item)
     return (found or text).rstrip()
+
+
+def _kind(error: str) -> type[NetlistError]:
+    """Return the exception for one of GHDL's errors."""
+    if _OF_MEMORIES in error:
+        return LostMemoryError
+    return GrownTableError if any(place in error for place in _OF_TABLES) else NetlistError
 
 
 def _other_warnings(text: str) -> str:

@@ -11,7 +11,7 @@
 
 #ifdef STAND_IN
 #include "task.h"
-int stand_in_critical;
+int stand_in_critical, stand_in_scheduler = taskSCHEDULER_RUNNING;
 TickType_t stand_in_ticks;
 #endif
 

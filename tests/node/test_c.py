@@ -54,7 +54,7 @@ def drivers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 @pytest.fixture(scope="module")
 def devices(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    sources = [f"firm/firm_{name}.c" for name in ("frame", "link", "dma", "uart")]
+    sources = [f"firm/firm_{name}.c" for name in ("frame", "limit", "link", "dma", "uart")]
     port = C_FOLDER / "ports" / "bare_metal"
     return compile_c_driver(
         "devices", tmp_path_factory.mktemp("devices"), sources, [port], {"FIRM_DMA_BUFFER_BYTES": 128}
@@ -179,6 +179,8 @@ def test_frames_go_through_the_dma_and_back(devices: Driver, longest: int) -> No
         ("room", "too_long 0 0 0"),
         ("simple", "no_sg 0 1 1"),
         ("reset", "stuck 0 1 1"),
+        # The same while nothing counts the ticks.
+        ("frozen", "stuck 0 1 1"),
     ],
 )
 def test_errors_of_the_dma_are_told(devices: Driver, fault: str, answer: str) -> None:

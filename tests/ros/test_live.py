@@ -66,8 +66,7 @@ class Place:
         spec = specification("quat2euler", self.ros.version, folder)
         text = spec.read_text(encoding="utf-8")
         if "image_in" not in text:
-            # At 64 bits, GHDL 2.0 crashes in one of its tables for ROS 2.
-            text = text.replace("name: quat2euler\n", "name: quat2euler\n  width: 32\n", 1)
+            text = text.replace("name: quat2euler\n", "name: quat2euler\n  width: 64\n", 1)
             spec.write_text(text + self.spelled(ECHO).partition("blocks:\n")[2], encoding="utf-8")
         return spec
 

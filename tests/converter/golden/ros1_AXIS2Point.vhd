@@ -12,6 +12,7 @@ entity AXIS2Point is
     -- the frame; tkeep is ignored, since every beat of an 8-bit stream holds its byte
     s_axis_tdata     : in  std_logic_vector(7 downto 0);
     s_axis_tkeep     : in  std_logic_vector(0 downto 0);
+    s_axis_tuser     : in  std_logic_vector(0 downto 0) := "0";  -- on the last beat: the sender aborted the frame
     s_axis_tvalid    : in  std_logic;
     s_axis_tlast     : in  std_logic;
     s_axis_tready    : out std_logic;
@@ -24,8 +25,8 @@ entity AXIS2Point is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
-    -- 4 its encoding is unknown;
-    -- the code is valid while frame_error is high
+    -- 4 its encoding is unknown,
+    -- 10 its sender aborted it; the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -40,6 +41,7 @@ begin
       rst_n            => rst_n,
       s_axis_tdata     => s_axis_tdata,
       s_axis_tkeep     => s_axis_tkeep,
+      s_axis_tuser     => s_axis_tuser,
       s_axis_tvalid    => s_axis_tvalid,
       s_axis_tlast     => s_axis_tlast,
       s_axis_tready    => s_axis_tready,

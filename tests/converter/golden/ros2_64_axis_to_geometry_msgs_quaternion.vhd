@@ -18,6 +18,7 @@ entity axis_to_geometry_msgs_quaternion is
     -- the frame; the lowest lane of its first beat held the id and is void
     s_axis_tdata     : in  std_logic_vector(63 downto 0);
     s_axis_tkeep     : in  std_logic_vector(7 downto 0);
+    s_axis_tuser     : in  std_logic_vector(0 downto 0) := "0";  -- on the last beat: the sender aborted the frame
     s_axis_tvalid    : in  std_logic;
     s_axis_tlast     : in  std_logic;
     s_axis_tready    : out std_logic;
@@ -31,8 +32,8 @@ entity axis_to_geometry_msgs_quaternion is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
-    -- 4 its encoding is unknown, 8 a beat is neither full nor the last one, is empty, or has gaps;
-    -- the code is valid while frame_error is high
+    -- 4 its encoding is unknown, 8 a beat is neither full nor the last one, is empty, or has gaps,
+    -- 10 its sender aborted it; the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -47,11 +48,12 @@ architecture rtl of axis_to_geometry_msgs_quaternion is
   constant LONG_FRAME   : code_t := "0011";
   constant BAD_ENCODING : code_t := "0100";
   constant BROKEN_BEAT  : code_t := "1000";
+  constant ABORTED      : code_t := "1010";
   constant NO_LENGTH    : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's first beat. After a fault, its low bits are those of the code.
+  -- The beat on s_axis, counted from the length's first beat. After a fault, its low bits are the code.
   -- Then stores may change, since their frame is lost.
-  subtype position_t is unsigned(2 downto 0);
+  subtype position_t is unsigned(3 downto 0);
   signal position_r     : position_t := (others => '0');
   signal next_position  : position_t;
   signal is_first       : std_logic;
@@ -105,9 +107,8 @@ begin
   msg_valid        <= complete_r;
   frame_error      <= ended_r;
   -- A wrong length is found a beat late, but is the frame's first fault.
-  frame_error_code <= BAD_LENGTH when match_r = NO_LENGTH
-                      else BROKEN_BEAT when position_r(2 downto 0) = 0
-                      else "0" & std_logic_vector(position_r(2 downto 0));
+  frame_error_code <= BAD_LENGTH when match_r = NO_LENGTH else
+                      std_logic_vector(position_r(code_t'range));
 
   compare : process (position_r, is_first, s_axis_tdata, s_axis_tkeep, match_r)
   begin
@@ -151,11 +152,13 @@ begin
     end if;
   end process;
 
-  check : process (position_r, is_first, s_axis_tdata, s_axis_tkeep, s_axis_tlast, match_r)
+  check : process (position_r, is_first, s_axis_tdata, s_axis_tkeep, s_axis_tuser, s_axis_tlast, match_r)
   begin
     fault <= NO_FAULT;
     if is_first = '0' and match_r = NO_LENGTH then
       fault <= BAD_LENGTH;
+    elsif s_axis_tlast = '1' and s_axis_tuser = "1" then
+      fault <= ABORTED;
     elsif s_axis_tlast = '0' and are_ones(s_axis_tkeep) = '0' then
       fault <= BROKEN_BEAT;
     elsif is_first = '1' and s_axis_tkeep(5) = '1' and s_axis_tdata(47 downto 40) /= x"00" then
@@ -209,7 +212,7 @@ begin
       -- The first fault of a frame is the one reported.
       next_position <= position_r;
       if broken_r = '0' then
-        next_position <= resize(unsigned(fault(2 downto 0)), position_t'length);
+        next_position <= resize(unsigned(fault), position_t'length);
       end if;
       next_broken <= not s_axis_tlast;
       next_ended  <= s_axis_tlast;

@@ -16,6 +16,7 @@ entity axis_to_awkward_msgs_carry254 is
     -- the frame; tkeep is ignored, since every beat of an 8-bit stream holds its byte
     s_axis_tdata     : in  std_logic_vector(7 downto 0);
     s_axis_tkeep     : in  std_logic_vector(0 downto 0);
+    s_axis_tuser     : in  std_logic_vector(0 downto 0) := "0";  -- on the last beat: the sender aborted the frame
     s_axis_tvalid    : in  std_logic;
     s_axis_tlast     : in  std_logic;
     s_axis_tready    : out std_logic;
@@ -26,8 +27,8 @@ entity axis_to_awkward_msgs_carry254 is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
-    -- 4 its encoding is unknown;
-    -- the code is valid while frame_error is high
+    -- 4 its encoding is unknown,
+    -- 10 its sender aborted it; the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -41,9 +42,10 @@ architecture rtl of axis_to_awkward_msgs_carry254 is
   constant SHORT_FRAME  : code_t := "0010";
   constant LONG_FRAME   : code_t := "0011";
   constant BAD_ENCODING : code_t := "0100";
+  constant ABORTED      : code_t := "1010";
   constant NO_LENGTH    : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's first beat. After a fault, its low bits are those of the code.
+  -- The beat on s_axis, counted from the length's first beat. After a fault, its low bits are the code.
   -- Then stores may change, since their frame is lost.
   subtype position_t is unsigned(8 downto 0);
   signal position_r     : position_t := (others => '0');
@@ -86,8 +88,7 @@ begin
   segment_valid    <= (others => complete_r);
   msg_valid        <= complete_r;
   frame_error      <= ended_r;
-  frame_error_code <= BAD_ENCODING when position_r(1 downto 0) = 0
-                      else "00" & std_logic_vector(position_r(1 downto 0));
+  frame_error_code <= std_logic_vector(position_r(code_t'range));
 
   compare : process (position_r, is_first, s_axis_tdata, match_r)
   begin
@@ -182,11 +183,13 @@ begin
     end if;
   end process;
 
-  check : process (position_r, is_first, s_axis_tdata, s_axis_tlast, match)
+  check : process (position_r, is_first, s_axis_tdata, s_axis_tuser, s_axis_tlast, match)
   begin
     fault <= NO_FAULT;
     if match = NO_LENGTH then
       fault <= BAD_LENGTH;
+    elsif s_axis_tlast = '1' and s_axis_tuser = "1" then
+      fault <= ABORTED;
     elsif position_r = 4 and s_axis_tdata /= x"00" then
       fault <= BAD_ENCODING;
     elsif position_r = 5 and s_axis_tdata /= x"01" then
@@ -222,7 +225,7 @@ begin
       -- The first fault of a frame is the one reported.
       next_position <= position_r;
       if broken_r = '0' then
-        next_position <= resize(unsigned(fault(1 downto 0)), position_t'length);
+        next_position <= resize(unsigned(fault), position_t'length);
       end if;
       next_broken <= not s_axis_tlast;
       next_ended  <= s_axis_tlast;

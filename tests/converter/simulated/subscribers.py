@@ -36,10 +36,12 @@ class Beat:
     data: bytes
     keep: int
     is_last: bool
+    is_aborted: bool = False
 
     def row(self, width: int) -> str:
         """The beat as the bench reads it."""
-        return f"{int.from_bytes(self.data, 'little'):0{width}b} {self.keep:0{width // 8}b} {int(self.is_last)}"
+        data = int.from_bytes(self.data, "little")
+        return f"{data:0{width}b} {self.keep:0{width // 8}b} {int(self.is_last)} {int(self.is_aborted)}"
 
 
 @dataclass(frozen=True)

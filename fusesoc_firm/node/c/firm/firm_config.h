@@ -27,6 +27,12 @@
 #ifndef FIRM_WRITERS
 #define FIRM_WRITERS 1 /* tasks that may put payloads at the same time */
 #endif
+#ifndef FIRM_UART_STORE_BYTES
+#define FIRM_UART_STORE_BYTES (2 * FIRM_LONGEST_PAYLOAD + 128) /* received bytes that wait while a frame is sent */
+#endif
+#ifndef FIRM_UART_PATIENCE_MS
+#define FIRM_UART_PATIENCE_MS 1000 /* until a frame is lost because the line takes no byte */
+#endif
 #ifndef FIRM_DMA_BUFFERS
 #define FIRM_DMA_BUFFERS 4 /* in each direction */
 #endif

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "firm_limit.h"
+
 #define MM2S 0x00u
 #define S2MM 0x30u
 #define CONTROL 0x00u
@@ -54,9 +56,9 @@ static uint32_t status_of(volatile firm_descriptor_t *descriptor) {
 
 /* Return whether bits of a register become 0 within a short time. */
 static int is_cleared(uintptr_t address, uint32_t bits) {
-    const uint32_t begun = firm_milliseconds();
+    firm_limit_t limit = firm_limit_of(PATIENCE_MS);
     while ((firm_read(address) & bits) != 0) {
-        if (firm_milliseconds() - begun >= PATIENCE_MS) {
+        if (firm_limit_is_over(&limit)) {
             return 0;
         }
         firm_pause();

@@ -17,5 +17,10 @@ void firm_unlock(firm_lock_t *lock) {
 
 uint32_t firm_milliseconds(void) { return (uint32_t)xTaskGetTickCount() * (uint32_t)portTICK_PERIOD_MS; }
 
-/* Wait at least one tick, so that tasks of lower priority also run. */
-void firm_pause(void) { vTaskDelay(1); }
+/* Wait at least one tick, so that tasks of lower priority also run. Before the scheduler runs, nothing may wait. The
+ * kernel's configuration needs INCLUDE_vTaskDelay and INCLUDE_xTaskGetSchedulerState. */
+void firm_pause(void) {
+    if (xTaskGetSchedulerState() == taskSCHEDULER_RUNNING) {
+        vTaskDelay(1);
+    }
+}
