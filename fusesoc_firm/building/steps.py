@@ -206,7 +206,7 @@ class _Run:
         for action, record in known:
             if log_of(record, self.results, action.folder) is None:
                 return False
-            if not self.results.restore(action.folder, record.outputs):
+            if not self.results.restore(action.folder, record):
                 return False
             for path in record.removed:
                 with suppress(OSError):
