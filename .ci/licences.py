@@ -38,6 +38,7 @@ PROGRAMS: Mapping[str, str] = {
     "iverilog": "simulates Verilog",
     "make": "runs the steps of a build",
     "python3": "runs everything",
+    "strace": "observes the steps of builds, for cached results",
     "tcl": "reads generated block designs, in tests",
     "verilator": "simulates Verilog",
     "yosys": "synthesises for iCE40, ECP5 and Gowin",
@@ -53,6 +54,7 @@ PROGRAMS: Mapping[str, str] = {
 PROSE = {
     "g++": "GPL-3+ with GCC Runtime Library Exception",
     "python3": "PSF-2.0",
+    "strace": "LGPL-2.1+",
     "tcl": "TCL",
 }
 # Programs that `make licences` does not install, with the licence that their makers name.

@@ -18,10 +18,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm.action import environment as variables
 from fusesoc_firm.action.contents import Contents
@@ -56,17 +58,19 @@ class Action:
 
     def key(self) -> str:
         """Return the digest of everything that is known before the step runs."""
-        return digest_of(
-            {
-                "format": _FORMAT,
-                "arguments": self.arguments,
-                "inputs": key_of(self.inputs),
-                "environment": variables.key_of(self.environment),
-                "machine": platform.machine(),
-                "python": sys.version_info[:3],
-                "edalize": _version("edalize"),
-            }
-        )
+        return digest_of(self.parts())
+
+    def parts(self) -> dict[str, Any]:
+        """Return everything that is known before the step runs."""
+        return {
+            "format": _FORMAT,
+            "arguments": self.arguments,
+            "inputs": key_of(self.inputs),
+            "environment": variables.key_of(self.environment),
+            "machine": platform.machine(),
+            "python": sys.version_info[:3],
+            "edalize": _version("edalize"),
+        }
 
     @property
     def search(self) -> str:
@@ -86,10 +90,18 @@ class Done:
 
 def look_up(action: Action, results: Results, contents: Contents) -> Record | None:
     """Return the stored result of an action, or None if there is none that is still valid."""
-    record = results.record(action.key())
-    if record is None or record.place not in ("", str(action.folder)):
-        return None
-    return record if hold(record.facts, contents, action.search) else None
+
+    def is_valid(record: Record) -> bool:
+        return record.place in ("", str(action.folder)) and hold(record.facts, contents, action.search)
+
+    key = action.key()
+    if (known := results.record(key)) and is_valid(known):
+        return known
+    if (known := results.remote_record(key)) and is_valid(known):
+        with suppress(OSError):
+            results.keep_record(key, known)
+        return known
+    return None
 
 
 def after(record: Record, inputs: Tree) -> dict[str, Item]:
@@ -100,7 +112,7 @@ def after(record: Record, inputs: Tree) -> dict[str, Item]:
 
 def log_of(record: Record, results: Results, folder: Path) -> bytes | None:
     """Return the output of a step, as if it had run in `folder`, or None if it is no longer stored."""
-    text = results.content(record.log)
+    text = results.content_of(record, record.log)
     return None if text is None else text.replace(_FOLDER_MARK, os.fsencode(folder))
 
 
@@ -137,6 +149,7 @@ class _Execution:
             self.results.keep_record(key, record)
         except OSError as error:
             return Done(0, seconds, tree, f"the store {self.results.root} cannot be written: {error.strerror}")
+        self.results.send(key, record)
         return Done(0, seconds, tree)
 
     def _record(self, tree: Tree, begin: int, seconds: float, trace: Trace) -> Record:
@@ -144,19 +157,22 @@ class _Execution:
         action = self.action
         outputs = changed(action.inputs, tree)
         place = os.fsencode(action.folder)
-        is_bound = False
+        is_bound, sizes = False, {}
         for path, item in outputs.items():
             if item.kind in {FILE, PROGRAM}:
                 data = (action.folder / path).read_bytes()
-                self.results.keep_content(data)
+                sizes[self.results.keep_content(data)] = len(data)
                 is_bound = is_bound or place in data
         with self.log.open("rb") as output:
             output.seek(begin)
-            text = self.results.keep_content(output.read().replace(place, _FOLDER_MARK))
+            text = output.read().replace(place, _FOLDER_MARK)
+        log = self.results.keep_content(text)
+        sizes[log] = len(text)
         facts = facts_of(_places(action).outside(trace), self.contents, action.search)
         ordered = {path: outputs[path] for path in in_order_of_time(action.folder, outputs)}
         gone = removed(action.inputs, tree)
-        return Record(tuple(facts), ordered, tuple(gone), text, seconds, str(action.folder) if is_bound else "")
+        bound_to = str(action.folder) if is_bound else ""
+        return Record(tuple(facts), ordered, tuple(gone), log, seconds, sizes, bound_to)
 
     def _difference(self, copy: Path, tree: Tree) -> str:
         """Run a step again on a copy of its inputs, in the same folder; return which outputs differ, or nothing."""

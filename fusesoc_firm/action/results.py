@@ -7,6 +7,9 @@
 The folders are those that remote caches of build tools use. The store has a size limit of its own, since binaries and
 bitstreams would push out generated cores. As in the store of generated cores, nothing that is read is trusted: a record
 of another form and a content with another digest count as missing.
+
+With a remote store, a result that is missing here is looked up there, and its contents are obtained when they are
+needed. New results are written to both. Notes are for one machine.
 """
 
 from __future__ import annotations
@@ -18,12 +21,14 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm.action.contents import Contents
 from fusesoc_firm.action.observed import Fact
 from fusesoc_firm.action.tree import FILE, FOLDER, LINK, PROGRAM, Item
 from fusesoc_firm.store import layout, shared_files
 from fusesoc_firm.store.layout import digest, is_digest, is_path
+from fusesoc_firm.store.remote import Remote, remote_store
 from fusesoc_firm.store.store import parse_size
 from fusesoc_firm.text.diagnostics import fail
 
@@ -42,8 +47,8 @@ class Record:
     """The result of a step that succeeded.
 
     `outputs` are the new and changed items in the order of their times, `removed` the removed paths, `log` the digest
-    of the output and `seconds` the duration. `place` is the folder of the step if an output contains its path, else
-    empty.
+    of the output and `seconds` the duration. `sizes` are the numbers of bytes of all contents by their digests. `place`
+    is the folder of the step if an output contains its path, else empty.
     """
 
     facts: tuple[Fact, ...]
@@ -51,15 +56,17 @@ class Record:
     removed: tuple[str, ...]
     log: str
     seconds: float
+    sizes: Mapping[str, int]
     place: str = ""
 
 
 @dataclass(frozen=True)
 class Results:
-    """The store of results in the folder `root`, of at most about `limit` bytes."""
+    """The store of results in the folder `root`, of at most about `limit` bytes, and the remote store."""
 
     root: Path
     limit: int
+    remote: Remote | None = None
 
     def contents(self) -> Contents:
         """Return the digests of files that this user's runs share."""
@@ -67,10 +74,15 @@ class Results:
 
     def record(self, key: str) -> Record | None:
         """Return the record of an action, or None if it is missing or damaged."""
-        try:
-            return _record(self._plain(_place(_AC, key)))
-        except (ValueError, TypeError, LookupError):
+        return _record(self._plain(_place(_AC, key)))
+
+    def remote_record(self, key: str) -> Record | None:
+        """Return the record of an action in the remote store, or None if it is missing or damaged."""
+        if self.remote is None or (data := self.remote.entry(key)) is None:
             return None
+        if (found := _record(_parsed(data))) is None:
+            self.remote.tell_damage(key)
+        return found
 
     def note(self, key: str) -> object:
         """Return the plain data of a note, or None if it is missing or damaged."""
@@ -82,24 +94,33 @@ class Results:
             self._keep_plain(_place(_NOTES, key), data)
 
     def content(self, name: str) -> bytes | None:
-        """Return the content with this digest, or None if it is missing or damaged."""
+        """Return the content with this digest, or None if it is missing here or damaged."""
         data = shared_files.read(str(self.root), _place(_CAS, name), _MOST_BYTES)
         if data is None or digest(data) != name:
             return None
         layout.mark_used(str(self.root), _place(_CAS, name))
         return data
 
+    def content_of(self, record: Record, name: str) -> bytes | None:
+        """Return a content of a record, from the remote store if it is missing here, or None."""
+        if (data := self.content(name)) is not None or self.remote is None:
+            return data
+        if (data := self.remote.content(name, record.sizes[name])) is not None:
+            with suppress(OSError):
+                self.keep_content(data)
+        return data
+
     def keep_record(self, key: str, record: Record) -> None:
         """Store the record of an action, whose contents are already stored. May raise `OSError`."""
-        plain = {
-            "facts": record.facts,
-            "outputs": [[path, item.kind, item.digest, item.identity] for path, item in record.outputs.items()],
-            "removed": record.removed,
-            "log": record.log,
-            "seconds": record.seconds,
-            "place": record.place,
-        }
-        self._keep_plain(_place(_AC, key), plain)
+        self._keep_plain(_place(_AC, key), _plain(record))
+
+    def send(self, key: str, record: Record) -> None:
+        """Write the record of an action and its contents to the remote store. Failures are only reported."""
+        if self.remote is None or not self.remote.is_writable:
+            return
+        contents = (self.content(name) for name in record.sizes)
+        if self.remote.put_contents(contents):
+            self.remote.put_entry(key, json.dumps(_plain(record)).encode())
 
     def keep_content(self, data: bytes) -> str:
         """Store a content and return its digest. May raise `OSError`."""
@@ -108,13 +129,13 @@ class Results:
             shared_files.write_whole(str(self.root), _place(_CAS, name), data)
         return name
 
-    def restore(self, folder: Path, items: Mapping[str, Item]) -> bool:
-        """Write items to a folder in their order; return False if a content is missing, and write no further items.
+    def restore(self, folder: Path, record: Record) -> bool:
+        """Write outputs to a folder in their order; return False if a content is missing, and write no further items.
 
         Files that have the right content are not written. May raise `OSError`.
         """
         contents = Contents()
-        return all(self._restore(folder / path, item, contents) for path, item in items.items())
+        return all(self._restore(folder / path, item, record, contents) for path, item in record.outputs.items())
 
     def size(self) -> int:
         """Return the number of bytes in the store."""
@@ -142,22 +163,38 @@ class Results:
         """Remove all results; return the number of removed bytes. May raise `OSError`."""
         return shared_files.remove(str(self.root), FOLDER_NAME)
 
+    def remove_damaged(self) -> list[Path]:
+        """Remove damaged files and files that cannot belong to the store; return their paths. May raise `OSError`."""
+        damaged = [name for name, status in self._listed() if not self._is_whole(name, status)]
+        for name in damaged:
+            shared_files.remove(str(self.root), name)
+        return [self.root / name for name in damaged]
+
+    def number(self) -> int:
+        """Return the number of stored results."""
+        return sum(name.startswith(f"{_AC}/") for name, _, _ in self._files())
+
+    def _is_whole(self, name: str, status: os.stat_result) -> bool:
+        part, key = name.rpartition("/")[0].rpartition("/")[0], name.rpartition("/")[2]
+        if not stat.S_ISREG(status.st_mode) or not is_digest(key) or name != _place(part, key):
+            return False
+        if part == _CAS:
+            return self.content(key) is not None
+        return (self.record(key) if part == _AC else self.note(key)) is not None
+
     def _plain(self, name: str) -> object:
         data = shared_files.read(str(self.root), name, _MOST_RECORD_BYTES)
         said, _, text = (data or b"").partition(b"\n")
         if data is None or digest(text).encode() != said:
             return None
         layout.mark_used(str(self.root), name)
-        try:
-            return json.loads(text)
-        except (ValueError, RecursionError):
-            return None
+        return _parsed(text)
 
     def _keep_plain(self, name: str, data: object) -> None:
         text = json.dumps(data).encode()
         shared_files.write_whole(str(self.root), name, digest(text).encode() + b"\n" + text)
 
-    def _restore(self, path: Path, item: Item, contents: Contents) -> bool:
+    def _restore(self, path: Path, item: Item, record: Record, contents: Contents) -> bool:
         if item.kind == FOLDER:
             path.mkdir(parents=True, exist_ok=True)
             return True
@@ -168,7 +205,7 @@ class Results:
                 path.symlink_to(item.digest)
             return True
         if path.is_symlink() or contents.digest(str(path)) != item.digest:
-            data = self.content(item.digest)
+            data = self.content_of(record, item.digest)
             if data is None:
                 return False
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -181,12 +218,12 @@ class Results:
     def _files(self) -> list[tuple[str, int, float]]:
         """Return the name, the size and the time of last use of each file, the most recently used first."""
         found = [
-            (name, status.st_size, status.st_mtime)
-            for part in (_AC, _CAS, _NOTES)
-            for name, status in shared_files.listed(str(self.root), part)
-            if stat.S_ISREG(status.st_mode)
+            (name, status.st_size, status.st_mtime) for name, status in self._listed() if stat.S_ISREG(status.st_mode)
         ]
         return sorted(found, key=lambda file: (-file[2], file[0]))
+
+    def _listed(self) -> list[tuple[str, os.stat_result]]:
+        return [item for part in (_AC, _CAS, _NOTES) for item in shared_files.listed(str(self.root), part)]
 
 
 def default_results(environment: Mapping[str, str] = os.environ) -> Results:
@@ -194,23 +231,51 @@ def default_results(environment: Mapping[str, str] = os.environ) -> Results:
     limit = environment.get(LIMIT) or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
         fail(f"{LIMIT} is '{limit}', which is not a size", hint="legal: a number of bytes, such as 500M or 20G")
-    return Results(Path(layout.default_root(environment)), size)
+    root = layout.default_root(environment)
+    return Results(Path(root), size, remote_store(environment, root))
 
 
 def _place(part: str, name: str) -> str:
     return f"{part}/{name[:2]}/{name}"
 
 
+def _parsed(text: bytes) -> object:
+    """Return the data in a JSON text, or None if the text is invalid or nested too deeply."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _plain(record: Record) -> dict[str, object]:
+    return {
+        "facts": record.facts,
+        "outputs": [[path, item.kind, item.digest, item.identity] for path, item in record.outputs.items()],
+        "removed": record.removed,
+        "log": record.log,
+        "seconds": record.seconds,
+        "sizes": dict(record.sizes),
+        "place": record.place,
+    }
+
+
 def _record(data: object) -> Record | None:
     """Return the record in plain data, or None if the data have another form."""
-    if not isinstance(data, dict):
+    try:
+        return _checked(data) if isinstance(data, dict) else None
+    except (ValueError, TypeError, LookupError, AttributeError):
         return None
-    facts, outputs, removed = data["facts"], data["outputs"], data["removed"]
+
+
+def _checked(data: Mapping[str, Any]) -> Record | None:
+    """Return the record in plain data, or None. May raise other errors for data of another form."""
+    facts, outputs, removed, sizes = data["facts"], data["outputs"], data["removed"], data["sizes"]
     is_good = (
         all(len(fact) == _FACT_PARTS and isinstance(fact[0], str) and isinstance(fact[1], str) for fact in facts)
         and all(_is_item(item) for item in outputs)
         and all(is_path(path) for path in removed)
-        and is_digest(data["log"])
+        and {data["log"], *(item[2] for item in outputs if item[1] in (FILE, PROGRAM))} == sizes.keys()
+        and all(is_digest(name) and type(size) is int and size >= 0 for name, size in sizes.items())
         and isinstance(data["seconds"], int | float)
         and isinstance(data["place"], str)
     )
@@ -222,7 +287,7 @@ def _record(data: object) -> Record | None:
     if links and any(path.startswith(links) for path in items):
         return None
     facts = tuple((kind, name, state) for kind, name, state in facts)
-    return Record(facts, items, tuple(removed), data["log"], float(data["seconds"]), data["place"])
+    return Record(facts, items, tuple(removed), data["log"], float(data["seconds"]), sizes, data["place"])
 
 
 def _is_item(item: object) -> bool:

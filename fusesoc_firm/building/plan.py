@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -117,26 +117,36 @@ def select_plan(selection: Selection, options: RunOptions, build_root: Path | No
     return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds), options, _solver(options, build_root))
 
 
-def plan_tests(cores: Sequence[str], targets: Sequence[str] = (), build_root: Path | None = None) -> Plan:
-    """Return a plan of the tests of cores: their targets named `sim*` and `test*` that simulate.
+def plan_tests(selection: Selection, options: RunOptions, build_root: Path | None = None) -> Plan:
+    """Return a plan of the selected tests: targets named `sim*` and `test*` that simulate.
 
-    Without names of cores, the plan contains the cores below the current folder. `targets` selects some of the tests.
-    Raise `InputError` for unknown cores, and for named cores without these tests.
+    Without names of cores, the plan contains the cores below the current folder; without targets, all tests. Raise
+    `InputError` for unknown cores, and for named cores without these tests.
     """
-    fusesoc = _fusesoc(RunOptions(), build_root)
+    fusesoc = _fusesoc(options, build_root)
     faults = Diagnostics()
-    names = [name for core in cores if (name := _full_name(fusesoc, core, (), faults))]
-    builds: list[Build] = []
-    for name in dict.fromkeys(names if cores else _cores_here(fusesoc)):
-        tests = _tests(fusesoc, name)
-        chosen = [test for test in tests if test in targets or not targets]
-        if cores and not (chosen if not targets else {*targets} <= {*tests}):
-            missing = [target for target in targets if target not in tests]
-            what = f"no test '{missing[0]}'" if missing else "no tests"
-            faults.error(f"{name} has {what}", hint=f"its tests: {', '.join(tests) or 'none'}")
-        builds += [Build(name, test, _work_root(fusesoc, name, tests[test])) for test in chosen]
+    builds: dict[Build, None] = {}
+    for core, patterns in selection.parts() or [("", selection.targets)]:
+        # Cores that are not named one by one need not have these tests.
+        is_lenient = selection.is_where_present or not core or is_pattern(core)
+        for name in _names(fusesoc, core, (), faults) if core else _cores_here(fusesoc):
+            if selection.affected is not None and name not in selection.affected:
+                continue
+            tests = _tests(fusesoc, name, options.use_flags())
+            chosen = _matching_tests(name, tests, patterns, Diagnostics() if is_lenient else faults)
+            builds |= dict.fromkeys(Build(name, test, _work_root(fusesoc, name, tests[test])) for test in chosen)
     faults.raise_if_any()
-    return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds))
+    return Plan(fusesoc, Path(fusesoc.config.build_root), tuple(builds), options, _solver(options, build_root))
+
+
+def _matching_tests(name: str, tests: Collection[str], patterns: Sequence[str], faults: Diagnostics) -> list[str]:
+    """Return the tests of a core that match the patterns, or all; add a fault for each pattern without a test."""
+    found = [(pattern, [test for test in tests if fnmatchcase(test, pattern)]) for pattern in patterns or ["*"]]
+    for pattern, fitting in found:
+        if not fitting:
+            what = f"no test '{pattern}'" if patterns else "no tests"
+            faults.error(f"{name} has {what}", hint=f"its tests: {', '.join(tests) or 'none'}")
+    return [test for test in tests if any(test in fitting for _, fitting in found)]
 
 
 def _fusesoc(options: RunOptions, build_root: Path | None) -> Any:
@@ -206,13 +216,13 @@ def _cores_here(fusesoc: Any) -> list[str]:
     return sorted(name for name in cores if Path(cores[name].core_file).resolve().is_relative_to(here))
 
 
-def _tests(fusesoc: Any, name: str) -> dict[str, dict[str, Any]]:
+def _tests(fusesoc: Any, name: str, further: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the tests of a core with their flags."""
     core = fusesoc.get_core(name)
     found: dict[str, dict[str, Any]] = {}
     for target in core.get_data({}).targets:
         if target.startswith(TESTS):
-            flags = {**core.get_flags(target), "target": target}
+            flags = {**core.get_flags(target), "target": target, **further}
             flow = core.get_flow(flags)
             if flow == "sim" or (not flow and flags.get("tool") in _SIMULATORS):
                 found[target] = flags

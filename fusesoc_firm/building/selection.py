@@ -33,6 +33,11 @@ class Selection:
         found = [core.partition("@") for core in self.cores]
         return [(core, tuple(own.split(",")) if mark else self.targets) for core, mark, own in found]
 
+    def words(self) -> tuple[object, ...]:
+        """Return the selection as plain data."""
+        affected = None if self.affected is None else sorted(self.affected)
+        return (self.cores, self.targets, self.is_where_present, affected)
+
 
 def is_pattern(text: str) -> bool:
     """Return whether a name contains wildcards."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from contextlib import closing
 from functools import partial
@@ -22,7 +21,7 @@ from fusesoc_firm.cli.build_options import (
 from fusesoc_firm.cli.common import command, positive
 from fusesoc_firm.text.diagnostics import fail
 
-_NOT_CACHED = ("setup", "cluster", "events", "junit")
+_NOT_CACHED = ("setup", "cluster")
 
 
 def add_build(commands: Any) -> None:
@@ -54,6 +53,7 @@ def add_build(commands: Any) -> None:
         action="store_true",
         help="take the results of steps with unchanged inputs from the store; each build starts in an empty folder",
     )
+    build.add_argument("--rerun", action="store_true", help="with --cached, run all steps, also those that are stored")
     build.add_argument("--clean", action="store_true", help="empty each build folder first")
     build.add_argument("--locked", action="store_true", help="report differences from each core's lock file as errors")
     add_limits(build)
@@ -64,14 +64,15 @@ def add_build(commands: Any) -> None:
 def _build_cached(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.building.plan import select_plan
     from fusesoc_firm.building.steps import Steps
-    from fusesoc_firm.cli.cached import Words, report, run_cached
+    from fusesoc_firm.cli.build_report import Report, Words
+    from fusesoc_firm.cli.cached import run_cached
     from fusesoc_firm.plugin.build import How
 
     if others := [name for name in _NOT_CACHED if getattr(arguments, name)]:
         fail(f"--cached cannot be combined with --{others[0]}")
-    started = time.monotonic()
     selection, options = selection_of(arguments), run_options_of(arguments)
-    steps = Steps(("build",) if arguments.build_only else ("build", "run"), flags=tuple(options.use_flags().items()))
+    names = ("build",) if arguments.build_only else ("build", "run")
+    steps = Steps(names, is_rerun=arguments.rerun, flags=tuple(options.use_flags().items()))
     how = How(
         is_locked=arguments.locked,
         jobs=arguments.jobs or 0,
@@ -79,22 +80,23 @@ def _build_cached(arguments: argparse.Namespace) -> None:
         limits=limits_of(arguments),
         steps=steps,
     )
-    affected = None if selection.affected is None else sorted(selection.affected)
-    chosen = (selection.cores, selection.targets, selection.is_where_present, affected)
-    words = Words("build", "ok", ("build", chosen, options.command_line(), steps.names))
+    chosen = ("build", *selection.words(), options.command_line(), names)
     make = partial(select_plan, selection, options, arguments.build_root)
-    report(words, run_cached(words, make, how, arguments.build_root), time.monotonic() - started)
+    report = Report(Words(is_cached=True), arguments.events, arguments.junit)
+    run_cached(chosen, make, how, arguments.build_root, report)
 
 
 def _build(arguments: argparse.Namespace) -> None:
     if arguments.cached:
         _build_cached(arguments)
         return
+    if arguments.rerun:
+        fail("--rerun needs --cached")
 
     from fusesoc_firm.building.plan import select_plan
-    from fusesoc_firm.cli.build_report import Report
+    from fusesoc_firm.cli.build_report import Report, Words
+    from fusesoc_firm.cli.cached import print_failures
     from fusesoc_firm.plugin.build import How, Listener, build
-    from fusesoc_firm.store.store import default_store
 
     plan = select_plan(selection_of(arguments), run_options_of(arguments), arguments.build_root)
     how = How(
@@ -108,13 +110,11 @@ def _build(arguments: argparse.Namespace) -> None:
         limits_of(arguments),
     )
     started = time.time()
-    report = Report(plan.builds, arguments.events, arguments.junit)
+    report = Report(Words(), arguments.events, arguments.junit)
+    report.plan(plan.builds)
     listener = Listener(report.tell, report.progress, report.begin)
     with closing(report), closing(build(plan, how, listener)) as outcomes:
         for outcome in outcomes:
             report.end(outcome)
-    # The warnings of builds are in their logs.
-    remote = default_store().remote
-    for warning in remote.failures(started) if remote else ():
-        print(warning, file=sys.stderr)
+    print_failures(started)
     report.finish()

@@ -23,13 +23,14 @@ _SWITCHES = {
 }
 
 
-def add_selection(parser: argparse.ArgumentParser) -> None:
-    """Add the cores and targets, for `selection_of`."""
+def add_selection(parser: argparse.ArgumentParser, default: str = "") -> None:
+    """Add the cores and targets, for `selection_of`; `default` names what is selected without them."""
     parser.add_argument(
         "cores",
         metavar="CORE",
         nargs="*",
-        help="a core's name in FuseSoC or a pattern such as 'acme:m:*', with targets of its own after @: CORE@sim,lint",
+        help="a core's name in FuseSoC or a pattern such as 'acme:m:*', with targets of its own after @: CORE@sim,lint"
+        + f" (default: {default})" * bool(default),
     )
     parser.add_argument(
         "--target",
@@ -48,16 +49,20 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def selection_of(arguments: argparse.Namespace) -> Selection:
-    """Return the selection in the arguments. May raise `InputError`."""
+def selection_of(arguments: argparse.Namespace, *, has_default: bool = False) -> Selection:
+    """Return the selection in the arguments; with `has_default`, cores and targets may be missing.
+
+    May raise `InputError`.
+    """
     from fusesoc_firm.building.selection import Selection
 
     revision: str | None = arguments.affected_since
-    if not arguments.cores and revision is None:
+    if not arguments.cores and revision is None and not has_default:
         fail("no core is selected", hint="name cores, or add --affected-since REV")
-    selection = Selection(tuple(arguments.cores) or ("*",), tuple(arguments.targets))
+    every = ("*",) if revision is not None else ()
+    selection = Selection(tuple(arguments.cores) or every, tuple(arguments.targets))
     missing = [core for core, targets in selection.parts() if not targets]
-    if missing:
+    if missing and not has_default:
         fail(f"no target of {missing[0]} is selected", hint=f"add --target NAME, or write {missing[0]}@NAME")
     affected = None
     if revision is not None:

@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 from xml.etree import ElementTree as ET
@@ -18,25 +19,65 @@ from fusesoc_firm.text.outputs import shown
 if TYPE_CHECKING:
     from fusesoc_firm.building.plan import Build
     from fusesoc_firm.building.pool import Outcome
+    from fusesoc_firm.building.steps import Step
 
-RESULTS = ("ok", "flaky", "failed", "skipped")
+_CACHED, _FAILED = "cached", "failed"
+
+
+@dataclass(frozen=True)
+class Words:
+    """The words of a report: a build's name, and a good result. With `is_cached`, builds run as actions."""
+
+    unit: str = "build"
+    good: str = "ok"
+    is_cached: bool = False
+
+    @property
+    def column(self) -> str:
+        """The title of the column with targets."""
+        return "test" if self.unit == "test" else "target"
+
+    @property
+    def counted(self) -> tuple[str, ...]:
+        """The results whose number is always printed."""
+        return (_CACHED, self.good, _FAILED) if self.is_cached else ()
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """All results, in the order of the summary."""
+        return (*((_CACHED,) if self.is_cached else ()), self.good, "flaky", _FAILED, "skipped")
+
+
+@dataclass(frozen=True)
+class Row:
+    """The outcome of a build, its result in the report's words, and its steps, if it ran as actions."""
+
+    outcome: Outcome
+    result: str
+    steps: tuple[Step, ...] = ()
 
 
 class Report:
     """The reports of one run, which is from the constructor to `close`."""
 
-    def __init__(self, builds: Sequence[Build], events: Path | None, junit: Path | None) -> None:
+    def __init__(self, words: Words, events: Path | None, junit: Path | None) -> None:
         """Begin the reports. Raise `InputError` if the file for the events cannot be written."""
         from tqdm import tqdm
 
         # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
         tqdm.monitor_interval = 0
         self._started = time.monotonic()
-        self._builds, self._junit = list(builds), junit
-        self._outcomes: list[Outcome] = []
+        self._words, self._junit = words, junit
+        self._builds: list[Build] = []
+        self._rows: list[Row] = []
         self._running: list[Build] = []
         self._events = _opened(events) if events else None
-        self._bar = tqdm(total=len(builds), unit="build", disable=None, file=sys.stderr)
+        self._bar = tqdm(unit=words.unit, disable=None, file=sys.stderr)
+
+    def plan(self, builds: Sequence[Build]) -> None:
+        """Note all builds of the run, before the first one begins or ends."""
+        self._builds = list(builds)
+        self._bar.total = len(builds)
         self._event("plan", builds=[_named(build) for build in builds])
 
     def tell(self, text: str) -> None:
@@ -55,42 +96,53 @@ class Report:
 
     def end(self, outcome: Outcome) -> None:
         """Note the end of a build."""
-        self._outcomes.append(outcome)
+        row = _row(outcome, self._words)
+        self._rows.append(row)
         self._running = [build for build in self._running if build != outcome.build]
-        self._event("end", **_result(outcome))
+        self._event("end", **_facts(row))
         self._show()
         self._bar.update()
 
     def close(self) -> None:
         """End the progress bar and the events, also of a run that was interrupted."""
         self._bar.close()
-        self._event("summary", builds=len(self._outcomes), **self._counts())
+        self._event("summary", builds=len(self._rows), **self._counts())
         if self._events:
             self._events.close()
 
     def finish(self) -> None:
         """Print the results and write JUnit's file. Raise `InputError` if a build failed."""
-        outcomes = sorted(self._outcomes, key=lambda outcome: self._builds.index(outcome.build))
+        places = {build: place for place, build in enumerate(self._builds)}
+        rows = sorted(self._rows, key=lambda row: places[row.outcome.build])
         seconds = time.monotonic() - self._started
         if self._junit:
-            _write(self._junit, junit(outcomes, seconds))
-        for outcome in outcomes:
+            _write(self._junit, junit(rows, seconds, self._words))
+        for outcome in (row.outcome for row in rows):
             if outcome.last_lines:
                 what = f"failed in try {outcome.tries - 1}" if outcome.is_good else "failed"
                 print(f"{outcome.build} {what}; the last lines of {shown(outcome.build.log)}")
                 print(*(f"    {line}" for line in outcome.last_lines), sep="\n")
-        _print_table(outcomes)
-        counts = ", ".join(f"{count} {result}" for result, count in self._counts().items() if count)
-        print(f"{len(outcomes)} builds in {seconds:.1f} s" + (f": {counts}" if counts else ""))
-        if failed := self._counts()["failed"]:
-            fail(f"{failed} of {len(outcomes)} builds failed")
+        _print_table(rows, self._words)
+        _print_faults(rows)
+        print(self._summary(rows, seconds))
+        if failed := self._counts()[_FAILED]:
+            fail(f"{failed} of {len(rows)} {self._words.unit}s failed")
+
+    def _summary(self, rows: Sequence[Row], seconds: float) -> str:
+        shown_counts = [
+            f"{count} {result}" for result, count in self._counts().items() if count or result in self._words.counted
+        ]
+        counts = f": {', '.join(shown_counts)}" if shown_counts else ""
+        saved = sum(step.seconds for row in rows for step in row.steps if step.state == _CACHED)
+        end = f"; {saved:.1f} s saved" if self._words.is_cached else ""
+        return f"{len(rows)} {self._words.unit}s in {seconds:.1f} s{counts}{end}"
 
     def _counts(self) -> dict[str, int]:
-        counts = Counter(outcome.result for outcome in self._outcomes)
-        return {result: counts[result] for result in RESULTS}
+        counts = Counter(row.result for row in self._rows)
+        return {result: counts[result] for result in self._words.results}
 
     def _show(self) -> None:
-        failed = self._counts()["failed"]
+        failed = self._counts()[_FAILED]
         now = ", ".join(map(str, dict.fromkeys(self._running)))
         self._bar.set_postfix_str(f"{now}{f', {failed} failed' if failed else ''}", refresh=False)
 
@@ -102,16 +154,17 @@ class Report:
                 print(json.dumps(line), file=self._events, flush=True)
 
 
-def junit(outcomes: Sequence[Outcome], seconds: float) -> str:
+def junit(rows: Sequence[Row], seconds: float, words: Words) -> str:
     """Return the results in the format of JUnit: a test case for each build, with the core as its class."""
     counts = {
-        "tests": len(outcomes),
-        "failures": sum(outcome.result == "failed" for outcome in outcomes),
-        "skipped": sum(outcome.is_skipped for outcome in outcomes),
+        "tests": len(rows),
+        "failures": sum(row.result == _FAILED for row in rows),
+        "skipped": sum(row.outcome.is_skipped for row in rows),
     }
-    suite = ET.Element("testsuite", name="firm build", time=f"{seconds:.3f}")
+    suite = ET.Element("testsuite", name=f"firm {words.unit}", time=f"{seconds:.3f}")
     suite.attrib |= {name: str(count) for name, count in counts.items()}
-    for outcome in outcomes:
+    for row in rows:
+        outcome = row.outcome
         name, core = outcome.build.target, outcome.build.core
         case = ET.SubElement(suite, "testcase", classname=core, name=name, time=f"{outcome.seconds:.3f}")
         text = "\n".join(map(_legal, outcome.last_lines))
@@ -121,40 +174,66 @@ def junit(outcomes: Sequence[Outcome], seconds: float) -> str:
             ET.SubElement(case, "failure", message=_legal(outcome.last_lines[-1:][0] if text else "")).text = text
         elif outcome.tries > 1:
             ET.SubElement(case, "system-out").text = f"flaky: passed in try {outcome.tries}\n{text}"
+        elif row.result == _CACHED:
+            ET.SubElement(case, "system-out").text = _CACHED
     suites = ET.Element("testsuites")
     suites.append(suite)
     ET.indent(suites)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(suites, encoding="unicode")}\n'
 
 
-def _print_table(outcomes: Sequence[Outcome]) -> None:
-    rows = [("core", "target", "result", "seconds", "log")]
-    rows += [
+def _row(outcome: Outcome, words: Words) -> Row:
+    steps: tuple[Step, ...] = ()
+    if words.is_cached and not outcome.is_skipped:
+        from fusesoc_firm.building.steps import steps_of
+
+        steps = steps_of(outcome.build)
+    is_cached = outcome.result == "ok" and bool(steps) and all(step.state == _CACHED for step in steps)
+    good = _CACHED if is_cached else words.good
+    return Row(outcome, good if outcome.result == "ok" else outcome.result, steps)
+
+
+def _print_table(rows: Sequence[Row], words: Words) -> None:
+    cells = [("core", words.column, "result", "seconds", "log")]
+    cells += [
         (
-            outcome.build.core,
-            outcome.build.target,
-            outcome.result,
-            f"{outcome.seconds:.1f}",
-            "" if outcome.is_skipped else shown(outcome.build.log),
+            row.outcome.build.core,
+            row.outcome.build.target,
+            row.result,
+            f"{row.outcome.seconds:.1f}",
+            "" if row.outcome.is_skipped else shown(row.outcome.build.log),
         )
-        for outcome in outcomes
+        for row in rows
     ]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        print("  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    for line in cells:
+        print("  ".join(f"{cell:{width}}" for cell, width in zip(line, widths, strict=True)).rstrip())
+
+
+def _print_faults(rows: Sequence[Row]) -> None:
+    """Print why the results of steps were not stored, each reason once."""
+    found = [
+        f"'{step.name}' of {row.outcome.build} is not cached: {step.fault}"
+        for row in rows
+        for step in row.steps
+        if step.fault
+    ]
+    print(*dict.fromkeys(found), sep="\n", end="\n" if found else "")
 
 
 def _named(build: Build) -> dict[str, str]:
     return {"core": build.core, "target": build.target, "log": str(build.log)}
 
 
-def _result(outcome: Outcome) -> dict[str, object]:
+def _facts(row: Row) -> dict[str, object]:
+    outcome = row.outcome
     return {
         **_named(outcome.build),
-        "result": outcome.result,
+        "result": row.result,
         "tries": outcome.tries,
         "seconds": round(outcome.seconds, 3),
         "last_lines": list(outcome.last_lines),
+        **({"steps": [asdict(step) for step in row.steps]} if row.steps else {}),
     }
 
 

@@ -1,30 +1,37 @@
-"""`firm cache`: the store of generated cores, also as a server for other machines."""
+"""`firm cache`: the stores of generated cores and of steps' results, also as a server for other machines."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import time
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import command, natural
 from fusesoc_firm.text.diagnostics import fail
 
+if TYPE_CHECKING:
+    from fusesoc_firm.action.results import Results
+    from fusesoc_firm.store.store import Store
+
 _UNIT = 1024
+_CORES, _RESULTS, _SERVED = "cores", "results", "served"
+_SERVED_LIMIT = "10G"
 
 
 def add_cache(commands: Any) -> None:
     """Declare the command and its actions."""
-    cache = command(commands, "cache", "show, clean, verify or serve the store of generated cores", "firm cache show")
+    cache = command(commands, "cache", "show, clean, verify or serve stored cores and results", "firm cache show")
     actions = cache.add_subparsers(title="actions", metavar="ACTION", required=True)
     show = command(
         actions, "show", "print the store's folder and its contents", "firm cache show --entries", _show_cache
     )
-    show.add_argument("--entries", action="store_true", help="also list all entries, the most recently used first")
+    show.add_argument("--entries", action="store_true", help="also list the generated cores, the last used first")
     clean = command(
         actions,
         "clean",
-        "remove stored cores, including those of earlier versions; concurrent runs are not disturbed",
+        "remove generated cores and results, including those of earlier versions; concurrent runs are not disturbed",
         "firm cache clean --to 200M",
         _clean_cache,
     )
@@ -32,7 +39,12 @@ def add_cache(commands: Any) -> None:
         "--to",
         type=_size,
         metavar="SIZE",
-        help="remove the least recently used entries until the store is at most SIZE, such as 200M",
+        help="remove the least recently used entries until each store is at most SIZE, such as 200M",
+    )
+    clean.add_argument(
+        "--only",
+        choices=(_CORES, _RESULTS, _SERVED),
+        help="generated cores, results of steps, or what other machines have written to 'firm cache serve'",
     )
     command(
         actions,
@@ -52,6 +64,13 @@ def add_cache(commands: Any) -> None:
     serve.add_argument(
         "--host", default="127.0.0.1", help="the address to listen on; 0.0.0.0 for all (default: this machine only)"
     )
+    serve.add_argument(
+        "--limit",
+        type=_size,
+        default=_SERVED_LIMIT,
+        metavar="SIZE",
+        help=f"the limit of what is served, of which the least recently used is removed (default: {_SERVED_LIMIT})",
+    )
     serve.add_argument("--port", type=natural, default=8099, help="the port; 0 for any free one (default: 8099)")
 
 
@@ -64,14 +83,20 @@ def _size(text: str) -> int:
 
 
 def _show_cache(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.action.results import default_results
     from fusesoc_firm.store.layout import read_entry
-    from fusesoc_firm.store.store import default_store
+    from fusesoc_firm.store.store import default_store, served_store
 
     store = default_store()
+    results, served = default_results(), served_store(0)
     entries = store.entries()
     print(f"folder   {store.root}")
     print(f"entries  {len(entries)}")
     print(f"size     {_shown(store.size())} of {_shown(store.limit)}")
+    print(f"results  {results.number()}")
+    print(f"size     {_shown(results.size())} of {_shown(results.limit)}")
+    if size := served.size():
+        print(f"served   {_shown(size)}")
     if not store.is_writable():
         print("rights   read-only: new results are not cached")
     if store.remote:
@@ -84,45 +109,52 @@ def _show_cache(arguments: argparse.Namespace) -> None:
 
 
 def _clean_cache(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.store.store import default_store
-
-    store = default_store()
-    try:
-        removed = store.clean() if arguments.to is None else store.shrink(arguments.to)
-    except OSError as error:
-        fail(f"cannot clean {store.root}: {error.strerror}")
-    print(f"{_shown(removed)} removed from {store.root}")
+    removed = 0
+    stores = _stores()
+    for store in [stores[arguments.only]] if arguments.only else stores.values():
+        try:
+            removed += store.clean() if arguments.to is None else store.shrink(arguments.to)
+        except OSError as error:
+            fail(f"cannot clean {store.root}: {error.strerror}")
+    print(f"{_shown(removed)} removed from {stores[_CORES].root}")
 
 
 def _verify_cache(_: argparse.Namespace) -> None:
-    from fusesoc_firm.store.store import default_store
-
-    store = default_store()
-    try:
-        damaged = store.remove_damaged()
-    except OSError as error:
-        fail(f"cannot remove a damaged entry from {store.root}: {error.strerror}")
+    damaged = []
+    stores = _stores()
+    for store in stores.values():
+        try:
+            damaged += store.remove_damaged()
+        except OSError as error:
+            fail(f"cannot remove a damaged entry from {store.root}: {error.strerror}")
     if damaged:
         files = "\n".join(map(str, damaged))
         entries = "1 entry was" if len(damaged) == 1 else f"{len(damaged)} entries were"
         fail(f"{entries} damaged and removed:\n{files}")
-    print(f"{store.root}: all entries are intact")
+    print(f"{stores[_CORES].root}: all entries are intact")
 
 
 def _serve_cache(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.store.remote import TOKEN
     from fusesoc_firm.store.server import Server
-    from fusesoc_firm.store.store import default_store
+    from fusesoc_firm.store.store import served_store
 
     token = os.environ.get(TOKEN, "")
     try:
-        server = Server(default_store(), arguments.host, arguments.port, token)
+        server = Server(served_store(arguments.limit), arguments.host, arguments.port, token)
     except (OSError, OverflowError) as error:
         fail(f"cannot listen on {arguments.host} port {arguments.port}: {getattr(error, 'strerror', None) or error}")
     rights = "clients with the token may write" if token else f"read-only; {TOKEN} lets clients with this token write"
     print(f"{server.url} serves {server.store.root}; {rights}", flush=True)
     with server:
         server.serve_forever()
+
+
+def _stores() -> Mapping[str, Store | Results]:
+    from fusesoc_firm.action.results import default_results
+    from fusesoc_firm.store.store import default_store, served_store
+
+    return {_CORES: default_store(), _RESULTS: default_results(), _SERVED: served_store(0)}
 
 
 def _shown(size: float) -> str:

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import argparse
-import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fusesoc_firm.cli.build_options import (
+    add_fusesoc,
+    add_limits,
+    add_reports,
+    add_selection,
+    limits_of,
+    run_options_of,
+    selection_of,
+)
 from fusesoc_firm.cli.common import command, positive
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
     from fusesoc_firm.building.plan import Plan
+    from fusesoc_firm.building.run_options import RunOptions
+    from fusesoc_firm.building.selection import Selection
 
 
 def add_test(commands: Any) -> None:
@@ -24,18 +34,7 @@ def add_test(commands: Any) -> None:
         "firm test robot:sys:quat2euler --target sim",
         _test,
     )
-    test.add_argument(
-        "cores", metavar="CORE", nargs="*", help="a core's name in FuseSoC (default: all cores below this folder)"
-    )
-    test.add_argument(
-        "--target",
-        dest="targets",
-        metavar="NAME",
-        nargs="+",
-        action="extend",
-        default=[],
-        help="the tests (default: all targets named sim* and test* that simulate)",
-    )
+    add_selection(test, "all targets named sim* and test* that simulate, of the cores below this folder")
     test.add_argument("--rerun", action="store_true", help="run all tests, also those that have passed")
     test.add_argument(
         "--jobs", type=positive, metavar="N", help="number of parallel tests (default: one per processor core)"
@@ -44,26 +43,37 @@ def add_test(commands: Any) -> None:
         "--build-root", type=Path, metavar="DIR", help="folder for the builds (default: FuseSoC's build folder)"
     )
     test.add_argument("--locked", action="store_true", help="report differences from each core's lock file as errors")
+    add_limits(test)
+    add_reports(test)
+    add_fusesoc(test)
 
 
 def _test(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.building.steps import Steps
-    from fusesoc_firm.cli.cached import Words, report, run_cached
+    from fusesoc_firm.cli.build_report import Report, Words
+    from fusesoc_firm.cli.cached import run_cached
     from fusesoc_firm.plugin.build import How
 
-    started = time.monotonic()
-    steps = Steps(("build", "run"), has_outputs=False, is_rerun=arguments.rerun)
-    how = How(is_locked=arguments.locked, jobs=arguments.jobs or 0, steps=steps)
-    words = Words("test", "passed", ("test", arguments.cores, arguments.targets))
-    outcomes = run_cached(words, partial(_plan, arguments), how, arguments.build_root)
-    report(words, outcomes, time.monotonic() - started)
+    selection, options = selection_of(arguments, has_default=True), run_options_of(arguments)
+    flags = tuple(options.use_flags().items())
+    steps = Steps(("build", "run"), has_outputs=False, is_rerun=arguments.rerun, flags=flags)
+    how = How(
+        is_locked=arguments.locked,
+        jobs=arguments.jobs or 0,
+        is_failing_fast=arguments.fail_fast,
+        limits=limits_of(arguments),
+        steps=steps,
+    )
+    report = Report(Words("test", "passed", is_cached=True), arguments.events, arguments.junit)
+    chosen = ("test", *selection.words(), options.command_line())
+    run_cached(chosen, partial(_plan, selection, options, arguments.build_root), how, arguments.build_root, report)
 
 
-def _plan(arguments: argparse.Namespace) -> Plan:
+def _plan(selection: Selection, options: RunOptions, build_root: Path | None) -> Plan:
     """Return the plan of the tests. May raise `InputError`."""
     from fusesoc_firm.building.plan import plan_tests
 
-    plan = plan_tests(arguments.cores, arguments.targets, arguments.build_root)
-    if not plan.builds:
+    plan = plan_tests(selection, options, build_root)
+    if not plan.builds and not selection.cores and selection.affected is None:
         fail("no core below this folder has a test", hint="tests are targets named sim* or test* that simulate")
     return plan

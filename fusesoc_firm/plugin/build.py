@@ -47,11 +47,15 @@ class How:
 
 @dataclass(frozen=True)
 class Listener:
-    """The functions that are called for builds that wait, during generation, and with each started try of a build."""
+    """The functions that are called for builds that wait, during generation, and with each started try of a build.
+
+    `recall_or_build` calls `plan` with all builds before the first one.
+    """
 
     tell: Callable[[str], None]
     progress: Callable[[str], None]
     begin: Callable[[Build, int], None] = ignore
+    plan: Callable[[Sequence[Build]], None] = lambda _: None
 
 
 def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
@@ -100,8 +104,8 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
 
 def recall_or_build(
     recall: Recall, make: Callable[[], Plan], how: How, listener: Listener
-) -> Generator[tuple[int, Outcome], None, None]:
-    """Yield the number of builds and the outcome of each build, as it finishes: recalled if possible, else built.
+) -> Generator[Outcome, None, None]:
+    """Yield the outcome of each build as it finishes: recalled if possible, else built.
 
     `make` makes the plan of the command whose notes `recall` reads. `how.steps` are the steps. Raise `InputError` as
     `make` and `build` do.
@@ -110,22 +114,25 @@ def recall_or_build(
     _set_launcher(how)
     recall.build_root.mkdir(parents=True, exist_ok=True)
     done: set[Build] = set()
+    known = None
     if not how.is_locked and not how.steps.is_rerun and (known := recall.builds()):
         builds, scan = known
+        listener.plan(builds)
         steps = replace(how.steps, recall=recall, scan=scan)
         for item in builds:
             if (seconds := steps.recalled(item)) is not None:
                 done.add(item)
-                yield len(builds), Outcome(item, True, seconds)
+                yield Outcome(item, True, seconds)
         recall.contents.save()
         if len(done) == len(builds):
             return
     with observed() as found:
         plan = make()
     steps = replace(how.steps, recall=recall, scan=recall.keep_builds(plan.builds, found))
+    if not known:
+        listener.plan(plan.builds)
     rest = tuple(item for item in plan.builds if item not in done)
-    for outcome in build(replace(plan, builds=rest), replace(how, steps=steps), listener):
-        yield len(plan.builds), outcome
+    yield from build(replace(plan, builds=rest), replace(how, steps=steps), listener)
 
 
 def _set_launcher(how: How) -> None:

@@ -1,7 +1,7 @@
 """A remote store over HTTP, in the layout of Bazel's remote caches, so that servers for those caches are suitable.
 
     GET, PUT  <URL>/ac/<key>           the SHA-256 and size of an entry
-    GET, PUT  <URL>/cas/<SHA-256>      the key in a line, then the entry
+    GET, PUT  <URL>/cas/<SHA-256>      the key in a line, then the entry; or a content to which an entry refers
 
 The value under `ac` is an `ActionResult` of the Remote Execution API, with one output file that is named after the key.
 Both values contain the key, so an entry that is stored under the key of another entry is detected. The server is not
@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -88,26 +88,40 @@ class Remote:
 
     def put_entry(self, key: str, data: bytes) -> None:
         """Write an entry to the server, if this user may write. Failures are only reported."""
-        if not self.is_writable or self._is_omitted(_READ) or self._is_omitted(_WRITE):
-            return
         whole = f"{key}\n".encode() + data
-        if len(whole) > MOST_BYTES:
-            return
+        if self._is_put(f"cas/{digest(whole)}", whole):
+            self._is_put(f"ac/{key}", action_result(key, digest(whole), len(whole)))
+
+    def content(self, sha256: str, size: int) -> bytes | None:
+        """Return the content with this SHA-256 and size, or None as for `entry`."""
+        if size > MOST_BYTES or self._is_omitted(_READ):
+            return None
         try:
-            self._put(f"cas/{digest(whole)}", whole)
-            self._put(f"ac/{key}", action_result(key, digest(whole), len(whole)))
+            data = self._get(f"cas/{sha256}", size)
         except _FailedError as error:
-            self._tell(_WRITE, str(error))
+            self._tell(_READ, str(error))
+            return None
+        if data is not None and (digest(data), len(data)) != (sha256, size):
+            self._tell(_DAMAGE, f"the content {sha256} is damaged and ignored")
+            return None
+        return data
+
+    def put_contents(self, contents: Iterable[bytes | None]) -> bool:
+        """Write contents to the server, if this user may write; return False if one is missing or cannot be written.
+
+        Failures are reported.
+        """
+        return all(data is not None and self._is_put(f"cas/{digest(data)}", data) for data in contents)
 
     def tell_damage(self, key: str) -> None:
         """Report that the server returned damaged data for a key."""
         self._tell(_DAMAGE, f"the entry {key} is damaged and ignored")
 
     def failures(self, since: float) -> list[str]:
-        """Return the warnings of all processes since a time in seconds since the epoch."""
+        """Return the warnings of other processes since a time in seconds since the epoch."""
         return [
             self._warning(text.decode(errors="replace"))
-            for kind in (_READ, _WRITE, _DAMAGE)
+            for kind in sorted({_READ, _WRITE, _DAMAGE} - self._told)
             if self._time(kind) >= since and (text := layout.read(self.root, self._mark(kind)))
         ]
 
@@ -146,6 +160,17 @@ class Remote:
             if response.length and len(data) <= size:
                 raise ConnectionError("the answer is cut")
             return data
+
+    def _is_put(self, name: str, data: bytes) -> bool:
+        """Write data to the server, if this user may write; return whether that succeeded, and report a failure."""
+        if not self.is_writable or len(data) > MOST_BYTES or self._is_omitted(_READ) or self._is_omitted(_WRITE):
+            return False
+        try:
+            self._put(name, data)
+        except _FailedError as error:
+            self._tell(_WRITE, str(error))
+            return False
+        return True
 
     def _put(self, name: str, data: bytes) -> None:
         with self._connected(len(data)) as connection:

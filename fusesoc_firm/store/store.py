@@ -41,6 +41,7 @@ Files = Mapping[str, bytes]
 
 _FORMER_LAYOUTS = ("v1", "v2", "v3")
 _DEFAULT_LIMIT = "1G"
+_SERVED = "served"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 # Shrinking leaves a margin, so that the limit is not exceeded again immediately.
 _KEPT_OF_LIMIT = 0.8
@@ -242,6 +243,11 @@ def default_store(environment: Mapping[str, str] = os.environ) -> Store:
         )
     root = layout.default_root(environment)
     return Store(Path(root), size, remote_store(environment, root))
+
+
+def served_store(limit: int, environment: Mapping[str, str] = os.environ) -> Store:
+    """Return the store of what other machines write to this one, with a limit of its own."""
+    return Store(Path(layout.default_root(environment), _SERVED), limit)
 
 
 def parse_size(text: str) -> int | None:

@@ -59,7 +59,7 @@ def test_a_result_is_recalled_with_its_outputs_and_its_log(folder: Path, results
     assert log_of(record, results, Path("/elsewhere")) == b"done\n/elsewhere\n"
     assert after(record, asked.inputs) == tree_of(folder, Contents())
     other = folder.with_name("other")
-    assert results.restore(other, record.outputs)
+    assert results.restore(other, record)
     assert (other / "out").read_text() == "content"
     assert os.access(other / "out", os.X_OK)
     assert str((other / "d" / "link").readlink()) == "in"
@@ -224,9 +224,9 @@ def test_damaged_and_removed_contents_are_not_restored(folder: Path, results: Re
     place = results.root / FOLDER_NAME / "cas"
     (blob,) = place.glob(f"*/{record.outputs['out'].digest}")
     blob.write_text("damaged")
-    assert not results.restore(folder.with_name("other"), record.outputs)
+    assert not results.restore(folder.with_name("other"), record)
     blob.unlink()
-    assert not results.restore(folder.with_name("other"), record.outputs)
+    assert not results.restore(folder.with_name("other"), record)
     (path,) = (results.root / FOLDER_NAME / "ac").glob("*/*")
     path.write_bytes(path.read_bytes()[:-1])
     assert results.record(asked.key()) is None

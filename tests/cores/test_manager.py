@@ -121,7 +121,7 @@ def test_it_is_latch_free(library: Library, width: int, subscribers: int, publis
     ("generic", "value", "legal"),
     [
         ("WIDTH", 48, "8, 16, 32, 64, 128, 256, 512"),
-        ("SUBSCRIBERS", 0, "1 to 256"),
+        ("SUBSCRIBERS", 0, "1 to 65536"),
         ("SUBSCRIBERS", 257, "1 to 256"),
         ("PUBLISHERS", 0, "1 to 256"),
         ("PUBLISHERS", 257, "1 to 256"),

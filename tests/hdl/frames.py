@@ -18,13 +18,13 @@ class Frame:
     id: int
     payload: bytes
 
-    def to_bytes(self) -> bytes:
+    def to_bytes(self, id_bytes: int = 1) -> bytes:
         """Id, length, payload."""
-        return bytes([self.id]) + len(self.payload).to_bytes(4, "little") + self.payload
+        return self.id.to_bytes(id_bytes, "little") + len(self.payload).to_bytes(4, "little") + self.payload
 
-    def beats(self, width: int) -> int:
+    def beats(self, width: int, id_bytes: int = 1) -> int:
         """The beats it takes on a stream of `width` bits."""
-        return -(-len(self.to_bytes()) * 8 // width)
+        return -(-len(self.to_bytes(id_bytes)) * 8 // width)
 
 
 def random_frames(ids: Sequence[int], count: int, longest: int, seed: int) -> list[Frame]:
@@ -34,10 +34,11 @@ def random_frames(ids: Sequence[int], count: int, longest: int, seed: int) -> li
     return [Frame(source.choice(ids), source.randbytes(source.randint(0, longest))) for _ in range(count)]
 
 
-def write_stimulus(path: Path, frames: Iterable[bytes], aborted: Collection[int] = ()) -> None:
+def write_stimulus(path: Path, frames: Iterable[bytes], aborted: Collection[int] = (), id_bytes: int = 1) -> None:
     """A stimulus file; frame n has the label `frame n`, and is aborted if n is in `aborted`."""
     text = "".join(
-        f"> frame {n}\n{_hex_lines(frame)}" + (f"! aborted {frame[0]} 10\n" if n in aborted else "")
+        f"> frame {n}\n{_hex_lines(frame)}"
+        + (f"! aborted {int.from_bytes(frame[:id_bytes], 'little')} 10\n" if n in aborted else "")
         for n, frame in enumerate(frames)
     )
     path.write_text(text, encoding="ascii")

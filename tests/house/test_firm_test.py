@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 
 from fusesoc_firm.action.trace import can_trace, traced
+from fusesoc_firm.store.server import Server
+from fusesoc_firm.store.store import Store
 from tests.hdl.ghdl import REPOSITORY
+from tests.store.test_remote import SECRET, served
 
 pytestmark = pytest.mark.skipif(not can_trace(), reason="strace is not installed or not permitted")
 
@@ -220,6 +225,108 @@ def test_an_edit_runs_its_dependents_and_a_failure_is_not_cached(library: Path) 
     status, text = run(library, *cores)
     assert (status, set(results(text).values())) == (0, {"cached"})
     assert set(results(run(library, *cores, "--rerun")[1]).values()) == {"passed"}
+
+
+def test_a_second_machine_runs_nothing(library: Path) -> None:
+    """With an empty store of its own, and the remote store to which the first one wrote."""
+    token = {"FUSESOC_FIRM_REMOTE_TOKEN": SECRET}
+    with served(Server(Store(library.parent / "server", 2**30), "127.0.0.1", 0, SECRET)) as url:
+        status, text = run(library, FUSESOC_FIRM_REMOTE=url, **token)
+        assert (status, set(results(text).values())) == (0, {"passed"}), text
+        shutil.rmtree(library / "build")
+        shutil.rmtree(library.parent / "store")
+        status, text = run(library, FUSESOC_FIRM_REMOTE=url)
+        assert (status, set(results(text).values())) == (0, {"cached"}), text
+        assert "counted" in (library / "build" / "acme_m_counter_1.0" / "sim.log").read_text()
+        # The outputs come along where they are wanted.
+        selected = ("acme:m:gate", "--target", "sim_icarus", "--cached")
+        status, text = run(library, *selected, name="build", FUSESOC_FIRM_REMOTE=url)
+        assert (status, results(text)) == (0, {"sim_icarus": "cached"}), text
+        assert (library / "build" / "acme_m_gate_1.0" / "sim_icarus" / "acme_m_gate_1.0").is_file()
+    # A server that is down costs one warning and the work.
+    shutil.rmtree(library.parent / "store")
+    status, text = run(library, "acme:m:counter", FUSESOC_FIRM_REMOTE=url)
+    assert (status, set(results(text).values())) == (0, {"passed"}), text
+    assert text.count("warning: ") == 1
+    assert f"warning: remote store {url}: Connection refused" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "tests"),
+    [
+        (("acme:m:*", "--target", "sim_i*"), {"sim_icarus"}),
+        (("acme:m:counter@test*", "acme:m:gate@sim_icarus"), {"test_old", "sim_icarus"}),
+        (("counter", "gate", "--target", "sim", "--where-present"), {"sim"}),
+        (("--target", "sim_icarus", "--tool", "ghdl"), {"sim_icarus"}),
+    ],
+)
+def test_tests_are_selected_like_builds(library: Path, arguments: tuple[str, ...], tests: set[str]) -> None:
+    status, text = run(library, *arguments, "--timeout", "100")
+    assert (status, results(text)) == (0, dict.fromkeys(tests, "passed")), text
+
+
+def test_reports_tell_what_was_cached(library: Path) -> None:
+    """The same counts in the summary, in the events and in JUnit's file, for both commands."""
+    (library / "counter" / "limit.txt").write_text("5\n")
+    reports = ("--events", "events", "--junit", "junit.xml")
+    for name, good, *selected in (
+        ("test", "passed", "--target", "sim", "sim_icarus"),
+        ("build", "ok", "acme:m:*", "--target", "sim", "sim_icarus", "--where-present", "--cached"),
+    ):
+        for expected in (good, "cached", good):
+            rerun = ["--rerun"] if (library / "again").exists() else []
+            status, text = run(library, *selected, *rerun, *reports, name=name)
+            assert (status, results(text)) == (1, {"sim": "failed", "sim_icarus": expected}), text
+            counts = {"cached": expected == "cached", good: expected == good, "failed": 1, "flaky": 0, "skipped": 0}
+            (library / "again").touch() if expected == "cached" else (library / "again").unlink(missing_ok=True)
+            assert re.search(
+                rf"2 {name}s in [\d.]+ s: {counts['cached']:d} cached, {counts[good]:d} {good}, 1 failed; ", text
+            )
+            events = [json.loads(line) for line in (library / "events").read_text().splitlines()]
+            assert len(events[0]["builds"]) == 2
+            assert {event: counts[event] for event in counts} == {event: events[-1][event] for event in counts}
+            steps = {event["target"]: event["steps"] for event in events if event["event"] == "end"}
+            assert [step["state"] for step in steps["sim_icarus"]] == [{"cached": "cached"}.get(expected, "ran")] * 2
+            assert steps["sim"][-1]["state"] == "failed"
+            suite = ET.parse(library / "junit.xml").getroot()[0]
+            assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == (f"firm {name}", "2", "1")
+            assert [item.text for item in suite.iter("system-out")] == ["cached"] * (expected == "cached")
+        shutil.rmtree(library / "build")
+        shutil.rmtree(library.parent / "store")
+    assert "--rerun needs --cached" in run(library, "gate@sim_icarus", "--rerun", name="build")[1]
+
+
+def test_why_a_step_ran(library: Path) -> None:
+    selected = ("acme:m:counter", "--target", "sim")
+
+    def why(*arguments: str, is_good: bool = True, **variables: str) -> list[str]:
+        assert run(library, *selected, *arguments, **variables)[0] == (0 if is_good else 1)
+        status, text = run(library, *selected, name="why")
+        assert status == 0, text
+        return [line.strip() for line in text.splitlines()[1:]]
+
+    status, text = run(library, *selected, name="why")
+    assert (status, "has no cached steps here" in text) == (1, True)
+    edited = ["limit.txt differs", "src/acme_m_counter_1.0/limit.txt differs"]
+    new = "it has not run in this folder before"
+    assert why() == ["build  ran", new, "run    ran", new]
+    assert why() == ["build  cached", "run    cached"]
+    limit = library / "counter" / "limit.txt"
+    limit.write_text("11\n")
+    assert why() == ["build  ran", *edited, "run    ran", *edited]
+    # What was recalled counts as well.
+    limit.write_text("10\n")
+    assert why() == ["build  cached", "run    cached"]
+    limit.write_text("5\n")
+    assert why(is_good=False) == ["build  ran", *edited, "run    failed", *edited]
+    failed = "the last run failed, or its result is not stored"
+    assert why(is_good=False) == ["build  cached", "run    failed", failed]
+    limit.write_text("10\n")
+    assert why(SECRET="a-value")[:4] == ["build  ran", *edited, "the variable SECRET is new"]
+    assert why("--rerun", SECRET="a-value") == ["build  ran", "--rerun", "run    ran", "--rerun"]
+    notes = [path.read_text(errors="replace") for path in (library.parent / "store").glob("*/notes/*/*")]
+    assert any("SECRET" in note for note in notes)
+    assert not any("a-value" in note for note in notes)
 
 
 def test_what_is_not_cached_is_reported(library: Path) -> None:

@@ -404,7 +404,7 @@ def test_the_command(tmp_path: Path, capfd: Captured) -> None:
         try:
             found = re.fullmatch(r"(http://127\.0\.0\.1:\d+) serves (.*); clients with the token may write\n", line)
             assert found
-            assert found[2] == str(tmp_path / "server")
+            assert found[2] == str(tmp_path / "server" / "served")
             obtain(machine(tmp_path / "ci", found[1], SECRET))
             assert machine(tmp_path / "a", found[1]).obtain(Key(KEY), refuse) == Entry(FILES, True)
             taken = [*command[:-1], found[1].rpartition(":")[2]]

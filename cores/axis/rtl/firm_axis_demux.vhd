@@ -3,7 +3,8 @@
 -- `tready` are decoded. At 8 bits the id's beat ends here. Wider streams keep the beat, with an invalid lowest lane
 -- (the bytes are still there, `tkeep` is unchanged), so that nothing needs realignment. A frame with an unknown id, or
 -- with only an id at 8 bits, is dropped, and `id_error` pulses in the cycle after its first beat. The paths from input
--- to output are combinational: put a register slice in front.
+-- to output are combinational: put a register slice in front. For ids of two bytes, the upper one, which a
+-- firm_axis_id_remove has removed, is `high`.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -17,6 +18,10 @@ entity firm_axis_demux is
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
+
+    -- Valid on the first beat of a frame: the upper byte of the id, and whether the frame has one.
+    high     : in std_logic_vector(7 downto 0) := x"00";
+    has_high : in std_logic                    := '1';
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
@@ -46,7 +51,8 @@ architecture rtl of firm_axis_demux is
   signal index_r : std_logic_vector(INDEX_BITS_USED-1 downto 0);
   signal known_r : std_logic;
 
-  signal known_id : std_logic;  -- the lowest lane, read as an id, belongs to a destination
+  signal id       : std_logic_vector(15 downto 0);  -- the lowest lane, read as an id
+  signal known_id : std_logic;                      -- it belongs to a destination
   signal index    : std_logic_vector(INDEX_BITS_USED-1 downto 0);
   signal forward  : std_logic;  -- this beat goes to a destination
   signal valid    : std_logic;
@@ -60,11 +66,12 @@ begin
   assert is_stream_width(WIDTH)
     report "firm_axis_demux: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
-  assert DESTINATIONS >= 1 and DESTINATIONS <= 256
-    report "firm_axis_demux: DESTINATIONS is " & integer'image(DESTINATIONS) & "; legal: 1 to 256"
+  assert DESTINATIONS >= 1 and DESTINATIONS <= 65536
+    report "firm_axis_demux: DESTINATIONS is " & integer'image(DESTINATIONS) & "; legal: 1 to 65536"
     severity failure;
 
-  known_id <= is_below(s_axis_tdata(7 downto 0), DESTINATIONS);
+  id       <= high & s_axis_tdata(7 downto 0);
+  known_id <= is_below(id, DESTINATIONS) and has_high;
 
   byte_wide : if WIDTH = 8 generate
     index   <= index_r;
@@ -72,7 +79,7 @@ begin
   end generate byte_wide;
 
   wider : if WIDTH > 8 generate
-    index   <= s_axis_tdata(INDEX_BITS_USED-1 downto 0) when first_r = '1' else index_r;
+    index   <= id(INDEX_BITS_USED-1 downto 0) when first_r = '1' else index_r;
     forward <= known_id when first_r = '1' else known_r;
   end generate wider;
 
@@ -108,7 +115,7 @@ begin
         end if;
       end if;
       if first_r = '1' then
-        index_r <= s_axis_tdata(INDEX_BITS_USED-1 downto 0);
+        index_r <= id(INDEX_BITS_USED-1 downto 0);
         known_r <= known_id;
       end if;
     end if;

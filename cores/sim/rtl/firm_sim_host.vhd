@@ -10,12 +10,14 @@ use ieee.numeric_std.all;
 use ieee.math_real.all;
 use std.textio.all;
 library firm;
-use firm.firm_axis_pkg.is_stream_width;
+use firm.firm_axis_pkg.all;
 use firm.firm_sim_pkg.all;
 
 entity firm_sim_host is
   generic (
     WIDTH : integer := 8;
+    -- Bytes of a frame's id: 1 or 2.
+    ID_BYTES : integer := 1;
     -- Bits of `frame_error`, one per converter.
     ERRORS : integer := 1;
     -- Paths relative to the directory in which the simulator runs.
@@ -50,7 +52,7 @@ entity firm_sim_host is
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
     s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
-    s_axis_tid    : in  std_logic_vector(7 downto 0);
+    s_axis_tid    : in  std_logic_vector(8*ID_BYTES-1 downto 0);
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -77,10 +79,35 @@ architecture simulation of firm_sim_host is
     return integer'image(beats) & " beats, " & integer'image(integer(100.0 * real(beats) / real(cycles))) & " %";
   end function percent_of;
 
+  -- The id in the first beat of a frame. If the beat is narrower, the comparison of the bytes shows whether `tid` is
+  -- right.
+  function id_of(tdata, tid : std_logic_vector) return std_logic_vector is
+    variable beat : std_logic_vector(WIDTH+7 downto 0);
+  begin
+    if WIDTH < 8*ID_BYTES then
+      return tid;
+    end if;
+    beat(WIDTH-1 downto 0) := tdata;
+    return beat(8*ID_BYTES-1 downto 0);
+  end function id_of;
+
+  -- The highest byte first.
+  function hex_of_id(id : std_logic_vector) return string is
+    alias numbered : std_logic_vector(id'length-1 downto 0) is id;
+  begin
+    if ID_BYTES = 1 then
+      return to_hex(numbered);
+    end if;
+    return to_hex(numbered(numbered'high downto numbered'high-7)) & to_hex(numbered(7 downto 0));
+  end function hex_of_id;
+
 begin
 
   assert is_stream_width(WIDTH)
     report "firm_sim_host: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+  assert ID_BYTES = 1 or ID_BYTES = 2
+    report "firm_sim_host: ID_BYTES is " & integer'image(ID_BYTES) & "; legal: 1, 2"
     severity failure;
   assert ERRORS >= 1
     report "firm_sim_host: ERRORS is " & integer'image(ERRORS) & "; legal: 1 or more"
@@ -268,10 +295,10 @@ begin
     end procedure show_frame;
 
     -- Nothing is written without a file: writing would double the simulation time.
-    procedure note_frame(id : in byte_t) is
+    procedure note_frame(id : in std_logic_vector(8*ID_BYTES-1 downto 0)) is
     begin
       if RECEIVED_FILE /= "" then
-        write(received_line, "< id " & to_hex(id));
+        write(received_line, "< id " & hex_of_id(id));
         writeline(received, received_line);
       end if;
     end procedure note_frame;
@@ -300,7 +327,7 @@ begin
       end if;
     end procedure note_end;
 
-    procedure begin_frame(id : in byte_t) is
+    procedure begin_frame(id : in std_logic_vector(8*ID_BYTES-1 downto 0)) is
     begin
       note_frame(id);
       is_in_frame    := true;
@@ -310,7 +337,7 @@ begin
       receiving      := null;
       received_id    := NO_ID;
       if not is_defined(id) then
-        frame_fault("its id is " & to_hex(id));
+        frame_fault("its id is " & hex_of_id(id));
         return;
       end if;
       received_id := to_integer(unsigned(id));
@@ -406,10 +433,10 @@ begin
       beats_out := beats_out + 1;
       last_out  := cycle;
       if not is_in_frame then
-        begin_frame(s_axis_tdata(7 downto 0));
+        begin_frame(id_of(s_axis_tdata, s_axis_tid));
       end if;
-      if received_id /= NO_ID and s_axis_tid /= std_logic_vector(to_unsigned(received_id, 8)) then
-        frame_fault("tid is " & to_hex(s_axis_tid));
+      if received_id /= NO_ID and s_axis_tid /= std_logic_vector(to_unsigned(received_id, 8*ID_BYTES)) then
+        frame_fault("tid is " & hex_of_id(s_axis_tid));
       end if;
       count_kept(bytes);
       for lane in 0 to bytes-1 loop
@@ -554,8 +581,8 @@ begin
 
   begin
     random_1 := SEED;
-    read_stimulus_file(STIMULUS_FILE, stimulus);
-    read_expected_file(EXPECTED_FILE, expected);
+    read_stimulus_file(STIMULUS_FILE, stimulus, ID_BYTES);
+    read_expected_file(EXPECTED_FILE, expected, ID_BYTES);
     if RECEIVED_FILE /= "" then
       file_open(received, RECEIVED_FILE, write_mode);
     end if;

@@ -27,9 +27,10 @@ package firm_sim_pkg is
     next_of_id  : frame_ptr_t;  -- the next one with the same id
   end record frame_t;
 
-  type frame_per_id_t is array (0 to 255) of frame_ptr_t;
+  type frame_per_id_t is array (0 to 65535) of frame_ptr_t;
 
   type frame_file_t is record
+    id_bytes       : natural;         -- of a frame's id
     first          : frame_ptr_t;
     last           : frame_ptr_t;
     frames         : natural;
@@ -39,8 +40,9 @@ package firm_sim_pkg is
     frame_errors   : natural;
   end record frame_file_t;
 
-  procedure read_stimulus_file(path : in string; content : inout frame_file_t);
-  procedure read_expected_file(path : in string; content : inout frame_file_t);
+  -- An id has one byte or two.
+  procedure read_stimulus_file(path : in string; content : inout frame_file_t; id_bytes : in positive := 1);
+  procedure read_expected_file(path : in string; content : inout frame_file_t; id_bytes : in positive := 1);
 
   function to_byte(char : character) return byte_t;
   -- Of a byte that is defined.
@@ -70,7 +72,7 @@ end package firm_sim_pkg;
 package body firm_sim_pkg is
 
   constant HEX_DIGITS   : string(1 to 16) := "0123456789abcdef";
-  constant HEADER_BYTES : positive := 5;
+  constant LENGTH_BYTES : positive        := 4;
 
   type byte_table_t is array (character) of byte_t;
 
@@ -335,19 +337,38 @@ package body firm_sim_pkg is
     end if;
   end procedure announce_errors;
 
+  -- The number in `count` bytes of a frame from byte `first` on, the lowest byte first.
+  procedure read_number(frame : inout frame_t; first, count : in positive; number : out natural) is
+    variable value : natural := 0;
+  begin
+    for place in first+count-1 downto first loop
+      value := 256*value + character'pos(frame.bytes(place));
+    end loop;
+    number := value;
+  end procedure read_number;
+
+  -- The last frame must contain an id.
+  procedure check_id(path : in string; line_number : in natural; content : inout frame_file_t) is
+  begin
+    if content.last.size < content.id_bytes then
+      fail_at(path, line_number, "the frame before this line is shorter than its id");
+    end if;
+  end procedure check_id;
+
   -- `! aborted id code`: the last frame has this id and is aborted.
   procedure abort_frame(path : in string; line_number : in natural; text : in string; content : inout frame_file_t) is
     constant ABORTED : string   := "! aborted ";
     constant CODE    : positive := 10;
     constant PLACE   : positive := next_word(text, ABORTED'length + 1);
-    variable id      : integer  := -1;
+    variable id      : natural;
   begin
     if content.last = null then
       fail_at(path, line_number, "'! aborted' must follow a frame");
     elsif content.last.size = 0 then
       fail_at(path, line_number, "the frame before this line has no bytes");
     end if;
-    id := character'pos(content.last.bytes(1));
+    check_id(path, line_number, content);
+    read_number(content.last.all, 1, content.id_bytes, id);
     if parse_number(text, ABORTED'length + 1) /= id or parse_number(text, PLACE) /= CODE then
       fail_at(path, line_number, "expected '! aborted " & integer'image(id) & " " & integer'image(CODE)
               & "', the frame's id and the code of aborted frames");
@@ -375,21 +396,25 @@ package body firm_sim_pkg is
   -- The last frame is complete: check it and append it to the others with its id.
   procedure close_frame(path : in string; line_number : in natural; mark : in character;
     content : inout frame_file_t) is
-    variable announced : natural := HEADER_BYTES;
-    variable is_masked : boolean := false;
-    variable id        : natural;
+    constant HEADER_BYTES : positive := content.id_bytes + LENGTH_BYTES;
+    variable announced    : natural;
+    variable is_masked    : boolean := false;
+    variable id           : natural;
   begin
     if content.last = null then
       return;
     end if;
     if content.last.size = 0 then
       fail_at(path, line_number, "the frame before this line has no bytes");
+    elsif mark = '>' then
+      return;
     end if;
-    if mark = '<' and not content.last.is_aborted then
+    check_id(path, line_number, content);
+    if not content.last.is_aborted then
       if content.last.size < HEADER_BYTES then
         fail_at(path, line_number, "the frame before this line is shorter than id and length");
       end if;
-      for place in HEADER_BYTES downto 2 loop
+      for place in HEADER_BYTES downto content.id_bytes+1 loop
         if content.last.any_byte /= null then
           is_masked := is_masked or content.last.any_byte(place) = '.';
         end if;
@@ -397,14 +422,13 @@ package body firm_sim_pkg is
           fail_at(path, line_number, "the frame before this line announces more than 2 GiB");
         end if;
       end loop;
-      announced := character'pos(content.last.bytes(2)) + 2**8*character'pos(content.last.bytes(3))
-                   + 2**16*character'pos(content.last.bytes(4)) + 2**24*character'pos(content.last.bytes(5));
+      read_number(content.last.all, content.id_bytes+1, LENGTH_BYTES, announced);
       if not is_masked and announced /= content.last.size - HEADER_BYTES then
         fail_at(path, line_number, "the frame before this line announces " & integer'image(announced)
                 & " bytes of payload but has " & integer'image(content.last.size - HEADER_BYTES));
       end if;
     end if;
-    id := character'pos(content.last.bytes(1));
+    read_number(content.last.all, 1, content.id_bytes, id);
     if content.first_of_id(id) = null then
       content.first_of_id(id) := content.last;
     else
@@ -437,12 +461,14 @@ package body firm_sim_pkg is
     end if;
   end procedure read_line;
 
-  procedure read_frame_file(path : in string; mark : in character; content : inout frame_file_t) is
+  procedure read_frame_file(path : in string; id_bytes : in positive; mark : in character;
+    content : inout frame_file_t) is
     file source          : text;
     variable status      : file_open_status;
     variable line_text   : line;
     variable line_number : natural := 0;
   begin
+    content.id_bytes := id_bytes;
     file_open(status, source, path, read_mode);
     if status /= open_ok then
       fail_at(path, 1, "the file cannot be opened");
@@ -460,14 +486,14 @@ package body firm_sim_pkg is
     end if;
   end procedure read_frame_file;
 
-  procedure read_stimulus_file(path : in string; content : inout frame_file_t) is
+  procedure read_stimulus_file(path : in string; content : inout frame_file_t; id_bytes : in positive := 1) is
   begin
-    read_frame_file(path, '>', content);
+    read_frame_file(path, id_bytes, '>', content);
   end procedure read_stimulus_file;
 
-  procedure read_expected_file(path : in string; content : inout frame_file_t) is
+  procedure read_expected_file(path : in string; content : inout frame_file_t; id_bytes : in positive := 1) is
   begin
-    read_frame_file(path, '<', content);
+    read_frame_file(path, id_bytes, '<', content);
   end procedure read_expected_file;
 
   procedure find_frame(content : inout frame_file_t; number : in natural; frame : out frame_ptr_t) is

@@ -43,6 +43,7 @@ from fusesoc_firm.system.derived.queue import queue_of
 from fusesoc_firm.system.derived.status import status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
+from fusesoc_firm.system.derived.watchdog import watchdog_of
 from fusesoc_firm.system.written.sources import declares_width
 from fusesoc_firm.system.written.specification import (
     CONVERTER,
@@ -117,6 +118,7 @@ def derive(
         names=names,
         link=link,
         status=status_of(project, link, max(len(subscribers), len(publishers)), faults),
+        watchdog=watchdog_of(project, scheduling, publishers, faults),
     )
     check_entities(system, parts.blocks, faults)
     faults.raise_if_any()

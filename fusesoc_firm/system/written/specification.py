@@ -102,6 +102,12 @@ class Project(Section):
         form="integer",
         default=16,
     )
+    watchdog: int = key(
+        "cycles of clk after which a publisher that stops in the middle of a frame is cut off; 0: never",
+        form="integer",
+        default=1 << 20,
+        is_asked=False,
+    )
     interconnect: Text = key(
         "connection between host and system: streams for a DMA engine, or a serial link",
         choices=(AXI_STREAM, *LINKS),
