@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.length import DEFAULT_LONGEST
+from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.system.views.show import default_lengths
-from tests.system.systems import converter, derived, specification
+from tests.system.systems import LIBRARIES, converter, derived, specification
 
+SPECS = Path(__file__).resolve().parents[2] / "specs"
 IMAGE, STRING = "sensor_msgs/Image", "std_msgs/String"
 
 
@@ -45,6 +47,14 @@ def test_a_publisher_sends_what_a_subscriber_may_be(tmp_path: Path) -> None:
     )
     system = derived(tmp_path, specification(limited))
     assert [item.max_length for item in system.publishers] == [70, None]
+
+
+def test_the_shipped_systems_name_their_longest_payloads() -> None:
+    """Nothing of them depends on a default."""
+    specs = [path for path in SPECS.glob("*/*.yaml") if not path.stem.startswith("stimuli")]
+    assert specs
+    lines = [line for path in specs for line in default_lengths(load_system(path, LIBRARIES).system)]
+    assert lines == []
 
 
 def test_another_subscriber_does_not_raise_a_default(tmp_path: Path) -> None:

@@ -37,12 +37,17 @@ def with_longest_sent(
 ) -> tuple[Converter, ...]:
     """Return the publishers, those whose frames may pause with their longest payloads; note faults in `maxLength`.
 
-    By default, a publisher sends at most as much as the system's subscribers accept, since a response often has the
-    size of its cause.
+    By default, a publisher sends at most as much as the system's subscribers accept from the host, since a response
+    often has the size of its cause.
     """
     _check_keys(blocks, publishers, faults)
-    default = max([DEFAULT_LONGEST, *(item.max_length or 0 for item in subscribers)])
-    return tuple(_limited(item, blocks[item.block], default, faults) if item.may_pause else item for item in publishers)
+    default = max([DEFAULT_LONGEST, *(item.max_length or 0 for item in subscribers if item.software is None)])
+    return tuple(
+        _limited(item, blocks[item.block], default if item.software is None else MOST_BYTES, faults)
+        if item.may_pause
+        else item
+        for item in publishers
+    )
 
 
 def _check_keys(blocks: Mapping[str, Block], converters: Iterable[Converter], faults: Diagnostics) -> None:
