@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import Any
 
 from fusesoc_firm.scheduling.policies import POLICIES
-from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.derived.model import DerivedSystem, Tree
 from fusesoc_firm.system.hardware.maps import port_map
 
 
 def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """Return the scheduler's entity and generics, with the constants for publishers' times that the generics use."""
+    """Return the scheduler's entity and generics, with the constants for publishers' times that the generics use.
+
+    If publishers are in groups, return the generics of the Manager of Managers, too, which contains the schedulers.
+    """
     scheduling = system.scheduling
     policy = POLICIES[scheduling.policy]
     times = {
@@ -28,11 +32,32 @@ def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
     constants = [_times(name, times[name], system) for name in policy.generics if name in times]
     generics = [(name, values[name]) for name in policy.generics]
     return {
+        "tree": _tree(system.tree) if system.tree else None,
         "scheduler": policy.entity,
         "scheduler_generics": port_map([("REQUESTERS", str(len(system.publishers))), *generics]),
         "is_preemptive": scheduling.is_preemptive,
         "scheduler_times": {"constants": constants} if constants else None,
     }
+
+
+def _tree(tree: Tree) -> dict[str, str]:
+    """Return the generics of the Manager of Managers."""
+    return {
+        "sizes": _aggregate(len(group) for group in tree.groups),
+        "policies": f"0 to {len(tree.groups) - 1} => firm.firm_sched_pkg.{tree.policy.upper()}",
+        "top_policy": tree.top_policy.upper(),
+        "highs": _aggregate(number // 256 for group in tree.groups for number in group),
+    }
+
+
+def _aggregate(values: Iterable[int]) -> str:
+    """Return the elements of an array, with ranges of equal values."""
+    parts, first = list[str](), 0
+    for value, run in groupby(values):
+        beyond = first + len(list(run))
+        parts.append(f"{first} => {value}" if beyond == first + 1 else f"{first} to {beyond - 1} => {value}")
+        first = beyond
+    return ", ".join(parts)
 
 
 def _times(name: str, cycles: Sequence[int | None], system: DerivedSystem) -> dict[str, Any]:

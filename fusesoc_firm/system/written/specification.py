@@ -102,6 +102,13 @@ class Project(Section):
         form="integer",
         default=16,
     )
+    id_bytes: int = key(
+        "bytes of a frame's id: 1 for up to 256 subscribers and 256 publishers, 2 for up to 65,536",
+        name="idBytes",
+        form="integer",
+        choices=(1, 2),
+        default=1,
+    )
     interconnect: Text = key(
         "connection between host and system: streams for a DMA engine, or a serial link",
         choices=(AXI_STREAM, *LINKS),
