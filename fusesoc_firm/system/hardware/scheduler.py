@@ -40,24 +40,24 @@ def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
     }
 
 
-def _tree(tree: Tree) -> dict[str, str]:
+def _tree(tree: Tree) -> dict[str, Any]:
     """Return the generics of the Manager of Managers."""
     return {
-        "sizes": _aggregate(len(group) for group in tree.groups),
-        "policies": f"0 to {len(tree.groups) - 1} => firm.firm_sched_pkg.{tree.policy.upper()}",
+        "sizes": _runs(len(group) for group in tree.groups),
+        "last_group": len(tree.groups) - 1,
+        "policy": tree.policy.upper(),
         "top_policy": tree.top_policy.upper(),
-        "highs": _aggregate(number // 256 for group in tree.groups for number in group),
+        "highs": _runs(number // 256 for group in tree.groups for number in group),
     }
 
 
-def _aggregate(values: Iterable[int]) -> str:
-    """Return the elements of an array, with ranges of equal values."""
-    parts, first = list[str](), 0
+def _runs(values: Iterable[int]) -> list[dict[str, int]]:
+    """Return the ranges of equal values of an array."""
+    runs, first = list[dict[str, int]](), 0
     for value, run in groupby(values):
-        beyond = first + len(list(run))
-        parts.append(f"{first} => {value}" if beyond == first + 1 else f"{first} to {beyond - 1} => {value}")
-        first = beyond
-    return ", ".join(parts)
+        runs.append({"first": first, "last": first + len(list(run)) - 1, "value": value})
+        first = runs[-1]["last"] + 1
+    return runs
 
 
 def _times(name: str, cycles: Sequence[int | None], system: DerivedSystem) -> dict[str, Any]:
