@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm.action import environment as variables
 from fusesoc_firm.action.contents import Contents
@@ -57,17 +58,19 @@ class Action:
 
     def key(self) -> str:
         """Return the digest of everything that is known before the step runs."""
-        return digest_of(
-            {
-                "format": _FORMAT,
-                "arguments": self.arguments,
-                "inputs": key_of(self.inputs),
-                "environment": variables.key_of(self.environment),
-                "machine": platform.machine(),
-                "python": sys.version_info[:3],
-                "edalize": _version("edalize"),
-            }
-        )
+        return digest_of(self.parts())
+
+    def parts(self) -> dict[str, Any]:
+        """Return everything that is known before the step runs."""
+        return {
+            "format": _FORMAT,
+            "arguments": self.arguments,
+            "inputs": key_of(self.inputs),
+            "environment": variables.key_of(self.environment),
+            "machine": platform.machine(),
+            "python": sys.version_info[:3],
+            "edalize": _version("edalize"),
+        }
 
     @property
     def search(self) -> str:

@@ -25,11 +25,14 @@ from fusesoc_firm.action.tree import Tree, tree_of
 from fusesoc_firm.building.folder_lock import FolderLock
 from fusesoc_firm.building.plan import Build
 from fusesoc_firm.building.process import run_all, set_up
+from fusesoc_firm.building.reasons import reasons, remember
 from fusesoc_firm.building.recall import Recall, observed
 from fusesoc_firm.text.files import write_whole
 
 CACHED, RAN, FAILED = "cached", "ran", "failed"
 _EDAM = ".eda.yml"
+_RERUN = "--rerun"
+_NOT_STORED = "the last run failed, or its result is not stored"
 _BACKEND = ("-m", "fusesoc_firm.action.backend")
 
 
@@ -37,13 +40,14 @@ _BACKEND = ("-m", "fusesoc_firm.action.backend")
 class Step:
     """A step of a build: its name, `cached`, `ran` or `failed`, the seconds, and why the result is not stored.
 
-    The seconds of a cached step are those of the run that was stored.
+    The seconds of a cached step are those of the run that was stored. `reasons` tell why the step was not cached.
     """
 
     name: str
     state: str
     seconds: float
     fault: str = ""
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,8 @@ class Steps:
             return None
         try:
             build.log.write_bytes(b"".join(logs))
+            for action, record in found:
+                remember(action, record.facts, results)
             _report(build, [Step(action.name, CACHED, record.seconds) for action, record in found])
         finally:
             lock.release()
@@ -184,16 +190,20 @@ class _Run:
             known = []
         tree = inputs
         for action, record in known:
+            remember(action, record.facts, self.results)
             self._show(record)
             self.steps.append(Step(action.name, CACHED, record.seconds))
             tree = after(record, tree)
-        return all(self._runs(name) for name in names[len(known) :])
+        return all(self._runs(name, is_rerun=is_rerun) for name in names[len(known) :])
 
-    def _runs(self, name: str) -> bool:
+    def _runs(self, name: str, *, is_rerun: bool) -> bool:
         """Run a step; return whether it succeeded."""
         action = self._action(name, tree_of(self.build.work_root, self.contents))
+        why = [_RERUN] if is_rerun else reasons(action, self.results, self.contents) or [_NOT_STORED]
         done = execute(action, self.results, self.contents, self.build.log)
-        self.steps.append(Step(name, FAILED if done.status else RAN, done.seconds, done.fault))
+        record = self.results.record(action.key())
+        remember(action, record.facts if record else (), self.results)
+        self.steps.append(Step(name, FAILED if done.status else RAN, done.seconds, done.fault, tuple(why)))
         if done.fault:
             print(f"{self.build}: the step '{name}' is not cached: {done.fault}", flush=True)
         return done.status == 0

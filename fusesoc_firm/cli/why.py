@@ -1,4 +1,4 @@
-"""`firm why`: show the source lines of a generated line."""
+"""`firm why`: show the source lines of a generated line, or why the steps of a build ran."""
 
 from __future__ import annotations
 
@@ -13,25 +13,59 @@ from fusesoc_firm.text.outputs import shown
 if TYPE_CHECKING:
     from fusesoc_firm.text.render import TracedLine
 
+_MOST_REASONS = 20
+
 
 def add_why(commands: Any) -> None:
     """Declare the command."""
     why = command(
         commands,
         "why",
-        "show the lines in the template, specification and message definition that produced a generated line",
+        "show the source lines that produced a generated line; with --target, why the steps of a build ran",
         "firm why build/robot_sys_quat2euler_0.2.0/sim/src/robot_sys_quat2euler-system_0.2.0/quat2euler_system.vhd:80",
         _tell_why,
     )
     why.add_argument(
-        "place", metavar="FILE[:LINE]", help="a generated file in a build; without LINE, all its lines are explained"
+        "place",
+        metavar="FILE[:LINE]|CORE",
+        help="a generated file in a build, of which all lines are explained without LINE; or, with --target, a core",
+    )
+    why.add_argument(
+        "--target",
+        metavar="NAME",
+        help="name the inputs that differed when the steps of this target ran in 'firm test' or 'firm build --cached'",
+    )
+    why.add_argument(
+        "--build-root", type=Path, metavar="DIR", help="the folder of the builds (default: FuseSoC's build folder)"
     )
 
 
 def _tell_why(arguments: argparse.Namespace) -> None:
+    if arguments.target:
+        _tell_steps(arguments.place, arguments.target, arguments.build_root)
+    else:
+        _tell_lines(arguments.place)
+
+
+def _tell_steps(core: str, target: str, build_root: Path | None) -> None:
+    from fusesoc_firm.building.plan import make_plan
+    from fusesoc_firm.building.steps import steps_of
+
+    (build,) = make_plan([core], [target], build_root).builds
+    if not (steps := steps_of(build)):
+        fail(f"{build} has no cached steps here", hint=f"run 'firm build {build.core} --target {target} --cached'")
+    print(build)
+    for step in steps:
+        reasons = [*step.reasons[:_MOST_REASONS]]
+        if more := len(step.reasons) - len(reasons):
+            reasons.append(f"and {more} more")
+        print(f"  {step.name:5}  {step.state}", *(f"         {reason}" for reason in reasons), sep="\n")
+
+
+def _tell_lines(written: str) -> None:
     from fusesoc_firm.plugin.why import why
 
-    path, number = _split(arguments.place)
+    path, number = _split(written)
     if not path.is_file():
         fail(f"there is no file {path}", hint="the form is FILE or FILE:LINE")
     found = why(path)

@@ -108,7 +108,7 @@ def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
 
 
 def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None:
-    """Raise `InputError` if the simulator does not support the language of an accelerator or of the host's link.
+    """Raise `InputError` if the simulator does not support the language of an accelerator or several clocks.
 
     The hint names the `target` of the default simulator.
     """
@@ -117,11 +117,6 @@ def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None
         fail(
             f"{simulator} cannot simulate a system with several clocks",
             hint=f"the additional clocks are generated in VHDL; use --target={target}",
-        )
-    if not known.reads_vhdl and system.link:
-        fail(
-            f"{simulator} cannot simulate the interconnect '{system.link.kind.value}'",
-            hint=f"the host's end of a link is written in VHDL; use --target={target}",
         )
     if system.id_bytes > 1 and (target == "live" or not known.reads_vhdl):
         fail(

@@ -105,16 +105,16 @@ def check_bench(work: Library, vectors: Sequence[Quaternion], tmp_path: Path, **
 
 
 def test_back_to_back_frames_never_wait(rtl: Library, tmp_path: Path) -> None:
-    """A message with every frame of a stream of 8 bits: at most 90 cycles latency, none taken late."""
-    bounds = {"MAX_LATENCY": 90, "MAX_INTERVAL": FRAME_BYTES}
+    """A message with every frame of a stream of 8 bits: at most 92 cycles latency, none taken late."""
+    bounds = {"MAX_LATENCY": 92, "MAX_INTERVAL": FRAME_BYTES}
     report = check_bench(rtl, quaternions(400), tmp_path, SPACING=FRAME_BYTES, **bounds)
-    assert "latency 90 to 90, longest interval 37 cycles" in report
+    assert "latency 92 to 92, longest interval 37 cycles" in report
 
 
 def test_full_throughput(rtl: Library, tmp_path: Path) -> None:
     """A message is always waiting; it is taken early, so part of its latency is waiting inside."""
     report = check_bench(rtl, quaternions(400), tmp_path, MAX_INTERVAL=FRAME_BYTES)
-    assert "longest interval 36 cycles" in report
+    assert "longest interval 37 cycles" in report
 
 
 @pytest.mark.one_in(5)
@@ -128,7 +128,7 @@ def test_random_stalls(rtl: Library, tmp_path: Path, seed: int, stall_in: int, s
 @pytest.mark.parametrize(
     ("generics", "message"),
     [
-        ({"MAX_LATENCY": 89}, "latency 90 exceeds 89"),
+        ({"MAX_LATENCY": 91}, "latency 92 exceeds 91"),
         ({"SPACING": 40, "MAX_INTERVAL": 39}, "interval 40 exceeds 39"),
     ],
 )

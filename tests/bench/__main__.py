@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable
 
 from tests.bench import (
+    actions,
     applications,
     area,
     builds,
@@ -51,7 +52,7 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing and loops: only rows whose names match, such as 'Image.* 64 bits'",
+        help="for timing, loops and actions: only rows whose names match, such as 'Image.* 64 bits'",
     )
     parser.add_argument(
         "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"
@@ -89,6 +90,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "applications": lambda: applications.measure(Yosys(), _tell),
         "systems": lambda: systems.measure(seed, _tell),
         "builds": lambda: builds.measure(_tell),
+        "actions": lambda: actions.measure(_tell, figures.written(), arguments.row),
         "simulators": lambda: simulators.measure(_tell),
         "replay": lambda: replay.measure(seed, _tell),
         "live": lambda: live.measure(_tell),

@@ -11,6 +11,7 @@ from importlib import metadata
 
 from tests import yowasp
 from tests.bench import (
+    actions,
     applications,
     area,
     builds,
@@ -60,7 +61,12 @@ PAGES = (
         ("manager", "timing", "use"),
     ),
     Page("applications", "Figures of whole systems", "area and cycles", ("images", "links", "applications")),
-    Page("builds", "Figures of builds", "build and simulation times", ("systems", "builds", "simulators", "store")),
+    Page(
+        "builds",
+        "Figures of builds",
+        "build and simulation times",
+        ("systems", "builds", "actions", "simulators", "store"),
+    ),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live")),
 )
 _HEADINGS = {
@@ -76,6 +82,7 @@ _HEADINGS = {
     "applications": "Applications",
     "systems": "Systems",
     "builds": "Builds",
+    "actions": "Cached steps",
     "simulators": "Simulators",
     "store": "Store",
     "replay": "Replay",
@@ -108,6 +115,7 @@ _METHODS = {
         Yosys.""",
     "systems": "The table lists the time to check and generate a large system.",
     "builds": "The table lists the time to generate many cores.",
+    "actions": """The table lists the time of commands whose [steps are cached](../reference/actions.md).""",
     "simulators": """The system of specs/quat2euler, with converters, Manager and accelerator, is connected to the
         simulated host. Frames, stalls and received bytes are the same in every simulator.""",
     "store": "The tables list the number of cores that a second run of FuseSoC generates, and the time of this run.",
@@ -144,6 +152,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         applications,
         systems,
         builds,
+        actions,
         simulators,
         store,
         replay,
@@ -184,6 +193,9 @@ def _versions(part: str) -> str:
     if part in ("systems", "store"):
         packages = ["rosbags", *(["fusesoc"] if part == "store" else [])]
         return ", ".join([f"Python {platform.python_version()}", *map(_package, packages)])
+    if part == "actions":
+        tools = [f"Python {platform.python_version()}", _package("fusesoc"), *map(_first_line, ("ghdl", "verilator"))]
+        return ", ".join([*tools, *simulators.versions()])
     if part == "builds":
         return f"Python {platform.python_version()}, {_package('fusesoc')} and two processors"
     if part == "loops":

@@ -37,11 +37,14 @@ _CONVERTERS_TITLE = "Converters of ROS 2 messages, MHz"
 _SYSTEMS_TITLE = "Clock of whole systems, MHz"
 _SCHEDULERS_TITLE = "Schedulers, MHz"
 _MANAGER_TITLE = f"Manager without its scheduler, {MANAGER_WIDTH} bits, MHz"
+_ARITHMETIC_TITLE = "Arithmetic of accelerators, MHz"
 _LOOP_TITLE = f"Manager with its scheduler, {MANAGER_WIDTH} bits, MHz"
 _COLUMNS = ("design", "bits", "MHz", "of each seed", "LUT4", "FF", "bar", "result", "stretch")
 _NOTES = {
     _SYSTEMS_TITLE: """In the systems of a subscriber and a publisher for each message, messages are passed through. The
         others are the demo systems.""",
+    _ARITHMETIC_TITLE: """The entities of [Arithmetic](../reference/arithmetic.md) for float64 and float32, with
+        fixed-point numbers of 32 bits. Multipliers (MULT18X18D) are not counted.""",
     _LOOP_TITLE: "The path from a grant through the Manager and back to the scheduler is included.",
 }
 
@@ -67,6 +70,15 @@ _DEMOS = {
     **dict.fromkeys(("mobile_robot", "sobel", "image_pipeline", "robotic_arm"), (100.0, 125.0)),
 }
 _LOOP_ENTITY = "manager_loop"
+# EXPONENT_BITS and MANTISSA_BITS by the bits of a number.
+_FLOATS = {64: (11, 52), 32: (8, 23)}
+_ARITHMETIC = (
+    "firm_float_add",
+    "firm_float_multiply",
+    "firm_float_multiply_add",
+    "firm_fixed_to_float",
+    "firm_float_to_fixed",
+)
 
 
 @dataclass(frozen=True)
@@ -106,6 +118,7 @@ def rows() -> dict[str, list[Row]]:
         _SCHEDULERS_TITLE: [*_schedulers()],
         _MANAGER_TITLE: [*_managers()],
         _LOOP_TITLE: [*_loops()],
+        _ARITHMETIC_TITLE: [*_arithmetic()],
     }
 
 
@@ -258,6 +271,29 @@ def _loop(policy: str, channels: int) -> Callable[[Path], Design]:
         file.write_text(render(file.name, configuration, Path(__file__).parent), encoding="ascii")
         library.analyse([file])
         return _synthesised(Subject(library, _LOOP_ENTITY, {"WIDTH": MANAGER_WIDTH, "CHANNELS": channels}))
+
+    return make
+
+
+def _arithmetic() -> Iterator[Row]:
+    for width, (exponent, mantissa) in _FLOATS.items():
+        for entity in _ARITHMETIC:
+            generics = {"EXPONENT_BITS": exponent, "MANTISSA_BITS": mantissa}
+            yield Row(entity, width, _operation(entity, generics))
+    for width, other in (64, 32), (32, 64):
+        generics = {
+            f"{side}_{name}": bits
+            for side, size in (("IN", width), ("OUT", other))
+            for name, bits in zip(("EXPONENT_BITS", "MANTISSA_BITS"), _FLOATS[size], strict=True)
+        }
+        yield Row(f"firm_float_resize to {other} bits", width, _operation("firm_float_resize", generics))
+
+
+def _operation(entity: str, generics: Mapping[str, int]) -> Callable[[Path], Design]:
+    def make(folder: Path) -> Design:
+        library = Library("firm", folder)
+        library.analyse(core_files("acc/float/float"))
+        return _synthesised(Subject(library, entity, generics))
 
     return make
 

@@ -15,7 +15,8 @@ from tests.hdl.ghdl import CORES, Generic, RunResult, core_files
 from tests.processes import limited
 from tests.system.simulated.systems import HARDWARE
 
-HOST = tuple(CORES / "sim" / "rtl" / f"{name}.v" for name in ("firm_sim_host", "firm_sim_join", "firm_axis_checker"))
+_HOST = ("firm_sim_host", "firm_sim_join", "firm_axis_checker", "firm_sim_link", "firm_sim_uart", "firm_sim_spi")
+HOST = tuple(CORES / "sim" / "rtl" / f"{name}.v" for name in _HOST)
 
 
 @dataclass(frozen=True)

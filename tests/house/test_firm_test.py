@@ -296,6 +296,39 @@ def test_reports_tell_what_was_cached(library: Path) -> None:
     assert "--rerun needs --cached" in run(library, "gate@sim_icarus", "--rerun", name="build")[1]
 
 
+def test_why_a_step_ran(library: Path) -> None:
+    selected = ("acme:m:counter", "--target", "sim")
+
+    def why(*arguments: str, is_good: bool = True, **variables: str) -> list[str]:
+        assert run(library, *selected, *arguments, **variables)[0] == (0 if is_good else 1)
+        status, text = run(library, *selected, name="why")
+        assert status == 0, text
+        return [line.strip() for line in text.splitlines()[1:]]
+
+    status, text = run(library, *selected, name="why")
+    assert (status, "has no cached steps here" in text) == (1, True)
+    edited = ["limit.txt differs", "src/acme_m_counter_1.0/limit.txt differs"]
+    new = "it has not run in this folder before"
+    assert why() == ["build  ran", new, "run    ran", new]
+    assert why() == ["build  cached", "run    cached"]
+    limit = library / "counter" / "limit.txt"
+    limit.write_text("11\n")
+    assert why() == ["build  ran", *edited, "run    ran", *edited]
+    # What was recalled counts as well.
+    limit.write_text("10\n")
+    assert why() == ["build  cached", "run    cached"]
+    limit.write_text("5\n")
+    assert why(is_good=False) == ["build  ran", *edited, "run    failed", *edited]
+    failed = "the last run failed, or its result is not stored"
+    assert why(is_good=False) == ["build  cached", "run    failed", failed]
+    limit.write_text("10\n")
+    assert why(SECRET="a-value")[:4] == ["build  ran", *edited, "the variable SECRET is new"]
+    assert why("--rerun", SECRET="a-value") == ["build  ran", "--rerun", "run    ran", "--rerun"]
+    notes = [path.read_text(errors="replace") for path in (library.parent / "store").glob("*/notes/*/*")]
+    assert any("SECRET" in note for note in notes)
+    assert not any("a-value" in note for note in notes)
+
+
 def test_what_is_not_cached_is_reported(library: Path) -> None:
     """A test bench that reads a file that is not in its core."""
     bench = library / "counter" / "bench.vhd"

@@ -66,7 +66,7 @@ def answers(built: BuiltSimulator, frames: list[bytes], shape: tuple[int, int]) 
         for frame in frames:
             simulator.request(frame)
         simulator.run(1)
-        while simulator.quiet < 20_000:
+        while simulator.quiet < 100_000:
             for event in simulator.run(20_000):
                 if isinstance(event, Burst):
                     last = event.last_cycle or 0
@@ -131,24 +131,31 @@ def quaternion() -> bytes:
 
 @pytest.mark.check
 @pytest.mark.parametrize(
-    "changes",
+    ("tool", "changes"),
     [
-        {"  name: quat2euler\n": "  name: quat2euler\n  interconnect: uart\n  clock: 100 MHz\n"},
-        {
-            "  fpgaPart: xc7z020clg400-1\n": "  clock: 100 MHz\n  clocks: [{name: fast, frequency: 150 MHz}]\n",
-            "    type: quat2euler\n": "    type: quat2euler\n    clock: fast\n",
-        },
+        ("ghdl", {"  name: quat2euler\n": "  name: quat2euler\n  interconnect: uart\n  clock: 100 MHz\n"}),
+        ("verilator", {"  name: quat2euler\n": "  name: quat2euler\n  interconnect: uart\n  clock: 10 MHz\n"}),
+        ("verilator", {"  name: quat2euler\n": "  name: quat2euler\n  interconnect: spi\n"}),
+        (
+            "ghdl",
+            {
+                "  fpgaPart: xc7z020clg400-1\n": "  clock: 100 MHz\n  clocks: [{name: fast, frequency: 150 MHz}]\n",
+                "    type: quat2euler\n": "    type: quat2euler\n    clock: fast\n",
+            },
+        ),
     ],
-    ids=["link", "clocks"],
+    ids=["uart", "uart_verilator", "spi_verilator", "clocks"],
 )
-def test_links_and_further_clocks(tmp_path: Path, changes: dict[str, str]) -> None:
+def test_links_and_further_clocks(tmp_path: Path, tool: str, changes: dict[str, str]) -> None:
+    if shutil.which(tool) is None:
+        pytest.skip(f"{tool} is not installed")
     spec = copy_of("quat2euler", tmp_path, has_core=True)
     text = spec.read_text()
     for old, new in changes.items():
         assert old in text
         text = text.replace(old, new, 1)
     spec.write_text(text)
-    built = build_simulator(spec, build_root=tmp_path / "build")
+    built = build_simulator(spec, tool, build_root=tmp_path / "build")
     found, _ = answers(built, [quaternion()] * 3, (1, 8))
     # Roll, pitch and yaw of the identity rotation.
     assert found == [b"\x00\x18\x00\x00\x00" + bytes(24)] * 3

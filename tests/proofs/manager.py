@@ -40,8 +40,8 @@ _SLOT = (
     Mutation(
         _MANAGER, "sched_request <= pub_axis_tvalid", "sched_request <= (others => '1')", ("scheduler_sees_requests",)
     ),
-    Mutation(_MANAGER, "<= granted_tvalid and granted_tready", "<= granted_tvalid", ("scheduler_sees_beats",)),
-    Mutation(_MANAGER, "sched_last    <= granted_tlast", "sched_last    <= '1'", ("scheduler_sees_last",)),
+    Mutation(_MANAGER, "(granted_tvalid and granted_tready)", "granted_tvalid", ("scheduler_sees_beats",)),
+    Mutation(_MANAGER, "cut or granted_tlast", "'1'", ("scheduler_sees_last",)),
 )
 
 _TO_SUBSCRIBERS = Proof(

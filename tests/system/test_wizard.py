@@ -115,8 +115,8 @@ def test_the_paths_of_messages_decide_what_can_be_named(tmp_path: Path) -> None:
     extend_specification(tmp_path / "robot.yaml", answers, names)
     assert "paths:" in (tmp_path / "robot.yaml").read_text()
     assert asked[0] == ["msg", "me:msgs:arm"]
-    wrong = ["robot", *[""] * 9, "mgs"]
-    with pytest.raises(InputError, match="answer 11: 'mgs' is not a folder, a bag or a core"):
+    wrong = ["robot", *[""] * 8, "mgs"]
+    with pytest.raises(InputError, match="answer 10: 'mgs' is not a folder, a bag or a core"):
         extend_specification(tmp_path / "other.yaml", PipeAsker(wrong, io.StringIO()), names)
 
 
@@ -252,8 +252,8 @@ blocks:
     [
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
-        (["robot", *[""] * 10, "no", "a", "b"], "answer 14: 'type' cannot be 'b'"),
-        (["robot", *[""] * 10, "no", "a", "", "ROS", "subscriber", ""], "answer 17: 'message' is required"),
+        (["robot", *[""] * 9, "no", "a", "b"], "answer 13: 'type' cannot be 'b'"),
+        (["robot", *[""] * 9, "no", "a", "", "ROS", "subscriber", ""], "answer 16: 'message' is required"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:
@@ -265,6 +265,6 @@ def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], messa
 
 def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
-    answers = ["robot", *[""] * 10, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "", "", "no", "yes", "a"]
-    with pytest.raises(InputError, match="answer 25: 'a' already exists"):
+    answers = ["robot", *[""] * 9, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "", "", "no", "yes", "a"]
+    with pytest.raises(InputError, match="answer 24: 'a' already exists"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)

@@ -15,7 +15,10 @@ entity firm_manager is
     SUBSCRIBERS : integer := 1;
     PUBLISHERS  : integer := 1;
     -- The scheduler may move the grant between any two beats of a frame.
-    PREEMPTIVE : boolean := false
+    PREEMPTIVE : boolean := false;
+    -- Cycles after which a publisher that stops in the middle of a frame is cut off; 0: never. A PREEMPTIVE scheduler
+    -- serves other publishers meanwhile, so there is nothing to watch.
+    WATCHDOG : integer := 0
   );
   port (
     clk   : in std_logic;
@@ -62,7 +65,9 @@ entity firm_manager is
     sched_grant_select : in  std_logic_vector(index_bits(PUBLISHERS)-1 downto 0);
 
     -- Pulses for a frame from the host that reaches no subscriber.
-    id_error : out std_logic
+    id_error : out std_logic;
+    -- Pulses for a publisher that the watchdog has cut off.
+    expired : out std_logic_vector(PUBLISHERS-1 downto 0)
   );
 end entity firm_manager;
 
@@ -89,6 +94,8 @@ architecture rtl of firm_manager is
   signal sent_tlast  : std_logic;
   signal sent_tready : std_logic;
 
+  signal cut : std_logic;  -- the watchdog ends the granted publisher's frame
+
   signal out_tid : std_logic_vector(7 downto 0);
 
 begin
@@ -98,6 +105,10 @@ begin
     severity failure;
   assert PUBLISHERS >= 1 and PUBLISHERS <= 256
     report "firm_manager: PUBLISHERS is " & integer'image(PUBLISHERS) & "; legal: 1 to 256"
+    severity failure;
+
+  assert WATCHDOG >= 0
+    report "firm_manager: WATCHDOG is " & integer'image(WATCHDOG) & "; legal: 0 or more"
     severity failure;
 
   u_slice_in : entity firm.firm_axis_register_slice
@@ -167,7 +178,7 @@ begin
       m_axis_tready => granted_tready
     );
 
-  whole_frames : if not PREEMPTIVE generate
+  whole_frames : if not PREEMPTIVE and WATCHDOG <= 0 generate
     sent_tdata     <= granted_tdata;
     sent_tkeep     <= granted_tkeep;
     sent_tuser     <= granted_tuser;
@@ -175,6 +186,39 @@ begin
     sent_tlast     <= granted_tlast;
     granted_tready <= sent_tready;
   end generate whole_frames;
+
+  watched_frames : if not PREEMPTIVE and WATCHDOG > 0 generate
+    u_watchdog : entity firm.firm_axis_watchdog
+      generic map (
+        WIDTH   => WIDTH,
+        SOURCES => PUBLISHERS,
+        LIMIT   => WATCHDOG
+      )
+      port map (
+        clk           => clk,
+        rst_n         => rst_n,
+        source        => sched_grant_select,
+        s_axis_tdata  => granted_tdata,
+        s_axis_tkeep  => granted_tkeep,
+        s_axis_tuser  => granted_tuser,
+        s_axis_tvalid => granted_tvalid,
+        s_axis_tlast  => granted_tlast,
+        s_axis_tready => granted_tready,
+        m_axis_tdata  => sent_tdata,
+        m_axis_tkeep  => sent_tkeep,
+        m_axis_tuser  => sent_tuser,
+        m_axis_tvalid => sent_tvalid,
+        m_axis_tlast  => sent_tlast,
+        m_axis_tready => sent_tready,
+        cut           => cut,
+        expired       => expired
+      );
+  end generate watched_frames;
+
+  unwatched_frames : if PREEMPTIVE or WATCHDOG <= 0 generate
+    cut     <= '0';
+    expired <= (others => '0');
+  end generate unwatched_frames;
 
   parts_of_frames : if PREEMPTIVE generate
     u_burst : entity firm.firm_axis_burst
@@ -234,7 +278,7 @@ begin
   end generate name_publisher;
 
   sched_request <= pub_axis_tvalid;
-  sched_beat    <= granted_tvalid and granted_tready;
-  sched_last    <= granted_tlast;
+  sched_beat    <= cut or (granted_tvalid and granted_tready);
+  sched_last    <= cut or granted_tlast;
 
 end architecture rtl;

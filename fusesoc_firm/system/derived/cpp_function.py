@@ -7,7 +7,7 @@ shared library.
 
 The function has the name of its file. The parameters are the inputs' fields by value, followed by the outputs' fields
 by pointer or reference, in wire order. The parameters should be named `<field>_in` and `<field>_out`; these names
-become the ports' names.
+become the ports' names. An array of fixed size is a C++ array, of which each element is a port: `<field>_in_0`.
 """
 
 from __future__ import annotations
@@ -36,27 +36,46 @@ _CPP_TYPES = {
 
 
 @dataclass(frozen=True)
-class Argument:
-    """A parameter of the C++ function.
+class Element:
+    """A value of the C++ function that has its own port.
 
-    `port` is the kernel's port and `signal` the accelerator's signal; `word` is the index of the first 32-bit word
-    that carries the argument.
+    `port` is the kernel's port and `signal` the accelerator's signal or a part of it; `word` is the index of the first
+    32-bit word that carries the value.
+    """
+
+    port: str
+    signal: str
+    bits: int
+    is_bit: bool
+    word: int
+
+    @property
+    def words(self) -> int:
+        """The number of 32-bit words that carry the value."""
+        return -(-self.bits // WORD_BITS)
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A parameter of the C++ function: a value or, with a `count`, an array of so many values.
+
+    `port` is the parameter's name; `elements` are its values in the order of the array.
     """
 
     port: str
     signal: str
     field: FieldPort
-    word: int
+    elements: tuple[Element, ...]
 
     @property
-    def bits(self) -> int:
-        """The width of the kernel's port in bits."""
-        return self.field.width or 1
+    def count(self) -> int | None:
+        """The number of elements of an array; None for a single value."""
+        return len(self.elements) if self.field.field.is_array else None
 
     @property
-    def words(self) -> int:
-        """The number of 32-bit words that carry the argument."""
-        return -(-self.bits // WORD_BITS)
+    def end(self) -> int:
+        """The index of the first 32-bit word that follows the argument."""
+        return self.elements[-1].word + self.elements[-1].words
 
 
 def function_name(accelerator: AcceleratorType) -> str:
@@ -90,17 +109,33 @@ def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argume
 def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[str]) -> list[Argument]:
     found: list[Argument] = []
     for (side, field), name in zip(fields, names, strict=False):
-        word = found[-1].word + found[-1].words if found else 0
-        found.append(Argument(name, f"{side.prefix}{field.name}", field, word))
+        signal = f"{side.prefix}{field.name}"
+        found.append(Argument(name, signal, field, _elements(name, signal, field, found[-1].end if found else 0)))
     return found
+
+
+def _elements(name: str, signal: str, field: FieldPort, word: int) -> tuple[Element, ...]:
+    """Return the values of a parameter; element 0 of an array is in the lowest bits of its signal."""
+    bits = field.field.type.bits
+    if not field.field.is_array:
+        return (Element(name, signal, bits, field.width is None, word),)
+    words = -(-bits // WORD_BITS)
+    return tuple(
+        Element(f"{name}_{k}", f"{signal}({(k + 1) * bits - 1} downto {k * bits})", bits, False, word + k * words)
+        for k in range(field.field.count)
+    )
 
 
 def prototype(accelerator: AcceleratorType) -> str:
     """Return the required declaration of the function."""
     inputs, outputs = arguments(accelerator)
-    parameters = [f"{cpp_type(item)} {item.port}" for item in inputs]
-    parameters += [f"{cpp_type(item)} *{item.port}" for item in outputs]
+    parameters = [f"{cpp_type(item)} {item.port}{_size(item)}" for item in inputs]
+    parameters += [f"{cpp_type(item)} {'' if item.count else '*'}{item.port}{_size(item)}" for item in outputs]
     return f"void {function_name(accelerator)}({', '.join(parameters)})"
+
+
+def _size(argument: Argument) -> str:
+    return f"[{argument.count}]" if argument.count else ""
 
 
 def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
@@ -130,7 +165,7 @@ def _problems(frame: Frame) -> list[str]:
         check_fixed_size(frame)
     except InputError as error:
         return [f"messages of fixed size, but {fault.message}" for fault in error.diagnostics]
-    return [f"single values, not the array {port.comment}" for port in field_ports(frame) if port.field.is_array]
+    return []
 
 
 def cpp_type(argument: Argument) -> str:

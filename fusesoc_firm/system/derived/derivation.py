@@ -45,6 +45,7 @@ from fusesoc_firm.system.derived.status import status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
 from fusesoc_firm.system.derived.tree import tree_of
+from fusesoc_firm.system.derived.watchdog import watchdog_of
 from fusesoc_firm.system.written.sources import declares_width
 from fusesoc_firm.system.written.specification import (
     CONVERTER,
@@ -103,7 +104,7 @@ def derive(
     subscribers = tuple(replace(item, queue=queue_of(parts.blocks[item.block], item, faults)) for item in subscribers)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
-    tree = tree_of(project, scheduling, link, faults)
+    tree = tree_of(project, scheduling, link, publishers, faults)
     faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
@@ -121,6 +122,7 @@ def derive(
         link=link,
         status=status_of(project, link, max(len(subscribers), len(publishers)), faults),
         tree=tree,
+        watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),
     )
     check_entities(system, parts.blocks, faults)
     faults.raise_if_any()

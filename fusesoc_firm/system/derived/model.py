@@ -84,6 +84,11 @@ class Converter(Topic):
     software: End | None = None
     queue: Queue | None = None
 
+    @property
+    def may_pause(self) -> bool:
+        """Whether the frames of this publisher may pause: one of fixed size or with a buffer has the whole frame."""
+        return not self.frame.is_fixed_size and not self.buffer
+
 
 class LengthSource(Enum):
     """The source of the length of a payload of variable size."""
@@ -280,7 +285,8 @@ class Clock:
 class DerivedSystem:
     """The whole system; `name` is an identifier, `width` the width of the streams, `clocks` all clocks except clk.
 
-    `clock` is the frequency of clk in Hz, if it is given.
+    `clock` is the frequency of clk in Hz, if it is given. A publisher that stops in the middle of a frame is cut off
+    after `watchdog` cycles, if this is not 0.
 
     Without a `link`, the streams are ports of the system. Converters, accelerators and connections in software are not
     included. `names` maps each accelerator's message sides to their names outside the accelerator: `<block>_in`,
@@ -301,6 +307,7 @@ class DerivedSystem:
     clock: Fraction | None = None
     clocks: tuple[Clock, ...] = ()
     status: StatusAccess | None = None
+    watchdog: int = 0
     tree: Tree | None = None
 
     @property

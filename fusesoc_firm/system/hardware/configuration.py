@@ -50,6 +50,7 @@ def system_configuration(system: DerivedSystem) -> Context:
         **interconnect_configuration(system),
         **status_configuration(system),
         **scheduler_configuration(system),
+        "watchdog": {"cycles": system.watchdog} if system.watchdog else None,
         "clocks": _clocks(system),
         "resets": _resets(system),
         "publisher_errors": [

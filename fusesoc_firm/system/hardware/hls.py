@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import PurePosixPath
 
 from fusesoc_firm.converter.vhdl import vhdl_type
@@ -9,6 +10,7 @@ from fusesoc_firm.system.derived.cpp_function import (
     AP_PORTS,
     WORD_BITS,
     Argument,
+    Element,
     arguments,
     cpp_type,
     function_name,
@@ -43,49 +45,67 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Context:
         "input_sides": [side.prefix for side in accelerator.inputs],
         "output_sides": [{"prefix": side.prefix, "number": n} for n, side in enumerate(accelerator.outputs)],
         "output_count": len(accelerator.outputs),
-        "inputs": [_kernel_port(argument) for argument in inputs],
-        "outputs": [_kernel_port(argument) for argument in outputs],
+        "inputs": [_kernel_port(element) for element in _elements(inputs)],
+        "outputs": [_kernel_port(element) for element in _elements(outputs)],
     }
 
 
-def _kernel_port(argument: Argument) -> Context:
+def _elements(arguments: Iterable[Argument]) -> list[Element]:
+    """Return the values of all arguments, each of which has a port of the kernel."""
+    return [element for argument in arguments for element in argument.elements]
+
+
+def _kernel_port(element: Element) -> Context:
     """Return a port of the kernel, in which a single bit is also a vector."""
-    is_bit = argument.field.width is None
-    return {"port": argument.port, "signal": argument.signal, "bits": argument.bits, "is_bit": is_bit}
+    return {"port": element.port, "signal": element.signal, "bits": element.bits, "is_bit": element.is_bit}
 
 
 def kernel_configuration(accelerator: AcceleratorType) -> Context:
     """Return the configuration of the simulated kernel, and of the shim between it and the C++ function."""
     inputs, outputs = arguments(accelerator)
-    column = max(len(name) for name in [*AP_PORTS, *(f"{argument.port}_ap_vld" for argument in [*inputs, *outputs])])
+    values, results = _elements(inputs), _elements(outputs)
+    column = max(len(name) for name in [*AP_PORTS, *(f"{element.port}_ap_vld" for element in [*values, *results])])
     return {
         "function": function_name(accelerator),
         "kernel": kernel_entity(accelerator),
         "source": str(PurePosixPath(accelerator.accelerator.sources[0]).name),
         "library": library_name(accelerator),
-        "inputs": [_argument(argument, column) for argument in inputs],
-        "outputs": [_argument(argument, column) for argument in outputs],
+        "inputs": [_element(element, column) for element in values],
+        "outputs": [_element(element, column) for element in results],
+        "parameters": [_parameter(argument) for argument in inputs],
+        "results": [_parameter(argument) for argument in outputs],
         **{name: name.ljust(column) for name in AP_PORTS},
-        "input_words": max(1, sum(argument.words for argument in inputs)),
-        "output_words": max(1, sum(argument.words for argument in outputs)),
+        "input_words": max(1, *(argument.end for argument in inputs)) if inputs else 1,
+        "output_words": max(1, *(argument.end for argument in outputs)) if outputs else 1,
     }
 
 
-def _argument(argument: Argument, column: int) -> Context:
+def _parameter(argument: Argument) -> Context:
+    """Return a parameter of the C++ function and the words of its values."""
+    first = argument.elements[0]
     return {
         "name": argument.port,
-        "padded": argument.port.ljust(column),
-        "padded_valid": f"{argument.port}_ap_vld".ljust(column),
-        "type": vhdl_type(argument.bits),
         "cpp_type": cpp_type(argument),
-        "word": argument.word,
+        "is_array": argument.count is not None,
+        "count": len(argument.elements),
+        "word": first.word,
+        "words": first.words,
+    }
+
+
+def _element(element: Element, column: int) -> Context:
+    return {
+        "name": element.port,
+        "padded": element.port.ljust(column),
+        "padded_valid": f"{element.port}_ap_vld".ljust(column),
+        "type": vhdl_type(element.bits),
         "words": [
             {
-                "index": argument.word + number,
-                "high": min(argument.bits, WORD_BITS * (number + 1)) - 1,
+                "index": element.word + number,
+                "high": min(element.bits, WORD_BITS * (number + 1)) - 1,
                 "low": WORD_BITS * number,
-                "bits": min(argument.bits - WORD_BITS * number, WORD_BITS),
+                "bits": min(element.bits - WORD_BITS * number, WORD_BITS),
             }
-            for number in range(argument.words)
+            for number in range(element.words)
         ],
     }

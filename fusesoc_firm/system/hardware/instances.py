@@ -17,7 +17,7 @@ from fusesoc_firm.system.derived.model import (
 from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
 from fusesoc_firm.system.hardware.crossings import port_of
 from fusesoc_firm.system.hardware.maps import port_map
-from fusesoc_firm.system.hardware.names import FRAME_WORDS, Names, reset_of
+from fusesoc_firm.system.hardware.names import ERROR_WORDS, FRAME_WORDS, Names, reset_of, watched_publishers
 from fusesoc_firm.system.written.specification import Pin
 
 ERROR_CODE_BITS = 4
@@ -62,14 +62,25 @@ def _queue(names: Names, converter: Converter, system: DerivedSystem) -> dict[st
 def publisher_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
     """Return the instance of a publisher, followed by its buffer if it stores whole frames."""
     ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
-    has_errors = not converter.frame.is_fixed_size and not converter.buffer
+    is_watched = converter in watched_publishers(system)
     return {
         **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
         **_part_of_manager(converter, system),
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
-        "error": error_of(converter, system) if has_errors else None,
+        "error": error_of(converter, system) if converter.may_pause and not is_watched else None,
+        "watched": _watched(names, converter, system) if is_watched else None,
         "buffer": _buffer(names, converter, system) if converter.buffer else None,
+    }
+
+
+def _watched(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return the errors of a publisher beside those that the watchdog finds."""
+    return {
+        "block": converter.block,
+        **{word: names.frame(converter.block, word) for word in ERROR_WORDS},
+        "id": converter.id,
+        "out": error_of(converter, system),
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
+from fusesoc_firm.system.derived.model import DerivedSystem, Link, LinkKind
 
 # A link's pins at the top level, with their names in the link's core; a board may omit pins that have a default.
 LINK_PINS = {
@@ -24,6 +24,10 @@ LINK_PINS = {
 }
 
 
+# The default baud rate of firm_uart_link, which a netlist keeps.
+_BAUD = 1_000_000
+
+
 def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
     """Return the streams as ports of the top level, or the link that they connect to."""
     if system.link is None:
@@ -34,10 +38,15 @@ def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
             "entity": f"firm_{system.link.kind.value}_link",
             "longest": system.link.longest,
             "adapter": f"firm_sim_{system.link.kind.value}",
-            "uart": {"clock_hz": system.link.clock_hz} if system.link.kind is LinkKind.UART else None,
+            "uart": _uart(system.link) if system.link.kind is LinkKind.UART else None,
             "pins": [
                 {"name": name, "direction": direction, "type": type_}
                 for name, direction, type_ in LINK_PINS[system.link.kind]
             ],
         },
     }
+
+
+def _uart(link: Link) -> dict[str, Any]:
+    """Return the clock's frequency, and the cycles of a bit, as firm_uart_link rounds them."""
+    return {"clock_hz": link.clock_hz, "bit_cycles": (link.clock_hz + _BAUD // 2) // _BAUD}

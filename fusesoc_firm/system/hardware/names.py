@@ -6,7 +6,15 @@ from collections.abc import Iterator, Mapping
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.payload_length import length_entity
-from fusesoc_firm.system.derived.model import AcceleratorBlock, Clock, Connection, DerivedSystem, End, LengthSource
+from fusesoc_firm.system.derived.model import (
+    AcceleratorBlock,
+    Clock,
+    Connection,
+    Converter,
+    DerivedSystem,
+    End,
+    LengthSource,
+)
 from fusesoc_firm.system.derived.sides import (
     PAYLOAD_LENGTH,
     Handshake,
@@ -30,7 +38,7 @@ _TAKEN = """
     burst_tdata burst_tkeep burst_tuser burst_tid burst_tvalid burst_tlast burst_tready
     u_host u_system u_join u_environment
     sub_axis_tdata sub_axis_tkeep sub_axis_tuser sub_axis_tlast sub_axis_tvalid sub_axis_tready
-    pub_axis_tdata pub_axis_tkeep pub_axis_tuser pub_axis_tvalid pub_axis_tlast pub_axis_tready
+    pub_axis_tdata pub_axis_tkeep pub_axis_tuser pub_axis_tvalid pub_axis_tlast pub_axis_tready pub_expired
     sched_request sched_beat sched_last sched_grant_valid sched_grant_select
     u_link u_adapter clock_hz baud link_error link_error_code
     uart_rxd uart_txd uart_rts_n uart_cts_n spi_sclk spi_cs_n spi_mosi spi_miso spi_irq
@@ -55,6 +63,8 @@ RELEASED = "domains_rst_n"
 # Between a publisher and its buffer, and between a queue and its subscriber.
 FRAME_WORDS = (*AXIS, "tuser", "error", "error_code")
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in FRAME_WORDS)
+# Between a publisher that the watchdog may cut off and the system's errors.
+ERROR_WORDS = ("error", "error_code")
 
 
 class Names:
@@ -91,6 +101,7 @@ class Names:
             _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
         ]
         signals += [(block, "", word) for block in (*queued, *buffered) for word in FRAME_SIGNALS]
+        signals += [(item.block, "", f"frame_{word}") for item in watched_publishers(system) for word in ERROR_WORDS]
         signals += [(*pin, "synced") for pin in synchronised]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
         signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
@@ -141,6 +152,11 @@ class Names:
     def frame(self, block: str, signal: str) -> str:
         """Return a signal between a publisher and its buffer, or between a queue and its subscriber."""
         return self._signals[block, "", f"frame_{signal}"]
+
+
+def watched_publishers(system: DerivedSystem) -> list[Converter]:
+    """Return the publishers that the watchdog may cut off."""
+    return [item for item in system.publishers if system.watchdog and item.may_pause]
 
 
 def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]]:

@@ -13,6 +13,9 @@ from fusesoc_firm.text.render import Context
 VERILOG_BENCH_TEMPLATE = "verilog/test_bench.v"
 ENVIRONMENT_TEMPLATE = "vhdl/in_environment.vhd"
 
+# Cycles without a beat until a simulation with a link ends: the time of 300 bytes, which a link sends without a beat at
+# the host.
+_QUIET_BITS = 3000
 # Space for the user's own files next to the generated ones.
 _LEAST_FRAMES = 65536
 
@@ -38,6 +41,7 @@ def verilog_bench_configuration(
         "open_pins": [] if has_environment else _open_pins(system),
         "most_frames": max(_LEAST_FRAMES, frames),
         "most_beats": beats,
+        "quiet": _QUIET_BITS * (system.link.clock_hz // 1_000_000 if system.link and system.link.clock_hz else 10),
     }
 
 

@@ -98,8 +98,16 @@ def _function(type_: AcceleratorType) -> Context:
     return {
         "function": function_name(type_),
         "prototype": prototype(type_),
-        "inputs": [item.port for item in inputs],
-        "outputs": [{"port": item.port, "value": copied.get(item.signal, "0")} for item in outputs],
+        "inputs": [{"port": item.port, "is_array": item.count is not None} for item in inputs],
+        "outputs": [
+            {
+                "port": item.port,
+                "is_array": item.count is not None,
+                "count": len(item.elements),
+                "value": f"{copied[item.signal]}{'[k]' if item.count else ''}" if item.signal in copied else "0",
+            }
+            for item in outputs
+        ],
     }
 
 

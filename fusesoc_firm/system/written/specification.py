@@ -108,6 +108,13 @@ class Project(Section):
         form="integer",
         choices=(1, 2),
         default=1,
+        is_asked=False,
+    )
+    watchdog: int = key(
+        "cycles of clk after which a publisher that stops in the middle of a frame is cut off; 0: never",
+        form="integer",
+        default=1 << 20,
+        is_asked=False,
     )
     interconnect: Text = key(
         "connection between host and system: streams for a DMA engine, or a serial link",

@@ -7,7 +7,7 @@
 -- after Bernardes and Viollet, "Quaternion to Euler angles conversion" (2022). Lengths cancel, so the
 -- quaternion need not be a unit, and nothing is ill-conditioned but what has no answer at the gimbal lock.
 -- Two CORDIC units turn (Q, R) and (P, S); a third makes the pitch of their lengths while they work on the
--- next message. 90 cycles from taking a message to its result, a new message every 36.
+-- next message. 92 cycles from taking a message to its result, a new message every 37.
 
 library ieee;
 use ieee.std_logic_1164.all;

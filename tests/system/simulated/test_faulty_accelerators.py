@@ -9,6 +9,9 @@ import pytest
 import yaml
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.frame.faults import Fault
+from fusesoc_firm.system.hardware.status import status_map
+from fusesoc_firm.system.status_frames import read_request, status_answer
 from tests.hdl.frames import traffic, write_stimulus
 from tests.system.simulated.systems import DATA, GeneratedSystem, build, call
 
@@ -48,6 +51,10 @@ def _converter(name: str, mode: str, message: str, **more: object) -> dict[str, 
     return {"name": name, "middleware": "ROS1", "mode": mode, "message": message, **more}
 
 
+def _ros2(name: str, mode: str, message: str, **more: object) -> dict[str, object]:
+    return _converter(name, mode, message, middleware="ROS2", **more)
+
+
 def _exchange(system: GeneratedSystem, ids: list[int], faults: int) -> int:
     """Send frames of these ids, and expect those of the good channel back; return the number of cycles."""
     source = random.Random(SEED)
@@ -74,3 +81,137 @@ def test_an_accelerator_that_never_takes(tmp_path: Path, width: int, overflow: s
     healthy = _system(tmp_path / "healthy", width, "deaf", takes=True, queue=FRAMES, overflow=overflow)
     # To replace a frame takes a cycle.
     assert cycles <= _exchange(healthy, ids, 0) + (dropped if overflow == "drop_oldest" else 0)
+
+
+LIMIT = 32
+HEALTHY = "none"
+# Each response to such a number is faulty.
+SICK = [number for number in range(20, 60) if number % 8 == 7]
+WELL = [number for number in range(20, 60) if number % 8 != 7]
+CODES = {
+    "pauses": Fault.WATCHDOG,
+    "stops": Fault.WATCHDOG,
+    "ends early": Fault.SHORT_FRAME,
+    "goes on": Fault.LONG_FRAME,
+}
+_CDR = bytes.fromhex("00010000")
+
+
+def _texts(folder: Path, width: int, fault: str, queue: int) -> GeneratedSystem:
+    """A channel that returns Points, and one that responds to a number with a text of this length, and a fault."""
+    folder.mkdir()
+    text = (DATA / "falter.vhd").read_text()
+    (folder / "falter.vhd").write_text(text.replace(f':= "{HEALTHY}"', f':= "{fault}"'))
+    interface = {
+        "input": [{"middleware": "ROS2", "message": "std_msgs/UInt16"}],
+        "output": [{"middleware": "ROS2", "message": "std_msgs/String"}],
+    }
+    source = {"name": "falter", "type": "VHDL", "sources": "falter.vhd", "interface": interface}
+    blocks = [
+        _ros2("good", "subscriber", POINT, outgoing=[{"name": "good_back"}]),
+        _ros2("bad", "subscriber", "std_msgs/UInt16", outgoing=[{"name": "acc"}], queue=queue, overflow="drop_newest"),
+        {"name": "acc", "type": "falter", "outgoing": [{"name": "bad_back"}]},
+        _ros2("good_back", "publisher", POINT),
+        _ros2("bad_back", "publisher", "std_msgs/String"),
+    ]
+    project = {"name": "faulty", "width": width, "status": "frames", "watchdog": LIMIT}
+    content = {"project": project, "accelerators": [source], "blocks": blocks}
+    (folder / "faulty.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+    (folder / "stimuli.yaml").write_text("- good: {x: 1.0, y: 2.0, z: 3.0}\n")
+    (folder / "model.py").write_text("def respond(subscriber, message):\n    return []\n")
+    return build(call(folder / "faulty.yaml", folder / "stimuli.yaml", folder / "model.py"), folder / "work")
+
+
+def _point(source: random.Random) -> bytes:
+    return pack_frame(GOOD, _CDR + source.randbytes(24))
+
+
+def _number(number: int) -> bytes:
+    return pack_frame(BAD, _CDR + number.to_bytes(2, "little"))
+
+
+def _answer(frame: bytes, fault: str) -> str:
+    """The lines of the expected frame for a frame to the system."""
+    number = int.from_bytes(frame[-2:], "little")
+    if frame[0] == BAD and number in SICK and fault != HEALTHY:
+        return "" if fault == "is silent" else f"  {BAD:02x}\n! aborted {BAD} 10\n"
+    letters = bytes(ord("a") + place % 26 for place in range(number))
+    text = pack_frame(BAD, _CDR + (number + 1).to_bytes(4, "little") + letters + b"\0")
+    return f"  {(frame if frame[0] == GOOD else text).hex()}\n"
+
+
+def _run(
+    system: GeneratedSystem, frames: list[bytes], fault: str, faults: int, answered: set[int] | None = None
+) -> int:
+    """Send the frames, and expect the responses to `answered`, by default to all; return the number of cycles."""
+    write_stimulus(system.folder / "stimulus.txt", frames)
+    answers = "".join(
+        f"< @{place} answer\n{lines}"
+        for place, frame in enumerate(frames)
+        if (answered is None or place in answered) and (lines := _answer(frame, fault))
+    )
+    (system.folder / "expected.txt").write_text(f"! frame_error {faults}\n{answers}")
+    result = system.run(SEED=SEED, STALL_PERCENT=0)
+    assert result.exit_code == 0, result.output
+    return traffic(result.output).cycles
+
+
+@pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
+@pytest.mark.parametrize("fault", ["pauses", "ends early", "goes on"])
+def test_an_accelerator_whose_response_is_faulty_now_and_then(tmp_path: Path, width: int, fault: str) -> None:
+    """The other channel keeps 99 % of the rate that it has beside a healthy accelerator."""
+    print(f"frames from seed {SEED}")
+    source = random.Random(SEED)
+    count = 600 if width == 8 else 2400
+    numbers = [source.choice(SICK if source.random() < 0.05 else WELL) for _ in range(100)]
+    texts = [_number(number) for number in numbers]
+    frames = [_point(source) for _ in range(count)]
+    for place, frame in zip(sorted(source.sample(range(count), len(texts))), texts, strict=True):
+        frames[place] = frame
+    sick = sum(number in SICK for number in numbers)
+    assert sick
+    healthy = _run(_texts(tmp_path / "healthy", width, HEALTHY, 128), frames, HEALTHY, 0)
+    cycles = _run(_texts(tmp_path / "faulty", width, fault, 128), frames, fault, sick)
+    print(f"{fault}: {cycles} cycles, {healthy} beside a healthy accelerator")
+    assert 99 * cycles <= 100 * healthy
+
+
+@pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
+@pytest.mark.parametrize("fault", ["stops", "is silent"])
+def test_an_accelerator_that_answers_no_more(tmp_path: Path, width: int, fault: str) -> None:
+    """The other channel keeps 99 % of the rate that it has alone; the host's stream also carries the dropped frames."""
+    print(f"frames from seed {SEED}")
+    source = random.Random(SEED)
+    count = 600 if width == 8 else 2400
+    frames = [_point(source) if source.random() < 0.8 else _number(source.choice(SICK)) for _ in range(count)]
+    frames[-1] = _point(source)
+    good = [place for place, frame in enumerate(frames) if frame[0] == GOOD]
+    bad = [place for place, frame in enumerate(frames) if frame[0] == BAD]
+    system = _texts(tmp_path / "faulty", width, fault, FRAMES)
+    faults = len(bad) - FRAMES - 1 + (fault == "stops")
+    cycles = _run(system, frames, fault, faults, {*good, bad[0]})
+    alone = _run(system, [frames[place] for place in good], fault, 0)
+    beats = sum(-(-len(frames[place]) // (width // 8)) for place in bad)
+    print(f"{fault}: {cycles} cycles; {alone} alone, and {beats} beats")
+    assert 99 * cycles <= 100 * (alone + beats)
+
+
+@pytest.mark.parametrize("fault", CODES)
+def test_the_status_has_the_code_at_the_channel(tmp_path: Path, fault: str) -> None:
+    registers = status_map("faulty", 2, 2)
+    code = CODES[fault].value
+    system = _texts(tmp_path / "faulty", 8, fault, FRAMES)
+    values = {f"publisher[{BAD}].faults[{code - 1}]": 1, f"publisher[{GOOD}].faults[{code - 1}]": 0}
+    # A register that never changes; the responses leave meanwhile.
+    reads = [("magic", 0x4D524946)] * 60 + [*values.items()]
+    sent = [_number(SICK[0]), _point(random.Random(SEED))]
+    frames = sent + [read_request(registers.by_name[name].address) for name, _ in reads]
+    write_stimulus(system.folder / "stimulus.txt", frames)
+    answers = [f"< @{place} answer\n{_answer(frame, fault)}" for place, frame in enumerate(sent)]
+    answers += [
+        f"< @{place} read\n  {status_answer(registers.by_name[name].address, word).hex()}\n"
+        for place, (name, word) in enumerate(reads, start=len(sent))
+    ]
+    (system.folder / "expected.txt").write_text(f"! frame_error 1\n{''.join(answers)}")
+    result = system.run(SEED=SEED, STALL_PERCENT=0)
+    assert result.exit_code == 0, result.output

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.request.request import Request
+from tests.hdl import verilog
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
 BLOCKS = """
@@ -28,13 +31,16 @@ def respond(subscriber, message):
 """
 
 
-def _built(folder: Path, interconnect: str, width: int) -> GeneratedSystem:
+def _request(folder: Path, interconnect: str, width: int) -> Request:
     project = f"project: {{name: linked, interconnect: {interconnect}, clock: 12 MHz, width: {width}}}"
     (folder / "spec.yaml").write_text(project + BLOCKS)
     (folder / "stimuli.yaml").write_text(STIMULI)
     (folder / "model.py").write_text(MODEL)
-    request = call(folder / "spec.yaml", folder / "stimuli.yaml", folder / "model.py")
-    return build(request, folder / "system")
+    return call(folder / "spec.yaml", folder / "stimuli.yaml", folder / "model.py")
+
+
+def _built(folder: Path, interconnect: str, width: int) -> GeneratedSystem:
+    return build(_request(folder, interconnect, width), folder / "system")
 
 
 @pytest.mark.one_in(7)
@@ -44,6 +50,29 @@ def test_a_system_answers_over_any_interconnect(tmp_path: Path, interconnect: st
     system = _built(tmp_path, interconnect, width)
     assert system.passes(STALL_PERCENT=0)
     assert system.passes(SEED=3, STALL_PERCENT=30)
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed")
+@pytest.mark.parametrize("interconnect", ["uart", "spi"])
+def test_a_linked_system_answers_as_a_netlist(tmp_path: Path, interconnect: str) -> None:
+    icarus = verilog.build(_request(tmp_path, interconnect, 32), tmp_path)
+    result = icarus.run(tmp_path, SEED=3, STALL_PERCENT=30)
+    assert result.output.splitlines()[-1] == "PASS 5/5", result.output
+
+
+@pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed")
+def test_a_broken_frame_ends_a_simulation_in_verilog(tmp_path: Path) -> None:
+    """A system that sends a byte with one wrong bit."""
+    top, files = verilog.translated(_request(tmp_path, "uart", 8), tmp_path)
+    adapter = next(path for path in files if path.stem == "firm_sim_uart")
+    broken = tmp_path / "firm_sim_uart.v"
+    right = "received_data[received_bit] = uart_txd;"
+    text = adapter.read_text()
+    assert right in text
+    broken.write_text(text.replace(right, f"{right} received_data[6] = 0;"))
+    icarus = verilog.compile_verilog(top, [broken if path == adapter else path for path in files], tmp_path)
+    assert "the system sent a frame whose" in icarus.run(tmp_path).output
 
 
 @pytest.mark.parametrize("interconnect", ["uart", "spi"])

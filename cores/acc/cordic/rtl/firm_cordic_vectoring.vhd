@@ -8,7 +8,7 @@
 -- remaining places after it.
 -- As soon as y is 0, the angle is exact and no longer changes: multiples of pi/4 have no error, and
 -- (0, 0) has the angle 0. Otherwise the error is at most 2**-(ITERATIONS-1) rad.
--- A vector takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
+-- A vector takes ITERATIONS cycles, one to load and one to fold; the next one is loaded while the result is taken.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -107,19 +107,21 @@ architecture rtl of firm_cordic_vectoring is
   signal half_pi     : angle_t;
   signal pi          : angle_t;
 
-  signal count_r     : count_t;
-  signal busy_r      : std_logic;
-  signal done_r      : std_logic;
-  signal ready       : std_logic;
+  signal count_r      : count_t;
+  signal busy_r       : std_logic;
+  signal folding_r    : std_logic;  -- the vector was loaded in the cycle before
+  signal done_r       : std_logic;
+  signal ready        : std_logic;
 
-  signal magnitude_r : magnitude_t;
-  signal scaled_r    : scaled_t;
-  signal aligned_r   : scaled_t;
-  signal angle_r     : angle_t;
-  -- The folded vector is mirrored: its angle counts backwards.
-  signal mirrored_r  : std_logic;
+  signal magnitude_r  : magnitude_t;
+  signal scaled_r     : scaled_t;
+  signal aligned_r    : scaled_t;
+  signal angle_r      : angle_t;
+  -- The signs of x and y. If they differ, the folded vector is mirrored: its angle counts backwards.
+  signal x_negative_r : std_logic;
+  signal y_negative_r : std_logic;
   -- y has been 0, so the angle no longer changes.
-  signal exact_r     : std_logic;
+  signal exact_r      : std_logic;
 
 begin
 
@@ -153,9 +155,12 @@ begin
         busy_r <= '0';
         done_r <= '0';
       elsif ready = '1' then
-        busy_r  <= in_valid;
-        done_r  <= '0';
-        count_r <= (others => '0');
+        busy_r    <= in_valid;
+        folding_r <= in_valid;
+        done_r    <= '0';
+        count_r   <= (others => '0');
+      elsif folding_r = '1' then
+        folding_r <= '0';
       elsif busy_r = '1' then
         count_r <= count_r + 1;
         if count_r = ITERATIONS-1 then
@@ -175,25 +180,28 @@ begin
   begin
     if rising_edge(clk) then
       if ready = '1' and in_valid = '1' then
-        mirrored_r  <= in_x(WIDTH-1) xor in_y(WIDTH-1);
-        exact_r     <= '0';
-        magnitude_r <= absolute(in_x);
-        scaled_r    <= resize(absolute(in_y), WIDTH+1);
-        aligned_r   <= resize(absolute(in_y), WIDTH+1);
-        angle_r     <= (others => '0');
-        if signed(in_x) < 0 then
+        x_negative_r <= in_x(WIDTH-1);
+        y_negative_r <= in_y(WIDTH-1);
+        exact_r      <= '0';
+        magnitude_r  <= absolute(in_x);
+        scaled_r     <= resize(absolute(in_y), WIDTH+1);
+        angle_r      <= (others => '0');
+      elsif folding_r = '1' then
+        -- A cycle of its own, since the input may come late and is compared with 0 here.
+        aligned_r <= scaled_r;
+        if x_negative_r = '1' then
           angle_r <= pi;
-          if signed(in_y) < 0 then
+          if y_negative_r = '1' then
             angle_r <= -pi;
           end if;
-        elsif signed(in_x) = 0 then
+        elsif magnitude_r = 0 then
           -- On the y axis: turned onto the x axis at once, which is exact.
-          magnitude_r <= absolute(in_y);
+          magnitude_r <= scaled_r(WIDTH-1 downto 0);
           scaled_r    <= (others => '0');
           aligned_r   <= (others => '0');
-          if signed(in_y) < 0 then
+          if y_negative_r = '1' then
             angle_r <= -half_pi;
-          elsif signed(in_y) /= 0 then
+          elsif scaled_r /= 0 then
             angle_r <= half_pi;
           end if;
         end if;
@@ -216,7 +224,7 @@ begin
         if scaled_r = 0 then
           exact_r <= '1';
         elsif exact_r = '0' then
-          if below xor mirrored_r = '1' then
+          if below xor (x_negative_r /= y_negative_r) then
             angle_r <= angle_r - step;
           else
             angle_r <= angle_r + step;

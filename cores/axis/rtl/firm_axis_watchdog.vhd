@@ -1,0 +1,167 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Frees a stream of whole frames from a source that stops in the middle of a frame. After LIMIT cycles in which the
+-- receiver is ready and the source offers nothing, the frame ends with an abort (`tuser`) instead of its next beat, and
+-- the scheduler is told that the frame is over. The source's late beats up to its `tlast` are taken and dropped; if
+-- the source stops among them, its grant ends after LIMIT cycles as well. Then its next frame is forwarded.
+--
+-- A memory with one bit per source records which sources are late. It is cleared in the 2**n cycles after reset, for an
+-- index of n bits; no beat is taken meanwhile. The paths from input to output are combinational.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_axis_watchdog is
+  generic (
+    WIDTH   : integer := 8;
+    SOURCES : integer := 2;
+    -- Cycles without a beat within a frame, 1 or more.
+    LIMIT : integer := 1024
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- The source of the offered beat; changes between frames only.
+    source        : in  std_logic_vector(index_bits(SOURCES)-1 downto 0);
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- The bytes of the beat that aborts a frame are void.
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic;
+
+    -- For the scheduler: the frame ends without a beat of the source.
+    cut : out std_logic;
+    -- Pulses for each aborted frame, one bit for each source.
+    expired : out std_logic_vector(SOURCES-1 downto 0)
+  );
+end entity firm_axis_watchdog;
+
+architecture rtl of firm_axis_watchdog is
+
+  constant INDEX_BITS_USED : positive := index_bits(SOURCES);
+
+  type memory_t is array (natural range 0 to 2**INDEX_BITS_USED-1) of std_logic_vector(0 downto 0);
+  signal is_late    : memory_t;  -- the rest of a frame of this source is dropped
+  signal address    : std_logic_vector(INDEX_BITS_USED-1 downto 0);
+  signal write_bit  : std_logic;
+  signal late_next  : std_logic_vector(0 downto 0);
+  signal late       : std_logic;
+  signal clearing_r : std_logic;
+  signal cleared_r  : unsigned(INDEX_BITS_USED-1 downto 0);  -- the next bit to clear
+
+  signal inside_r : std_logic;                    -- a frame has begun
+  signal waited_r : natural range 0 to LIMIT-1;   -- cycles in a row without a beat
+  signal cut_r    : std_logic;                    -- the frame is to end
+  signal ends     : std_logic;                    -- it ends in this cycle
+
+  signal accepted : std_logic;                    -- a beat may leave, or be dropped
+  signal ready    : std_logic;
+  signal taken    : std_logic;
+
+begin
+
+  assert is_stream_width(WIDTH)
+    report "firm_axis_watchdog: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+  assert SOURCES >= 1 and SOURCES <= 256
+    report "firm_axis_watchdog: SOURCES is " & integer'image(SOURCES) & "; legal: 1 to 256"
+    severity failure;
+  assert LIMIT >= 1
+    report "firm_axis_watchdog: LIMIT is " & integer'image(LIMIT) & "; legal: 1 or more"
+    severity failure;
+
+  late     <= is_late(to_integer(unsigned(address)))(0);
+  accepted <= not clearing_r and (m_axis_tready or late);
+  ready    <= accepted and not cut_r;
+  taken    <= s_axis_tvalid and ready;
+  ends     <= cut_r and accepted;
+
+  address      <= std_logic_vector(cleared_r) when clearing_r = '1' else source;
+  write_bit    <= clearing_r or ends or (taken and s_axis_tlast);
+  late_next(0) <= ends and not clearing_r;
+
+  remember_late : process (clk)
+  begin
+    if rising_edge(clk) then
+      if write_bit = '1' then
+        is_late(to_integer(unsigned(address))) <= late_next;
+      end if;
+    end if;
+  end process remember_late;
+
+  clear_memory : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        clearing_r <= '1';
+        cleared_r  <= (others => '0');
+      elsif clearing_r = '1' then
+        cleared_r <= cleared_r + 1;
+        if cleared_r = 2**INDEX_BITS_USED-1 then
+          clearing_r <= '0';
+        end if;
+      end if;
+    end if;
+  end process clear_memory;
+
+  watch : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        inside_r <= '0';
+        waited_r <= 0;
+        cut_r    <= '0';
+      elsif ends = '1' then
+        inside_r <= '0';
+        cut_r    <= '0';
+      elsif taken = '1' then
+        inside_r <= not s_axis_tlast;
+        waited_r <= 0;
+      elsif inside_r = '1' and ready = '1' then
+        if waited_r = LIMIT-1 then
+          waited_r <= 0;
+          cut_r    <= '1';
+        else
+          waited_r <= waited_r + 1;
+        end if;
+      end if;
+    end if;
+  end process watch;
+
+  report_frames : process (clk)
+  begin
+    if rising_edge(clk) then
+      expired <= decode(source, rst_n and ends and not late, SOURCES);
+    end if;
+  end process report_frames;
+
+  end_frame : process (s_axis_tkeep, s_axis_tuser, s_axis_tlast, cut_r)
+  begin
+    m_axis_tkeep <= s_axis_tkeep;
+    m_axis_tuser <= s_axis_tuser;
+    m_axis_tlast <= s_axis_tlast;
+    if cut_r = '1' then
+      m_axis_tkeep    <= (others => '0');
+      m_axis_tkeep(0) <= '1';
+      m_axis_tuser    <= "1";
+      m_axis_tlast    <= '1';
+    end if;
+  end process end_frame;
+
+  m_axis_tdata  <= s_axis_tdata;
+  m_axis_tvalid <= not clearing_r and not late and (s_axis_tvalid or cut_r);
+  s_axis_tready <= ready;
+  cut           <= ends;
+
+end architecture rtl;

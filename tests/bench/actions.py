@@ -1,0 +1,182 @@
+"""Time of `firm test` and `firm build --cached` if nothing has changed, on one machine and on a second one."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.message import ROS2
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.store.server import Server
+from fusesoc_firm.store.store import Store
+from fusesoc_firm.tools.library_path import demos_root, library_root
+from tests.bench.store import APPLICATIONS
+from tests.bench.systems import processor_time
+from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
+from tests.hdl.ghdl import REPOSITORY
+
+TITLE = "Unchanged steps of builds"
+CONVERTERS = 30
+
+_COLUMNS = ("what", "state", "builds", "steps run", "wall, s", "processor, s", "bar, s", "result")
+_NOTE = f"""
+    The lint of {CONVERTERS} cores, each with one converter, is `firm build --cached`: GHDL's netlist and Verilator's
+    lint. The simulations of the seven applications with GHDL, Icarus Verilog and Verilator are `firm test`. A second
+    machine has an empty store and no builds, and reads the remote store to which the first run wrote, over HTTP on
+    the same machine. 'steps run' counts the steps that were not cached. Times include the start of Python. The bar
+    applies to the processor time of all processes, which is at least the wall-clock time on an idle machine.
+    """
+_TOKEN = "bench"
+_FIRST, _UNCHANGED, _REMOVED, _SECOND = "first run", "unchanged", "builds removed", "second machine"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A command, and the seconds that it may take in each state after the first run."""
+
+    name: str
+    command: tuple[str, ...]
+    bars: Mapping[str, float]
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The states in which the command runs, one after the other."""
+        return (_FIRST, *self.bars)
+
+
+JOBS = (
+    Job(
+        f"lint of {CONVERTERS} converters",
+        ("build", "bench:lint:*@lint", "--cached", "--build-only"),
+        {_UNCHANGED: 2.5},
+    ),
+    Job(
+        "simulations of the applications",
+        ("test", *(f"robot:sys:{name}" for name in APPLICATIONS)),
+        {_UNCHANGED: 5, _REMOVED: 10, _SECOND: 60},
+    ),
+)
+
+
+def keys() -> dict[str, list[tuple[str, ...]]]:
+    """The first cells of every row, by table."""
+    return {TITLE: [(job.name, state) for job in JOBS for state in job.states]}
+
+
+def measure(tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
+    """Run the jobs whose names match; the rows of the others are those of the written page."""
+    known = known_rows(written, TITLE, _COLUMNS)
+    rows: list[tuple[str, ...]] = []
+    for job in JOBS:
+        if not re.search(pattern, job.name):
+            missing = ("", "", "", "", "", NOT_MEASURED)
+            rows += [known.get((job.name, state), (job.name, state, *missing)) for state in job.states]
+            continue
+        with tempfile.TemporaryDirectory() as place:
+            for row in _rows(job, Path(place), tell):
+                tell(" ".join(row))
+                rows.append(row)
+    return [Table(TITLE, _COLUMNS, tuple(rows), _NOTE)]
+
+
+def _rows(job: Job, folder: Path, tell: Tell) -> Iterator[tuple[str, ...]]:
+    _write_project(folder)
+    with _served(folder / "served") as url:
+        for state in job.states:
+            if state in (_REMOVED, _SECOND):
+                shutil.rmtree(folder / "build")
+            machine = "second" if state == _SECOND else "first"
+            token = _TOKEN if state == _FIRST else ""
+            bar = job.bars.get(state)
+            try:
+                found = run(job.command, folder, machine, url, token)
+            except subprocess.CalledProcessError as error:
+                tell(f"{job.name}, {state}: {error.stdout}{error.stderr}")
+                yield (job.name, state, "", "", "", "", f"{bar or ''}", FAILED)
+                return
+            is_met = not bar or (found.processor <= bar and not found.steps)
+            yield (
+                *(job.name, state, str(found.builds), str(found.steps), f"{found.wall:.1f}", f"{found.processor:.1f}"),
+                *(("", "") if bar is None else (f"{bar:g}", MET if is_met else MISSED)),
+            )
+
+
+@dataclass(frozen=True)
+class Run:
+    """The numbers of builds and of steps that ran, and the seconds of the wall clock and of the processors."""
+
+    builds: int
+    steps: int
+    wall: float
+    processor: float
+
+
+def run(command: Sequence[str], folder: Path, machine: str, url: str, token: str) -> Run:
+    """Run a command of `firm` in a project, with the store of a machine. Raises `CalledProcessError`."""
+    variables = {
+        "PYTHONPATH": str(REPOSITORY),
+        "FUSESOC_FIRM_CACHE": str(folder / "stores" / machine),
+        "FUSESOC_FIRM_ACTIONS_TWICE": "0",
+        "FUSESOC_FIRM_REMOTE": url,
+        "FUSESOC_FIRM_REMOTE_TOKEN": token,
+    }
+    events = folder / "events"
+    before, start = processor_time(), time.monotonic()
+    subprocess.run(
+        [sys.executable, "-m", "fusesoc_firm.cli", *command, "--events", str(events)],
+        cwd=folder,
+        env={**os.environ, **variables},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    wall, processor = time.monotonic() - start, processor_time() - before
+    ends = [line for text in events.read_text().splitlines() if (line := json.loads(text))["event"] == "end"]
+    steps = sum(step["state"] != "cached" for line in ends for step in line["steps"])
+    return Run(len(ends), steps, wall, processor)
+
+
+def _write_project(folder: Path) -> None:
+    """Write a project with our libraries and a core for each of the first converters."""
+    libraries = {"firm": library_root(), "demos": demos_root(), "bench": "library"}
+    places = "".join(f"[library.{name}]\nlocation = {place}\n" for name, place in libraries.items())
+    (folder / "fusesoc.conf").write_text(f"[main]\nignored_dirs = build\n{places}")
+    (folder / "library").mkdir()
+    for number, name in enumerate([*MessageLibrary(ROS2).names()][:CONVERTERS]):
+        top = f"axis_to_{str(name).replace('/', '_').lower()}"
+        parameters = f"{{message: {name}, ros: 2, direction: subscriber, width: 32, name: c{number}}}"
+        lines = (
+            "CAPI=2:",
+            f"name: bench:lint:c{number}:1.0",
+            'filesets: {base: {depend: ["robot:firm:generators"]}}',
+            f"generate: {{one: {{generator: firm, parameters: {parameters}}}}}",
+            "targets:",
+            f"  lint: {{filesets: [base], generate: [one], toplevel: c{number}_{top}, flow: lint, flow_options:",
+            "    {tool: verilator, frontends: [ghdlsynth], ghdlsynth_refuse_loops: true}}",
+            "",
+        )
+        (folder / "library" / f"c{number}.core").write_text("\n".join(lines))
+
+
+@contextmanager
+def _served(folder: Path) -> Iterator[str]:
+    """Serve a remote store within this context, and yield its URL."""
+    with Server(Store(folder, 2**33), "127.0.0.1", 0, _TOKEN) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            yield server.url
+        finally:
+            server.shutdown()
+            thread.join()

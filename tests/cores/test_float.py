@@ -1,0 +1,319 @@
+"""robot:acc:firm_float in simulation: every operation over 10,000 operands against NumPy or exact arithmetic."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import random
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.hdl.ghdl import CORES, Generic, Library, core_files
+
+FLOAT = CORES / "acc" / "float"
+SEED = 2718
+COUNT = 10_000
+SIZES = {"float64": (11, 52), "float32": (8, 23)}
+TYPES: dict[str, Any] = {"float64": np.float64, "float32": np.float32}
+BITS: dict[str, Any] = {"float64": np.uint64, "float32": np.uint32}
+
+
+def load_model() -> ModuleType:
+    specification = importlib.util.spec_from_file_location("firm_float_model", FLOAT / "model.py")
+    assert specification
+    assert specification.loader
+    module = importlib.util.module_from_spec(specification)
+    # Its dataclass looks for the module by name.
+    sys.modules[specification.name] = module
+    specification.loader.exec_module(module)
+    return module
+
+
+MODEL = load_model()
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    found = Library("firm", tmp_path_factory.mktemp("float"))
+    found.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/float/float"))
+    found.analyse(core_files("acc/float/float", fileset="tb"))
+    return found
+
+
+class Numbers:
+    """Operands of one size that meet every special case."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.exponent_bits, self.mantissa_bits = SIZES[name]
+        self.width = 1 + self.exponent_bits + self.mantissa_bits
+        self.random = random.Random(f"{SEED} {name}")
+        top = ((1 << self.exponent_bits) - 1) << self.mantissa_bits
+        least = 1 << self.mantissa_bits
+        one = (2 ** (self.exponent_bits - 1) - 1) << self.mantissa_bits
+        # Zero, subnormal numbers, the normal ones beside them, one and its neighbours, the largest, infinity, NaN.
+        magnitudes = [0, 1, 2, 3, least >> 1, least - 1, least, least + 1, one - 1, one, one + 1, one + (least >> 1)]
+        magnitudes += [top - 1, top, top + 1, top + (least >> 1), top + least - 1]
+        self.specials = [sign << (self.width - 1) | bits for sign in (0, 1) for bits in magnitudes]
+
+    def draw(self) -> int:
+        """Draw a number: any bits, a special one, one of few bits, or one beside zero."""
+        kind = self.random.random()
+        bits = self.random.getrandbits(self.width)
+        if kind < 0.1:
+            return int(self.random.choice(self.specials))
+        exponent = self.random.randint(-60, 60) + 2 ** (self.exponent_bits - 1) - 1
+        field: int = min(max(exponent, 0), 2**self.exponent_bits - 2) << self.mantissa_bits
+        sign = bits & (1 << (self.width - 1))
+        fraction = bits & ((1 << self.mantissa_bits) - 1)
+        if kind < 0.4:
+            return sign | field | fraction
+        if kind < 0.6:
+            few = self.random.randint(0, self.mantissa_bits)
+            return sign | field | fraction >> few << few
+        if kind < 0.7:
+            return sign | fraction >> self.random.randint(0, self.mantissa_bits)
+        return bits
+
+    def beside(self, bits: int) -> int:
+        """A number whose exponent is near that of another one, of any sign."""
+        near = bits + (self.random.randint(-2, 2) << self.random.randint(0, self.mantissa_bits))
+        near ^= self.random.getrandbits(1) << (self.width - 1)
+        return near & ((1 << self.width) - 1)
+
+    def halves(self, bits: int) -> int:
+        """A number whose sum with another one is a tie, or nearly."""
+        exponent = (bits >> self.mantissa_bits) & ((1 << self.exponent_bits) - 1)
+        field = max(exponent - self.mantissa_bits - 1, 0) << self.mantissa_bits
+        return field + self.random.choice((-1, 0, 0, 0, 1)) & ((1 << self.width) - 1)
+
+    def second(self, first: int) -> int:
+        """A further operand."""
+        return self.random.choice((lambda _: self.draw(), self.beside, self.halves))(first)
+
+    def several(self, count: int, operands: int) -> list[list[int]]:
+        """Rows of operands: every pair of special numbers, then any."""
+        rows = [[a, b, *(self.draw() for _ in range(operands - 2))] for a in self.specials for b in self.specials]
+        if operands == 1:
+            rows = [[a] for a in self.specials]
+        while len(rows) < count:
+            first = self.draw()
+            rows.append([first, *(self.second(first) for _ in range(operands - 1))])
+        return rows
+
+    def values(self, bits: Iterable[int]) -> Any:
+        return np.array(list(bits), dtype=BITS[self.name]).view(TYPES[self.name])
+
+
+def operate(
+    library: Library, folder: Path, width: int, rows: Sequence[Sequence[int]], **generics: Generic
+) -> tuple[list[int], str]:
+    """The results of the bench as integers, and its report."""
+    lines = ("".join(format(number, f"0{width}b") for number in row) for row in rows)
+    (folder / "vectors.txt").write_text("\n".join(lines) + "\n")
+    paths = {"VECTORS": str(folder / "vectors.txt"), "RESULTS": str(folder / "results.txt")}
+    print(f"seed {SEED}")
+    found = library.run("firm_float_tb", {"SEED": SEED, **paths, **generics})
+    assert found.exit_code == 0, found.output
+    return [int(line, 2) for line in (folder / "results.txt").read_text().split()], found.output
+
+
+def check(numbers: Numbers, rows: Sequence[Sequence[int]], found: Sequence[int], expected: Any) -> None:
+    """Every bit is equal; a NaN is the positive quiet one."""
+    quiet = (2 ** (numbers.exponent_bits + 1) - 1) << (numbers.mantissa_bits - 1)
+    wanted = np.where(np.isnan(expected), quiet, expected.view(BITS[numbers.name]))
+    assert len(found) == len(wanted)
+    wrong = [
+        f"{[format(number, 'x') for number in row]}: {bits:x}, expected {int(right):x}"
+        for row, bits, right in zip(rows, found, wanted, strict=True)
+        if bits != right
+    ]
+    assert not wrong, "\n".join([f"{len(wrong)} wrong", *wrong[:20]])
+
+
+def size_of(numbers: Numbers) -> dict[str, Generic]:
+    return {"EXPONENT_BITS": numbers.exponent_bits, "MANTISSA_BITS": numbers.mantissa_bits}
+
+
+OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
+    "add": np.add,
+    "subtract": np.subtract,
+    "multiply": np.multiply,
+}
+
+
+@pytest.mark.parametrize("name", SIZES)
+@pytest.mark.parametrize("operation", OPERATIONS)
+def test_results_are_those_of_numpy(library: Library, tmp_path: Path, operation: str, name: str) -> None:
+    numbers = Numbers(name)
+    rows = numbers.several(COUNT, 2)
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION=operation, **size_of(numbers))
+    with np.errstate(all="ignore"):
+        expected = OPERATIONS[operation](*(numbers.values(column) for column in zip(*rows, strict=True)))
+    check(numbers, rows, found, expected)
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_a_product_and_sum_is_rounded_once(library: Library, tmp_path: Path, name: str) -> None:
+    numbers = Numbers(name)
+    rows = numbers.several(COUNT, 3)
+    with np.errstate(all="ignore"):
+        for row in rows[COUNT // 2 :]:
+            # The sum cancels the product, or nearly.
+            if numbers.random.random() < 0.5:
+                product = np.multiply(*numbers.values(row[:2]))
+                row[2] = numbers.beside(int(product.view(BITS[name])))
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="multiply_add", **size_of(numbers))
+    size = MODEL.Format(*SIZES[name])
+    expected = [MODEL.multiply_add(*map(float, numbers.values(row)), size) for row in rows]
+    check(numbers, rows, found, np.array(expected, dtype=TYPES[name]))
+
+
+@pytest.mark.parametrize(("name", "other"), [("float64", "float32"), ("float32", "float64")])
+def test_conversions_between_sizes_are_those_of_numpy(library: Library, tmp_path: Path, name: str, other: str) -> None:
+    numbers, results = Numbers(name), Numbers(other)
+    rows = numbers.several(COUNT, 1)
+    if name == "float64":
+        # Numbers beside those of float32, and beside the middle of two.
+        for row in rows[COUNT // 2 :]:
+            near = results.values([results.draw()]).astype(np.float64).view(np.uint64)[0]
+            row[0] = int(near) ^ numbers.random.choice((0, 1, 1 << 28, 1 << 28 | 1))
+    size = {"OUT_EXPONENT_BITS": results.exponent_bits, "OUT_MANTISSA_BITS": results.mantissa_bits}
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="resize", **size_of(numbers), **size)
+    with np.errstate(all="ignore"):
+        check(results, rows, found, numbers.values(row[0] for row in rows).astype(TYPES[other]))
+
+
+FIXED = [(32, 0, True), (64, 0, True), (64, 0, False), (8, 0, False), (16, 8, True), (40, 30, True), (128, 100, True)]
+
+
+@pytest.mark.one_in(3)
+@pytest.mark.parametrize("name", SIZES)
+@pytest.mark.parametrize(("width", "fraction", "is_signed"), FIXED)
+def test_conversions_from_fixed_point(
+    library: Library, tmp_path: Path, name: str, width: int, fraction: int, is_signed: bool
+) -> None:
+    numbers = Numbers(name)
+    ends = [0, 1, 2, 3, 2**width - 1, 2 ** (width - 1), 2 ** (width - 1) - 1, 2 ** (width - 1) + 1]
+    rows = [[end] for end in ends]
+    while len(rows) < COUNT:
+        bits = numbers.random.getrandbits(width) >> numbers.random.randrange(width)
+        rows.append([numbers.random.choice((bits, 2**width - 1 - bits))])
+    generics = {"WIDTH": width, "FRACTION": fraction, "IS_SIGNED": is_signed}
+    found, _ = operate(library, tmp_path, width, rows, OPERATION="from_fixed", **size_of(numbers), **generics)
+    size = MODEL.Format(*SIZES[name])
+    signed = [row[0] - (2**width if is_signed and row[0] >= 2 ** (width - 1) else 0) for row in rows]
+    expected = np.array([MODEL.from_fixed(number, fraction, size) for number in signed], dtype=TYPES[name])
+    check(numbers, rows, found, expected)
+    if not fraction and width <= 64:
+        # NumPy's conversion of its integers.
+        integers = np.array(signed, dtype=np.int64 if is_signed else np.uint64)
+        check(numbers, rows, found, integers.astype(TYPES[name]))
+
+
+@pytest.mark.one_in(3)
+@pytest.mark.parametrize("truncates", [False, True])
+@pytest.mark.parametrize("name", SIZES)
+@pytest.mark.parametrize(("width", "fraction", "is_signed"), FIXED)
+def test_conversions_to_fixed_point(
+    library: Library, tmp_path: Path, name: str, width: int, fraction: int, is_signed: bool, truncates: bool
+) -> None:
+    numbers = Numbers(name)
+    rows = numbers.several(COUNT // 2, 1)
+    size = MODEL.Format(*SIZES[name])
+    while len(rows) < COUNT:
+        # In range or a little beyond, often half a unit.
+        halves = numbers.random.randint(-(2**width), 2 ** (width + 1)) >> numbers.random.randrange(width)
+        near = TYPES[name](MODEL.from_fixed(halves, fraction + 1, size))
+        rows.append([int(near.view(BITS[name]))])
+    generics = {"WIDTH": width, "FRACTION": fraction, "IS_SIGNED": is_signed, "TRUNCATES": truncates}
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="to_fixed", **size_of(numbers), **generics)
+    expected = []
+    for row in rows:
+        number = float(numbers.values(row)[0])
+        units, beyond, undefined = MODEL.to_fixed(number, width, fraction, is_signed=is_signed, truncates=truncates)
+        expected.append((units % 2**width) << 2 | beyond << 1 | undefined)
+    wrong = [
+        (hex(row[0]), hex(bits), hex(right))
+        for row, bits, right in zip(rows, found, expected, strict=True)
+        if bits != right
+    ]
+    assert not wrong, (len(wrong), wrong[:10])
+
+
+# In cycles, as docs/reference/arithmetic.md states them: of float64, then of float32.
+LATENCIES = {
+    "add": (14, 14),
+    "multiply": (15, 14),
+    "multiply_add": (21, 18),
+    "resize": (7, 8),
+    "from_fixed": (8, 8),
+    "to_fixed": (6, 6),
+}
+
+
+@pytest.mark.parametrize("name", SIZES)
+@pytest.mark.parametrize("operation", LATENCIES)
+def test_latency_and_throughput(library: Library, tmp_path: Path, operation: str, name: str) -> None:
+    numbers = Numbers(name)
+    rows = [[0]] * 50
+    width = {"from_fixed": 32, "multiply_add": 3 * numbers.width, "resize": numbers.width, "to_fixed": numbers.width}
+    other = SIZES["float32" if name == "float64" else "float64"]
+    generics = {**size_of(numbers), "OUT_EXPONENT_BITS": other[0], "OUT_MANTISSA_BITS": other[1]}
+    bits = width.get(operation, 2 * numbers.width)
+    _, report = operate(library, tmp_path, bits, rows, OPERATION=operation, STALLS=0, **generics)
+    latency, cycles = map(int, re.findall(r"\d+", report.splitlines()[-1]))
+    assert latency == LATENCIES[operation][list(SIZES).index(name)]
+    # One result in every cycle.
+    assert cycles == latency + len(rows)
+
+
+ENTITIES = {
+    "multiply": "firm_float_multiply",
+    "add": "firm_float_add",
+    "multiply_add": "firm_float_multiply_add",
+    "to_fixed": "firm_float_to_fixed",
+    "from_fixed": "firm_fixed_to_float",
+}
+
+
+@pytest.mark.parametrize("operation", ENTITIES)
+def test_netlists_have_no_latches_and_the_same_results(library: Library, tmp_path: Path, operation: str) -> None:
+    numbers = Numbers("float32")
+    operands = {"multiply_add": 3, "multiply": 2, "add": 2}.get(operation, 1)
+    rows = random.Random(SEED).sample(numbers.several(2000, operands), 300)
+    results, _ = operate(library, tmp_path, 32, rows, OPERATION=operation, **size_of(numbers))
+    assert library.latches(ENTITIES[operation], size_of(numbers)) == []
+    netlist = Library("firm", tmp_path)
+    netlist.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/float/float"))
+    netlist.replace_by_netlist(ENTITIES[operation], size_of(numbers))
+    netlist.analyse(core_files("acc/float/float", fileset="tb"))
+    assert operate(netlist, tmp_path, 32, rows, OPERATION=operation, **size_of(numbers))[0] == results
+
+
+def test_the_model_has_the_results_of_numpy() -> None:
+    numbers = Numbers("float32")
+    for row in numbers.several(2000, 2):
+        a, b = map(float, numbers.values(row))
+        with np.errstate(all="ignore"):
+            product = float(np.float32(a) * np.float32(b))
+        if not math.isnan(product):
+            assert MODEL.multiply_add(a, b, -0.0, MODEL.FLOAT32) == product
+
+
+def own_data(name: str) -> list[str]:
+    return (FLOAT / "tb" / "data" / f"{name}.txt").read_text().split()
+
+
+def test_the_results_that_the_own_bench_expects_are_right() -> None:
+    numbers = Numbers("float64")
+    rows = [[int(line[k : k + 64], 2) for k in (0, 64, 128)] for line in own_data("vectors")]
+    expected = [MODEL.multiply_add(*map(float, numbers.values(row))) for row in rows]
+    check(numbers, rows, [int(line, 2) for line in own_data("expected")], np.array(expected))
