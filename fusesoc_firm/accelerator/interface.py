@@ -18,6 +18,7 @@ _FIELD = re.compile(r"([\w.\[\]]+): ")
 # Names of fields that a message has in only one version of ROS; a source file may serve both versions.
 _OF_ONE_ROS = ("nsec", "nanosec", "seq")
 _WORDS = {"in": "input", "out": "output"}
+_KINDS = {"in": "an input", "out": "an output"}
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,9 @@ def compare(type_: AcceleratorType, units: Sequence[Unit], faults: Diagnostics) 
 
 def _compare_port(port: UnitPort, wanted: WantedPort, faults: Diagnostics) -> None:
     if port.direction != wanted.direction:
-        message = f"{port.name} is an {_WORDS.get(port.direction, port.direction)}, and {wanted.origin} needs an "
-        faults.error(f"{message}{_WORDS[wanted.direction]}", port.place)
+        kind = _KINDS.get(port.direction, f"a {port.direction} port")
+        message = f"{port.name} is {kind}, and {wanted.origin} needs {_KINDS[wanted.direction]}"
+        faults.error(message, port.place)
     legal = ("std_logic", "std_ulogic") if wanted.width is None else ("std_logic_vector",)
     if port.type and port.type not in legal:
         message = f"{port.name} has the type {port.type}, {wanted.origin} needs {vhdl_type(wanted.width)}"

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import add_sources, command
+from fusesoc_firm.cli.common import add_sources, command, positive
+from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.library import Libraries
+    from fusesoc_firm.simulation.excerpt import Recording
+    from fusesoc_firm.system.scaffold.project import Project
+
+# The options that describe a new system, which an example has already.
+_DESCRIBING = ("input", "output", "ros", "language", "width", "from_bag", "limit")
+_OPTIONS = {"input": "--in", "output": "--out", "from_bag": "--from-bag"}
 
 
 def add_init(commands: Any) -> None:
@@ -26,8 +37,18 @@ def add_init(commands: Any) -> None:
         nargs="?",
         help="the name of the folder, the system and the accelerator (default: asked)",
     )
-    init.add_argument("--in", dest="input", metavar="TYPE", help="the message that is received (default: asked)")
-    init.add_argument("--out", dest="output", metavar="TYPE", help="the message that is sent (default: asked)")
+    init.add_argument(
+        "--in",
+        dest="input",
+        metavar="TYPE|TOPIC",
+        help="the message that is received, or with --from-bag its topic (default: asked)",
+    )
+    init.add_argument(
+        "--out",
+        dest="output",
+        metavar="TYPE|TOPIC",
+        help="the message that is sent, or a topic in the bag with this message (default: asked)",
+    )
     init.add_argument("--ros", choices=("1", "2"), help="the ROS version (default: 2)")
     init.add_argument(
         "--language",
@@ -37,18 +58,78 @@ def add_init(commands: Any) -> None:
     init.add_argument(
         "--width", choices=[str(2**n) for n in range(3, 10)], help="width in bits of the streams (default: 8)"
     )
+    init.add_argument(
+        "--from-bag",
+        type=Path,
+        metavar="BAG",
+        help="take topics, messages and stimuli from a recorded bag (ROS 1 or ROS 2)",
+    )
+    init.add_argument(
+        "--limit",
+        type=positive,
+        metavar="N",
+        help="take at most N messages from the bag (default: 10, or fewer if they are longer than 100,000 bytes)",
+    )
+    init.add_argument(
+        "--example", metavar="DEMO", help="copy a demo system, such as quat2euler (NAME is then only the folder)"
+    )
     add_sources(init)
 
 
 def _init(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.converter.stream import WIDTHS
+    if arguments.limit and not arguments.from_bag:
+        fail("--limit needs --from-bag")
+    if arguments.example:
+        _copy_example(arguments)
+    else:
+        _start(arguments)
+
+
+def _copy_example(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.scaffold.example import copy_example
+    from fusesoc_firm.tools.library_path import demos_root, library_root
+
+    if given := [name for name in _DESCRIBING if getattr(arguments, name)]:
+        fail(f"an example has no {_OPTIONS.get(given[0], f'--{given[0]}')}", hint="only NAME can be chosen")
+    folder = Path(arguments.name or arguments.example)
+    _print_files(folder, copy_example(arguments.example, folder, demos_root(), library_root()))
+    print(f"next: cd {folder} && firm sim {arguments.example}.yaml")
+
+
+def _start(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.library import libraries
-    from fusesoc_firm.message.middleware import middleware_of
-    from fusesoc_firm.system.scaffold.project import ask, create
-    from fusesoc_firm.text.prompts import asker
+    from fusesoc_firm.system.scaffold.project import create
     from fusesoc_firm.tools.library_path import library_root
 
-    known = libraries(arguments.path, os.environ, arguments.distro)
+    recording = _recording(arguments)
+    places = [recording.path] if recording and recording.has_definitions else []
+    known = libraries([*arguments.path, *places], os.environ, arguments.distro)
+    project = _project(arguments, known, recording)
+    if recording:
+        project = replace(project, stimuli=recording.stimuli(project, known[recording.ros], arguments.limit))
+    folder = Path(project.name)
+    _print_files(folder, create(project, folder, known, library_root(), arguments.path))
+    print(f"next: cd {folder} && firm sim")
+
+
+def _recording(arguments: argparse.Namespace) -> Recording | None:
+    if arguments.from_bag is None:
+        return None
+    from fusesoc_firm.simulation.excerpt import Recording
+
+    found = Recording.of(arguments.from_bag)
+    if arguments.ros and int(arguments.ros) != found.ros.number:
+        fail(f"{found.path} uses {found.ros.title}, not ROS {arguments.ros}", hint="omit --ros")
+    return found
+
+
+def _project(arguments: argparse.Namespace, known: Libraries, recording: Recording | None) -> Project:
+    """Return the project from the options and, for the rest, from answers to questions."""
+    from fusesoc_firm.converter.stream import WIDTHS
+    from fusesoc_firm.message.middleware import middleware_of
+    from fusesoc_firm.system.scaffold.project import ask
+    from fusesoc_firm.text.prompts import asker
+
     given = {
         "name": arguments.name,
         "in": arguments.input,
@@ -58,15 +139,21 @@ def _init(arguments: argparse.Namespace) -> None:
         "width": arguments.width,
     }
     answers = {name: value for name, value in given.items() if value is not None}
+    if recording:
+        answers["ros"] = str(recording.ros.number)
+        if not {"in", "out"} <= answers.keys():
+            print(*recording.table, sep="\n")
     if {"name", "in", "out"} <= answers.keys():
         answers = {"ros": "2", "language": "vhdl", "width": "8"} | answers
 
     def names(ros: int) -> Sequence[str]:
         return [] if {"in", "out"} <= answers.keys() else [str(name) for name in known[middleware_of(ros)].names()]
 
-    project = ask(answers, asker(), names, [str(width) for width in WIDTHS])
-    folder = Path(project.name)
-    for path in create(project, folder, known, library_root(), arguments.path):
+    topics = {topic: str(message) for topic, (message, _) in recording.topics.items()} if recording else {}
+    return ask(answers, asker(), names, [str(width) for width in WIDTHS], topics)
+
+
+def _print_files(folder: Path, files: Iterable[Path]) -> None:
+    for path in files:
         if not path.name.startswith(".") and path.name != "FUSESOC_IGNORE":
             print(folder / path)
-    print(f"next: cd {folder} && firm sim")

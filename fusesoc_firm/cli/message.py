@@ -71,6 +71,7 @@ def _add_verification(verify: argparse.ArgumentParser) -> None:
         "--cluster", metavar="ADDRESS", help="run on the Dask cluster of the scheduler at ADDRESS, not on this machine"
     )
     verify.add_argument("--report", type=Path, metavar="F.json", help="write the report to F.json and F.html")
+    verify.add_argument("--json", action="store_true", help="print the report as JSON instead of a summary")
     verify.add_argument("--keep", type=Path, metavar="DIR", help="keep the work folder of each failed message in DIR")
 
 
@@ -101,5 +102,5 @@ def _verify_messages(arguments: argparse.Namespace) -> None:
         library_of(arguments, arguments.ros),
         arguments.types,
         Settings(arguments.width, arguments.stimuli, arguments.seed, keeps_files=arguments.keep is not None),
-        Places(arguments.jobs, arguments.cluster, arguments.report, arguments.keep, command),
+        Places(arguments.jobs, arguments.cluster, arguments.report, arguments.keep, command, arguments.json),
     )

@@ -70,6 +70,7 @@ def add_replay(commands: Any) -> None:
         metavar="CYCLES",
         help="number of cycles without a beat after which the system is considered idle (default: %(default)s)",
     )
+    replay.add_argument("--json", action="store_true", help="print the summary as JSON, for other programs")
     add_simulator_options(replay)
 
 
@@ -103,6 +104,6 @@ def _replay(arguments: argparse.Namespace) -> None:
         load(arguments),
         Source(arguments.source, arguments.limit, arguments.start, arguments.duration),
         Target(arguments.target, Form(arguments.format) if arguments.format else None, arguments.force),
-        Settings(dict(arguments.map), arguments.quiet, arguments.latency),
+        Settings(dict(arguments.map), arguments.quiet, arguments.latency, arguments.json),
         start,
     )

@@ -24,8 +24,8 @@ _NARROWEST = 60
 _ERROR = re.compile(r"(?:\b|:)error\b|^Traceback|^\S+:\d+:\d+: ", re.IGNORECASE)
 # Lines of FuseSoC, Edalize and make around the message of the tool that failed.
 _NOISE = re.compile(
-    r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|Setup failed)|far: |(Entering|Leaving) directory "
-    r"|\S+ -m fusesoc_firm\.cli tool "
+    r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|Setup failed|.* exited with an error)|far: "
+    r"|(Entering|Leaving) directory |\S+ -m fusesoc_firm\.cli tool "
 )
 # A place in a file that FuseSoC copied into the build folder.
 _COPY = re.compile(r"(?<!\S)src/[^/\s]+/(?P<path>[^\s:]+):(?P<line>\d+)\b")
@@ -145,7 +145,8 @@ def _print_errors(chosen: Simulation, folder: Path | None, loaded: LoadedSystem 
     """
     lines = [line for line in chosen.build.log.read_text(encoding="utf-8").splitlines() if not _NOISE.match(line)]
     first = next((number for number, line in enumerate(lines) if _ERROR.search(line)), max(0, len(lines) - _MOST_LINES))
-    for line in lines[first : first + _MOST_LINES]:
+    here = f"{Path.cwd().resolve()}/"
+    for line in (text.removeprefix(here) for text in lines[first : first + _MOST_LINES]):
         place = _COPY.search(line)
         original = _original(place, chosen.build.work_root, folder) if place else None
         named = (

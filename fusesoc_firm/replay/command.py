@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -9,6 +10,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -64,12 +66,13 @@ class Settings:
     """The settings of a replay: `names` renames topics of blocks.
 
     The hardware is at rest after `quiet` cycles without a beat. If latency is included, a response's stamp is the
-    cause's stamp plus the hardware's latency.
+    cause's stamp plus the hardware's latency. The summary is a table, or JSON if `is_json` is set.
     """
 
     names: Mapping[str, str]
     quiet: int
     has_latency: bool = False
+    is_json: bool = False
 
 
 def replay(
@@ -106,7 +109,10 @@ def replay(
             run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
             going = _Replay(bag, routes, run, topics, written, clock)
             going.play(source)
-        going.print_summary(target.path)
+        if settings.is_json:
+            print(json.dumps(going.summary(target.path), indent=2, ensure_ascii=False))
+        else:
+            going.print_summary(target.path)
     if going.errors:
         errors = "1 error" if going.errors == 1 else f"{going.errors} errors"
         fail(f"{errors}; {going.refused} of {going.played.total()} messages had errors")
@@ -127,6 +133,8 @@ class _Replay:
     refused: int = 0
     errors: int = 0
     is_over: bool = False
+    # The first errors, each in one line.
+    shown: list[str] = field(default_factory=list)
 
     def play(self, source: Source) -> None:
         """Replay all messages, and report an early end."""
@@ -182,28 +190,53 @@ class _Replay:
     def _report(self, fault: str) -> None:
         self.errors += 1
         if self.errors <= _SHOWN:
+            self.shown.append(fault)
             tqdm.write(f"error: {self.bag.path}: {fault}", file=sys.stderr)
 
+    def summary(self, path: Path) -> dict[str, Any]:
+        """Return the numbers of received, sent and dropped messages by topic, and the first errors."""
+        return {
+            "bag": str(path),
+            "in": [
+                _count(stream.topic, stream.type, self.played[stream])
+                | {"blocks": [item.block for item in route.subscribers]}
+                for stream, route in self.routes.items()
+            ],
+            "out": [
+                _count(topic.name, topic.type, self.sent[block]) | {"block": block}
+                for block, topic in self.topics.items()
+            ],
+            "dropped": [
+                _count(stream.topic, stream.type, count)
+                for stream, count in self.bag.streams.items()
+                if stream not in self.routes
+            ],
+            "errors": self.errors,
+            "messages_with_errors": self.refused,
+            "first_errors": self.shown,
+            "cycles": self.run.simulator.cycle,
+        }
+
     def print_summary(self, path: Path) -> None:
-        """Print the numbers of received and sent messages, topic by topic."""
+        """Print the summary as a table."""
+        found = self.summary(path)
         if self.errors > _SHOWN:
             print(f"and {self.errors - _SHOWN} more errors", file=sys.stderr)
-        rows = [("in", *self._way(stream), str(self.played[stream])) for stream in self.routes]
-        rows += [("out", block, topic.name, topic.type, str(self.sent[block])) for block, topic in self.topics.items()]
+        rows = [("in", ", ".join(row["blocks"]), row["topic"], row["type"], str(row["count"])) for row in found["in"]]
+        rows += [("out", row["block"], row["topic"], row["type"], str(row["count"])) for row in found["out"]]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         for *words, count in rows:
             print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
-        dropped = {stream: count for stream, count in self.bag.streams.items() if stream not in self.routes}
-        for stream, number in dropped.items():
-            print(f"no subscriber for {stream.topic} ({stream.type}): {number}")
+        for row in found["dropped"]:
+            print(f"no subscriber for {row['topic']} ({row['type']}): {row['count']}")
         print(
-            f"{path}: {self.played.total()} in, {self.sent.total()} out, {sum(dropped.values())} dropped,"
-            f" {self.errors} errors, {self.run.simulator.cycle} cycles"
+            f"{path}: {self.played.total()} in, {self.sent.total()} out,"
+            f" {sum(row['count'] for row in found['dropped'])} dropped, {self.errors} errors, {found['cycles']} cycles"
         )
 
-    def _way(self, stream: Stream) -> tuple[str, str, str]:
-        blocks = ", ".join(item.block for item in self.routes[stream].subscribers)
-        return blocks, stream.topic, stream.type
+
+def _count(topic: str, type_: str, count: int) -> dict[str, Any]:
+    return {"topic": topic, "type": type_, "count": count}
 
 
 def seconds(stamp: int) -> str:

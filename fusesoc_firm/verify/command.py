@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 import time
@@ -19,7 +20,7 @@ from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output, make_folder
 from fusesoc_firm.tools.workers import Workers, cluster_workers, local_workers
 from fusesoc_firm.verify.campaign import Entry, Settings, run, select
-from fusesoc_firm.verify.report import Report, make_report, write_report
+from fusesoc_firm.verify.report import Report, as_data, make_report, write_report
 from fusesoc_firm.verify.simulation import ghdl
 from fusesoc_firm.verify.task import Verdict
 
@@ -28,13 +29,17 @@ _SHOWN = 20
 
 @dataclass(frozen=True)
 class Places:
-    """The folders for work and results; `command` is the beginning of a command that verifies one message again."""
+    """The places for work and results; `command` is the beginning of a command that verifies one message again.
+
+    The report is printed as a summary, or as JSON if `is_json` is set.
+    """
 
     jobs: int | None = None
     cluster: str | None = None
     report: Path | None = None
     keep: Path | None = None
     command: Sequence[str] = ()
+    is_json: bool = False
 
 
 def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: Settings, places: Places) -> None:
@@ -64,7 +69,13 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
             bar.set_postfix_str(f"{entry.name}, {failed} failed", refresh=False)
             bar.update()
     report = make_report(entries, settings, time.monotonic() - started)
-    _print_summary(report, places)
+    beside = write_report(report, places.report) if places.report else None
+    if places.is_json:
+        print(json.dumps(as_data(report), indent=2, ensure_ascii=False))
+    else:
+        _print_summary(report, places)
+        if beside:
+            print(f"{places.report}, {beside}")
     totals = report.totals
     if totals[Verdict.FAIL]:
         fail(f"{totals[Verdict.FAIL]} of {len(entries)} messages failed")
@@ -102,5 +113,3 @@ def _print_summary(report: Report, places: Places) -> None:
     judges = Counter(entry.result.judge for entry in report.entries if entry.result.judge)
     judged = "; ".join(f"{count} by {judge}" for judge, count in sorted(judges.items()))
     print(f"{len(report.entries)} messages in {report.seconds:g} s: {counts}\njudged: {judged or 'none'}")
-    if places.report:
-        print(f"{places.report}, {write_report(report, places.report)}")

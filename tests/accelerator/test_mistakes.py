@@ -64,7 +64,7 @@ VHDL = [
     # directions
     ("out_data                       : out", "out_data : in ", "out_data", "out_data is an input"),
     ("in_width                       : in ", "in_width : out", "in_width", "in_width is an output"),
-    ("in_msg_ready                   : out", "in_msg_ready : buffer", "in_msg_ready", "in_msg_ready is an buffer"),
+    ("in_msg_ready                   : out", "in_msg_ready : buffer", "in_msg_ready", "in_msg_ready is a buffer port"),
     # types
     (
         "out_segment_valid              : out std_logic_vector(0 downto 0)",

@@ -16,6 +16,8 @@ from tests.pages.stage import stage
 LINES, COLUMNS = 250, 100
 # Written by commands; their lines of prose are as long as those of all pages.
 GENERATED = [DOCS / "figures"]
+# Followed by beginners, so they are run with the tests; `make docs` runs all pages.
+FOLLOWED = ["tutorials/first-accelerator.md", "how-to/start-from-a-bag.md"]
 # Drawn and held to the code by a test of its own.
 TESTED_PICTURES = {"house.svg"}
 
@@ -111,6 +113,12 @@ def test_the_source_of_the_site_has_every_file_that_is_linked(tmp_path: Path) ->
     copies = [Page(path) for path in sorted(tmp_path.rglob("*.md"))]
     assert len(copies) > len(pages())
     assert [link for page in copies for link in page.links if not link.file.exists()] == []
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("name", FOLLOWED)
+def test_a_page_for_beginners_prints_what_it_shows(tmp_path: Path, name: str) -> None:
+    assert check(Page(DOCS / name), tmp_path) == []
 
 
 PAGE = """\

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -298,6 +299,27 @@ def test_the_summary(tmp_path: Path, capsys: Captured) -> None:
     ]
     # A message takes 4 + 19 + 4 cycles, and 100 cycles of rest.
     assert lines[3] == f"{tmp_path}/o.bag: 12 in, 12 out, 1 dropped, 0 errors, {12 * 127} cycles"
+
+
+def test_the_summary_as_json(tmp_path: Path, capsys: Captured) -> None:
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 1)))
+    items = [*points("ros1", 12), ("/s", STRING, 10**18, payload("ros1", STRING, "x"))]
+    items[3] = (*items[3][:3], items[3][3][:-9])
+    source = bag(tmp_path, "ros1", items)
+    with pytest.raises(InputError, match="1 error; 1 of 12 messages had errors"):
+        run(loaded, source, tmp_path / "o.bag", "echo", quiet=100, is_json=True)
+    assert json.loads(capsys.readouterr().out) == {
+        "bag": f"{tmp_path}/o.bag",
+        "in": [{"topic": "/p", "type": "geometry_msgs/msg/Point", "count": 12, "blocks": ["p"]}],
+        "out": [{"topic": "/p_out", "type": "geometry_msgs/msg/Point", "count": 11, "block": "p_out"}],
+        "dropped": [{"topic": "/s", "type": STRING, "count": 1}],
+        "errors": 1,
+        "messages_with_errors": 1,
+        "first_errors": [
+            "/p, message 3, at 1000000000.030000000: the payload of geometry_msgs/Point must have 24 bytes, not 15"
+        ],
+        "cycles": 11 * 127,
+    }
 
 
 # --- what does not go through ----------------------------------------------------------------------------------------

@@ -218,7 +218,8 @@ def test_a_source_that_withdraws_is_found(gates: Library) -> None:
 def test_the_command_reports(tmp_path: Path, capsys: Captured) -> None:
     path = tmp_path / "report.json"
     names = ["geometry_msgs/Po?nt", "geometry_msgs/Vector3", "std_msgs/Empty"]
-    assert main(["message", "verify", *names, "--ros", "1", "--report", str(path), "--width", "64", "--jobs", "1"]) == 0
+    command = ["message", "verify", *names, "--ros", "1", "--report", str(path), "--width", "64", "--jobs", "1"]
+    assert main(command) == 0
     assert "3 messages in" in capsys.readouterr().out
     data = json.loads(path.read_text())
     assert [(each["name"], each["verdict"], each.get("same_as")) for each in data["messages"]] == [
@@ -228,6 +229,12 @@ def test_the_command_reports(tmp_path: Path, capsys: Captured) -> None:
     ]
     for text in (path.read_text(), path.with_suffix(".html").read_text()):
         assert str(tmp_path) not in text and str(REPOSITORY) not in text
+
+
+def test_the_command_prints_the_report_as_json(capsys: Captured) -> None:
+    assert main(["message", "verify", "std_msgs/Empty", "--jobs", "1", "--stimuli", "1", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert (data["totals"]["pass"], data["messages"][0]["name"]) == (1, "std_msgs/Empty")
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,16 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.frame.length import sent_length_of
+from fusesoc_firm.frame.length import longest_payload, sent_length_of
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop
 from fusesoc_firm.frame.model import Path as FieldPath
 from fusesoc_firm.frame.select import with_names_in_use
@@ -29,7 +30,7 @@ from fusesoc_firm.system.scaffold.python_skeleton import copied_fields
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.system.written.specification import SOFTWARE
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.diagnostics import Diagnostic, InputError, fail, nearest
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.outputs import check_parent, write
 from fusesoc_firm.text.prompts import Asker, Question
@@ -37,6 +38,7 @@ from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.text.yaml_text import yaml_dump
 
 _SUBSCRIBER, _PUBLISHER, _FORWARDER = "sub", "pub", "pass_through"
+_STIMULI = "stimuli.yaml"
 _MESSAGES = 3
 # Bytes; block RAM of a small FPGA. The author of a specification chooses the size that the messages need.
 _BUFFER = 4096
@@ -60,8 +62,23 @@ LANGUAGES = {
 
 
 @dataclass(frozen=True)
+class RecordedStimuli:
+    """The stimuli of a new project from a bag: the name of the file and the bytes of the longest payload.
+
+    `write` writes the file at a path. The file contains the definitions of all messages of the project.
+    """
+
+    name: str
+    longest: int
+    write: Callable[[Path], None]
+
+
+@dataclass(frozen=True)
 class Project:
-    """The answers that determine a new project; `width` is in bits."""
+    """The answers that determine a new project; `width` is in bits.
+
+    The topics are the names of the blocks if they are empty. Without `stimuli`, the project has examples of its own.
+    """
 
     name: str
     input: str
@@ -69,6 +86,9 @@ class Project:
     ros: int = 2
     language: str = "vhdl"
     width: int = 8
+    input_topic: str = ""
+    output_topic: str = ""
+    stimuli: RecordedStimuli | None = None
 
 
 def name_fault(name: str) -> str | None:
@@ -80,11 +100,19 @@ def name_fault(name: str) -> str | None:
     return None
 
 
-def ask(known: dict[str, str], asker: Asker, names: Callable[[int], Sequence[str]], widths: Sequence[str]) -> Project:
+def ask(
+    known: Mapping[str, str],
+    asker: Asker,
+    names: Callable[[int], Sequence[str]],
+    widths: Sequence[str],
+    topics: Mapping[str, str] | None = None,
+) -> Project:
     """Return a project from the known answers, and ask for the others.
 
-    `names` returns the messages of a ROS version.
+    `names` returns the messages of a ROS version. `topics` are the topics of a bag, with their messages: the input is
+    one of them, and the output a message or one of them. May raise `InputError`.
     """
+    recorded = topics or {}
 
     def answer(name: str, meaning: str, words: Sequence[str] = (), default: str = "", **rules: Any) -> str:
         question = Question(name, meaning, words, default=default, is_required=True, **rules)
@@ -93,14 +121,32 @@ def ask(known: dict[str, str], asker: Asker, names: Callable[[int], Sequence[str
     name = answer("name", "the project's name, and the name of its folder and accelerator", check=name_fault)
     ros = int(answer("ros", "the ROS version of the messages", ("1", "2"), "2", is_choice=True))
     messages = names(ros)
+    if recorded:
+        taken = answer("in", "the topic in the bag that the accelerator receives", tuple(recorded), is_choice=True)
+        given = answer("out", "the message or topic that the accelerator sends", [*recorded, *messages], is_choice=True)
+        _check_topics(taken, given, recorded)
+    else:
+        taken = answer("in", "the message that the accelerator receives", messages, is_choice=True)
+        given = answer("out", "the message that the accelerator sends", messages, is_choice=True)
     return Project(
         name,
-        answer("in", "the message that the accelerator receives", messages, is_choice=True),
-        answer("out", "the message that the accelerator sends", messages, is_choice=True),
+        recorded.get(taken, taken),
+        recorded.get(given, given),
         ros,
         answer("language", "the accelerator's language", tuple(LANGUAGES), "vhdl", is_choice=True),
         int(answer("width", "the width in bits of the streams", widths, "8", is_choice=True)),
+        taken if taken in recorded else "",
+        given if given in recorded else "",
     )
+
+
+def _check_topics(taken: str, given: str, recorded: Mapping[str, str]) -> None:
+    """Raise `InputError` for a topic that is not in the bag, or that would be both input and output."""
+    for topic in (taken, given):
+        if topic not in recorded and (topic is taken or topic.startswith("/")):
+            fail(f"the bag has no topic '{topic}'", hint=nearest(topic, recorded))
+    if taken == given:
+        fail(f"'{taken}' is the topic of both the input and the output", hint="give the message of the output instead")
 
 
 def create(project: Project, folder: Path, known: Libraries, library: Path, paths: Sequence[Path] = ()) -> list[Path]:
@@ -111,32 +157,68 @@ def create(project: Project, folder: Path, known: Libraries, library: Path, path
     """
     if fault := name_fault(project.name):
         fail(fault)
+    with new_folder(folder) as inner:
+        _write_all(project, inner, known, [os.path.relpath(path, folder) for path in paths])
+        write_surroundings(inner, project.name, library)
+    return files_of(folder)
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """Return a folder to fill, which becomes `folder` if the context ends without an error.
+
+    Raise `InputError` if `folder` is not empty. Faults in files that were written to the folder have no place, since
+    the files no longer exist.
+    """
     check_parent(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         fail(f"cannot write {folder}: it exists", hint="choose another name, or remove it")
     with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=".firm") as made:
-        inner = Path(made) / project.name
-        _write_all(project, inner, known, library, [os.path.relpath(path, folder) for path in paths])
+        inner = Path(made) / folder.name
+        inner.mkdir()
+        try:
+            yield inner
+        except InputError as error:
+            raise InputError(_without_places_in(inner, error.diagnostics)) from None
         shutil.copytree(inner, folder, dirs_exist_ok=True)
+
+
+def _without_places_in(folder: Path, faults: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    for fault in faults:
+        is_inside = fault.source is not None and Path(fault.source.file).is_relative_to(folder)
+        yield replace(fault, source=None) if is_inside else fault
+
+
+def write_surroundings(folder: Path, name: str, library: Path) -> None:
+    """Write the files that make a folder a FuseSoC library `name`; `library` is the folder of the generators."""
+    write(folder / "fusesoc.conf", render("project/fusesoc.conf", {"name": name, "library": str(library)}))
+    write(folder / ".gitignore", _IGNORED)
+    write(folder / "build" / "FUSESOC_IGNORE", "")
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Return all files in a project, relative to its folder."""
     return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
 
 
-def _write_all(project: Project, folder: Path, known: Libraries, library: Path, paths: Sequence[str]) -> None:
-    ros = middleware_of(project.ros)
+def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence[str]) -> None:
+    ros, stimuli = middleware_of(project.ros), project.stimuli
     taken, given = (_frame(name, ros, known) for name in (project.input, project.output))
     spec = folder / f"{project.name}.yaml"
     write(spec, render("project/specification.yaml", _specification(project, ros, taken, given)))
     loaded = load_system(spec, known, needs_sources=False)
     for path, text in missing_sources(loaded.system, folder).items():
         write(path, text)
-    write(folder / "stimuli.yaml", yaml_dump([{_SUBSCRIBER: message} for message in _examples(taken)]))
+    if stimuli:
+        stimuli.write(folder / stimuli.name)
+        paths = [stimuli.name, *paths]
+    else:
+        write(folder / _STIMULI, yaml_dump([{_SUBSCRIBER: message} for message in _examples(taken)]))
     write(folder / "model.py", render("project/model.py", _model(project, loaded, given)))
     core = spec.with_suffix(".core")
-    options = CoreOptions(description=f"{project.input} to {project.output}", paths=paths)
+    description = f"{project.input} to {project.output}"
+    options = CoreOptions(description=description, paths=paths, stimuli=stimuli.name if stimuli else _STIMULI)
     write(core, new_core(loaded.system, spec.name, options))
-    write(folder / "fusesoc.conf", render("project/fusesoc.conf", {"name": project.name, "library": str(library)}))
-    write(folder / ".gitignore", _IGNORED)
-    write(folder / "build" / "FUSESOC_IGNORE", "")
 
 
 def _frame(name: str, ros: Middleware, known: Libraries) -> Frame:
@@ -145,6 +227,7 @@ def _frame(name: str, ros: Middleware, known: Libraries) -> Frame:
 
 
 def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame) -> Context:
+    longest = project.stimuli.longest if project.stimuli else 0
     language = LANGUAGES[project.language]
     own = {"name": project.name, "type": language.type, "source": language.source.format(project.name)}
     accelerators: list[Context] = []
@@ -155,7 +238,7 @@ def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame
         accelerators = [first | {"output": project.input, "length": [] if taken.is_fixed_size else ["given"]}]
         length: list[str] = []
     else:
-        length, buffer = _length(taken, given)
+        length, buffer = _length(taken, given, longest)
     accelerators.append(own | {"output": project.output, "length": length, "next": _PUBLISHER, "buffer": []})
     return {
         "name": project.name,
@@ -166,12 +249,21 @@ def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame
         "accelerators": accelerators,
         "subscriber": _SUBSCRIBER,
         "publisher": _PUBLISHER,
+        "is_topic": not project.input_topic,
+        "input_topic": project.input_topic,
+        "output_topic": project.output_topic,
+        "max_length": [_power_of_two(longest)] if longest > longest_payload(taken) else [],
         "first": accelerators[0]["name"],
         "buffer": buffer,
     }
 
 
-def _length(taken: Frame, given: Frame) -> tuple[list[str], list[int]]:
+def _power_of_two(size: int) -> int:
+    """Return the least power of two that is not less than a number of bytes."""
+    return 1 << (size - 1).bit_length()
+
+
+def _length(taken: Frame, given: Frame, longest: int) -> tuple[list[str], list[int]]:
     """Return the source of the output's length and the publisher's buffer, each empty for the default.
 
     With a counted length, all equal strings and arrays can be forwarded.
@@ -184,7 +276,7 @@ def _length(taken: Frame, given: Frame) -> tuple[list[str], list[int]]:
     shared = equal_paths(taken, given) & kinds.keys()
     if sent_length_of(given).is_computed and len(shared) <= 1:
         return [], []
-    return ["buffered"], [_BUFFER]
+    return ["buffered"], [max(_BUFFER, _power_of_two(longest))]
 
 
 def _model(project: Project, loaded: LoadedSystem, given: Frame) -> Context:

@@ -119,6 +119,14 @@ def test_nothing_is_written_after_a_fault(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_fault_in_the_new_specification_names_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "turn", "--in", "std_msgs/String", "--out", "std_msgs/UInt8", "--language", "hls"]) == 1
+    assert capsys.readouterr().err.startswith("error: 'turn' has the type HLS")
+
+
 def test_six_questions() -> None:
     def names(ros: int) -> list[str]:
         assert ros == 1

@@ -1,0 +1,31 @@
+"""`firm init --example`: a new project that is a copy of a demo system."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from fusesoc_firm.system.scaffold.project import files_of, new_folder, write_surroundings
+from fusesoc_firm.text.diagnostics import fail, nearest
+from fusesoc_firm.text.naming import identifier
+
+# The pages beside the demo systems have links that only a checkout has.
+_LEFT_OUT = ("README.md", "__pycache__")
+
+
+def examples(demos: Path) -> list[str]:
+    """Return the names of the demo systems in a folder."""
+    return sorted(path.name for path in demos.iterdir() if (path / f"{path.name}.core").is_file())
+
+
+def copy_example(example: str, folder: Path, demos: Path, library: Path) -> list[Path]:
+    """Copy a demo system to a new folder as a project, and return its files, relative to `folder`.
+
+    `demos` is the folder of the demo systems, and `library` the folder of the generators. May raise `InputError`.
+    """
+    if example not in (known := examples(demos)):
+        fail(f"unknown example '{example}'", hint=nearest(example, known))
+    with new_folder(folder) as inner:
+        shutil.copytree(demos / example, inner, ignore=shutil.ignore_patterns(*_LEFT_OUT), dirs_exist_ok=True)
+        write_surroundings(inner, identifier(folder.name), library)
+    return files_of(folder)
