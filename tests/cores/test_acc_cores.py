@@ -1,4 +1,4 @@
-"""The cores under cores/acc in simulation, over their generics, against exact arithmetic."""
+"""CORDIC and the conversions of double precision in simulation, over their generics, against exact arithmetic."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.hdl.ghdl import Generic, Library, core_files
+from tests.hdl.ghdl import CORES, Generic, Library, core_files
 
-ACC = Path(__file__).parents[2] / "cores" / "acc"
 SEED = 1618
 PI = Fraction("3.14159265358979323846264338327950288")
 
@@ -21,11 +20,10 @@ PI = Fraction("3.14159265358979323846264338327950288")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     """The library with the benches, beside `firm` in the same directory."""
     directory = tmp_path_factory.mktemp("acc")
-    Library("firm", directory).analyse(
-        core_files("axis/package", "sim/checker", "sim/host", "acc/cordic/cordic", "acc/float64/float64")
-    )
+    cores = ("acc/cordic/cordic", "acc/float64/float64")
+    Library("firm", directory).analyse(core_files("axis/package", "sim/checker", "sim/host", *cores))
     work = Library("work", directory)
-    work.analyse(sorted(ACC.glob("*/tb/*.vhd")))
+    work.analyse([bench for core in cores for bench in sorted((CORES / core).parent.glob("tb/*.vhd"))])
     return work
 
 
@@ -212,7 +210,7 @@ def test_float64(library: Library, tmp_path: Path, count: int, block_fraction: i
 
 def own_data(core: str, name: str) -> list[list[str]]:
     """The words of each line of a file of a core's own bench."""
-    return [line.split() for line in (ACC / core / "tb" / "data" / f"{name}.txt").read_text().splitlines()]
+    return [line.split() for line in (CORES / "acc" / core / "tb" / "data" / f"{name}.txt").read_text().splitlines()]
 
 
 def test_the_results_that_the_cores_own_benches_expect_are_right() -> None:
