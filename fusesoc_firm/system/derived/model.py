@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.middleware import Middleware
@@ -206,6 +207,15 @@ class Scheduling:
     reasons: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Tree:
+    """A Manager of Managers: the ids of each group's publishers, the policy of each group and that among the groups."""
+
+    groups: tuple[tuple[int, ...], ...]
+    policy: str
+    top_policy: str
+
+
 class LinkKind(Enum):
     """The kind of link that carries bytes between the host and a board without a processor."""
 
@@ -280,7 +290,7 @@ class DerivedSystem:
 
     Without a `link`, the streams are ports of the system. Converters, accelerators and connections in software are not
     included. `names` maps each accelerator's message sides to their names outside the accelerator: `<block>_in`,
-    `<block>_out1` and so on.
+    `<block>_out1` and so on. If ids have two bytes, `tree` is the Manager of Managers.
     """
 
     name: str
@@ -298,6 +308,18 @@ class DerivedSystem:
     clocks: tuple[Clock, ...] = ()
     status: StatusAccess | None = None
     watchdog: int = 0
+    tree: Tree | None = None
+
+    @property
+    def id_bytes(self) -> int:
+        """The number of bytes in a frame's id."""
+        return 2 if self.tree else 1
+
+    @cached_property
+    def places(self) -> Mapping[int, int]:
+        """The place of each publisher among the Manager's inputs, by id."""
+        order = chain.from_iterable(self.tree.groups) if self.tree else range(len(self.publishers))
+        return {number: place for place, number in enumerate(order)}
 
     def clock_of(self, block: str) -> Clock | None:
         """Return the clock of a block, or None for the system's clock."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import Any
 
 from fusesoc_firm.scheduling.policies import POLICIES
-from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.derived.model import DerivedSystem, Tree
 from fusesoc_firm.system.hardware.maps import port_map
 
 
 def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """Return the scheduler's entity and generics, with the constants for publishers' times that the generics use."""
+    """Return the scheduler's entity and generics, with the constants for publishers' times that the generics use.
+
+    If publishers are in groups, return the generics of the Manager of Managers, too, which contains the schedulers.
+    """
     scheduling = system.scheduling
     policy = POLICIES[scheduling.policy]
     times = {
@@ -28,11 +32,32 @@ def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
     constants = [_times(name, times[name], system) for name in policy.generics if name in times]
     generics = [(name, values[name]) for name in policy.generics]
     return {
+        "tree": _tree(system.tree) if system.tree else None,
         "scheduler": policy.entity,
         "scheduler_generics": port_map([("REQUESTERS", str(len(system.publishers))), *generics]),
         "is_preemptive": scheduling.is_preemptive,
         "scheduler_times": {"constants": constants} if constants else None,
     }
+
+
+def _tree(tree: Tree) -> dict[str, Any]:
+    """Return the generics of the Manager of Managers."""
+    return {
+        "sizes": _runs(len(group) for group in tree.groups),
+        "last_group": len(tree.groups) - 1,
+        "policy": tree.policy.upper(),
+        "top_policy": tree.top_policy.upper(),
+        "highs": _runs(number // 256 for group in tree.groups for number in group),
+    }
+
+
+def _runs(values: Iterable[int]) -> list[dict[str, int]]:
+    """Return the ranges of equal values of an array."""
+    runs, first = list[dict[str, int]](), 0
+    for value, run in groupby(values):
+        runs.append({"first": first, "last": first + len(list(run)) - 1, "value": value})
+        first = runs[-1]["last"] + 1
+    return runs
 
 
 def _times(name: str, cycles: Sequence[int | None], system: DerivedSystem) -> dict[str, Any]:

@@ -102,6 +102,14 @@ class Project(Section):
         form="integer",
         default=16,
     )
+    id_bytes: int = key(
+        "bytes of a frame's id: 1 for up to 256 subscribers and 256 publishers, 2 for up to 65,536",
+        name="idBytes",
+        form="integer",
+        choices=(1, 2),
+        default=1,
+        is_asked=False,
+    )
     watchdog: int = key(
         "cycles of clk after which a publisher that stops in the middle of a frame is cut off; 0: never",
         form="integer",

@@ -21,6 +21,8 @@ RUNTIME = (
     "sched/package",
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
+    "sched/by_policy",
+    "manager/tree",
     "board/link",
     "status/status",
 )
