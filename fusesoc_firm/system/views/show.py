@@ -221,6 +221,8 @@ def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
     shown: dict[str, Any] = {"scheduler": scheduling.policy}
     if scheduling.reasons:
         shown["because"] = [*scheduling.reasons]
+    if scheduling.groups:
+        shown["groups"] = [{"scheduler": item.policy, "publishers": [*item.blocks]} for item in scheduling.groups]
     return shown | ({"shortestRun": scheduling.shortest_run} if scheduling.is_preemptive else {})
 
 
