@@ -17,7 +17,15 @@ LINES, COLUMNS = 250, 100
 # Written by commands; their lines of prose are as long as those of all pages.
 GENERATED = [DOCS / "figures"]
 # Followed by beginners, so they are run with the tests; `make docs` runs all pages.
-FOLLOWED = ["tutorials/first-accelerator.md", "how-to/start-from-a-bag.md"]
+FOLLOWED = [
+    "tutorials/first-accelerator.md",
+    "tutorials/first-accelerator-in-cpp.md",
+    "tutorials/first-accelerator-in-python.md",
+    "how-to/start-from-a-bag.md",
+    "how-to/when-it-does-not-work.md",
+    # It builds a bitstream, which takes minutes.
+    pytest.param("how-to/onto-an-icebreaker.md", marks=pytest.mark.thorough),
+]
 # Drawn and held to the code by a test of its own.
 TESTED_PICTURES = {"house.svg"}
 
