@@ -69,6 +69,7 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
         **_part_of_manager(converter, system),
         "beats": _beats(names, converter, system),
         "late": _late(names, converter, system) if converter.late_bytes else None,
+        "max_length": {"bytes": converter.max_length} if converter.max_length else None,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
         "error": error_of(converter, system) if converter.may_pause and not is_watched else None,
         "watched": _watched(names, converter, system) if is_watched else None,

@@ -248,7 +248,7 @@ class Block(Section):
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     max_length: int | None = key(
-        "bytes of a subscriber's longest payload, if the message has no bounds (default: 65536)",
+        "bytes of the longest payload, if the message has no bounds (default: 65536, with a link 2000)",
         name="maxLength",
         form="integer",
         only_of=CONVERTER,
