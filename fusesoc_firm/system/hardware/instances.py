@@ -92,22 +92,25 @@ def _part_of_manager(converter: Converter, system: DerivedSystem) -> dict[str, i
     return {"id": converter.id, "id_byte": converter.id % 256, "place": system.places[converter.id]}
 
 
-def _beats(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, str]:
+def _beats(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
     """Return the signals to which a publisher, or its buffer, sends frames: of its FIFO, or else of the Manager."""
     if not converter.late_bytes:
         return _manager_beats(converter, system)
-    return {word: names.late(converter.block, word) + "(0)" * (word == "tuser") for word in LATE_WORDS}
+    return {**{word: names.late(converter.block, word) for word in LATE_WORDS}, "place": 0, "slice": None}
 
 
-def _manager_beats(converter: Converter, system: DerivedSystem) -> dict[str, str]:
+def _manager_beats(converter: Converter, system: DerivedSystem) -> dict[str, Any]:
     """Return the part of the Manager's inputs that receives a publisher's frames."""
     place, width = system.places[converter.id], system.width
     lanes = width // 8
-    return {
-        "tdata": f"pub_axis_tdata({width * (place + 1) - 1} downto {width * place})",
-        "tkeep": f"pub_axis_tkeep({lanes * (place + 1) - 1} downto {lanes * place})",
-        **{word: f"pub_axis_{word}({place})" for word in ("tuser", "tvalid", "tlast", "tready")},
+    part = {
+        "place": place,
+        "data_high": width * (place + 1) - 1,
+        "data_low": width * place,
+        "keep_high": lanes * (place + 1) - 1,
+        "keep_low": lanes * place,
     }
+    return {**{word: f"pub_axis_{word}" for word in LATE_WORDS}, "place": place, "slice": part}
 
 
 def _late(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
