@@ -25,7 +25,7 @@ from fusesoc_firm.system.derived.entities import check_entities
 from fusesoc_firm.system.derived.ids import check_count
 from fusesoc_firm.system.derived.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.derived.link import link_of
-from fusesoc_firm.system.derived.longest import with_longest_payloads
+from fusesoc_firm.system.derived.longest import with_longest_payloads, with_longest_sent
 from fusesoc_firm.system.derived.model import (
     AcceleratorBlock,
     AcceleratorType,
@@ -100,8 +100,9 @@ def derive(
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
-    subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), parts.blocks, faults)
+    subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), project, parts.blocks, faults)
     subscribers = tuple(replace(item, queue=queue_of(parts.blocks[item.block], item, faults)) for item in subscribers)
+    publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
     tree = tree_of(project, scheduling, link, publishers, faults)

@@ -192,9 +192,18 @@ class PublisherTimes:
 
 
 @dataclass(frozen=True)
+class Group:
+    """Publishers with consecutive ids that have a scheduler of their own: their blocks and the scheduler's policy."""
+
+    policy: str
+    blocks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Scheduling:
     """The scheduler that chooses the next frame to the host: its policy, with the publishers' times by id.
 
+    If there are groups, `policy` chooses among them, and the scheduler is a combined one (section 4.3.5).
     A preemptive policy interrupts a frame after `shortest_run` beats at the earliest. The scheduler counts time in
     `time_bits` bits. If the policy was chosen automatically, `reasons` explains the choice.
     """
@@ -205,6 +214,7 @@ class Scheduling:
     shortest_run: int
     time_bits: int
     reasons: tuple[str, ...] = ()
+    groups: tuple[Group, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import LENGTH_BYTES
 from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
 from fusesoc_firm.scheduling.tasks import Task
+from fusesoc_firm.system.derived.groups import groups_of
 from fusesoc_firm.system.derived.ids import ONE_BYTE
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, PublisherTimes, Scheduling
 from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, Block, Project
@@ -64,13 +65,16 @@ def scheduling_of(
     reader = _Reader(clock, faults)
     times = tuple(reader.times(blocks[item.block], item, project) for item in publishers)
     policy, reasons = str(project.scheduler), tuple[str, ...]()
+    groups = groups_of(project, publishers, faults)
     _check_shortest_run(project, faults)
-    _check_complete(policy, [blocks[item.block] for item in publishers], times, faults)
+    for name in dict.fromkeys([group.policy for group in groups] or [policy]):
+        _check_complete(name, [blocks[item.block] for item in publishers], times, faults)
     if policy == AUTO_SCHEDULER and project.id_bytes > ONE_BYTE:
         policy, reasons = _IN_GROUPS
     elif policy == AUTO_SCHEDULER:
         policy, reasons = _chosen(project, publishers, times)
-    return Scheduling(policy, times, POLICIES[policy].is_preemptive, project.shortest_run, _time_bits(times), reasons)
+    is_preemptive = any(POLICIES[name].is_preemptive for name in (policy, *(group.policy for group in groups)))
+    return Scheduling(policy, times, is_preemptive, project.shortest_run, _time_bits(times), reasons, groups)
 
 
 def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
@@ -100,7 +104,7 @@ def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
 
     The result is empty unless all times of all publishers are known, and if publishers are in groups.
     """
-    if system.tree:
+    if system.tree or system.scheduling.groups:
         return ()
     tasks = _tasks(system.publishers, system.scheduling.times)
     if len(tasks) < len(system.publishers):

@@ -55,13 +55,13 @@ def tree_of(
             project.place("id_bytes"),
             f"a Manager for 'idBytes: {TWO_BYTES}' has none; with 'buffer', a publisher sends only whole frames",
         )
-    groups = groups_of(scheduling.times)
+    groups = groups_by_period(scheduling.times)
     if project.scheduler != AUTO_SCHEDULER:
         return Tree(groups, scheduling.policy, scheduling.policy)
     return Tree(groups, _TURNS, _TURNS if _meets_periods(groups, scheduling.times) else _PRIORITY)
 
 
-def groups_of(times: Sequence[PublisherTimes]) -> tuple[tuple[int, ...], ...]:
+def groups_by_period(times: Sequence[PublisherTimes]) -> tuple[tuple[int, ...], ...]:
     """Return the ids of each group's publishers: by period if all periods are known, else in order of ids."""
     count = len(times)
     periods = [item.period for item in times if item.period]

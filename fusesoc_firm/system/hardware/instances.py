@@ -67,6 +67,7 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
         **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
         **_part_of_manager(converter, system),
+        "max_length": {"bytes": converter.max_length} if converter.max_length else None,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
         "error": error_of(converter, system) if converter.may_pause and not is_watched else None,
         "watched": _watched(names, converter, system) if is_watched else None,

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, Converter, DerivedSystem
+from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, Converter, DerivedSystem, Scheduling
 from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.hardware.crossings import crossings
 from fusesoc_firm.text.diagnostics import fail
@@ -44,7 +44,7 @@ def diagram(system: DerivedSystem) -> str:
 def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
     """Draw the Manager in both directions, the converters and the accelerators."""
     graph.node(f"{_MANAGER}_in", "Manager", shape="box")
-    graph.node(f"{_MANAGER}_out", f"Manager\n{system.scheduling.policy}", shape="box")
+    graph.node(f"{_MANAGER}_out", f"Manager\n{_scheduler(system.scheduling)}", shape="box")
     for converter in (*system.subscribers, *system.publishers):
         label = (
             f"{dot_text(converter.block)}\n{converter.frame.message}\n{converter.frame.ros.title}{_queue(converter)}"
@@ -52,6 +52,12 @@ def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
         graph.node(_node(converter.block), label, **_CONVERTER)
     for block in system.accelerators:
         graph.node(_node(block.block), _accelerator(block) + _differences(system, block), **_ACCELERATOR)
+
+
+def _scheduler(scheduling: Scheduling) -> str:
+    """Return the policy, followed by those of the groups if there are any."""
+    groups = ", ".join(group.policy for group in scheduling.groups)
+    return f"{scheduling.policy}\namong {groups}" if groups else scheduling.policy
 
 
 def _queue(converter: Converter) -> str:

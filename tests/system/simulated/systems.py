@@ -22,6 +22,7 @@ RUNTIME = (
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
     "sched/by_policy",
+    "sched/combined",
     "manager/tree",
     "board/link",
     "status/status",

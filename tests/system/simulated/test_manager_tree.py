@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.system.derived.model import PublisherTimes
-from fusesoc_firm.system.derived.tree import groups_of
+from fusesoc_firm.system.derived.tree import groups_by_period
 from tests.hdl.frames import traffic
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
@@ -64,7 +64,7 @@ def test_1024_publishers_use_the_whole_channel(tmp_path: Path) -> None:
 def test_groups_follow_from_periods() -> None:
     source = random.Random(SEED)
     times = [PublisherTimes(source.randint(50_000, 5_000_000), 10, None) for _ in range(1000)]
-    groups = groups_of(times)
+    groups = groups_by_period(times)
     assert sorted(number for group in groups for number in group) == list(range(1000))
     for group in groups:
         assert len(group) * len(groups) * 10 <= min(times[number].period or 0 for number in group)
@@ -74,7 +74,7 @@ def test_groups_follow_from_periods() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 5, 256, 1024, 65536])
 def test_without_periods_groups_are_equal(count: int) -> None:
-    groups = groups_of([PublisherTimes(None, None, None)] * count)
+    groups = groups_by_period([PublisherTimes(None, None, None)] * count)
     assert [number for group in groups for number in group] == list(range(count))
     assert len(groups) <= 256
     assert max(map(len, groups)) <= 256
