@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from html import escape
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 from urllib.parse import quote
@@ -18,6 +17,7 @@ from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, Conv
 from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.hardware.crossings import crossings
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.quoting import dot_markup
 
 if TYPE_CHECKING:
     from graphviz import Digraph
@@ -202,9 +202,9 @@ def _about(system: DerivedSystem) -> str:
 
 
 def _converter(converter: Converter) -> list[str]:
-    block = [] if converter.name == f"/{converter.block}" else [f"block {converter.block}"]
+    block = [] if converter.name == f"/{converter.block}" else [converter.block]
     kind = f"used by {converter.software.block}" if converter.software else converter.name
-    return [kind, str(converter.frame.message), converter.frame.ros.title, *block]
+    return [kind, *block, str(converter.frame.message), converter.frame.ros.title]
 
 
 def _queue(converter: Converter) -> list[str]:
@@ -263,13 +263,13 @@ def _is_handshake(port: str) -> bool:
 
 def _title(lines: Iterable[str]) -> str:
     """Return a node's label in Graphviz's markup, one line below the other, the first one bold."""
-    first, *rest = (escape(line) for line in lines)
+    first, *rest = (dot_markup(line) for line in lines)
     return f"<{'<br/>'.join([f'<b>{first}</b>', *rest])}>"
 
 
 def _label(lines: Iterable[str]) -> str:
     """Return an edge's label in Graphviz's markup, with a distance from the edge."""
-    text = "<br/>".join(escape(line) for line in lines)
+    text = "<br/>".join(dot_markup(line) for line in lines)
     return f'<<table border="0" cellspacing="0" cellpadding="4"><tr><td>{text}</td></tr></table>>'
 
 
