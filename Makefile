@@ -36,7 +36,7 @@ DOCS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # Programs other than Python that tests run.
-TEST_TOOLS := ccache iverilog strace verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
+TEST_TOOLS := bwrap:bubblewrap ccache iverilog strace verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET))) $(if $(SEED),--seed $(SEED)) \
   $(if $(WAVES),--waves) $(if $(SIM_OPTIONS),--options="$(SIM_OPTIONS)")

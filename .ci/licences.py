@@ -31,6 +31,7 @@ RUN_TIME = "run time"
 
 # Packages of Debian and what they are called for.
 PROGRAMS: Mapping[str, str] = {
+    "bubblewrap": "runs steps of builds in a sandbox",
     "ccache": "caches compiled files, in tests",
     "g++": "compiles simulated C++ kernels, Verilator's models, nodes in C++",
     "ghdl": "analyses, simulates and translates VHDL",

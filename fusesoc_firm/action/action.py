@@ -30,6 +30,7 @@ from fusesoc_firm.action.contents import Contents
 from fusesoc_firm.action.observed import facts_of, hold
 from fusesoc_firm.action.places import Places, places_of
 from fusesoc_firm.action.results import Record, Results
+from fusesoc_firm.action.sandbox import sandboxed
 from fusesoc_firm.action.trace import Trace, can_trace, fix_addresses, traced
 from fusesoc_firm.action.tree import FILE, PROGRAM, Item, Tree, changed, in_order_of_time, key_of, removed, tree_of
 from fusesoc_firm.store.layout import digest_of
@@ -46,7 +47,7 @@ _FOLDER_MARK = b"\0FOLDER\0"
 class Action:
     """A step: its name, the arguments of Python for it, its folder, the content of the folder and the environment.
 
-    `declared` are inputs outside the folder; their contents are observed.
+    `declared` are inputs outside the folder; their contents are observed. With `is_sandboxed`, no other files exist.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Action:
     inputs: Tree
     environment: Mapping[str, str]
     declared: tuple[str, ...] = ()
+    is_sandboxed: bool = False
 
     def key(self) -> str:
         """Return the digest of everything that is known before the step runs."""
@@ -70,6 +72,8 @@ class Action:
             "machine": platform.machine(),
             "python": sys.version_info[:3],
             "edalize": _version("edalize"),
+            # A step elsewhere may have found other files.
+            **({"sandbox": True} if self.is_sandboxed else {}),
         }
 
     @property
@@ -197,13 +201,17 @@ def _run(action: Action, log: Path) -> tuple[int, Trace | None]:
     temporary.mkdir(parents=True)
     environment = {**variables.of_step(action.environment), "TMPDIR": str(temporary)}
     command = [sys.executable, *action.arguments]
+
+    def within(*further: Path) -> list[str]:
+        return sandboxed(_places(action), *further) if action.is_sandboxed else []
+
     fix_addresses()
     try:
         with log.open("ab") as output:
             if can_trace():
-                return traced(command, action.folder, environment, output)
+                return traced(command, action.folder, environment, output, within)
             done = subprocess.run(
-                command,
+                [*within(), *command],
                 cwd=action.folder,
                 env=environment,
                 stdin=subprocess.DEVNULL,

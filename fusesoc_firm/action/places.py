@@ -23,13 +23,14 @@ _OURS = tuple(f"{PACKAGE}/{part}" for part in ("action/backend.py", "text", "too
 
 @dataclass(frozen=True)
 class Places:
-    """The folder of a step, the folder for its temporary files, and the places of tools and of their caches."""
+    """The folder of a step, the folder for its temporary files, the places of tools and of their caches, and HOME."""
 
     folder: str
     temporary: str
     tools: tuple[str, ...]
     caches: tuple[str, ...] = ()
     declared: frozenset[str] = field(default_factory=frozenset)
+    home: str = ""
 
     def outside(self, trace: Trace) -> Trace:
         """Return what a step used outside its folder, without what is not recorded."""
@@ -83,6 +84,7 @@ def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], dec
             os.path.join(caches, "YoWASP"),
         ),
         frozenset(map(os.path.realpath, declared)),
+        home,
     )
 
 

@@ -16,7 +16,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
@@ -71,14 +71,21 @@ def can_trace() -> bool:
 
 
 def traced(
-    command: Sequence[str], folder: Path, environment: Mapping[str, str], output: IO[bytes]
+    command: Sequence[str],
+    folder: Path,
+    environment: Mapping[str, str],
+    output: IO[bytes],
+    within: Callable[[Path], Sequence[str]] = lambda _: (),
 ) -> tuple[int, Trace]:
-    """Run a command in a folder, with its output in a file; return the exit status and the trace."""
+    """Run a command in a folder, with its output in a file; return the exit status and the trace.
+
+    `within` returns the beginning of a command line that starts `strace`, which must be able to write to this folder.
+    """
     with tempfile.TemporaryDirectory(prefix="firm-trace-") as place:
         record = Path(place, "trace")
         options = ["-f", "-y", "-q", "--seccomp-bpf", "-e", f"trace={_CALLS}", "-e", "signal=none", "-o", str(record)]
         status = subprocess.run(
-            ["strace", *options, "--", *command],
+            [*within(Path(place)), "strace", *options, "--", *command],
             cwd=folder,
             env=dict(environment),
             stdin=subprocess.DEVNULL,

@@ -15,7 +15,13 @@ from fusesoc_firm.action.results import Results
 from fusesoc_firm.store.layout import digest_of
 
 _NEW = "it has not run in this folder before"
-_OTHER = {"arguments": "the command", "machine": "the machine", "python": "Python's version", "edalize": "Edalize"}
+_OTHER = {
+    "arguments": "the command",
+    "machine": "the machine",
+    "python": "Python's version",
+    "edalize": "Edalize",
+    "sandbox": "--sandbox",
+}
 # Kinds of facts whose names say enough; a missing path that appears is named by its path.
 _KINDS = {"program": "the program ", "file": "", "folder": "the names in ", "there": ""}
 
@@ -45,7 +51,7 @@ def reasons(action: Action, results: Results, contents: Contents) -> list[str]:
 
 def _differences(note: Any, action: Action, contents: Contents) -> Iterator[str]:
     was, now = note["parts"], _plain(action)
-    yield from (f"{name} differs" for part, name in _OTHER.items() if was[part] != now[part])
+    yield from (f"{name} differs" for part, name in _OTHER.items() if was.get(part) != now.get(part))
     yield from _changes("", was["inputs"], now["inputs"])
     yield from _changes("the variable ", was["environment"], now["environment"])
     for kind, name, before in note["facts"]:

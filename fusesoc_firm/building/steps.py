@@ -55,7 +55,7 @@ class Steps:
     """How a build runs as actions: the names of its steps after the setup, and whether their outputs are wanted.
 
     With `is_rerun`, steps run although their results are stored. `scan` is the state of FuseSoC's libraries for the
-    notes of `recall`, and `flags` are the user's flags.
+    notes of `recall`, and `flags` are the user's flags. With `is_sandboxed`, steps see only their inputs and tools.
     """
 
     names: tuple[str, ...]
@@ -64,12 +64,13 @@ class Steps:
     recall: Recall | None = None
     scan: str = ""
     flags: tuple[tuple[str, bool | str], ...] = ()
+    is_sandboxed: bool = False
 
     def __call__(self, fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
         """Set a build up and run its steps; leave the report, and exit with status 1 if a step fails."""
         report_of(build).unlink(missing_ok=True)
         if fusesoc.config.no_export:
-            # The sources are not in the build's folder, so no step could be cached.
+            # The sources are not in the build's folder, so no step could be cached; the command line refuses a sandbox.
             run_all(fusesoc, build, ("--setup", "--build", *(("--run",) if "run" in self.names else ()), *options))
             return
         results = default_results()
@@ -82,6 +83,7 @@ class Steps:
             results,
             contents,
             partial(set_up, fusesoc, build, options),
+            is_sandboxed=self.is_sandboxed,
         )
         if self.recall:
             tree = tree_of(build.work_root, contents)
@@ -104,9 +106,8 @@ class Steps:
         if (known := self.recall.setup(build, self.scan)) is None:
             return None
         backend, tree = known
-        found = recorded(
-            self.names, lambda name, inputs: action_of(name, build, backend, inputs), tree, results, contents
-        )
+        act = partial(action_of, build, backend, is_sandboxed=self.is_sandboxed)
+        found = recorded(self.names, act, tree, results, contents)
         logs = [log for _, record in found if (log := log_of(record, results, build.work_root)) is not None]
         if len(logs) < len(self.names) or (self.has_outputs and not _is_in_place(build, tree, found, contents)):
             return None
@@ -148,11 +149,11 @@ def steps_of(build: Build) -> tuple[Step, ...]:
         return ()
 
 
-def action_of(step: str, build: Build, backend: tuple[str, str], inputs: Tree) -> Action:
+def action_of(build: Build, backend: tuple[str, str], step: str, inputs: Tree, *, is_sandboxed: bool = False) -> Action:
     """Return the action of a build's step; `backend` is `flow` or `tool` with its name in Edalize."""
     edam = next(path for path in inputs if path.endswith(_EDAM) and "/" not in path)
     arguments = (*_BACKEND, step, *backend, edam)
-    return Action(step, arguments, build.work_root, inputs, os.environ)
+    return Action(step, arguments, build.work_root, inputs, os.environ, is_sandboxed=is_sandboxed)
 
 
 def recorded(
@@ -178,6 +179,7 @@ class _Run:
     results: Results
     contents: Contents
     set_up: Callable[[], None]
+    is_sandboxed: bool = False
     steps: list[Step] = field(default_factory=list)
 
     def all(self, names: tuple[str, ...], *, is_rerun: bool, has_outputs: bool) -> bool:
@@ -209,7 +211,7 @@ class _Run:
         return done.status == 0
 
     def _action(self, name: str, tree: Tree) -> Action:
-        return action_of(name, self.build, self.backend, tree)
+        return action_of(self.build, self.backend, name, tree, is_sandboxed=self.is_sandboxed)
 
     def _restored(self, known: list[tuple[Action, Record]]) -> bool:
         """Write the outputs of recalled steps to the folder; return False if one is no longer stored."""

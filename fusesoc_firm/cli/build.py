@@ -13,7 +13,9 @@ from fusesoc_firm.cli.build_options import (
     add_fusesoc,
     add_limits,
     add_reports,
+    add_sandbox,
     add_selection,
+    is_sandboxed,
     limits_of,
     run_options_of,
     selection_of,
@@ -53,7 +55,10 @@ def add_build(commands: Any) -> None:
         action="store_true",
         help="take the results of steps with unchanged inputs from the store; each build starts in an empty folder",
     )
-    build.add_argument("--rerun", action="store_true", help="with --cached, run all steps, also those that are stored")
+    add_sandbox(build)
+    build.add_argument(
+        "--rerun", action="store_true", help="with --cached or --sandbox, run all steps, also those that are stored"
+    )
     build.add_argument("--clean", action="store_true", help="empty each build folder first")
     build.add_argument("--locked", action="store_true", help="report differences from each core's lock file as errors")
     add_limits(build)
@@ -69,10 +74,12 @@ def _build_cached(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.plugin.build import How
 
     if others := [name for name in _NOT_CACHED if getattr(arguments, name)]:
-        fail(f"--cached cannot be combined with --{others[0]}")
+        cached = "--sandbox" if arguments.sandbox else "--cached"
+        fail(f"{cached} cannot be combined with --{others[0]}")
     selection, options = selection_of(arguments), run_options_of(arguments)
     names = ("build",) if arguments.build_only else ("build", "run")
-    steps = Steps(names, is_rerun=arguments.rerun, flags=tuple(options.use_flags().items()))
+    flags = tuple(options.use_flags().items())
+    steps = Steps(names, is_rerun=arguments.rerun, flags=flags, is_sandboxed=is_sandboxed(arguments))
     how = How(
         is_locked=arguments.locked,
         jobs=arguments.jobs or 0,
@@ -87,11 +94,11 @@ def _build_cached(arguments: argparse.Namespace) -> None:
 
 
 def _build(arguments: argparse.Namespace) -> None:
-    if arguments.cached:
+    if arguments.cached or arguments.sandbox:
         _build_cached(arguments)
         return
     if arguments.rerun:
-        fail("--rerun needs --cached")
+        fail("--rerun needs --cached or --sandbox")
 
     from fusesoc_firm.building.plan import select_plan
     from fusesoc_firm.cli.build_report import Report, Words

@@ -93,6 +93,27 @@ def limits_of(arguments: argparse.Namespace) -> Limits:
     return Limits(arguments.timeout or 0, arguments.retries)
 
 
+def add_sandbox(parser: argparse.ArgumentParser) -> None:
+    """Add the option for steps that see only their inputs, for `is_sandboxed`."""
+    parser.add_argument(
+        "--sandbox",
+        action="store_true",
+        help="run each step where only its inputs and the machine's tools exist, without a network (needs 'bwrap')",
+    )
+
+
+def is_sandboxed(arguments: argparse.Namespace) -> bool:
+    """Return whether steps are to run in a sandbox. Raise `InputError` if that is not possible."""
+    if not arguments.sandbox:
+        return False
+    if arguments.no_export:
+        fail("--sandbox cannot be combined with --no-export", hint="without export, a step's inputs are in no folder")
+    from fusesoc_firm.action.sandbox import check_sandbox
+
+    check_sandbox()
+    return True
+
+
 def add_fusesoc(parser: argparse.ArgumentParser) -> None:
     """Add the options of `fusesoc run`, for `run_options_of`."""
     group = parser.add_argument_group("options of 'fusesoc run'")

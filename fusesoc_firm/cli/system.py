@@ -5,14 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load, print_warnings
 from fusesoc_firm.node.languages import LANGUAGES, Place
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from fusesoc_firm.system.derived.model import DerivedSystem
 
 
 def add_system(commands: Any) -> None:
@@ -32,6 +35,14 @@ def add_system(commands: Any) -> None:
         _new_system,
     )
     check = command(actions, "check", "report all faults in a specification", "firm system check robot.yaml", _check)
+    check.add_argument(
+        "--stimuli",
+        type=Path,
+        metavar="F",
+        action="append",
+        default=[],
+        help="check also that the system accepts all messages in a YAML file or bag; may be repeated",
+    )
     show = command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
     )
@@ -136,7 +147,7 @@ def _check(arguments: argparse.Namespace) -> None:
     if arguments.json:
         _check_as_json(arguments)
     else:
-        _check_system(arguments)
+        _check_system(arguments, arguments.stimuli)
 
 
 def _check_as_json(arguments: argparse.Namespace) -> None:
@@ -147,6 +158,7 @@ def _check_as_json(arguments: argparse.Namespace) -> None:
         loaded = load(arguments)
         warnings = loaded.warnings
         warnings += check_sources(loaded, arguments.spec)
+        _check_stimuli(loaded.system, arguments.stimuli)
     except InputError as error:
         faults = error.diagnostics
     _print_json({"valid": not faults, "diagnostics": [item.data() for item in (*faults, *warnings)]})
@@ -158,15 +170,25 @@ def _print_json(data: object) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=False))
 
 
-def _check_system(arguments: argparse.Namespace) -> None:
+def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
     from fusesoc_firm.system.views.show import counts, default_lengths
 
     loaded = load(arguments)
     print_warnings(check_sources(loaded, arguments.spec))
     system = loaded.system
+    _check_stimuli(system, stimuli)
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
     for line in default_lengths(system):
         print(line)
+
+
+def _check_stimuli(system: DerivedSystem, paths: Iterable[Path]) -> None:
+    """Raise `InputError` for the first file with a message that the system does not accept."""
+    from fusesoc_firm.simulation.software_run import stimulated
+    from fusesoc_firm.simulation.stimuli import read_stimuli
+
+    for path in paths:
+        read_stimuli(path, stimulated(system))
 
 
 def _show_system(arguments: argparse.Namespace) -> None:

@@ -11,7 +11,9 @@ from fusesoc_firm.cli.build_options import (
     add_fusesoc,
     add_limits,
     add_reports,
+    add_sandbox,
     add_selection,
+    is_sandboxed,
     limits_of,
     run_options_of,
     selection_of,
@@ -43,6 +45,7 @@ def add_test(commands: Any) -> None:
         "--build-root", type=Path, metavar="DIR", help="folder for the builds (default: FuseSoC's build folder)"
     )
     test.add_argument("--locked", action="store_true", help="report differences from each core's lock file as errors")
+    add_sandbox(test)
     add_limits(test)
     add_reports(test)
     add_fusesoc(test)
@@ -56,7 +59,13 @@ def _test(arguments: argparse.Namespace) -> None:
 
     selection, options = selection_of(arguments, has_default=True), run_options_of(arguments)
     flags = tuple(options.use_flags().items())
-    steps = Steps(("build", "run"), has_outputs=False, is_rerun=arguments.rerun, flags=flags)
+    steps = Steps(
+        ("build", "run"),
+        has_outputs=False,
+        is_rerun=arguments.rerun,
+        flags=flags,
+        is_sandboxed=is_sandboxed(arguments),
+    )
     how = How(
         is_locked=arguments.locked,
         jobs=arguments.jobs or 0,

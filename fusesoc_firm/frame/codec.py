@@ -12,6 +12,6 @@ from fusesoc_firm.frame.values import CodecError, MessageValue
 __all__ = ["CodecError", "MessageValue", "decode", "encode", "pack_frame", "used_bytes"]
 
 
-def pack_frame(identifier: int, payload: bytes) -> bytes:
+def pack_frame(identifier: int, payload: bytes, id_bytes: int = ID_BYTES) -> bytes:
     """Return the whole frame: the id, the payload's length and the payload."""
-    return identifier.to_bytes(ID_BYTES, "little") + len(payload).to_bytes(LENGTH_BYTES, "little") + payload
+    return identifier.to_bytes(id_bytes, "little") + len(payload).to_bytes(LENGTH_BYTES, "little") + payload

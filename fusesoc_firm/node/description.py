@@ -85,7 +85,11 @@ class NodeDescription:
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:
-    """Describe the node of a system. Raise `InputError` for a middleware other than ROS."""
+    """Describe the node of a system. Raise `InputError` for a middleware other than ROS and for ids of two bytes."""
+    if loaded.system.id_bytes > 1:
+        fail(
+            f"nodes do not support 'idBytes: {loaded.system.id_bytes}'", hint="such a system is simulated with firm sim"
+        )
     system, software = loaded.system, loaded.system.software
     here = {block.block for block in software.blocks if block.type.accelerator.sources}
     subscribers, entering = _parted(system.subscribers, here)

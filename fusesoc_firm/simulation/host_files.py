@@ -17,17 +17,17 @@ _BYTES_A_LINE = 32
 _LABEL_WIDTH = 160
 
 
-def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter]) -> str:
+def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter], id_bytes: int = ID_BYTES) -> str:
     """Return the text of the stimulus file."""
     ids = {item.block: item.id for item in subscribers}
     lines: list[str] = []
     for stimulus in stimuli:
         lines.append(f"> {_label(stimulus.subscriber, stimulus.message)}")
-        lines += _hex_lines(pack_frame(ids[stimulus.subscriber.block], stimulus.payload), None)
+        lines += _hex_lines(pack_frame(ids[stimulus.subscriber.block], stimulus.payload, id_bytes), None)
     return "\n".join(lines) + "\n"
 
 
-def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]) -> str:
+def expected_text(responses: Iterable[Response], publishers: Iterable[Converter], id_bytes: int = ID_BYTES) -> str:
     """Return the text of the file of expected frames, in which padding matches any byte."""
     ids = {item.block: item.id for item in publishers}
     lines: list[str] = []
@@ -35,8 +35,8 @@ def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]
         publisher = response.publisher
         cause = "" if response.cause is None else f"@{response.cause} "
         lines.append(f"< {cause}{_label(publisher, response.message)}")
-        used = b"\1" * (ID_BYTES + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
-        lines += _hex_lines(pack_frame(ids[publisher.block], response.payload), used)
+        used = b"\1" * (id_bytes + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
+        lines += _hex_lines(pack_frame(ids[publisher.block], response.payload, id_bytes), used)
     return "\n".join(lines) + "\n"
 
 

@@ -65,10 +65,14 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
         frames = max(len(found.stimuli), len(found.responses))
         files |= _verilog_bench(configuration, system, frames, _beats(found.responses, system.width))
     files |= {
-        "stimulus.txt": GeneratedFile(stimulus_text(found.stimuli, system.subscribers), "user", copyto="stimulus.txt"),
-        "expected.txt": GeneratedFile(expected_text(found.responses, system.publishers), "user", copyto="expected.txt"),
+        "stimulus.txt": _host_file("stimulus.txt", stimulus_text(found.stimuli, system.subscribers, system.id_bytes)),
+        "expected.txt": _host_file("expected.txt", expected_text(found.responses, system.publishers, system.id_bytes)),
     }
     return GeneratedCore(f"Simulation of system {system.name}", files)
+
+
+def _host_file(name: str, text: str) -> GeneratedFile:
+    return GeneratedFile(text, "user", copyto=name)
 
 
 def live_inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
@@ -113,6 +117,11 @@ def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None
         fail(
             f"{simulator} cannot simulate a system with several clocks",
             hint=f"the additional clocks are generated in VHDL; use --target={target}",
+        )
+    if system.id_bytes > 1 and (target == "live" or not known.reads_vhdl):
+        fail(
+            f"{simulator} cannot simulate a system with 'idBytes: {system.id_bytes}' here",
+            hint="only the simulated host in VHDL has ids of two bytes; use --target=sim",
         )
     for type_ in system.accelerator_types:
         accelerator = type_.accelerator

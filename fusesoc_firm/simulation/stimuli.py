@@ -54,22 +54,29 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
         from fusesoc_firm.message.bag_reader import BAGS
 
         hint = f"stimuli are a YAML file (.yaml, .yml) or a bag; {BAGS}"
-        stimuli = [Stimulus(*recorded) for recorded in read_bag(path, subscribers, hint)]
+        stimuli = [_recorded(path, *message) for message in read_bag(path, subscribers, hint)]
     if not stimuli:
         names = ", ".join(subscriber.block for subscriber in subscribers)
         fail(f"{path} contains no message for {names}")
-    for stimulus in stimuli:
-        _check_length(path, stimulus)
     return stimuli
 
 
-def _check_length(path: Path, stimulus: Stimulus) -> None:
-    longest, size = stimulus.subscriber.max_length, len(stimulus.payload)
-    if longest is not None and size > longest:
-        fail(
-            f"{path} contains a message of {size} bytes for {stimulus.subscriber.block}, which accepts {longest}",
-            hint=f"add 'maxLength: {size}' or more to the block",
-        )
+def _recorded(path: Path, subscriber: Topic, payload: bytes, message: dict[str, Any]) -> Stimulus:
+    if _is_too_long(subscriber, payload):
+        fault, hint = _length_fault(subscriber, payload)
+        fail(f"{path}: {fault}", hint=hint)
+    return Stimulus(subscriber, payload, message)
+
+
+def _is_too_long(subscriber: Topic, payload: bytes) -> bool:
+    return subscriber.max_length is not None and len(payload) > subscriber.max_length
+
+
+def _length_fault(subscriber: Topic, payload: bytes) -> tuple[str, str]:
+    """Return the fault of a message that is longer than its subscriber accepts, and a hint."""
+    size = len(payload)
+    fault = f"a message has {size} bytes, but '{subscriber.block}' accepts {subscriber.max_length}"
+    return fault, f"add 'maxLength: {size}' or more to the block"
 
 
 def _from_yaml(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
@@ -105,4 +112,8 @@ def _item(text: YamlText, node: yaml.Node, known: dict[str, Topic], faults: Diag
     if len(faults.found) > before:
         return None
     payload = encode(subscriber.frame, completed(subscriber.frame, message))
+    if _is_too_long(subscriber, payload):
+        fault, hint = _length_fault(subscriber, payload)
+        faults.error(fault, text.source(value), hint)
+        return None
     return Stimulus(subscriber, payload, decode(subscriber.frame, payload))

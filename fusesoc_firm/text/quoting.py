@@ -101,8 +101,11 @@ def dot_text(text: str) -> str:
 
 
 def dot_markup(text: str) -> str:
-    """Return `text` escaped for a label in Graphviz's markup, where a backslash also begins an escape sequence."""
-    return html.escape(text).replace("\\", "\\\\")
+    """Return `text` escaped for a label in Graphviz's markup, where a backslash also begins an escape sequence.
+
+    Graphviz rejects a bracket alone, but not its number.
+    """
+    return html.escape(text).replace("\\", "\\\\").replace("]", "&#93;")
 
 
 def plot_text(text: str) -> str:

@@ -6,6 +6,7 @@ import contextlib
 import sqlite3
 import tracemalloc
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,13 @@ def test_messages_go_by_topic_or_type_in_order_of_time(tmp_path: Path, kind: str
     found = read_stimuli(write(tmp_path, kind, recordings), subscribers)
     assert x_values(found) == [("arm_right", 2.0), ("wind", 3.0), ("arm_left", 1.0), ("arm_left", 4.0)]
     assert all(item.payload == encode(item.subscriber.frame, item.message) for item in found)
+
+
+def test_a_recorded_message_that_is_too_long(tmp_path: Path) -> None:
+    path = write(tmp_path, "ros1", [("/s", STRING, 0.0, 0)])
+    topic = replace(subscriber("s", "std_msgs/String", ROS1), max_length=4)
+    with pytest.raises(InputError, match=rf"{path}: a message has 5 bytes, but 's' accepts 4"):
+        read_stimuli(path, [topic])
 
 
 @pytest.mark.parametrize("kind", KINDS)

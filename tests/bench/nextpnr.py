@@ -47,6 +47,8 @@ _FOLD = 4
 _WANTED = 200
 # Yosys names a net without a name after the cells up to the next one that has a name.
 _NEW_NAME = re.compile(r"_(?:TRELLIS_FF|LUT4|CCU2C|PFUMX|L6MUX21|DP16KD|MULT18X18D)_|[$\[]")
+# GHDL notes where an instance or a register was written: for generated VHDL, a folder that is new in each run.
+_COMMENT = re.compile(r"/\*.*?\*/")
 _TEMPLATES = Path(__file__).parent
 
 
@@ -95,8 +97,9 @@ class Nextpnr:
     def place(self, verilog: str, top: str, seeds: Sequence[int] = SEEDS) -> Placement:
         """Place a netlist once for each seed; raises `SynthesisError`.
 
-        Placements that are known for the same text and the same tools are not repeated.
+        Placements that are known for the same text and the same tools are not repeated; comments do not matter.
         """
+        verilog = _COMMENT.sub("", verilog)
         file = self.known / f"{_digest(verilog, top)}.json"
         found = _read(file)
         if found and set(seeds) <= set(found.fmax):

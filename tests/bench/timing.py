@@ -76,6 +76,10 @@ _ARITHMETIC = (
     "firm_float_add",
     "firm_float_multiply",
     "firm_float_multiply_add",
+    "firm_float_divide",
+    "firm_float_square_root",
+    "firm_float_compare",
+    "firm_float_clamp",
     "firm_fixed_to_float",
     "firm_float_to_fixed",
 )

@@ -318,6 +318,14 @@ def test_software_is_counted_apart(capsys: Captured) -> None:
     assert text.endswith(": 2 subscribers, 2 accelerators, 2 publishers, 1 accelerator in software\n")
 
 
+def test_messages_for_a_system_are_checked(tmp_path: Path, capsys: Captured) -> None:
+    stimuli, wrong = SPEC.with_name("stimuli.yaml"), tmp_path / "wrong.yaml"
+    assert "is valid" in out(capsys, "system", "check", str(SPEC), "--stimuli", str(stimuli))
+    wrong.write_text("- nobody: {x: 1.0}\n", encoding="utf-8")
+    text = error(capsys, "system", "check", str(SPEC), "--stimuli", str(stimuli), "--stimuli", str(wrong))
+    assert f"{wrong}:1:3: error: 'nobody' is not a subscriber" in text
+
+
 @pytest.mark.parametrize("distro", ["noetic", "humble"])
 def test_a_distribution_of_either_version_serves_a_specification(distro: str, capsys: Captured) -> None:
     assert "is valid" in out(capsys, "system", "check", str(SPEC), "--distro", distro)

@@ -146,6 +146,7 @@ OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "add": np.add,
     "subtract": np.subtract,
     "multiply": np.multiply,
+    "divide": np.divide,
 }
 
 
@@ -158,6 +159,45 @@ def test_results_are_those_of_numpy(library: Library, tmp_path: Path, operation:
     with np.errstate(all="ignore"):
         expected = OPERATIONS[operation](*(numbers.values(column) for column in zip(*rows, strict=True)))
     check(numbers, rows, found, expected)
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_square_roots_are_those_of_numpy(library: Library, tmp_path: Path, name: str) -> None:
+    numbers = Numbers(name)
+    rows = numbers.several(COUNT, 1)
+    for row in rows[COUNT // 2 :]:
+        # Squares and their neighbours; few roots of negative numbers.
+        with np.errstate(all="ignore"):
+            square = np.square(numbers.values([row[0] >> numbers.mantissa_bits // 2 << numbers.mantissa_bits // 2]))
+        row[0] = int(square.view(BITS[name])[0]) + numbers.random.choice((0, 0, 0, 1)) & (1 << (numbers.width - 1)) - 1
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="square_root", **size_of(numbers))
+    with np.errstate(all="ignore"):
+        check(numbers, rows, found, np.sqrt(numbers.values(row[0] for row in rows)))
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_comparisons_are_those_of_numpy(library: Library, tmp_path: Path, name: str) -> None:
+    numbers = Numbers(name)
+    rows = numbers.several(COUNT, 2)
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="compare", **size_of(numbers))
+    a, b = (numbers.values(column) for column in zip(*rows, strict=True))
+    with np.errstate(all="ignore"):
+        expected = (a < b) * 8 | (a == b) * 4 | (a > b) * 2 | (np.isnan(a) | np.isnan(b)) * 1
+    assert found == expected.tolist()
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_a_clamp_is_that_of_numpy(library: Library, tmp_path: Path, name: str) -> None:
+    numbers = Numbers(name)
+    rows = numbers.several(COUNT, 3)
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="clamp", **size_of(numbers))
+    number, low, high = (numbers.values(column) for column in zip(*rows, strict=True))
+    with np.errstate(all="ignore"):
+        clipped = np.minimum(np.maximum(number, low), high)
+    expected = np.array([MODEL.clamp(*map(float, row)) for row in zip(number, low, high, strict=True)], TYPES[name])
+    check(numbers, rows, found, expected)
+    # NumPy may choose either zero.
+    np.testing.assert_array_equal(expected, clipped)
 
 
 @pytest.mark.parametrize("name", SIZES)
@@ -253,10 +293,16 @@ LATENCIES = {
     "add": (14, 14),
     "multiply": (15, 14),
     "multiply_add": (21, 18),
+    "divide": (64, 35),
+    "square_root": (58, 29),
+    "compare": (1, 1),
+    "clamp": (2, 2),
     "resize": (7, 8),
     "from_fixed": (8, 8),
     "to_fixed": (6, 6),
 }
+# Cycles from one result to the next, unless a result leaves in every cycle.
+INTERVALS = {"divide": (57, 28), "square_root": (56, 27)}
 
 
 @pytest.mark.parametrize("name", SIZES)
@@ -264,21 +310,27 @@ LATENCIES = {
 def test_latency_and_throughput(library: Library, tmp_path: Path, operation: str, name: str) -> None:
     numbers = Numbers(name)
     rows = [[0]] * 50
-    width = {"from_fixed": 32, "multiply_add": 3 * numbers.width, "resize": numbers.width, "to_fixed": numbers.width}
+    one, three = numbers.width, 3 * numbers.width
+    width = {"from_fixed": 32, "multiply_add": three, "clamp": three}
+    width |= {"square_root": one, "resize": one, "to_fixed": one}
     other = SIZES["float32" if name == "float64" else "float64"]
     generics = {**size_of(numbers), "OUT_EXPONENT_BITS": other[0], "OUT_MANTISSA_BITS": other[1]}
     bits = width.get(operation, 2 * numbers.width)
     _, report = operate(library, tmp_path, bits, rows, OPERATION=operation, STALLS=0, **generics)
     latency, cycles = map(int, re.findall(r"\d+", report.splitlines()[-1]))
     assert latency == LATENCIES[operation][list(SIZES).index(name)]
-    # One result in every cycle.
-    assert cycles == latency + len(rows)
+    interval = INTERVALS.get(operation, (1, 1))[list(SIZES).index(name)]
+    assert cycles == latency + interval * (len(rows) - 1) + 1
 
 
 ENTITIES = {
     "multiply": "firm_float_multiply",
     "add": "firm_float_add",
     "multiply_add": "firm_float_multiply_add",
+    "divide": "firm_float_divide",
+    "square_root": "firm_float_square_root",
+    "compare": "firm_float_compare",
+    "clamp": "firm_float_clamp",
     "to_fixed": "firm_float_to_fixed",
     "from_fixed": "firm_fixed_to_float",
 }
@@ -287,7 +339,7 @@ ENTITIES = {
 @pytest.mark.parametrize("operation", ENTITIES)
 def test_netlists_have_no_latches_and_the_same_results(library: Library, tmp_path: Path, operation: str) -> None:
     numbers = Numbers("float32")
-    operands = {"multiply_add": 3, "multiply": 2, "add": 2}.get(operation, 1)
+    operands = {"multiply_add": 3, "clamp": 3, "multiply": 2, "add": 2, "divide": 2, "compare": 2}.get(operation, 1)
     rows = random.Random(SEED).sample(numbers.several(2000, operands), 300)
     results, _ = operate(library, tmp_path, 32, rows, OPERATION=operation, **size_of(numbers))
     assert library.latches(ENTITIES[operation], size_of(numbers)) == []

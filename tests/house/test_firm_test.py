@@ -13,7 +13,10 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from fusesoc_firm.action.contents import Contents
+from fusesoc_firm.action.sandbox import can_sandbox
 from fusesoc_firm.action.trace import can_trace, traced
+from fusesoc_firm.action.tree import tree_of
 from fusesoc_firm.store.server import Server
 from fusesoc_firm.store.store import Store
 from tests.hdl.ghdl import REPOSITORY
@@ -210,6 +213,36 @@ def test_second_runs_of_steps_write_the_same_bytes(library: Path) -> None:
         assert (status, results(text)) == (0, {"sim": expected, "sim_icarus": expected}), text
 
 
+@pytest.mark.skipif(not can_sandbox(), reason="bwrap is not installed or not permitted")
+def test_a_sandbox_changes_no_output(library: Path) -> None:
+    """The same bytes of a program, a library and logs, apart from GHDL's times; and what an action did not declare."""
+    selected = ("acme:m:*", "--target", "sim", "sim_icarus", "sim_verilator", "--where-present")
+    assert run(library, *selected, "--cached", name="build")[0] == 0
+    outside = outputs(library)
+    status, text = run(library, *selected, "--sandbox", name="build")
+    # A result of a step outside a sandbox is not a result of this step.
+    assert (status, set(results(text).values())) == (0, {"ok"}), text
+    assert outputs(library) == outside
+    assert any(path.name == "Vgate" for path in outside)
+    bench = library / "counter" / "bench.vhd"
+    bench.write_text(bench.read_text().replace('"limit.txt"', f'"{library}/counter/limit.txt"'))
+    edited = ("acme:m:counter", "--target", "sim", "--rerun")
+    assert "is not an input of its core" in run(library, *edited)[1]
+    status, text = run(library, *edited, "--sandbox")
+    assert (status, results(text)) == (1, {"sim": "failed"}), text
+    status, text = run(library, *edited, "--sandbox", "--no-export")
+    assert (status, "cannot be combined with --no-export" in text) == (1, True), text
+
+
+def outputs(library: Path) -> dict[Path, str]:
+    """Return the identities of all files of builds."""
+    return {
+        root / path: item.identity or item.digest
+        for root in (library / "build").glob("*/*/")
+        for path, item in tree_of(root, Contents()).items()
+    }
+
+
 def test_an_edit_runs_its_dependents_and_a_failure_is_not_cached(library: Path) -> None:
     cores = ("acme:m:counter", "--target", "sim", "test_old")
     assert run(library, *cores)[0] == 0
@@ -293,7 +326,7 @@ def test_reports_tell_what_was_cached(library: Path) -> None:
             assert [item.text for item in suite.iter("system-out")] == ["cached"] * (expected == "cached")
         shutil.rmtree(library / "build")
         shutil.rmtree(library.parent / "store")
-    assert "--rerun needs --cached" in run(library, "gate@sim_icarus", "--rerun", name="build")[1]
+    assert "--rerun needs --cached or --sandbox" in run(library, "gate@sim_icarus", "--rerun", name="build")[1]
 
 
 def test_why_a_step_ran(library: Path) -> None:

@@ -328,3 +328,16 @@ def test_what_does_not_fit_a_message_of_variable_size(tmp_path: Path) -> None:
         (5, "the length of 'dimensions' must be at most 3, not 4"),
         (6, "a std_msgs/String needs a value for data"),
     ]
+
+
+def test_a_message_that_is_too_long(tmp_path: Path) -> None:
+    """The limit is the subscriber's longest payload, with the count of a text."""
+    subscriber = Converter("name", frame("std_msgs/String"), 0, max_length=7)
+    path = tmp_path / "stimuli.yaml"
+    path.write_text("- name: {data: abc}\n- name: {data: abcd}\n", encoding="utf-8")
+    with pytest.raises(InputError, match="a message has 8 bytes, but 'name' accepts 7") as raised:
+        read_stimuli(path, [subscriber])
+    assert f"{path}:2:9" in str(raised.value)
+    assert "add 'maxLength: 8' or more to the block" in str(raised.value)
+    path.write_text("- name: {data: abc}\n", encoding="utf-8")
+    assert len(read_stimuli(path, [subscriber])) == 1

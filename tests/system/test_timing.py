@@ -157,3 +157,16 @@ def test_without_all_times_nothing_is_certain(tmp_path: Path) -> None:
     found = system(tmp_path, "scheduler: fixed_priority", "period: 500", "deadline: 80")
     assert bounds_of(found) == ()
     assert "worstLatenessCycles" not in derived_description(found)["Converters"]["msg_to_AXIS"][0]
+
+
+def test_a_combined_scheduler(tmp_path: Path) -> None:
+    groups = "groups: [{scheduler: edf_latency, publishers: [p0, p1]}, {scheduler: lst, publishers: p2}]"
+    combined = system(tmp_path, f"scheduler: lru, {groups}", *["period: 5000"] * 3)
+    assert combined.scheduling.is_preemptive
+    assert bounds_of(combined) == ()
+    shown = derived_description(combined)["System"]
+    assert (shown["scheduler"], [group["scheduler"] for group in shown["groups"]]) == ("lru", ["edf_latency", "lst"])
+    text = system_configuration(combined)
+    generics = {item["formal"]: item["actual"] for item in text["scheduler_generics"]}
+    assert (text["scheduler"], generics["TOP_POLICY"]) == ("firm_sched_combined", "firm.firm_sched_pkg.LRU")
+    assert {"PERIODS", "DEADLINES", "TRANSFER_TIMES", "TIME_BITS", "SHORTEST_RUN"} < generics.keys()

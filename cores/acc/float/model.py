@@ -52,6 +52,13 @@ def multiply_add(a: float, b: float, c: float, size: Format = FLOAT64) -> float:
     return product + c if not Fraction(a) * Fraction(b) else 0.0
 
 
+def clamp(number: float, low: float, high: float) -> float:
+    """Return the number, but at least `low` and then at most `high`; NaN if one of them is NaN; -0 is below +0."""
+    if math.isnan(number) or math.isnan(low) or math.isnan(high):
+        return math.nan
+    return min(max(number, low, key=_order), high, key=_order)
+
+
 def from_fixed(number: int, fraction: int = 0, size: Format = FLOAT64) -> float:
     """Return the number of units of 2**-fraction, rounded to nearest, ties to even."""
     return size.rounded(Fraction(number, 2**fraction))
@@ -69,6 +76,10 @@ def to_fixed(
     to_whole: Callable[[Fraction], int] = math.trunc if truncates else round
     units = to_whole(Fraction(number) * 2**fraction)
     return min(max(units, low), high), not low <= units <= high, False
+
+
+def _order(number: float) -> tuple[float, float]:
+    return number, math.copysign(1.0, number)
 
 
 def _exponent(magnitude: Fraction) -> int:

@@ -14,7 +14,9 @@ entity firm_axis_trim is
   generic (
     WIDTH : integer := 8;
     -- The number of bytes that padding may add.
-    SLACK : natural := 0
+    SLACK : natural := 0;
+    -- The greatest length, less than 2**30; 0: any. A frame that announces more is aborted after its first bytes.
+    MAX_LENGTH : natural := 0
   );
   port (
     clk   : in std_logic;
@@ -42,10 +44,12 @@ entity firm_axis_trim is
     piece_ready : out std_logic;
 
     -- Bytes were offered beyond the frame's end, or it ended with more bytes missing than padding may add; both are a
-    -- cycle late. `is_closed`: the frame was aborted, so the rest of what is offered is dropped.
+    -- cycle late. `is_closed`: the frame was aborted, so the rest of what is offered is dropped. `is_refused` pulses in
+    -- the cycle after `start` for a length above MAX_LENGTH.
     is_cut     : out std_logic;
     is_lacking : out std_logic;
     is_closed  : out std_logic;
+    is_refused : out std_logic;
 
     m_data  : out std_logic_vector(WIDTH-1 downto 0);
     m_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
@@ -83,6 +87,8 @@ architecture rtl of firm_axis_trim is
   signal is_failed : std_logic;
   signal cut_r     : std_logic;
   signal stuck_r   : std_logic;         -- the frame should end, but lacks a beat and more
+  signal started_r : std_logic;         -- the frame has just begun
+  signal refused   : std_logic;         -- it announces too much
 
   signal wanted  : count_t;
   signal room    : count_t;    -- the remaining bytes, if they are few
@@ -114,8 +120,24 @@ begin
   announced <= std_logic_vector(not left_r);
   is_closed <= closed_r;
 
+  unlimited : if MAX_LENGTH = 0 generate
+    refused <= '0';
+  end generate unlimited;
+
+  limited : if MAX_LENGTH > 0 generate
+    constant LIMIT_BITS : positive := index_bits(MAX_LENGTH+1);
+    signal is_short     : std_logic;  -- the length has few bits
+    signal is_legal     : std_logic;
+  begin
+    is_short <= are_ones(std_logic_vector(left_r(31 downto LIMIT_BITS)));
+    is_legal <= is_short and is_below(not std_logic_vector(left_r(LIMIT_BITS-1 downto 0)), MAX_LENGTH+1);
+    refused  <= started_r and not (is_legal or open_r);
+  end generate limited;
+
+  is_refused <= refused;
+
   -- All of these come a cycle after a piece that is not the frame's last one.
-  is_failed <= (fault or cut_r or stuck_r or failed_r) and not closed_r;
+  is_failed <= (fault or refused or cut_r or stuck_r or failed_r) and not closed_r;
 
   hold_piece : process (clk)
   begin
@@ -128,7 +150,7 @@ begin
         if header = '0' and exceeds = '1' then
           m_count <= room;
         end if;
-        if header = '0' and (is_failed = '1' or abort = '1' or (last = '1' and open_r = '1')) then
+        if is_failed = '1' or (header = '0' and (abort = '1' or (last = '1' and open_r = '1'))) then
           m_count <= (others => '0');
         end if;
       end if;
@@ -160,13 +182,15 @@ begin
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
-        closed_r <= '0';
-        failed_r <= '0';
-        cut_r    <= '0';
-        stuck_r  <= '0';
+        started_r <= '0';
+        closed_r  <= '0';
+        failed_r  <= '0';
+        cut_r     <= '0';
+        stuck_r   <= '0';
       else
-        cut_r   <= valid and exceeds and not last and not header and not closed_r;
-        stuck_r <= valid and last and lacks and not ends;
+        started_r <= valid and free and start;
+        cut_r     <= valid and exceeds and not last and not header and not closed_r;
+        stuck_r   <= valid and last and lacks and not ends;
         if free = '1' then
           failed_r <= '0';
           closed_r <= is_failed or (closed_r and not (valid and start));

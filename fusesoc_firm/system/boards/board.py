@@ -194,6 +194,8 @@ def on_board(specification: Specification, board: Board) -> Specification:
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
     """Raise `InputError` if the clocks or pins of a system and of its board do not match."""
+    if system.id_bytes > 1:
+        fail(f"board '{board.name}' has no host for a system with 'idBytes: {system.id_bytes}'")
     clocks = 1 + len(system.clocks)
     if board.processor and clocks > MOST_CLOCKS:
         fail(f"board '{board.name}' has at most {MOST_CLOCKS} clocks, including clk; the system has {clocks}")

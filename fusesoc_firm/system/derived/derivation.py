@@ -22,9 +22,10 @@ from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.connections import Wiring, places
 from fusesoc_firm.system.derived.cpp_function import check_kernel
 from fusesoc_firm.system.derived.entities import check_entities
+from fusesoc_firm.system.derived.ids import check_count
 from fusesoc_firm.system.derived.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.derived.link import link_of
-from fusesoc_firm.system.derived.longest import with_longest_payloads
+from fusesoc_firm.system.derived.longest import with_longest_payloads, with_longest_sent
 from fusesoc_firm.system.derived.model import (
     AcceleratorBlock,
     AcceleratorType,
@@ -36,13 +37,14 @@ from fusesoc_firm.system.derived.model import (
     PayloadLength,
     Topic,
 )
-from fusesoc_firm.system.derived.partition import MOST_CONVERTERS, Parting, Parts, message_names
+from fusesoc_firm.system.derived.partition import Parting, Parts, message_names
 from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
 from fusesoc_firm.system.derived.queue import queue_of
 from fusesoc_firm.system.derived.status import status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
+from fusesoc_firm.system.derived.tree import tree_of
 from fusesoc_firm.system.derived.watchdog import watchdog_of
 from fusesoc_firm.system.written.sources import declares_width
 from fusesoc_firm.system.written.specification import (
@@ -91,17 +93,19 @@ def derive(
     parts = analysis.parts(analysis.wiring().connect(), names)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
     faults.raise_if_any()
-    parts.check(analysis.blocks, faults)
+    parts.check(analysis.blocks, specification.project.id_bytes, faults)
     buffers = publisher_buffers(connections, parts.of_mode(PUBLISHER), faults)
     faults.raise_if_any()
     project = specification.project
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
-    subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), parts.blocks, faults)
+    subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), project, parts.blocks, faults)
     subscribers = tuple(replace(item, queue=queue_of(parts.blocks[item.block], item, faults)) for item in subscribers)
+    publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
+    tree = tree_of(project, scheduling, link, publishers, faults)
     faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
@@ -118,7 +122,8 @@ def derive(
         names=names,
         link=link,
         status=status_of(project, link, max(len(subscribers), len(publishers)), faults),
-        watchdog=watchdog_of(project, scheduling, publishers, faults),
+        tree=tree,
+        watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),
     )
     check_entities(system, parts.blocks, faults)
     faults.raise_if_any()
@@ -295,11 +300,8 @@ class _Analysis:
         if not found and are_known:
             message = f"the system has no {mode}, but needs at least one"
             self.faults.error(message, blocks[0].name.source, f"a {mode} is a block with 'mode: {mode}'")
-        elif len(found) > MOST_CONVERTERS:
-            self.faults.error(
-                f"the system has {len(found)} {mode}s; ids are one byte long, so the limit is {MOST_CONVERTERS}",
-                found[MOST_CONVERTERS].name.source,
-            )
+        else:
+            check_count("system", mode, found, self.specification.project.id_bytes, self.faults)
 
     def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
         """Yield the topics of all converters and of software in other programs; `names` are from `message_names`."""

@@ -9,9 +9,6 @@ from fusesoc_firm.system.derived.model import Converter, Link, LinkKind, Schedul
 from fusesoc_firm.system.written.specification import AXI_STREAM, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# The longest payload that a link accepts where a message is unbounded. With the header and the bytes that an adapter
-# sends late, it fills a memory of 2,048 bytes.
-_UNBOUNDED_BYTES = 2000
 # Bytes that ROS 2 may append to a payload.
 _TRAILING_BYTES = 3
 # The limit of the hardware's generic LONGEST.
@@ -52,10 +49,7 @@ def link_of(
 
 def _longest(subscribers: Iterable[Converter]) -> int:
     """Return the number of payload bytes in the longest frame from the host."""
-    return max(
-        _UNBOUNDED_BYTES if item.has_default_length else item.max_length or item.frame.payload_bytes + _TRAILING_BYTES
-        for item in subscribers
-    )
+    return max(item.max_length or item.frame.payload_bytes + _TRAILING_BYTES for item in subscribers)
 
 
 def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:

@@ -1,48 +1,83 @@
-"""Determine the longest payload that each subscriber accepts."""
+"""Determine the longest payload that each subscriber accepts, and each publisher sends."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from fusesoc_firm.frame.length import DEFAULT_LONGEST, MOST_BYTES, bounded_payload, length_of
 from fusesoc_firm.system.derived.model import Converter
-from fusesoc_firm.system.written.specification import PUBLISHER, Block
+from fusesoc_firm.system.written.specification import AXI_STREAM, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
+
+# The default with a link, which stores whole frames. With the header and the bytes that an adapter sends late, such a
+# frame fills a memory of 2,048 bytes.
+_LINK_DEFAULT = 2000
 
 
 def with_longest_payloads(
-    subscribers: tuple[Converter, ...], blocks: Mapping[str, Block], faults: Diagnostics
+    subscribers: tuple[Converter, ...], project: Project, blocks: Mapping[str, Block], faults: Diagnostics
 ) -> tuple[Converter, ...]:
     """Return the subscribers, those of variable size with their longest payloads; note faults in `maxLength`."""
-    _check_keys(blocks, {item.block for item in subscribers if item.frame.is_fixed_size}, faults)
+    _check_keys(blocks, subscribers, faults)
+    has_link = project.interconnect != AXI_STREAM
     return tuple(
-        item if item.frame.is_fixed_size else _with_longest_payload(item, blocks[item.block], faults)
+        item
+        if item.frame.is_fixed_size
+        else _limited(item, blocks[item.block], _default(item, has_link=has_link), faults)
         for item in subscribers
     )
 
 
-def _check_keys(blocks: Mapping[str, Block], fixed: Set[str], faults: Diagnostics) -> None:
+def with_longest_sent(
+    publishers: tuple[Converter, ...],
+    subscribers: Iterable[Converter],
+    blocks: Mapping[str, Block],
+    faults: Diagnostics,
+) -> tuple[Converter, ...]:
+    """Return the publishers, those whose frames may pause with their longest payloads; note faults in `maxLength`.
+
+    By default, a publisher sends at most as much as the system's subscribers accept from the host, since a response
+    often has the size of its cause.
+    """
+    _check_keys(blocks, publishers, faults)
+    default = max([DEFAULT_LONGEST, *(item.max_length or 0 for item in subscribers if item.software is None)])
+    return tuple(
+        _limited(item, blocks[item.block], default if item.software is None else MOST_BYTES, faults)
+        if item.may_pause
+        else item
+        for item in publishers
+    )
+
+
+def _check_keys(blocks: Mapping[str, Block], converters: Iterable[Converter], faults: Diagnostics) -> None:
     """Note a fault for each `maxLength` that limits nothing."""
-    for name, block in blocks.items():
+    for item in converters:
+        block = blocks[item.block]
         if block.max_length is None:
             continue
-        if name in fixed:
-            message = f"'{name}' has a 'maxLength', but {block.message} has a fixed size"
+        if item.frame.is_fixed_size:
+            message = f"'{item.block}' has a 'maxLength', but {item.frame.message} has a fixed size"
             faults.error(message, block.place("max_length"), "remove the key: only messages of variable size need it")
-        elif block.mode == PUBLISHER:
-            message = f"'{name}' has a 'maxLength', which is legal only for subscribers"
-            faults.error(message, block.place("max_length"), "the key 'buffer' limits the payloads of a publisher")
+        elif item.buffer:
+            message = f"'{item.block}' has a 'maxLength' and a 'buffer'"
+            faults.error(message, block.place("max_length"), "remove the key: the buffer limits the payloads")
 
 
-def _with_longest_payload(subscriber: Converter, block: Block, faults: Diagnostics) -> Converter:
-    bounded, given = bounded_payload(subscriber.frame), block.max_length
+def _limited(converter: Converter, block: Block, default: int, faults: Diagnostics) -> Converter:
+    """Return the converter with its longest payload: the message's bounds, the block's `maxLength`, or a default."""
+    bounded, given = bounded_payload(converter.frame), block.max_length
     if given is None:
-        # Software of the system itself keeps its lengths.
-        default = DEFAULT_LONGEST if subscriber.software is None else MOST_BYTES
-        return replace(subscriber, max_length=bounded or default, has_default_length=bounded is None)
-    least, most = length_of(subscriber.frame).minimum, bounded or MOST_BYTES
+        return replace(converter, max_length=bounded or default, has_default_length=bounded is None)
+    least, most = length_of(converter.frame).minimum, bounded or MOST_BYTES
     if not least <= given <= most:
-        message = f"'maxLength' of '{subscriber.block}' cannot be {given} bytes for {subscriber.frame.message}"
+        message = f"'maxLength' of '{converter.block}' cannot be {given} bytes for {converter.frame.message}"
         faults.error(message, block.place("max_length"), f"legal here: {least} to {most}")
-    return replace(subscriber, max_length=given)
+    return replace(converter, max_length=given)
+
+
+def _default(subscriber: Converter, *, has_link: bool) -> int:
+    """Return the longest payload of a message without bounds; software of the system itself keeps its lengths."""
+    if has_link:
+        return _LINK_DEFAULT
+    return DEFAULT_LONGEST if subscriber.software is None else MOST_BYTES

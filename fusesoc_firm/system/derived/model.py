@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.middleware import Middleware
@@ -191,9 +192,18 @@ class PublisherTimes:
 
 
 @dataclass(frozen=True)
+class Group:
+    """Publishers with consecutive ids that have a scheduler of their own: their blocks and the scheduler's policy."""
+
+    policy: str
+    blocks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Scheduling:
     """The scheduler that chooses the next frame to the host: its policy, with the publishers' times by id.
 
+    If there are groups, `policy` chooses among them, and the scheduler is a combined one (section 4.3.5).
     A preemptive policy interrupts a frame after `shortest_run` beats at the earliest. The scheduler counts time in
     `time_bits` bits. If the policy was chosen automatically, `reasons` explains the choice.
     """
@@ -204,6 +214,16 @@ class Scheduling:
     shortest_run: int
     time_bits: int
     reasons: tuple[str, ...] = ()
+    groups: tuple[Group, ...] = ()
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A Manager of Managers: the ids of each group's publishers, the policy of each group and that among the groups."""
+
+    groups: tuple[tuple[int, ...], ...]
+    policy: str
+    top_policy: str
 
 
 class LinkKind(Enum):
@@ -280,7 +300,7 @@ class DerivedSystem:
 
     Without a `link`, the streams are ports of the system. Converters, accelerators and connections in software are not
     included. `names` maps each accelerator's message sides to their names outside the accelerator: `<block>_in`,
-    `<block>_out1` and so on.
+    `<block>_out1` and so on. If ids have two bytes, `tree` is the Manager of Managers.
     """
 
     name: str
@@ -298,6 +318,18 @@ class DerivedSystem:
     clocks: tuple[Clock, ...] = ()
     status: StatusAccess | None = None
     watchdog: int = 0
+    tree: Tree | None = None
+
+    @property
+    def id_bytes(self) -> int:
+        """The number of bytes in a frame's id."""
+        return 2 if self.tree else 1
+
+    @cached_property
+    def places(self) -> Mapping[int, int]:
+        """The place of each publisher among the Manager's inputs, by id."""
+        order = chain.from_iterable(self.tree.groups) if self.tree else range(len(self.publishers))
+        return {number: place for place, number in enumerate(order)}
 
     def clock_of(self, block: str) -> Clock | None:
         """Return the clock of a block, or None for the system's clock."""

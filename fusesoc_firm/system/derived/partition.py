@@ -14,6 +14,7 @@ from functools import cached_property, reduce
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import names_in_use, with_names_in_use
+from fusesoc_firm.system.derived.ids import check_count
 from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, End, MessageSide, Software, Topic
 from fusesoc_firm.system.written.specification import PUBLISHER, SUBSCRIBER, Block
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -22,9 +23,6 @@ from fusesoc_firm.text.yaml_sections import keys_only_of
 from fusesoc_firm.text.yaml_text import Text
 
 Sides = Mapping[str, tuple[MessageSide, ...]]
-
-# An id is one byte.
-MOST_CONVERTERS = 256
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Parts:
         """Return the hardware's subscribers or publishers."""
         return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == mode}
 
-    def check(self, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
+    def check(self, blocks: Mapping[str, Block], id_bytes: int, faults: Diagnostics) -> None:
         """Note the faults in the hardware of a specification with these `blocks`."""
         first = next(iter(blocks.values())).name.source
         if not self.blocks:
@@ -58,11 +56,8 @@ class Parts:
             if not found:
                 hint = f"a {mode} is a block with 'mode: {mode}', or a message between hardware and software"
                 faults.error(f"the hardware has no {mode}, but needs at least one", first, hint)
-            elif len(found) > MOST_CONVERTERS:
-                message = (
-                    f"the hardware has {len(found)} {mode}s; ids are one byte long, so the limit is {MOST_CONVERTERS}"
-                )
-                faults.error(message, found[MOST_CONVERTERS].name.source)
+            else:
+                check_count("hardware", mode, found, id_bytes, faults)
         taking = {end.block for name, end in self.crossings.items() if self.blocks[name].mode == PUBLISHER}
         for block in self.software.blocks:
             if block.block not in taking:

@@ -15,8 +15,11 @@ from math import ceil, floor
 from typing import TYPE_CHECKING
 
 from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.frame.model import LENGTH_BYTES
 from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
 from fusesoc_firm.scheduling.tasks import Task
+from fusesoc_firm.system.derived.groups import groups_of
+from fusesoc_firm.system.derived.ids import ONE_BYTE
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, PublisherTimes, Scheduling
 from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -25,8 +28,6 @@ from fusesoc_firm.text.yaml_text import Text
 if TYPE_CHECKING:
     from fusesoc_firm.scheduling.analysis import Bound, Channel
 
-# The number of bytes before a frame's payload: id and length.
-_HEADER_BYTES = 5
 # A scheduler's times are a few bits wider than the longest deadline, to distinguish early from late (cores/sched).
 _SPARE_TIME_BITS = 3
 _FEWEST_TIME_BITS, _MOST_TIME_BITS = 8, 31
@@ -44,6 +45,9 @@ _LONGEST_RUN = 2**31 - 1
 _PERIOD = "add 'period: <cycles, time or rate>', such as 'period: 100 Hz'"
 _WCET = "add 'wcet: <cycles or time>', or 'buffer: <bytes of the longest payload>'"
 
+# With ids of two bytes, `tree` decides; a group's schedulers take turns.
+_IN_GROUPS = "round_robin", ("publishers are in groups by period, so those with short periods have more turns",)
+
 Rounding = Callable[[Fraction], int]
 
 
@@ -59,13 +63,18 @@ def scheduling_of(
     `clock` is the frequency of clk in Hz, if it is given.
     """
     reader = _Reader(clock, faults)
-    times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
+    times = tuple(reader.times(blocks[item.block], item, project) for item in publishers)
     policy, reasons = str(project.scheduler), tuple[str, ...]()
+    groups = groups_of(project, publishers, faults)
     _check_shortest_run(project, faults)
-    _check_complete(policy, [blocks[item.block] for item in publishers], times, faults)
-    if policy == AUTO_SCHEDULER:
+    for name in dict.fromkeys([group.policy for group in groups] or [policy]):
+        _check_complete(name, [blocks[item.block] for item in publishers], times, faults)
+    if policy == AUTO_SCHEDULER and project.id_bytes > ONE_BYTE:
+        policy, reasons = _IN_GROUPS
+    elif policy == AUTO_SCHEDULER:
         policy, reasons = _chosen(project, publishers, times)
-    return Scheduling(policy, times, POLICIES[policy].is_preemptive, project.shortest_run, _time_bits(times), reasons)
+    is_preemptive = any(POLICIES[name].is_preemptive for name in (policy, *(group.policy for group in groups)))
+    return Scheduling(policy, times, is_preemptive, project.shortest_run, _time_bits(times), reasons, groups)
 
 
 def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
@@ -93,8 +102,10 @@ def channel_of(system: DerivedSystem) -> Channel:
 def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
     """Return the bounds for each publisher under the system's scheduler, in the order of the publishers' ids.
 
-    The result is empty unless all times of all publishers are known.
+    The result is empty unless all times of all publishers are known, and if publishers are in groups.
     """
+    if system.tree or system.scheduling.groups:
+        return ()
     tasks = _tasks(system.publishers, system.scheduling.times)
     if len(tasks) < len(system.publishers):
         return ()
@@ -128,9 +139,9 @@ def _chosen(
     return choice.best.policy, choice.reasons
 
 
-def frame_beats(payload_bytes: int, width: int) -> int:
+def frame_beats(payload_bytes: int, width: int, id_bytes: int = ONE_BYTE) -> int:
     """Return the number of beats in a frame on a stream of `width` bits."""
-    return -(-(_HEADER_BYTES + payload_bytes) * 8 // width)
+    return -(-(id_bytes + LENGTH_BYTES + payload_bytes) * 8 // width)
 
 
 def _time_bits(times: Iterable[PublisherTimes]) -> int:
@@ -185,7 +196,7 @@ class _Reader:
     clock: Fraction | None
     faults: Diagnostics
 
-    def times(self, block: Block, publisher: Converter, width: int) -> PublisherTimes:
+    def times(self, block: Block, publisher: Converter, project: Project) -> PublisherTimes:
         """Return a publisher's times.
 
         Periods and deadlines are rounded down, frame times up, so that rounding hides no late frame.
@@ -193,7 +204,7 @@ class _Reader:
         period = self._cycles(block.period, "period", floor)
         transfer_time = self._cycles(block.wcet, "wcet", ceil)
         if block.wcet is None:
-            transfer_time = _beats_at_most(publisher, width)
+            transfer_time = _beats_at_most(publisher, project)
         deadline = self._cycles(block.deadline, "deadline", floor) if block.deadline else period
         return PublisherTimes(period, transfer_time, deadline)
 
@@ -226,7 +237,7 @@ class _Reader:
         return self.clock / (number * _HERTZ[unit]) if number else Fraction(0)
 
 
-def _beats_at_most(publisher: Converter, width: int) -> int | None:
+def _beats_at_most(publisher: Converter, project: Project) -> int | None:
     """Return the number of beats in a publisher's longest frame, or None if its size is unbounded."""
     longest = publisher.buffer or length_of(publisher.frame).maximum
-    return None if longest is None else frame_beats(longest, width)
+    return None if longest is None else frame_beats(longest, project.width, project.id_bytes)

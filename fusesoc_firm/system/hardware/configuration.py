@@ -187,6 +187,8 @@ def dimensions(system: DerivedSystem) -> Context:
         "publisher_count": publishers,
         "pub_data_bits": publishers * system.width,
         "pub_keep_bits": publishers * system.width // 8,
+        "wide_ids": system.id_bytes > 1,
+        "id_bits": 8 * system.id_bytes,
         "select_bits": max(1, (publishers - 1).bit_length()),
         "error_count": len(system.error_blocks),
         "error_code_bits": ERROR_CODE_BITS * len(system.error_blocks),

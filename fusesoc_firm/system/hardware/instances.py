@@ -66,7 +66,8 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
     return {
         **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
-        **_part_of_manager(converter, system.width),
+        **_part_of_manager(converter, system),
+        "max_length": {"bytes": converter.max_length} if converter.max_length else None,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
         "error": error_of(converter, system) if converter.may_pause and not is_watched else None,
         "watched": _watched(names, converter, system) if is_watched else None,
@@ -84,15 +85,18 @@ def _watched(names: Names, converter: Converter, system: DerivedSystem) -> dict[
     }
 
 
-def _part_of_manager(converter: Converter, width: int) -> dict[str, int]:
+def _part_of_manager(converter: Converter, system: DerivedSystem) -> dict[str, int]:
     """Return the slice of the Manager's inputs that receives a publisher's frames."""
-    number, lanes = converter.id, width // 8
+    place, width = system.places[converter.id], system.width
+    lanes = width // 8
     return {
-        "id": number,
-        "data_high": width * (number + 1) - 1,
-        "data_low": width * number,
-        "keep_high": lanes * (number + 1) - 1,
-        "keep_low": lanes * number,
+        "id": converter.id,
+        "id_byte": converter.id % 256,
+        "place": place,
+        "data_high": width * (place + 1) - 1,
+        "data_low": width * place,
+        "keep_high": lanes * (place + 1) - 1,
+        "keep_low": lanes * place,
     }
 
 
@@ -113,7 +117,7 @@ def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[s
         "lanes": lanes,
         "depth": max(2, -(-(ID_BYTES + LENGTH_BYTES + converter.buffer) // lanes)),
         **{word: names.frame(block, word) for word in FRAME_WORDS},
-        **_part_of_manager(converter, system.width),
+        **_part_of_manager(converter, system),
         "out": error_of(converter, system),
     }
 

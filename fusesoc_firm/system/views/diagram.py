@@ -13,7 +13,14 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, Converter, DerivedSystem, PublisherTimes
+from fusesoc_firm.system.derived.model import (
+    AcceleratorBlock,
+    Connection,
+    Converter,
+    DerivedSystem,
+    PublisherTimes,
+    Scheduling,
+)
 from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.hardware.crossings import crossings
 from fusesoc_firm.text.diagnostics import fail
@@ -131,7 +138,7 @@ class _Painter:
         """Draw the Manager in both directions, the converters and the accelerators."""
         system = self._system
         self._node(graph, f"{_MANAGER}_in", "manager", ["Manager"])
-        self._node(graph, f"{_MANAGER}_out", "manager", ["Manager", *system.scheduling.policy.split("_", 2)])
+        self._node(graph, f"{_MANAGER}_out", "manager", ["Manager", *_scheduler(system.scheduling)])
         for subscriber in system.subscribers:
             self._node(graph, _name(subscriber.block), "converter", [*_converter(subscriber), *_queue(subscriber)])
         for publisher, times in zip_longest(system.publishers, system.scheduling.times):
@@ -199,6 +206,12 @@ def _about(system: DerivedSystem) -> str:
     clocks += [(clock.port, clock.frequency) for clock in system.clocks]
     words = [f"{system.name}: {system.width}-bit streams", *(f"{name} {_megahertz(hertz)}" for name, hertz in clocks)]
     return ", ".join([*words, *([f"link: {system.link.kind.value}"] if system.link else [])])
+
+
+def _scheduler(scheduling: Scheduling) -> list[str]:
+    """Return the words of the policy, followed by the policies of the groups if there are any."""
+    groups = [group.policy for group in scheduling.groups]
+    return [*scheduling.policy.split("_", 2), *(["among", *groups] if groups else [])]
 
 
 def _converter(converter: Converter) -> list[str]:

@@ -75,12 +75,12 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
 
 
 def default_lengths(system: DerivedSystem) -> list[str]:
-    """Return a line for each subscriber whose longest payload is a default."""
+    """Return a line for each converter whose longest payload is a default."""
     return [
         f"{item.block}: {item.frame.message} has no bounds and no 'maxLength'; payloads of more than"
         f" {item.max_length} bytes are refused"
-        for item in system.subscribers
-        if item.has_default_length and item.software is None
+        for item in (*system.subscribers, *system.publishers)
+        if item.has_default_length and (system.link or item.software is None)
     ]
 
 
@@ -221,6 +221,8 @@ def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
     shown: dict[str, Any] = {"scheduler": scheduling.policy}
     if scheduling.reasons:
         shown["because"] = [*scheduling.reasons]
+    if scheduling.groups:
+        shown["groups"] = [{"scheduler": item.policy, "publishers": [*item.blocks]} for item in scheduling.groups]
     return shown | ({"shortestRun": scheduling.shortest_run} if scheduling.is_preemptive else {})
 
 

@@ -82,6 +82,14 @@ class ClockDomain(Section):
 
 
 @dataclass(frozen=True)
+class PublisherGroup(Section):
+    """Publishers with a scheduler of their own."""
+
+    scheduler: Text = key("the policy that selects a publisher of the group", choices=tuple(POLICIES), is_required=True)
+    publishers: tuple[Text, ...] = key("the names of the group's publishers", form="texts", is_required=True)
+
+
+@dataclass(frozen=True)
 class Project(Section):
     """The settings of the whole system."""
 
@@ -92,15 +100,29 @@ class Project(Section):
         "width in bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8
     )
     scheduler: Text = key(
-        "the policy that selects the next publisher to send",
+        "the policy that selects the next publisher to send, or the next group if there are groups",
         choices=(*POLICIES, AUTO_SCHEDULER),
         default=Text(DEFAULT),
+    )
+    groups: tuple[PublisherGroup, ...] = key(
+        "groups of publishers with a scheduler each, in the order of the publishers' blocks",
+        form="sections",
+        section=PublisherGroup,
+        is_asked=False,
     )
     shortest_run: int = key(
         "minimum number of beats before a preemptive scheduler interrupts a publisher",
         name="shortestRun",
         form="integer",
         default=16,
+    )
+    id_bytes: int = key(
+        "bytes of a frame's id: 1 for up to 256 subscribers and 256 publishers, 2 for up to 65,536",
+        name="idBytes",
+        form="integer",
+        choices=(1, 2),
+        default=1,
+        is_asked=False,
     )
     watchdog: int = key(
         "cycles of clk after which a publisher that stops in the middle of a frame is cut off; 0: never",
@@ -219,7 +241,7 @@ class Block(Section):
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     max_length: int | None = key(
-        "bytes of a subscriber's longest payload, if the message has no bounds (default: 65536)",
+        "bytes of the longest payload, if the message has no bounds (default: 65536, with a link 2000)",
         name="maxLength",
         form="integer",
         only_of=CONVERTER,

@@ -21,6 +21,9 @@ RUNTIME = (
     "sched/package",
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
+    "sched/by_policy",
+    "sched/combined",
+    "manager/tree",
     "board/link",
     "status/status",
 )

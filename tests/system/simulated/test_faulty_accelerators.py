@@ -97,7 +97,7 @@ CODES = {
 _CDR = bytes.fromhex("00010000")
 
 
-def _texts(folder: Path, width: int, fault: str, queue: int) -> GeneratedSystem:
+def _texts(folder: Path, width: int, fault: str, queue: int, **keys: int) -> GeneratedSystem:
     """A channel that returns Points, and one that responds to a number with a text of this length, and a fault."""
     folder.mkdir()
     text = (DATA / "falter.vhd").read_text()
@@ -112,7 +112,7 @@ def _texts(folder: Path, width: int, fault: str, queue: int) -> GeneratedSystem:
         _ros2("bad", "subscriber", "std_msgs/UInt16", outgoing=[{"name": "acc"}], queue=queue, overflow="drop_newest"),
         {"name": "acc", "type": "falter", "outgoing": [{"name": "bad_back"}]},
         _ros2("good_back", "publisher", POINT),
-        _ros2("bad_back", "publisher", "std_msgs/String"),
+        _ros2("bad_back", "publisher", "std_msgs/String", **keys),
     ]
     project = {"name": "faulty", "width": width, "status": "frames", "watchdog": LIMIT}
     content = {"project": project, "accelerators": [source], "blocks": blocks}
@@ -213,5 +213,33 @@ def test_the_status_has_the_code_at_the_channel(tmp_path: Path, fault: str) -> N
         for place, (name, word) in enumerate(reads, start=len(sent))
     ]
     (system.folder / "expected.txt").write_text(f"! frame_error 1\n{''.join(answers)}")
+    result = system.run(SEED=SEED, STALL_PERCENT=0)
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("width", [8, pytest.param(32, marks=pytest.mark.check)])
+def test_an_accelerator_whose_response_is_too_long(tmp_path: Path, width: int) -> None:
+    """Its frame is refused with code 7, and the accelerator goes on; a beat of several bytes is not even begun."""
+    letters = 40
+    system = _texts(tmp_path / "faulty", width, HEALTHY, 8, maxLength=len(_CDR) + 4 + letters + 1)
+    code = Fault.TOO_LONG.value
+    registers = status_map("faulty", 2, 2)
+    reads = [("magic", 0x4D524946)] * 100 + [(f"publisher[{BAD}].faults[{code - 1}]", 2)]
+    numbers = [letters, letters + 1, 7, 1000, letters]
+    sent = [_number(number) for number in numbers]
+    frames = [*sent[:2], _point(random.Random(SEED)), *sent[2:]]
+    frames += [read_request(registers.by_name[name].address) for name, _ in reads]
+    write_stimulus(system.folder / "stimulus.txt", frames)
+    aborted = f"  {BAD:02x}\n! aborted {BAD} 10\n" if width == 8 else ""
+    answers = [
+        f"< @{place} answer\n{lines}"
+        for place, frame in enumerate(frames[: len(numbers) + 1])
+        if (lines := aborted if place in (1, 4) else _answer(frame, HEALTHY))
+    ]
+    answers += [
+        f"< @{place} read\n  {status_answer(registers.by_name[name].address, word).hex()}\n"
+        for place, (name, word) in enumerate(reads, start=len(numbers) + 1)
+    ]
+    (system.folder / "expected.txt").write_text(f"! frame_error 2\n{''.join(answers)}")
     result = system.run(SEED=SEED, STALL_PERCENT=0)
     assert result.exit_code == 0, result.output

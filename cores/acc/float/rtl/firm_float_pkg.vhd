@@ -25,6 +25,11 @@ package firm_float_pkg is
   -- The mantissa with its leading bit, which is 0 for zero and subnormal numbers.
   function mantissa_of(number : std_logic_vector; exponent_bits : positive) return unsigned;
 
+  -- A number, unless NaN, as an unsigned one of the same order; -0 is the one before +0.
+  function order_of(number : std_logic_vector) return unsigned;
+
+  function is_zero(number : std_logic_vector) return boolean;
+
   -- The bias of an exponent.
   function bias_of(exponent_bits : positive) return natural;
 
@@ -80,6 +85,24 @@ package body firm_float_pkg is
     end if;
     return unsigned('1' & bits(MANTISSA-1 downto 0));
   end function mantissa_of;
+
+  function order_of(number : std_logic_vector) return unsigned is
+    alias    bits   : std_logic_vector(number'length-1 downto 0) is number;
+    variable result : unsigned(number'length-1 downto 0);
+  begin
+    result := unsigned(bits);
+    if bits(bits'left) = '1' then
+      result := not result;
+    end if;
+    result(bits'left) := not bits(bits'left);
+    return result;
+  end function order_of;
+
+  function is_zero(number : std_logic_vector) return boolean is
+    alias bits : std_logic_vector(number'length-1 downto 0) is number;
+  begin
+    return unsigned(bits(number'length-2 downto 0)) = 0;
+  end function is_zero;
 
   function bias_of(exponent_bits : positive) return natural is
   begin

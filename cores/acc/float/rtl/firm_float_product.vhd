@@ -58,11 +58,6 @@ architecture rtl of firm_float_product is
   type sums_t is array (natural range <>) of sum_t;
   type sides_t is array (natural range <>) of std_logic_vector(SIDE-1 downto 0);
 
-  function is_zero(number : std_logic_vector) return boolean is
-  begin
-    return unsigned(number(EXPONENT_BITS+MANTISSA_BITS-1 downto 0)) = 0;
-  end function is_zero;
-
   -- With a zero in front, since ghdl 2.0 omits the highest bit of a product in a VHDL netlist.
   function limb_of(mantissa : mantissa_t; index : natural) return unsigned is
   begin

@@ -20,7 +20,7 @@ entity firm_float_tb is
     VECTORS           : string   := "vectors.txt";
     RESULTS           : string   := "results.txt";
     EXPECTED          : string   := "";
-    -- add, subtract, multiply, multiply_add, resize, to_fixed or from_fixed.
+    -- add, subtract, multiply, multiply_add, divide, square_root, compare, clamp, resize, to_fixed or from_fixed.
     OPERATION         : string   := "add";
     EXPONENT_BITS     : positive := 11;
     MANTISSA_BITS     : positive := 52;
@@ -45,11 +45,11 @@ architecture test of firm_float_tb is
 
   function in_width return positive is
   begin
-    if OPERATION = "multiply_add" then
+    if OPERATION = "multiply_add" or OPERATION = "clamp" then
       return 3*NUMBER;
     elsif OPERATION = "from_fixed" then
       return WIDTH;
-    elsif OPERATION = "resize" or OPERATION = "to_fixed" then
+    elsif OPERATION = "square_root" or OPERATION = "resize" or OPERATION = "to_fixed" then
       return NUMBER;
     end if;
     return 2*NUMBER;
@@ -61,6 +61,8 @@ architecture test of firm_float_tb is
       return OUT_EXPONENT_BITS + OUT_MANTISSA_BITS + 1;
     elsif OPERATION = "to_fixed" then
       return WIDTH + 2;
+    elsif OPERATION = "compare" then
+      return 4;
     end if;
     return NUMBER;
   end function out_width;
@@ -153,6 +155,93 @@ begin
       );
 
   end generate multiplies_and_adds;
+
+  divides : if OPERATION = "divide" generate
+
+    u_dut : entity firm.firm_float_divide
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_a       => operands(2*NUMBER-1 downto NUMBER),
+        in_b       => operands(NUMBER-1 downto 0),
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_number => result
+      );
+
+  end generate divides;
+
+  extracts : if OPERATION = "square_root" generate
+
+    u_dut : entity firm.firm_float_square_root
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_number  => operands,
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_number => result
+      );
+
+  end generate extracts;
+
+  compares : if OPERATION = "compare" generate
+
+    u_dut : entity firm.firm_float_compare
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk           => clk,
+        rst_n         => rst_n,
+        in_valid      => in_valid,
+        in_ready      => in_ready,
+        in_a          => operands(2*NUMBER-1 downto NUMBER),
+        in_b          => operands(NUMBER-1 downto 0),
+        out_valid     => out_valid,
+        out_ready     => out_ready,
+        out_less      => result(3),
+        out_equal     => result(2),
+        out_greater   => result(1),
+        out_unordered => result(0)
+      );
+
+  end generate compares;
+
+  clamps : if OPERATION = "clamp" generate
+
+    u_dut : entity firm.firm_float_clamp
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_number  => operands(3*NUMBER-1 downto 2*NUMBER),
+        in_low     => operands(2*NUMBER-1 downto NUMBER),
+        in_high    => operands(NUMBER-1 downto 0),
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_number => result
+      );
+
+  end generate clamps;
 
   resizes : if OPERATION = "resize" generate
 

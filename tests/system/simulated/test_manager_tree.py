@@ -1,0 +1,80 @@
+"""Systems with ids of two bytes: generated and simulated, with publishers in groups that follow from their periods."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.system.derived.model import PublisherTimes
+from fusesoc_firm.system.derived.tree import groups_by_period
+from tests.hdl.frames import traffic
+from tests.system.simulated.systems import GeneratedSystem, build, call
+
+SEED = 20261123
+
+
+def generated(folder: Path, publishers: int, width: int, *, messages: int, scheduler: str = "auto") -> GeneratedSystem:
+    """A subscriber whose messages all publishers send; periods from a seed."""
+    source = random.Random(SEED)
+    names = ", ".join(f"{{name: pub{number}}}" for number in range(publishers))
+    blocks = [f"  - {{name: sub, middleware: ROS1, mode: subscriber, message: std_msgs/UInt16, outgoing: [{names}]}}"]
+    for number in range(publishers):
+        period = source.randint(1_000, 2_000_000)
+        blocks.append(
+            f"  - {{name: pub{number}, middleware: ROS1, mode: publisher, message: std_msgs/UInt16, period: {period}}}"
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    spec, stimuli, model = (folder / name for name in ("spec.yaml", "stimuli.yaml", "model.py"))
+    settings = f"{{name: tree, width: {width}, idBytes: 2, scheduler: {scheduler}}}"
+    spec.write_text(f"project: {settings}\nblocks:\n" + "\n".join(blocks) + "\n", encoding="utf-8")
+    lines = (f"- sub: {{data: {source.randrange(2**16)}}}\n" for _ in range(messages))
+    stimuli.write_text("".join(lines), encoding="utf-8")
+    model.write_text(
+        f"def respond(_, message):\n    return [(f'pub{{number}}', message) for number in range({publishers})]\n",
+        encoding="utf-8",
+    )
+    return build(call(spec, stimuli, model), folder / "system")
+
+
+@pytest.mark.one_in(3)
+@pytest.mark.parametrize("width", [8, 16, 64])
+@pytest.mark.parametrize("scheduler", ["auto", "lru", "fixed_priority"])
+def test_messages_come_from_the_right_ids(tmp_path: Path, width: int, scheduler: str) -> None:
+    system = generated(tmp_path, 11, width, messages=5, scheduler=scheduler)
+    for stall in (0, 40):
+        assert system.passes(SEED=SEED, STALL_PERCENT=stall)
+
+
+@pytest.mark.check
+def test_more_publishers_than_a_byte_has_values(tmp_path: Path) -> None:
+    assert generated(tmp_path, 300, 8, messages=2).passes(SEED=SEED, STALL_PERCENT=30)
+
+
+@pytest.mark.check
+def test_1024_publishers_use_the_whole_channel(tmp_path: Path) -> None:
+    result = generated(tmp_path, 1024, 8, messages=3).run(SEED=SEED, STALL_PERCENT=0, WATCHDOG=100000)
+    assert result.exit_code == 0
+    found = traffic(result.output)
+    # Latencies of one message's way from the host and back.
+    assert found.cycles <= found.beats_out + 40
+
+
+def test_groups_follow_from_periods() -> None:
+    source = random.Random(SEED)
+    times = [PublisherTimes(source.randint(50_000, 5_000_000), 10, None) for _ in range(1000)]
+    groups = groups_by_period(times)
+    assert sorted(number for group in groups for number in group) == list(range(1000))
+    for group in groups:
+        assert len(group) * len(groups) * 10 <= min(times[number].period or 0 for number in group)
+    # The shortest periods are in the smallest group.
+    assert len(groups[0]) == min(map(len, groups[:-1]))
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 256, 1024, 65536])
+def test_without_periods_groups_are_equal(count: int) -> None:
+    groups = groups_by_period([PublisherTimes(None, None, None)] * count)
+    assert [number for group in groups for number in group] == list(range(count))
+    assert len(groups) <= 256
+    assert max(map(len, groups)) <= 256
