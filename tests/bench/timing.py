@@ -80,6 +80,9 @@ _ARITHMETIC = (
     "firm_float_square_root",
     "firm_float_compare",
     "firm_float_clamp",
+    "firm_float_sincos",
+    "firm_float_low_pass",
+    "firm_float_pid",
     "firm_fixed_to_float",
     "firm_float_to_fixed",
 )
@@ -296,7 +299,7 @@ def _arithmetic() -> Iterator[Row]:
 def _operation(entity: str, generics: Mapping[str, int]) -> Callable[[Path], Design]:
     def make(folder: Path) -> Design:
         library = Library("firm", folder)
-        library.analyse(core_files("acc/float/float"))
+        library.analyse(core_files("acc/cordic/cordic", "acc/float/float"))
         return _synthesised(Subject(library, entity, generics))
 
     return make
