@@ -114,13 +114,16 @@ class Results:
         """Store the record of an action, whose contents are already stored. May raise `OSError`."""
         self._keep_plain(_place(_AC, key), _plain(record))
 
-    def send(self, key: str, record: Record) -> None:
-        """Write the record of an action and its contents to the remote store. Failures are only reported."""
+    def send(self, key: str, record: Record) -> bool:
+        """Write the record of an action and its contents to the remote store; return whether that succeeded.
+
+        Failures are reported.
+        """
         if self.remote is None or not self.remote.is_writable:
-            return
+            return False
         contents = (self.content(name) for name in record.sizes)
-        if self.remote.put_contents(contents):
-            self.remote.put_entry(key, json.dumps(_plain(record)).encode())
+        entry = json.dumps(_plain(record)).encode()
+        return self.remote.put_contents(contents) and self.remote.put_entry(key, entry)
 
     def keep_content(self, data: bytes) -> str:
         """Store a content and return its digest. May raise `OSError`."""

@@ -19,8 +19,8 @@ from typing import Any
 from fusesoc_firm.building.plan import Build
 from fusesoc_firm.building.run_options import split
 
-Answer = Callable[[list[str]], bool]
-"""A function that answers the generator call with this command line, or returns False to leave it to FuseSoC."""
+Answer = Callable[[list[str], Callable[[], None]], None]
+"""A function that answers the generator call with this command line in the current folder, or lets FuseSoC start it."""
 
 
 Run = Callable[[Any, Build, tuple[str, ...]], None]
@@ -65,14 +65,18 @@ def save_time(answer: Answer) -> None:
 
 
 def _answering(launcher: Any, answer: Answer) -> type:
-    """Return a subclass of FuseSoC's launcher for generators that first calls `answer`."""
+    """Return a subclass of FuseSoC's launcher for generators that calls `answer`."""
 
     class Launcher(launcher):  # type: ignore[misc]
         def run(self) -> None:
+            here, start = Path.cwd(), super().run
+
+            def start_here() -> None:
+                with chdir(here):
+                    start()
+
             with chdir(self.cwd):
-                is_answered = answer([self.cmd, *self.args])
-            if not is_answered:
-                super().run()
+                answer([self.cmd, *self.args], start_here)
 
     return Launcher
 

@@ -69,6 +69,16 @@ def observed() -> Iterator[Observed]:
         _observed.remove(found)
 
 
+@contextmanager
+def unobserved() -> Iterator[None]:
+    """Let this process start programs within this context whose use of files is known otherwise."""
+    apart, _observed[:] = [*_observed], []
+    try:
+        yield
+    finally:
+        _observed[:] = apart
+
+
 def note_call(found: Iterable[Fact] | None) -> None:
     """Add the facts about a call of a generator; None if they are unknown."""
     for item in _observed:

@@ -77,9 +77,9 @@ class Steps:
         contents = results.contents()
         with observed() as found:
             set_up(fusesoc, build, options)
-        run = _Run(
+        run = StepsRun(
             build,
-            _backend(fusesoc, build, dict(self.flags)),
+            backend_of(fusesoc, build, dict(self.flags)),
             results,
             contents,
             partial(set_up, fusesoc, build, options),
@@ -91,7 +91,7 @@ class Steps:
         is_good = run.all(self.names, is_rerun=self.is_rerun, has_outputs=self.has_outputs)
         contents.save()
         results.shrink_if_needed()
-        _report(build, run.steps)
+        write_report(build, run.steps)
         if not is_good:
             sys.exit(1)
 
@@ -118,7 +118,7 @@ class Steps:
             build.log.write_bytes(b"".join(logs))
             for action, record in found:
                 remember(action, record.facts, results)
-            _report(build, [Step(action.name, CACHED, record.seconds) for action, record in found])
+            write_report(build, [Step(action.name, CACHED, record.seconds) for action, record in found])
         finally:
             lock.release()
         return time.monotonic() - started
@@ -132,7 +132,8 @@ def _is_in_place(build: Build, tree: Tree, found: list[tuple[Action, Record]], c
     return build.work_root.is_dir() and tree_of(build.work_root, contents) == expected
 
 
-def _report(build: Build, steps: Sequence[Step]) -> None:
+def write_report(build: Build, steps: Sequence[Step]) -> None:
+    """Leave the steps of a build for `steps_of`."""
     write_whole(report_of(build), json.dumps([asdict(step) for step in steps]).encode())
 
 
@@ -173,7 +174,9 @@ def recorded(
 
 
 @dataclass
-class _Run:
+class StepsRun:
+    """The steps of one build, whose folder `set_up` fills with the inputs again; `steps` are those that are done."""
+
     build: Build
     backend: tuple[str, str]
     results: Results
@@ -230,7 +233,7 @@ class _Run:
         print(text.decode(errors="backslashreplace"), end="", flush=True)
 
 
-def _backend(fusesoc: Any, build: Build, further: Mapping[str, Any]) -> tuple[str, str]:
+def backend_of(fusesoc: Any, build: Build, further: Mapping[str, Any]) -> tuple[str, str]:
     """Return `flow` or `tool`, and the name of the build's flow or tool in Edalize."""
     core = fusesoc.get_core(build.core)
     flags: Mapping[str, Any] = {**core.get_flags(build.target), "target": build.target, **further}

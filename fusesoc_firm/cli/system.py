@@ -56,11 +56,16 @@ def add_system(commands: Any) -> None:
     draw = command(
         actions,
         "diagram",
-        "draw a system: blocks, messages, widths and ids",
+        "draw a system: topics, blocks, messages, times, clocks and pins",
         "firm system diagram robot.yaml -o robot.svg",
         _draw_system,
     )
     add_picture(draw)
+    draw.add_argument(
+        "--theme",
+        choices=("light", "dark"),
+        help="the colours (default: light, and dark in an SVG whose reader prefers dark pages)",
+    )
     report = command(
         actions,
         "report",
@@ -259,11 +264,12 @@ def _write_node(arguments: argparse.Namespace) -> None:
 
 
 def _draw_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.views.diagram import diagram
+    from fusesoc_firm.system.views.diagram import dark_style, diagram
     from fusesoc_firm.tools.pictures import check_picture, draw
 
     check_picture(arguments.output, arguments.format)
-    draw(diagram(load(arguments).system), arguments.output, arguments.format)
+    style = "" if arguments.theme else dark_style()
+    draw(diagram(load(arguments).system, arguments.theme), arguments.output, arguments.format, style)
 
 
 def _report_system(arguments: argparse.Namespace) -> None:

@@ -10,11 +10,12 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from fusesoc_firm.building.apart import Prepare, build_apart, can_build_apart
 from fusesoc_firm.building.cluster import build_on
 from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.pool import Limits, Outcome, Pool, ignore
-from fusesoc_firm.building.process import run_all, save_time
-from fusesoc_firm.building.recall import Recall, note_call, observed
+from fusesoc_firm.building.process import Run, run_all, save_time
+from fusesoc_firm.building.recall import Recall, note_call, observed, unobserved
 from fusesoc_firm.building.steps import Steps
 from fusesoc_firm.plugin.answer import answer_from_store, noted_facts
 from fusesoc_firm.plugin.batch import prepare
@@ -80,6 +81,14 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
         for core in dict.fromkeys(build.core for build in plan.builds):
             check_locked(core)
     options = ["--setup"] * how.is_setup_only + ["--clean"] * how.is_clean
+    if how.cluster and not how.is_setup_only and can_build_apart():
+        flags = tuple(plan.options.use_flags().items())
+        names = ("build",) if how.is_build_only else ("build", "run")
+        with cluster_workers(how.cluster) as workers:
+            # Only the steps are limited and repeated.
+            pool = _pool(plan, replace(how, limits=Limits()), listener, tuple(plan.options.options()), Prepare(flags))
+            yield from build_apart(workers, pool, plan, names, how.limits)
+        return
     if how.cluster:
         options += ["--build-only"] * how.is_build_only + ["--build-root", str(plan.build_root)]
         options += [f"--timeout={how.limits.seconds:g}"] * bool(how.limits.seconds)
@@ -87,6 +96,13 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
         with cluster_workers(how.cluster) as workers:
             yield from build_on(workers, plan, options)
         return
+    options += ["--setup", "--build"] * how.is_build_only
+    words = (*options, *plan.options.options())
+    yield from _pool(plan, how, listener, words, how.steps or run_all).run(plan)
+
+
+def _pool(plan: Plan, how: How, listener: Listener, words: tuple[str, ...], run_build: Run) -> Pool:
+    """Generate the cores of all builds, and return a pool that runs the builds."""
     jobs = how.jobs or len(os.sched_getaffinity(0))
     plan.fetch()
     # Each call with a lock file checks this file.
@@ -96,10 +112,7 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
             for number, _ in enumerate(steps, start=1):
                 listener.progress(f"generated {number} of {len(calls)}")
         save_time(_answer)
-    options += ["--setup", "--build"] * how.is_build_only
-    words = (*options, *plan.options.options())
-    pool = Pool(words, jobs, listener.tell, how.limits, listener.begin, how.steps or run_all)
-    yield from pool.run(plan)
+    return Pool(words, jobs, listener.tell, how.limits, listener.begin, run_build)
 
 
 def recall_or_build(
@@ -148,12 +161,16 @@ def _generators_run_here() -> bool:
     return not chosen or Path(chosen).absolute() == Path(sys.executable).absolute()
 
 
-def _answer(line: Sequence[str]) -> bool:
-    """Answer a call from the store if the command line starts one of our generators."""
+def _answer(line: Sequence[str], start: Callable[[], None]) -> None:
+    """Answer a call from the store, or start the generator in the command line."""
     *_, script, path = line
     commands = {library_root() / "generators" / f"{name}_generator.py": name for name in GENERATORS}
     name = next((name for known, name in commands.items() if known.resolve() == Path(script).resolve()), None)
-    if name is None or not answer_from_store(name, Path(path)):
-        return False
+    if name is None:
+        start()
+        return
+    if not answer_from_store(name, Path(path)):
+        # What our generator uses is in its note.
+        with unobserved():
+            start()
     note_call(noted_facts(name, Path(path)))
-    return True

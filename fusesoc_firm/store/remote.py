@@ -86,11 +86,12 @@ class Remote:
             return None
         return data[len(head) :]
 
-    def put_entry(self, key: str, data: bytes) -> None:
-        """Write an entry to the server, if this user may write. Failures are only reported."""
+    def put_entry(self, key: str, data: bytes) -> bool:
+        """Write an entry to the server, if this user may write; return whether it is written. Failures are reported."""
         whole = f"{key}\n".encode() + data
-        if self._is_put(f"cas/{digest(whole)}", whole):
-            self._is_put(f"ac/{key}", action_result(key, digest(whole), len(whole)))
+        return self._is_put(f"cas/{digest(whole)}", whole) and self._is_put(
+            f"ac/{key}", action_result(key, digest(whole), len(whole))
+        )
 
     def content(self, sha256: str, size: int) -> bytes | None:
         """Return the content with this SHA-256 and size, or None as for `entry`."""

@@ -100,6 +100,14 @@ def dot_text(text: str) -> str:
     return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
+def dot_markup(text: str) -> str:
+    """Return `text` escaped for a label in Graphviz's markup, where a backslash also begins an escape sequence.
+
+    Graphviz rejects a bracket alone, but not its number.
+    """
+    return html.escape(text).replace("\\", "\\\\").replace("]", "&#93;")
+
+
 def plot_text(text: str) -> str:
     """Return `text` for matplotlib, with dollars escaped so that they do not begin formulas."""
     return text.replace("\\", "\\\\").replace("$", "\\$")

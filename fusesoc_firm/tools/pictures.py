@@ -26,20 +26,36 @@ def check_picture(path: Path | None, form: str | None) -> None:
         )
 
 
-def draw(dot: str, path: Path | None, form: str | None) -> None:
-    """Write a DOT graph as a picture to `path`, or print the picture in `form`. May raise `InputError`."""
+def draw(dot: str, path: Path | None, form: str | None, style: str = "") -> None:
+    """Write a DOT graph as a picture to `path`, or print the picture in `form`. May raise `InputError`.
+
+    `style` is a style sheet for SVG.
+    """
     if path:
-        write(path, picture(dot, path.suffix.removeprefix(".")))
+        write(path, picture(dot, path.suffix.removeprefix("."), style))
     else:
-        print(picture(dot, form or TEXTS[0]).decode(), end="")
+        print(picture(dot, form or TEXTS[0], style).decode(), end="")
 
 
-def picture(dot: str, form: str) -> bytes:
-    """Return a DOT graph converted to `svg`, `png`, `pdf` or `dot`. Raise `InputError` if Graphviz is missing."""
+def picture(dot: str, form: str, style: str = "") -> bytes:
+    """Return a DOT graph converted to `svg`, `png`, `pdf` or `dot`, an SVG with a style sheet.
+
+    Raise `InputError` if Graphviz is missing.
+    """
     if form == "dot":
         return dot.encode()
+    drawn = _converted(dot, form)
+    if not style or form != "svg":
+        return drawn
+    return drawn.replace(b"<g id=", f"<style>\n{style}</style>\n<g id=".encode(), 1)
+
+
+def _converted(dot: str, form: str) -> bytes:
+    options = ["-Gdpi=192"] if form == "png" else []
     try:
-        return subprocess.run(["dot", f"-T{form}"], input=dot.encode(), capture_output=True, check=True).stdout
+        return subprocess.run(
+            ["dot", f"-T{form}", *options], input=dot.encode(), capture_output=True, check=True
+        ).stdout
     except subprocess.CalledProcessError as error:
         fail(f"Graphviz cannot draw the picture as {form}: {error.stderr.decode(errors='replace').strip()}")
     except FileNotFoundError:

@@ -48,6 +48,17 @@ class Workers:
             yield from _finished(pending)
 
 
+def is_task_wanted() -> bool:
+    """Return whether the result of the task that runs in this thread of a worker is still wanted."""
+    distributed: Any = import_module("distributed")
+    try:
+        worker = distributed.get_worker()
+        return str(worker.state.tasks[worker.get_current_task()].state) == "executing"
+    except (ValueError, KeyError):
+        # The scheduler has forgotten the task, or this is not a worker.
+        return False
+
+
 def _finished(pending: dict[Future[Result], Task]) -> Iterator[tuple[Task, Result]]:
     done, _ = wait(pending, return_when=FIRST_COMPLETED)
     for future in done:

@@ -6,8 +6,11 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -19,7 +22,9 @@ from fusesoc_firm.action.trace import can_trace, traced
 from fusesoc_firm.action.tree import tree_of
 from fusesoc_firm.store.server import Server
 from fusesoc_firm.store.store import Store
+from fusesoc_firm.tools.library_path import library_root
 from tests.hdl.ghdl import REPOSITORY
+from tests.house.test_build import wait_until
 from tests.store.test_remote import SECRET, served
 
 pytestmark = pytest.mark.skipif(not can_trace(), reason="strace is not installed or not permitted")
@@ -392,3 +397,108 @@ def test_a_folder_without_tests(tmp_path: Path) -> None:
     status, text = run(tmp_path / "library")
     assert status == 1
     assert "no core below this folder has a test" in text
+
+
+def apart(folder: Path, scheduler: str) -> list[str]:
+    """Return the command of a Dask worker that sees neither the project nor the folders of another worker."""
+    own = ("--ro-bind", "/", "/", "--dev", "/dev", "--proc", "/proc", "--tmpfs", str(folder), "--die-with-parent")
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", scheduler, "--nthreads", "1", "--no-dashboard"]
+    return ["bwrap", *own, "--unshare-pid", *worker, "--no-nanny"]
+
+
+@pytest.fixture
+def machines(tmp_path: Path) -> Iterator[str]:
+    """Two workers in namespaces that share no folder but the installation; yield the scheduler's address."""
+    distributed = pytest.importorskip("distributed", reason="no distributed; make test installs it")
+    with (
+        ExitStack() as stack,
+        distributed.LocalCluster(
+            n_workers=0, host="127.0.0.1", protocol="tcp://", dashboard_address=":0", processes=False
+        ) as cluster,
+    ):
+        for number in range(2):
+            own = {
+                "FUSESOC_FIRM_CACHE": f"{tmp_path}/own/{number}",
+                "PYTHONPATH": str(REPOSITORY),
+                "TMPDIR": str(tmp_path),
+            }
+            process = subprocess.Popen(
+                apart(tmp_path, cluster.scheduler_address),
+                cwd="/",
+                env={**os.environ, **own},
+                stderr=subprocess.DEVNULL,
+            )
+            stack.callback(process.wait)
+            stack.callback(process.terminate)
+        with distributed.Client(cluster) as client:
+            client.wait_for_workers(2, timeout=60)
+        yield cluster.scheduler_address
+
+
+@pytest.mark.check
+@pytest.mark.xdist_group("dask")
+@pytest.mark.skipif(not can_sandbox(), reason="bwrap is not installed or not permitted")
+def test_a_cluster_without_a_shared_folder(library: Path, machines: str) -> None:
+    """Inputs and outputs travel through the remote store."""
+    token = {"FUSESOC_FIRM_REMOTE_TOKEN": SECRET}
+    selected = ("acme:m:*", "--target", "sim", "sim_icarus", "test_old", "--where-present", "--cluster", machines)
+    with served(Server(Store(library.parent / "server", 2**30), "127.0.0.1", 0, SECRET)) as url:
+        remote = {"FUSESOC_FIRM_REMOTE": url, **token}
+        status, text = run(library, *selected, name="build", **remote)
+        assert (status, results(text)) == (0, dict.fromkeys(("sim", "sim_icarus", "test_old"), "ok")), text
+        built = library / "build" / "acme_m_gate_1.0" / "sim_icarus"
+        log = built.with_name("sim_icarus.log").read_text()
+        assert "open" in log
+        assert os.access(built / "acme_m_gate_1.0", os.X_OK)
+        (library / "counter" / "limit.txt").write_text("5\n")
+        status, text = run(library, *selected, name="build", **remote)
+        assert (status, results(text)) == (1, {"sim": "failed", "sim_icarus": "ok", "test_old": "failed"}), text
+        assert "too high" in text
+        # A step that does not end: at its time limit, and when the command is interrupted.
+        gate = library / "gate" / "gate.v"
+        gate.write_text("module gate;\n  initial forever #1;\nendmodule\n")
+        endless = ("acme:m:gate", "--target", "sim_icarus", "--cluster", machines)
+        status, text = run(library, *endless, "--timeout", "20", name="build", **remote)
+        assert (status, "ended at the time limit of 20 s" in text) == (1, True), text
+        wait_until(lambda: not simulations(library))
+        running = subprocess.Popen(
+            command(*endless, name="build"),
+            cwd=library,
+            env=environment(library, **remote),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        wait_until(lambda: simulations(library))
+        running.send_signal(signal.SIGINT)
+        assert running.wait() == 130
+        wait_until(lambda: not simulations(library))
+
+
+def simulations(library: Path) -> list[str]:
+    """Return the ids of running simulations of Icarus Verilog in builds of a library, also of other machines."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if b"vvp" in (process / "cmdline").read_bytes() and str(library) in str((process / "cwd").readlink()):
+                found.append(process.name)
+    return found
+
+
+def test_a_first_run_is_noted_although_it_generated_a_core(library: Path) -> None:
+    """A call of our generator that FuseSoC starts as a process, since it is not in the store."""
+    with (library / "fusesoc.conf").open("a") as file:
+        file.write(f"[library.firm]\nlocation = {library_root()}\n")
+    (library / "made").mkdir()
+    (library / "made" / "made.core").write_text(
+        """\
+CAPI=2:
+name: acme:m:made:1.0
+filesets: {base: {depend: ["robot:firm:generators"]}}
+generate: {one: {generator: firm, parameters: {message: std_msgs/Bool, ros: 2, direction: subscriber, width: 32}}}
+targets:
+  sim_made: {filesets: [base], generate: [one], toplevel: axis_to_std_msgs_bool, default_tool: ghdl}
+"""
+    )
+    selected = ("acme:m:made",)
+    assert not is_recalled(library, *selected)
+    assert is_recalled(library, *selected)

@@ -19,6 +19,7 @@ GENERATED = [DOCS / "figures"]
 # Followed by beginners, so they are run with the tests; `make docs` runs all pages.
 FOLLOWED = [
     "tutorials/first-accelerator.md",
+    "tutorials/first-filter.md",
     "tutorials/first-accelerator-in-cpp.md",
     "tutorials/first-accelerator-in-python.md",
     "how-to/start-from-a-bag.md",
@@ -127,6 +128,18 @@ def test_the_source_of_the_site_has_every_file_that_is_linked(tmp_path: Path) ->
 @pytest.mark.parametrize("name", FOLLOWED)
 def test_a_page_for_beginners_prints_what_it_shows(tmp_path: Path, name: str) -> None:
     assert check(Page(DOCS / name), tmp_path) == []
+
+
+def test_the_first_filter_takes_forty_lines_and_three_commands() -> None:
+    """Lines that the skeleton already has, blank lines and comments are not typed; each edit of sed is a line."""
+    text = (DOCS / "tutorials/first-filter.md").read_text(encoding="utf-8")
+    files = "".join(re.findall(r"<!-- file: \S+ -->\n```\w+\n(.*?)```", text, re.DOTALL))
+    generated = ("def respond(", '"""Return the responses to one message')
+    typed = [line for line in map(str.strip, files.splitlines()) if line and not line.startswith(generated)]
+    commands = [command for block in blocks(Page(DOCS / "tutorials/first-filter.md")) for command, _ in block.steps()]
+    edits = sum(command.count("-e '") or 1 for command in commands if "sed -i" in command)
+    assert len(typed) + edits <= 40
+    assert sum("firm " in command for command in commands if "sed -i" not in command) <= 3
 
 
 PAGE = """\

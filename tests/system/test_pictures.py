@@ -11,13 +11,15 @@ import jsonschema
 import pytest
 import yaml
 
+from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import load_system
-from fusesoc_firm.system.views.diagram import diagram
+from fusesoc_firm.system.views.diagram import THEMES, dark_style, diagram
 from fusesoc_firm.system.views.report import Report, report
 from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.yaml_schema import json_schema
 from fusesoc_firm.tools.pictures import picture
+from tests.system.svg_texts import faults
 from tests.system.systems import LIBRARIES, accelerator, converter, derived, instance, specification
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,8 +41,40 @@ def test_the_diagram_has_every_block_and_connection(tmp_path: Path) -> None:
     text = diagram(derived(tmp_path, TEXT))
     edges = re.findall(r'"block (\w+)" -> "block (\w+)"', text)
     assert edges == [("sub", "acc"), ("sub", "copy"), ("acc", "pub"), ("image_in", "image_out")]
-    for what in ("geometry_msgs/Point\n192 bits", "mix (VHDL)", "id 2", "streams of 8 bits", "streams: ", "ROS 1"):
-        assert what in text.replace("\\n", "\n"), what
+    for what in ("<b>/sub</b><br/>geometry_msgs/Point", "192 bits", "mix (VHDL)", "id 2", "8-bit streams", "3 streams"):
+        assert what in text, what
+
+
+def test_the_diagram_has_times_clocks_pins_and_queues() -> None:
+    text = diagram(load_system(ROOT / "specs" / "multi_type" / "multi_type.yaml", LIBRARIES).system)
+    for what in ("clk 100 MHz", "100 Hz", "30 Hz<br/>deadline 20 ms", "<b>Manager</b><br/>fixed<br/>priority<br/>"):
+        assert what in text, what
+    text = diagram(load_system(ROOT / "specs" / "mobile_robot" / "mobile_robot.yaml", LIBRARIES).system)
+    assert "pins in: enc_a(4), enc_b(4)<br/>pins out: pwm(4), dir(4), enc_errors(32)<br/>pins out: stalled(4)" in text
+
+
+@needs_dot
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+def test_a_picture_of_an_application_is_legible_at_1200_pixels(path: Path) -> None:
+    system = load_beside(path).system
+    assert faults(picture(diagram(system), "svg", dark_style()), 1200) == []
+
+
+@needs_dot
+def test_illegible_pictures_are_found() -> None:
+    edge = 'a -> b [label="in the way", labelangle=0, labeldistance=3, taillabel="in the way"]'
+    assert faults(picture(f"digraph {{ rankdir=LR; {edge} }}", "svg"), 1200)
+    assert faults(picture('digraph { a [label="far too wide", fixedsize=true, width=0.2] }', "svg"), 1200)
+
+
+@needs_dot
+def test_a_picture_has_colours_for_dark_pages() -> None:
+    system = load_system(ROOT / "specs" / "multi_type" / "multi_type.yaml", LIBRARIES).system
+    svg = picture(diagram(system), "svg", dark_style()).decode()
+    assert "prefers-color-scheme: dark" in svg
+    assert all(f'class="node {name}"' in svg for name in ("host", "manager", "converter", "accelerator"))
+    assert all(f".{name} " in svg for name in THEMES["dark"].fills)
+    assert THEMES["dark"].paper in diagram(system, "dark")
 
 
 @needs_dot
@@ -48,7 +82,7 @@ def test_the_picture_is_the_same_each_time(tmp_path: Path) -> None:
     found = picture(diagram(derived(tmp_path, TEXT)), "svg")
     assert found == picture(diagram(derived(tmp_path, TEXT)), "svg")
     labels = [element.text for element in ET.fromstring(found).iter() if element.tag.endswith("}text")]
-    assert {"sub", "acc", "mix (VHDL)", "sensor_msgs/Image"} <= set(labels)
+    assert {"/sub", "acc", "mix (VHDL)", "sensor_msgs/Image"} <= set(labels)
 
 
 def test_missing_graphviz_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

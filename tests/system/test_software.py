@@ -489,7 +489,7 @@ def test_the_diagram_has_software_outside_of_the_fpga(tmp_path: Path) -> None:
     edges = ["host_out -> ", '"block b0" -> manager_in', 'manager_out -> "block b2"', '"block b2" -> host_in']
     for edge in (edges[0] + '"block b0"', *edges[1:]):
         assert f"\t{edge} [" in text, edge
-    assert "sub\ngeometry_msgs/Point" in text and "soft (ROS-SW)" in text
+    assert "sub<br/>geometry_msgs/Point" in text and "soft (ROS-SW)" in text
 
 
 def test_lines_of_software_are_written(tmp_path: Path) -> None:

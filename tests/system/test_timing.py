@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.scheduling.policies import POLICIES
+from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem, PublisherTimes, Scheduling
 from fusesoc_firm.system.derived.timing import bounds_of, frame_beats
 from fusesoc_firm.system.hardware.configuration import system_configuration
 from fusesoc_firm.system.views.show import derived_description
-from tests.system.systems import converter, derived, specification
+from tests.system.systems import LIBRARIES, converter, derived, read, specification
 
 PREEMPTIVE = {"fixed_priority_preemptive", "edf_resources", "edf_latency", "lst"}
 
@@ -170,3 +171,23 @@ def test_a_combined_scheduler(tmp_path: Path) -> None:
     generics = {item["formal"]: item["actual"] for item in text["scheduler_generics"]}
     assert (text["scheduler"], generics["TOP_POLICY"]) == ("firm_sched_combined", "firm.firm_sched_pkg.LRU")
     assert {"PERIODS", "DEADLINES", "TRANSFER_TIMES", "TIME_BITS", "SHORTEST_RUN"} < generics.keys()
+
+
+def test_fifos_for_late_frames(tmp_path: Path) -> None:
+    keys = ["period: 80, deadline: 3"] * 2
+    assert all(0 < item.late_bytes < 100 for item in system(tmp_path, "scheduler: round_robin", *keys).publishers)
+    without = system(tmp_path, "scheduler: round_robin, latenessBuffers: none", *keys)
+    assert not any(item.late_bytes for item in without.publishers)
+    # The lower priority may wait for ever, so there is no bound.
+    never = system(tmp_path, "scheduler: fixed_priority_preemptive", "period: 20", "period: 40")
+    assert never.publishers[1].late_bytes == 0
+
+
+def test_a_fifo_that_would_be_too_large(tmp_path: Path) -> None:
+    block = "  - {name: p, middleware: ROS, mode: publisher, message: geometry_msgs/Point, wcet: 90000, KEYS}\n"
+    blocks = converter("s", "subscriber", "Point", "p") + block.replace("KEYS", "period: 95000, deadline: 10")
+    found, faults = read(tmp_path, specification(blocks, project="{name: robot, scheduler: round_robin}"))
+    assert derive(found, tmp_path, LIBRARIES, faults).publishers[0].late_bytes == 0
+    assert [item.message for item in faults.warnings] == [
+        "'p' has no FIFO for the time in which its frames are late: it needs 89,991 bytes"
+    ]

@@ -155,6 +155,15 @@ def test_a_text_of_graphviz(tmp_path: Path) -> None:
     assert [(text or "").replace("\xa0", " ") for text in shown] == found
 
 
+@pytest.mark.skipif(not shutil.which("dot"), reason="no dot; make test installs Graphviz")
+def test_a_text_of_graphviz_in_markup(tmp_path: Path) -> None:
+    found = [text for text in texts(6) if text.strip() == text and "  " not in text]
+    nodes = "".join(f"  n{number} [label=<<b>{quoting.dot_markup(text)}</b>>]\n" for number, text in enumerate(found))
+    svg = ET.fromstring(run(["dot", "-Tsvg"], tmp_path, f"digraph {{\n{nodes}}}\n"))
+    shown = [item.text for item in svg.iter("{http://www.w3.org/2000/svg}text")]
+    assert [(text or "").replace("\xa0", " ") for text in shown] == found
+
+
 def test_a_text_of_markup() -> None:
     for name in ("html", "xml"):
         quote = quoting.QUOTES[name]["text"]

@@ -23,6 +23,7 @@ from fusesoc_firm.system.derived.connections import Wiring, places
 from fusesoc_firm.system.derived.cpp_function import check_kernel
 from fusesoc_firm.system.derived.entities import check_entities
 from fusesoc_firm.system.derived.ids import check_count
+from fusesoc_firm.system.derived.lateness import with_lateness_buffers
 from fusesoc_firm.system.derived.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.derived.link import link_of
 from fusesoc_firm.system.derived.longest import with_longest_payloads, with_longest_sent
@@ -127,7 +128,7 @@ def derive(
     )
     check_entities(system, parts.blocks, faults)
     faults.raise_if_any()
-    return system
+    return with_lateness_buffers(system, project, faults)
 
 
 def source_files(specification: Specification, folder: Path) -> list[Path]:

@@ -75,6 +75,7 @@ class Converter(Topic):
     """An instance of a converter; `id` counts subscribers and publishers separately, from 0, in the blocks' order.
 
     With `has_default_length`, `max_length` is a default, since neither bounds nor the specification limit the payload.
+    A publisher's `late_bytes` are stored in a FIFO while its frames are late (section 6.3.2).
     """
 
     id: int
@@ -83,6 +84,7 @@ class Converter(Topic):
     has_default_length: bool = False
     software: End | None = None
     queue: Queue | None = None
+    late_bytes: int = 0
 
     @property
     def may_pause(self) -> bool:

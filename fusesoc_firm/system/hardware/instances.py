@@ -17,7 +17,7 @@ from fusesoc_firm.system.derived.model import (
 from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
 from fusesoc_firm.system.hardware.crossings import port_of
 from fusesoc_firm.system.hardware.maps import port_map
-from fusesoc_firm.system.hardware.names import ERROR_WORDS, FRAME_WORDS, Names, reset_of, watched_publishers
+from fusesoc_firm.system.hardware.names import ERROR_WORDS, FRAME_WORDS, LATE_WORDS, Names, reset_of, watched_publishers
 from fusesoc_firm.system.written.specification import Pin
 
 ERROR_CODE_BITS = 4
@@ -67,6 +67,8 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
         **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
         **_part_of_manager(converter, system),
+        "beats": _beats(names, converter, system),
+        "late": _late(names, converter, system) if converter.late_bytes else None,
         "max_length": {"bytes": converter.max_length} if converter.max_length else None,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
         "error": error_of(converter, system) if converter.may_pause and not is_watched else None,
@@ -86,17 +88,43 @@ def _watched(names: Names, converter: Converter, system: DerivedSystem) -> dict[
 
 
 def _part_of_manager(converter: Converter, system: DerivedSystem) -> dict[str, int]:
-    """Return the slice of the Manager's inputs that receives a publisher's frames."""
+    """Return a publisher's place among the Manager's inputs."""
+    return {"id": converter.id, "id_byte": converter.id % 256, "place": system.places[converter.id]}
+
+
+def _beats(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return the signals to which a publisher, or its buffer, sends frames: of its FIFO, or else of the Manager."""
+    if not converter.late_bytes:
+        return _manager_beats(converter, system)
+    return {**{word: names.late(converter.block, word) for word in LATE_WORDS}, "place": 0, "slice": None}
+
+
+def _manager_beats(converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return the part of the Manager's inputs that receives a publisher's frames."""
     place, width = system.places[converter.id], system.width
     lanes = width // 8
-    return {
-        "id": converter.id,
-        "id_byte": converter.id % 256,
+    part = {
         "place": place,
         "data_high": width * (place + 1) - 1,
         "data_low": width * place,
         "keep_high": lanes * (place + 1) - 1,
         "keep_low": lanes * place,
+    }
+    return {**{word: f"pub_axis_{word}" for word in LATE_WORDS}, "place": place, "slice": part}
+
+
+def _late(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return the FIFO between a publisher and the Manager for late frames."""
+    block, lanes = converter.block, system.width // 8
+    return {
+        "block": block,
+        "label": names.label(block, "late"),
+        "bytes": converter.late_bytes,
+        "width": system.width,
+        "lanes": lanes,
+        "depth": max(2, -(-converter.late_bytes // lanes)),
+        **{word: names.late(block, word) for word in LATE_WORDS},
+        "beats": _manager_beats(converter, system),
     }
 
 
@@ -117,7 +145,7 @@ def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[s
         "lanes": lanes,
         "depth": max(2, -(-(ID_BYTES + LENGTH_BYTES + converter.buffer) // lanes)),
         **{word: names.frame(block, word) for word in FRAME_WORDS},
-        **_part_of_manager(converter, system),
+        "beats": _beats(names, converter, system),
         "out": error_of(converter, system),
     }
 

@@ -42,7 +42,7 @@ _TAKEN = """
     sched_request sched_beat sched_last sched_grant_valid sched_grant_select
     u_link u_adapter clock_hz baud link_error link_error_code
     uart_rxd uart_txd uart_rts_n uart_cts_n spi_sclk spi_cs_n spi_mosi spi_miso spi_irq
-    periods deadlines transfer_times firm_sched_pkg times_t
+    periods deadlines transfer_times sizes policies firm_sched_pkg times_t policies_t policy_t
     status_interrupt u_status_access u_status_registers u_status_counters
     bus_valid bus_write bus_address bus_write_data bus_read_data bus_done
     status_enable status_fault status_channel status_code status_lost status_address status_word status_clear
@@ -65,6 +65,8 @@ FRAME_WORDS = (*AXIS, "tuser", "error", "error_code")
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in FRAME_WORDS)
 # Between a publisher that the watchdog may cut off and the system's errors.
 ERROR_WORDS = ("error", "error_code")
+# Between a publisher and the FIFO for late frames.
+LATE_WORDS = (*AXIS, "tuser")
 
 
 class Names:
@@ -84,6 +86,8 @@ class Names:
         ]
         labels += [("u", block, "buffer") for block in buffered]
         labels += [("u", block, "queue") for block in queued]
+        late = [item.block for item in system.publishers if item.late_bytes]
+        labels += [("u", block, "late") for block in late]
         synchronised = [(block.block, str(pin.name)) for block, pin in synchronised_pins(system)]
         labels += [("u", *pin, "sync") for pin in synchronised]
         labels += [("u", *_crossing_key(item, word)) for item in all_crossings(system) for word in item.instances()]
@@ -102,6 +106,7 @@ class Names:
         ]
         signals += [(block, "", word) for block in (*queued, *buffered) for word in FRAME_SIGNALS]
         signals += [(item.block, "", f"frame_{word}") for item in watched_publishers(system) for word in ERROR_WORDS]
+        signals += [(block, "", f"late_{word}") for block in late for word in LATE_WORDS]
         signals += [(*pin, "synced") for pin in synchronised]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
         signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
@@ -152,6 +157,10 @@ class Names:
     def frame(self, block: str, signal: str) -> str:
         """Return a signal between a publisher and its buffer, or between a queue and its subscriber."""
         return self._signals[block, "", f"frame_{signal}"]
+
+    def late(self, block: str, signal: str) -> str:
+        """Return a signal between a publisher and its FIFO for late frames."""
+        return self._signals[block, "", f"late_{signal}"]
 
 
 def watched_publishers(system: DerivedSystem) -> list[Converter]:

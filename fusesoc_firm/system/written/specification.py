@@ -47,8 +47,8 @@ STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
 BLOCK, DROP_NEWEST, DROP_OLDEST = OVERFLOWS = ("block", "drop_newest", "drop_oldest")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
-# Whether the top level synchronises an input pin to its block's clock.
-ADDED, NOT_ADDED = SYNCHRONISERS = ("added", "none")
+# Whether the top level has a synchroniser after an input pin, or a FIFO after a publisher.
+ADDED, NOT_ADDED = ADDITIONS = ("added", "none")
 # `vendor:library:name`, with an optional version.
 _CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
 
@@ -108,6 +108,13 @@ class Project(Section):
         "groups of publishers with a scheduler each, in the order of the publishers' blocks",
         form="sections",
         section=PublisherGroup,
+        is_asked=False,
+    )
+    lateness_buffers: Text = key(
+        "FIFO after each publisher whose frames may be later than its deadline, for the data of that time",
+        name="latenessBuffers",
+        choices=ADDITIONS,
+        default=Text(ADDED),
         is_asked=False,
     )
     shortest_run: int = key(
@@ -178,7 +185,7 @@ class Pin(Section):
     bits: int | None = key("width in bits of a std_logic_vector (default: a std_logic)", form="integer")
     synchroniser: Text = key(
         "synchroniser of an input to the block's clock; none for clocks and for pins that the accelerator synchronises",
-        choices=SYNCHRONISERS,
+        choices=ADDITIONS,
         default=Text(ADDED),
     )
 

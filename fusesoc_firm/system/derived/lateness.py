@@ -1,0 +1,34 @@
+"""The FIFOs after publishers whose frames may be late (section 6.3.2), with sizes from the bounds on lateness."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.derived.timing import bounds_of
+from fusesoc_firm.system.written.specification import NOT_ADDED, Project
+from fusesoc_firm.text.diagnostics import Diagnostics
+
+_MOST_BYTES = 1 << 16
+
+
+def with_lateness_buffers(system: DerivedSystem, project: Project, faults: Diagnostics) -> DerivedSystem:
+    """Return the system with the `late_bytes` of each publisher, and warn if a FIFO would be too large.
+
+    Without all times of all publishers, or if a publisher may never be served, there is no bound and no FIFO.
+    """
+    if project.lateness_buffers == NOT_ADDED:
+        return system
+    publishers = list(system.publishers)
+    for bound in bounds_of(system):
+        place = next(place for place, item in enumerate(publishers) if item.block == bound.task.name)
+        late = bound.buffer or 0
+        if late > _MOST_BYTES:
+            faults.warn(
+                f"'{bound.task.name}' has no FIFO for the time in which its frames are late: it needs {late:,} bytes",
+                project.place("scheduler"),
+                f"at most {_MOST_BYTES:,} bytes are added; choose another scheduler, or longer periods",
+            )
+        else:
+            publishers[place] = replace(publishers[place], late_bytes=late)
+    return replace(system, publishers=tuple(publishers))
