@@ -294,12 +294,14 @@ def _arithmetic() -> Iterator[Row]:
             for name, bits in zip(("EXPONENT_BITS", "MANTISSA_BITS"), _FLOATS[size], strict=True)
         }
         yield Row(f"firm_float_resize to {other} bits", width, _operation("firm_float_resize", generics))
+    for entity in "firm_fixed_add", "firm_fixed_multiply", "firm_fixed_divide", "firm_fixed_resize":
+        yield Row(entity, 32, _operation(entity, {}))
 
 
 def _operation(entity: str, generics: Mapping[str, int]) -> Callable[[Path], Design]:
     def make(folder: Path) -> Design:
         library = Library("firm", folder)
-        library.analyse(core_files("acc/cordic/cordic", "acc/float/float"))
+        library.analyse(core_files("acc/cordic/cordic", "acc/float/float", "acc/fixed/fixed"))
         return _synthesised(Subject(library, entity, generics))
 
     return make

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import random
 import re
-import sys
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.cores.models import load_model
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
 
 FLOAT = CORES / "acc" / "float"
@@ -26,20 +24,7 @@ COUNTS = [100, pytest.param(COUNT, marks=pytest.mark.thorough)]
 SIZES = {"float64": (11, 52), "float32": (8, 23)}
 TYPES: dict[str, Any] = {"float64": np.float64, "float32": np.float32}
 BITS: dict[str, Any] = {"float64": np.uint64, "float32": np.uint32}
-
-
-def load_model() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("firm_float_model", FLOAT / "model.py")
-    assert specification
-    assert specification.loader
-    module = importlib.util.module_from_spec(specification)
-    # Its dataclass looks for the module by name.
-    sys.modules[specification.name] = module
-    specification.loader.exec_module(module)
-    return module
-
-
-MODEL = load_model()
+MODEL = load_model("float")
 
 
 @pytest.fixture(scope="module")
