@@ -23,6 +23,7 @@ from fusesoc_firm.converter.program import (
 from fusesoc_firm.frame.model import COUNT_BYTES, LENGTH_BYTES, Data, Loop
 from fusesoc_firm.text.render import Context
 
+_WORD_BITS = 32
 _DIGITS_IN_A_ROW = 64
 _NUMBERS_IN_A_ROW = 16
 
@@ -145,9 +146,18 @@ def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
     return found
 
 
+def is_lossy(entries: int) -> bool:
+    """Whether GHDL 2.0 may lose a table of so many bits.
+
+    A constant of 64, 96, ... bits becomes zero if only its highest 32 contain ones. Such a table therefore gets a
+    further bit, which is zero and never read.
+    """
+    return entries > _WORD_BITS and entries % _WORD_BITS == 0
+
+
 def digit_rows(digits: str) -> list[str]:
     """The rows of a descending table with one digit for each step."""
-    digits = digits[::-1]
+    digits = ("0" if is_lossy(len(digits)) else "") + digits[::-1]
     return [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
 
 

@@ -20,6 +20,7 @@ from tests.bench import (
     cycles,
     figures,
     fuzz,
+    fuzz_systems,
     images,
     links,
     live,
@@ -52,7 +53,7 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing, loops and actions: only rows whose names match, such as 'Image.* 64 bits'",
+        help="for timing, fuzz, loops and actions: only rows whose names match, such as 'Image.* 64 bits'",
     )
     parser.add_argument(
         "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"
@@ -76,7 +77,7 @@ def main() -> int:
 
 
 def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
-    seed, broken = arguments.seed, arguments.broken
+    seed = arguments.seed
     measures: dict[str, Callable[[], list[Table]]] = {
         "area": lambda: area.measure(Yosys(), _tell),
         "manager": lambda: manager.measure(Yosys(), _tell),
@@ -84,7 +85,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "loops": lambda: loops.measure(seed, _tell, figures.written(), arguments.row),
         "use": lambda: use.measure(seed, _tell),
         "cycles": lambda: cycles.measure(seed, _tell),
-        "fuzz": lambda: fuzz.measure(seed, _tell, broken),
+        "fuzz": lambda: _fuzz(arguments),
         "images": lambda: images.measure(Yosys(), seed, _tell),
         "links": lambda: links.measure(Yosys(), _tell),
         "applications": lambda: applications.measure(Yosys(), _tell),
@@ -97,6 +98,15 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "store": lambda: store.measure(_tell),
     }
     return measures[part]()
+
+
+def _fuzz(arguments: argparse.Namespace) -> list[Table]:
+    """The tables of converters and of whole systems, which together get ten times a converter's broken frames."""
+    seed, broken, written, row = arguments.seed, arguments.broken, figures.written(), arguments.row
+    return [
+        *fuzz.measure(seed, _tell, broken, written, row),
+        *fuzz_systems.measure(seed, _tell, 10 * broken, written, row),
+    ]
 
 
 def _tell(line: str) -> None:

@@ -17,6 +17,7 @@ from tests.bench import (
     builds,
     cycles,
     fuzz,
+    fuzz_systems,
     images,
     links,
     live,
@@ -104,7 +105,8 @@ _METHODS = {
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
-        not be delivered.""",
+        not be delivered. Whole systems are fuzzed in the same way.
+        `make bench BENCH="fuzz --row 'system of 64 bits'"` measures one of them.""",
     "loops": """GHDL's netlist is searched bit by bit, as [`lint`](../reference/netlist.md) does.""",
     "images": """The accelerators of specs/image_pipeline and specs/sobel are measured on their own: LUT/FF as in
         [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
@@ -146,6 +148,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         use,
         cycles,
         fuzz,
+        fuzz_systems,
         loops,
         images,
         links,

@@ -7,6 +7,7 @@ A frame is cut, lengthened, has a wrong length or count, has bytes changed, is a
 from __future__ import annotations
 
 import random
+import re
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from fusesoc_firm.message.middleware import middleware_of
 from tests.bench.designs import SUBSCRIBER, Converter, NotConvertedError
 from tests.bench.model import FrameError, Message, ModelError, Subscriber, subscriber_model
 from tests.bench.payloads import BrokenPayloadError, Payloads
-from tests.bench.tables import FAILED, MET, NOT_CONVERTED, Table, Tell
+from tests.bench.tables import FAILED, MET, NOT_CONVERTED, NOT_MEASURED, Table, Tell, known_rows
 
 BROKEN_FRAMES = 100_000
 TITLE = "Broken frames"
@@ -72,11 +73,18 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
     return {TITLE: [_key(converter) for converter in rows()]}
 
 
-def measure(seed: int, tell: Tell, broken: int = BROKEN_FRAMES) -> list[Table]:
-    """Fuzz every subscriber with `broken` broken frames; `tell` hears of each batch."""
+def measure(seed: int, tell: Tell, broken: int = BROKEN_FRAMES, written: str = "", pattern: str = "") -> list[Table]:
+    """Fuzz every subscriber whose name matches a regular expression with `broken` broken frames.
+
+    `tell` hears of each batch. The other rows are taken from the text `written` of docs/figures.
+    """
+    known = known_rows(written, TITLE, _COLUMNS, keys=3)
     lines = []
     for converter in rows():
         name = " ".join(_key(converter))
+        if not re.search(pattern, name):
+            lines.append(known.get(_key(converter)) or (*_key(converter), *[""] * 5, NOT_MEASURED))
+            continue
         try:
             with tempfile.TemporaryDirectory() as folder:
                 tally = fuzz(converter, Path(folder), broken, seed, tell)

@@ -15,7 +15,7 @@ from typing import Any
 
 from fusesoc_firm.text.render import render
 from tests.bench.designs import Converter, Design, Port, generate, is_field
-from tests.hdl.ghdl import Generic
+from tests.hdl.ghdl import Generic, Library
 
 # More than the longest measured payload.
 _LONGEST_PAYLOAD = 2**24
@@ -148,18 +148,23 @@ def publisher_model(converter: Converter, folder: Path) -> Publisher:
 
 def _build(design: Design, template: str, configuration: dict[str, Any], generics: Mapping[str, Generic]) -> Path:
     """The program of a design's netlist and the bench that `template` makes of `configuration`."""
-    folder = design.library.directory
-    netlist = design.library.synthesise(design.entity, generics, "verilog")
+    return verilate(design.library, design.entity, render(template, configuration, _HERE), generics)
+
+
+def verilate(library: Library, entity: str, bench: str, generics: Mapping[str, Generic] | None = None) -> Path:
+    """The program of an entity's netlist and a bench in C++, in the library's folder; raises `ModelError`."""
+    folder = library.directory
+    netlist = library.synthesise(entity, generics, "verilog")
     (folder / "netlist.v").write_text(netlist, encoding="utf-8")
-    (folder / "bench.cpp").write_text(render(template, configuration, _HERE), encoding="ascii")
+    (folder / "bench.cpp").write_text(bench, encoding="ascii")
     command = ["verilator", "--cc", "--exe", "--build", "-O3", "-CFLAGS", f"-I{_HERE}", "-Wno-fatal"]
     for option in ("OPT_FAST=-O2", "OPT_SLOW=-O0", "OPT_GLOBAL=-O0"):
         command += ["-MAKEFLAGS", option]
-    command += ["-Wno-INITIALDLY", "--top-module", design.entity, "--Mdir", "model", "netlist.v", "bench.cpp"]
+    command += ["-Wno-INITIALDLY", "--top-module", entity, "--Mdir", "model", "netlist.v", "bench.cpp"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise ModelError(done.stdout + done.stderr)
-    return folder / "model" / f"V{design.entity}"
+    return folder / "model" / f"V{entity}"
 
 
 def _execute(command: Sequence[str], folder: Path) -> str:

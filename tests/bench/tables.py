@@ -44,14 +44,14 @@ class Table:
         return Table(self.title, tuple(self.columns[index] for index in kept), tuple(rows), self.note)
 
 
-def known_rows(text: str, title: str, columns: Sequence[str]) -> dict[tuple[str, ...], tuple[str, ...]]:
-    """The rows of a table in a text, by their cells in the first two columns; columns without entries are restored."""
+def known_rows(text: str, title: str, columns: Sequence[str], keys: int = 2) -> dict[tuple[str, ...], tuple[str, ...]]:
+    """The rows of a table in a text, by their cells in the first columns; columns without entries are restored."""
     found = re.search(rf"^### {re.escape(title)}\n\n((?:\|.*\n)+)", text, re.MULTILINE)
     if not found:
         return {}
     heading, _, *lines = ([cell.strip() for cell in line.strip("|").split("|")] for line in found[1].splitlines())
     rows = (dict(zip(heading, line, strict=True)) for line in lines)
-    return {(cells[0], cells[1]): cells for cells in (tuple(row.get(name, "") for name in columns) for row in rows)}
+    return {cells[:keys]: cells for cells in (tuple(row.get(name, "") for name in columns) for row in rows)}
 
 
 def filled(text: str) -> str:

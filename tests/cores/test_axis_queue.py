@@ -104,8 +104,7 @@ def test_a_subscriber_that_never_takes_stalls_nobody(library: Library, tmp_path:
     assert ends == 200
     # One frame is about to leave, and two wait.
     assert sum(cycle.code == DROPPED for cycle in cycles) == ends - 3
-    stalled = sum(cycle.entering.is_valid and not cycle.entering.is_ready for cycle in cycles)
-    assert stalled == (ends - 3 if overflow == "drop_oldest" else 0)
+    assert not any(cycle.entering.is_valid and not cycle.entering.is_ready for cycle in cycles)
 
 
 def test_errors_of_the_subscriber_are_reported_as_well(library: Library, tmp_path: Path) -> None:

@@ -4,7 +4,8 @@
 -- The memory has a place of BEATS beats for each of FRAMES frames, the arriving and the leaving one included. Two lists
 -- hold the first addresses of places: of waiting frames, oldest first, and of free places. Without a free place, an
 -- arriving frame waits, or one frame is dropped as a whole: either the arriving frame (DROP_NEWEST), or the oldest
--- waiting one (DROP_OLDEST), whose place the arriving frame gets. A frame that has begun to leave is not dropped.
+-- waiting one (DROP_OLDEST), whose place the arriving frame gets in the same cycle. A frame that has begun to leave is
+-- not dropped.
 --
 -- A longer frame is cut after BEATS beats. With one beat above the longest legal frame, the subscriber after the queue
 -- therefore reports it.
@@ -81,17 +82,20 @@ architecture rtl of firm_axis_queue is
   -- The frame that arrives, or is to arrive next.
   signal place_r     : address_t;                       -- its place, if it has one
   signal has_place_r : std_logic;
-  signal write_r     : address_t;                       -- the address of its next beat
+  signal write_r     : address_t;                       -- the address of its next beat, once it has a place
   signal position_r  : natural range 0 to BEATS-1;      -- the number of its next beat
   signal skipping_r  : std_logic;                       -- its remaining beats are discarded
   signal running_r   : std_logic;
 
+  signal place      : address_t;  -- of the frame whose beat arrives
+  signal write      : address_t;  -- the address of this beat
   signal ready      : std_logic;
   signal keep_beat  : std_logic;
   signal is_end     : std_logic;  -- this beat is the last one that is kept
   signal arrived    : std_logic;
   signal refuse     : std_logic;  -- the arriving frame is dropped
-  signal replace    : std_logic;  -- the oldest waiting frame is dropped
+  signal replaces   : std_logic;  -- a new frame drops the oldest waiting one
+  signal replace    : std_logic;  -- it does so now
   signal need       : std_logic;  -- the next frame has no place yet
   signal is_unused  : std_logic;  -- a place has never been used
   signal is_free    : std_logic;  -- a place has become free
@@ -155,7 +159,7 @@ begin
 
   -- In --------------------------------------------------------------------------------------------------------------
 
-  keep_beat <= s_axis_tvalid and has_place_r and not skipping_r;
+  keep_beat <= s_axis_tvalid and (has_place_r or replaces) and not skipping_r;
   is_end    <= '1' when s_axis_tlast = '1' or position_r = BEATS-1 else '0';
   arrived   <= keep_beat and is_end;
 
@@ -165,12 +169,19 @@ begin
   need       <= arrived or not has_place_r;
   take_free  <= need and is_free and not is_unused;
 
+  -- While a beat is at the output. Without one, the oldest frame begins to leave.
   drop_oldest_frame : if DROP_OLDEST generate
-    replace <= s_axis_tvalid and is_waiting and not (has_place_r or skipping_r or is_unused or is_free or start);
+    replaces <= is_waiting and valid_r and not (has_place_r or skipping_r or is_unused or is_free);
+    replace  <= s_axis_tvalid and replaces;
+    place    <= oldest when replaces = '1' else place_r;
+    write    <= oldest when replaces = '1' else write_r;
   end generate drop_oldest_frame;
 
   keep_waiting_frames : if not DROP_OLDEST generate
-    replace <= '0';
+    replaces <= '0';
+    replace  <= '0';
+    place    <= place_r;
+    write    <= write_r;
   end generate keep_waiting_frames;
 
   drop_newest_frame : if DROP_NEWEST generate
@@ -179,7 +190,7 @@ begin
   end generate drop_newest_frame;
 
   keep_newest_frame : if not DROP_NEWEST generate
-    ready  <= has_place_r or skipping_r;
+    ready  <= has_place_r or skipping_r or replaces;
     refuse <= '0';
   end generate keep_newest_frame;
 
@@ -195,7 +206,7 @@ begin
       else
         running_r <= '1';
         if need = '1' then
-          has_place_r <= is_unused or is_free or replace;
+          has_place_r <= is_unused or is_free or (replace and not arrived);
         end if;
         if need = '1' and is_unused = '1' then
           unused_r <= unused_r + BEATS;
@@ -209,19 +220,15 @@ begin
           skipping_r <= (skipping_r or arrived or refuse) and not s_axis_tlast;
         end if;
       end if;
-      if need = '1' then
-        if is_unused = '1' then
-          place_r <= unused_r;
-          write_r <= unused_r;
-        elsif is_free = '1' then
-          place_r <= free(free_first_r);
-          write_r <= free(free_first_r);
-        else
-          place_r <= oldest;
-          write_r <= oldest;
-        end if;
+      if need = '1' and is_unused = '1' then
+        place_r <= unused_r;
+        write_r <= unused_r;
+      elsif need = '1' and is_free = '1' then
+        place_r <= free(free_first_r);
+        write_r <= free(free_first_r);
       elsif keep_beat = '1' then
-        write_r <= next_address(write_r);
+        place_r <= place;
+        write_r <= next_address(write);
       end if;
     end if;
   end process receive;
@@ -230,7 +237,7 @@ begin
   begin
     if rising_edge(clk) then
       if keep_beat = '1' then
-        memory(write_r) <= is_end & s_axis_tuser & s_axis_tkeep & s_axis_tdata;
+        memory(write) <= is_end & s_axis_tuser & s_axis_tkeep & s_axis_tdata;
       end if;
       if read_beat = '1' then
         word_r <= memory(read_address);
@@ -246,7 +253,7 @@ begin
   begin
     if rising_edge(clk) then
       if arrived = '1' then
-        waiting(waiting_end_r) <= place_r;
+        waiting(waiting_end_r) <= place;
       end if;
       if left = '1' then
         free(free_end_r) <= leaving_r;
@@ -286,7 +293,7 @@ begin
   -- Out -------------------------------------------------------------------------------------------------------------
 
   between      <= not valid_r or word_r(WORD_BITS-1);
-  start        <= is_waiting and between and (m_axis_tready or not valid_r);
+  start        <= is_waiting and between and (m_axis_tready or not valid_r) and not replace;
   left         <= valid_r and word_r(WORD_BITS-1) and m_axis_tready;
   read_beat    <= start or (not between and m_axis_tready);
   read_address <= oldest when between = '1' else read_r;

@@ -1,0 +1,122 @@
+"""The fuzzing of whole systems: its judge sees every kind of fault, and a sample of its frames."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.frame.faults import Fault
+from fusesoc_firm.message import ROS2
+from tests.bench import fuzz_systems
+from tests.bench.fuzz_judge import ENCODING, Judge, Record, Sent, Trouble, WrongError, read_records
+from tests.bench.fuzz_systems import System
+from tests.bench.payloads import Payloads
+
+SEED = 20261123
+NUMBER, LATE, SUBSCRIBER, UNKNOWN = 1, 3, 0, 9
+QUATERNION = Payloads(ROS2, "geometry_msgs/Quaternion")
+needs_verilator = pytest.mark.skipif(not shutil.which("verilator"), reason="no verilator")
+
+
+def _quaternion(first: int) -> Sent:
+    payload = ENCODING + bytes([first]) + bytes(31)
+    body = len(payload).to_bytes(4, "little") + payload
+    return Sent(0, body, Trouble.NONE, 0, QUATERNION.shown(payload))
+
+
+def _broken(id_: int = 0) -> Sent:
+    return Sent(id_, b"\x02\x00\x00\x00ab", Trouble.NONE, 0, None)
+
+
+def _number(number: int) -> Sent:
+    data = number.to_bytes(2, "little")
+    return Sent(NUMBER, b"\x06\x00\x00\x00" + ENCODING + data, Trouble.NONE, 0, {"data": data})
+
+
+def _text(number: int) -> Record:
+    text = b"abcdefghijklmnopqrstuvwxyz"[:number] + b"\0"
+    payload = ENCODING + len(text).to_bytes(4, "little") + text
+    return Record("F", 0, bytes([NUMBER]) + len(payload).to_bytes(4, "little") + payload)
+
+
+def _back(sent: Sent) -> Record:
+    return Record("F", 0, bytes([sent.id]) + sent.body)
+
+
+def _error(channel: int, code: Fault) -> Record:
+    return Record("E", channel, bytes([code.value]))
+
+
+ABORTED = Record("A", 0, b"\0")
+FIRST, SECOND = _quaternion(1), _quaternion(2)
+SENT = [FIRST, _broken(), SECOND, _number(5), _number(4), _number(8), _broken(NUMBER), _broken(UNKNOWN)]
+SHORT, LATER = _error(SUBSCRIBER, Fault.SHORT_FRAME), _error(LATE, Fault.WATCHDOG)
+OF_NUMBER, ID = _error(NUMBER, Fault.BAD_LENGTH), Record("I", 0, b"")
+RIGHT = [_back(FIRST), SHORT, ABORTED, _back(SECOND), LATER, _text(8), OF_NUMBER, ID]
+
+
+def _judge(sent: list[Sent], records: list[Record]) -> Judge:
+    judge = Judge([QUATERNION], is_ros2=True, late=LATE)
+    judge.judge(sent, records)
+    return judge
+
+
+def test_what_is_right() -> None:
+    """A number without a response is counted as such."""
+    assert _judge(SENT, RIGHT).dropped == 0
+    dropped = [_error(NUMBER, Fault.DROPPED) if record is OF_NUMBER else record for record in RIGHT]
+    assert _judge(SENT, dropped).dropped == 1
+
+
+@pytest.mark.parametrize(
+    ("records", "message"),
+    [
+        (RIGHT[1:], "came back as"),
+        ([*RIGHT, _back(SECOND)], "delivered as good"),
+        ([record for record in RIGHT if record is not SHORT], "1 broken frames of id 0, 0 counted"),
+        ([*RIGHT, SHORT], "1 broken frames of id 0, 2 counted"),
+        ([record for record in RIGHT if record != _back(SECOND)], "1 good frames are lost"),
+        ([record for record in RIGHT if record is not LATER], "numbers, 4 counted|4 numbers, 3 counted"),
+        ([*RIGHT, _text(7)], "no number has the answer"),
+        ([record for record in RIGHT if record is not OF_NUMBER], "1 broken numbers, 0 counted"),
+        ([*RIGHT, OF_NUMBER], "1 broken numbers, but 2 reported"),
+        (RIGHT[:-1], "1 unknown ids, 0 counted"),
+        ([*RIGHT, Record("A", 0, b"\x07")], "frames of .7., who are nobody"),
+    ],
+)
+def test_what_is_wrong(records: list[Record], message: str) -> None:
+    with pytest.raises(WrongError, match=message):
+        _judge(SENT, records)
+
+
+def test_a_reset_takes_what_is_under_way() -> None:
+    """What comes back before it is still judged, and after it everything."""
+    reset = Record("R", 0, (3).to_bytes(4, "little"))
+    hit = [FIRST, _broken(), SECOND, FIRST, *SENT]
+    _judge(hit, [_back(FIRST), reset, *RIGHT])
+    with pytest.raises(WrongError, match="came back as"):
+        _judge(hit, [_back(SECOND), reset, *RIGHT])
+    with pytest.raises(WrongError, match="came back as"):
+        _judge(hit, [_back(FIRST), reset, *RIGHT[1:]])
+
+
+def test_records_are_read() -> None:
+    records = [Record("E", 3, b"\x09"), Record("I", 0, b""), Record("F", 0, b"abc")]
+    data = b"".join(
+        item.kind.encode() + bytes([item.channel]) + len(item.data).to_bytes(4, "little") + item.data
+        for item in records
+    )
+    assert [*read_records(data)] == records
+
+
+@pytest.mark.check
+@needs_verilator
+@pytest.mark.parametrize("system", fuzz_systems.SYSTEMS, ids=lambda system: system.name)
+def test_a_thousand_broken_frames(tmp_path: Path, system: System) -> None:
+    print(f"seed {SEED}")
+    tally = fuzz_systems.fuzz(system, tmp_path, 1000, SEED, print)
+    assert not tally.fault, tally.fault
+    assert tally.broken >= 1000
+    assert tally.good > 300
