@@ -20,6 +20,7 @@ from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
 from fusesoc_firm.cli.query import add_query
 from fusesoc_firm.cli.replay import add_replay
+from fusesoc_firm.cli.ros import add_ros
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.sim import add_sim
 from fusesoc_firm.cli.simulator import add_simulator
@@ -108,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     add_system(commands)
     add_simulator(commands)
     add_live(commands)
+    add_ros(commands)
     add_status(commands)
     add_scheduler(commands)
     add_build(commands)

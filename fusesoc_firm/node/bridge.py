@@ -156,6 +156,7 @@ class Ros1(Ros):
         import rospy
 
         self._rospy = rospy
+        _warn_without_master()
         rospy.init_node(config["name"], disable_signals=True)
         rospy.on_shutdown(self._stopped_by_ros)
         self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in config["publishers"]}
@@ -215,6 +216,18 @@ class Ros1(Ros):
             for connection in list(publisher.impl.connections):
                 _flush(connection, latest)
         self._rospy.signal_shutdown("the hardware is disconnected")
+
+
+def _warn_without_master() -> None:
+    """Say how to start the master for which rospy waits, if it does not run."""
+    import rosgraph  # type: ignore[import-not-found, unused-ignore]
+
+    if not rosgraph.is_master_online():
+        print(
+            f"waiting for the ROS master at {rosgraph.get_master_uri()}; start it in another terminal with 'roscore' or"
+            " 'rosmaster --core', or set ROS_MASTER_URI to that of a running one",
+            file=sys.stderr,
+        )
 
 
 def _raw_class(rospy: Any, topic: dict[str, Any]) -> Any:
@@ -352,7 +365,9 @@ def _message_class(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), message)
     except (ImportError, AttributeError):
         raise BridgeError(
-            f"the message '{name}' is not installed for {sys.executable}; build and source the message's ROS 2 package"
+            f"the message '{name}' is not installed for {sys.executable}; 'firm ros install {package}' or"
+            f" 'apt-get install ros-$ROS_DISTRO-{package.replace('_', '-')}' installs a released package;"
+            " build and source a package of your own"
         ) from None
 
 

@@ -17,9 +17,15 @@ from typing import Protocol
 from fusesoc_firm.node import bridge
 from fusesoc_firm.node.description import NodeDescription, NodeTopic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
+from fusesoc_firm.node.ros_wheels import ros_python
 
 # For each version of ROS, a module that only the Python with that version can import.
 _MODULES = {1: "rospy", 2: "rclpy"}
+# How ROS is installed where it is missing.
+_INSTALLATION = {
+    1: "on Debian, 'apt-get install python3-rospy python3-rosmaster' installs ROS 1",
+    2: "'firm ros install' installs ROS 2 beside fusesoc-firm",
+}
 _END_SECONDS = 5.0
 
 
@@ -218,7 +224,7 @@ def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
 def _python_of(ros: int) -> str:
     """Return the path of the first Python that can import the modules of ROS. May raise `CarrierError`."""
     module = _MODULES[ros]
-    found = [shutil.which("python3"), "/usr/bin/python3", sys.executable]
+    found = [shutil.which("python3"), "/usr/bin/python3", sys.executable, str(ros_python())]
     candidates = [path for path in dict.fromkeys(found) if path and Path(path).exists()]
     for path in candidates:
         # An installed interpreter is not sufficient, since the sourced ROS may be for another Python.
@@ -226,5 +232,5 @@ def _python_of(ros: int) -> str:
             return path
     raise CarrierError(
         f"no Python found here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
-        f" source the setup file of ROS, or select a Python with --ros-python"
+        f" {_INSTALLATION[ros]}; if ROS is installed, source its setup file, or select its Python with --ros-python"
     )

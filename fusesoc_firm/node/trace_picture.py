@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
+from math import ceil
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 from fusesoc_firm.node.trace import COLUMNS
@@ -30,10 +30,12 @@ _CYCLES = (
     ("accelerator", "last_beat_in_cycle", "first_beat_out_cycle"),
     ("frame out", "first_beat_out_cycle", "last_beat_out_cycle"),
 )
-_ROW_INCHES = 2.6
+_ROW_INCHES = 4.2
 _WIDTH_INCHES = 11.0
+_NANOSECONDS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}
+_PERCENTILES = (50, 95, 99)
 # Without a date and matplotlib's random names, the same table always results in the same bytes.
-_SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
+_SETTINGS = {"svg.hashsalt": "firm", "font.size": 9, "axes.titlesize": 9}
 _METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
     ".svg": {"Date": None},
@@ -44,7 +46,9 @@ _METADATA: dict[str, dict[str, None]] = {
 def draw_trace(table: Path, picture: Path) -> None:
     """Draw a table that `Trace` wrote: a row of panels for each route, with wall time beside simulated time.
 
-    Raise `InputError` for another kind of file, for an unknown picture format, and if matplotlib is missing.
+    A panel is a timeline: each message has a row, and each stage a bar from its begin to its end, counted from the
+    begin of the first stage. Raise `InputError` for another kind of file, for an unknown picture format, and if
+    matplotlib is missing.
     """
     check_output(picture, SUFFIXES)
     ways = _ways(table)
@@ -55,10 +59,8 @@ def draw_trace(table: Path, picture: Path) -> None:
     drawing, axes = plots.subplots(len(ways), 2, figsize=size, squeeze=False, layout="constrained")
     for (left, right), ((subscriber, publisher), rows) in zip(axes, ways.items(), strict=True):
         way = plot_text(f"{subscriber} to {publisher}")
-        left.set_title(f"{way}: wall time")
-        right.set_title(f"{way}: simulated time")
-        _draw(left, rows, _WALL, lambda nanoseconds: nanoseconds / 1000, "us")
-        _draw(right, rows, _CYCLES, float, "cycles")
+        _draw(left, rows, _WALL, f"{way}, wall time", 1.0)
+        _draw(right, rows, _CYCLES, f"{way}, simulated time", _cycle(rows))
     try:
         drawing.savefig(picture, metadata=_METADATA[picture.suffix])
     except OSError as error:
@@ -66,24 +68,61 @@ def draw_trace(table: Path, picture: Path) -> None:
     plots.close(drawing)
 
 
+def _cycle(rows: Sequence[_Row]) -> float | None:
+    """Return the time of a cycle in ns, or None if the clock is unknown."""
+    for row in rows:
+        if row["hardware_ns"]:
+            cycles = _number(row["last_beat_out_cycle"]) - _number(row["first_beat_in_cycle"])
+            return _number(row["hardware_ns"]) / cycles if cycles else None
+    return None
+
+
 def _draw(
-    axis: Any, rows: Sequence[_Row], parts: Sequence[tuple[str, str, str]], scale: Callable[[float], float], unit: str
+    axis: Any, rows: Sequence[_Row], parts: Sequence[tuple[str, str, str]], title: str, tick: float | None
 ) -> None:
-    """Draw each message as a bar of stacked stages; a stage that began before the stage below it is omitted."""
+    """Draw the stages of all messages; `tick` is the time of the table's unit in ns, if it is known."""
     whole = [row for row in rows if all(row[name] is not None for _, *names in parts for name in names)]
-    axis.set_xlabel("message")
-    axis.set_ylabel(unit)
+    axis.set_ylabel("message")
     if not whole:
+        axis.set_title(title)
         axis.text(0.5, 0.5, "unknown for this hardware", ha="center", va="center", transform=axis.transAxes)
         return
-    numbers = [_number(row["message"]) for row in whole]
-    bottom = [0.0] * len(whole)
-    for label, first, last in parts:
-        spans = [max(0.0, scale(_number(row[last]) - _number(row[first]))) for row in whole]
-        middle = median(scale(_number(row[last]) - _number(row[first])) for row in whole)
-        axis.bar(numbers, spans, bottom=bottom, width=1.0, linewidth=0, label=f"{label}, median {middle:.4g}")
-        bottom = [below + span for below, span in zip(bottom, spans, strict=True)]
-    axis.legend(fontsize="small")
+    begin, end = parts[0][1], parts[-1][2]
+    totals = [_number(row[end]) - _number(row[begin]) for row in whole]
+    unit, scale = _unit(max(totals), tick)
+    axis.set_title(f"{title}\nwhole way: {_percentiles(totals, scale)} {unit}")
+    axis.set_xlabel(unit)
+    height = 0.9 / len(parts)
+    for lane, (label, first, last) in enumerate(parts):
+        spans = [_number(row[last]) - _number(row[first]) for row in whole]
+        axis.barh(
+            [_number(row["message"]) + (lane + 0.5) * height - 0.45 for row in whole],
+            [max(0.0, span) * scale for span in spans],
+            left=[(_number(row[first]) - _number(row[begin])) * scale for row in whole],
+            height=height,
+            color=f"C{lane}",
+            # Bars of many messages are thinner than a pixel.
+            edgecolor=f"C{lane}",
+            linewidth=0.6,
+            label=f"{label}: {_percentiles(spans, scale)} {unit}",
+        )
+    axis.invert_yaxis()
+    axis.yaxis.get_major_locator().set_params(integer=True)
+    axis.legend(fontsize="small", loc="upper left", bbox_to_anchor=(0, -0.14), frameon=False)
+
+
+def _unit(longest: float, tick: float | None) -> tuple[str, float]:
+    """Return the unit in which the longest time is at least 1, and the factor to it."""
+    if tick is None:
+        return "cycles", 1.0
+    unit = next((name for name, size in _NANOSECONDS.items() if longest * tick >= size), "ns")
+    return unit, tick / _NANOSECONDS[unit]
+
+
+def _percentiles(times: Sequence[float], scale: float) -> str:
+    """Return the median and high percentiles by nearest rank, which are times that were measured."""
+    found = sorted(times)
+    return ", ".join(f"p{p} {found[ceil(p * len(found) / 100) - 1] * scale:.3g}" for p in _PERCENTILES)
 
 
 def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:

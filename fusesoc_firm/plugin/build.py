@@ -169,8 +169,8 @@ def _answer(line: Sequence[str], start: Callable[[], None]) -> None:
     if name is None:
         start()
         return
-    if not answer_from_store(name, Path(path)):
-        # What our generator uses is in its note.
-        with unobserved():
+    # What our generator uses is in its note, also the versions of programs.
+    with unobserved():
+        if not answer_from_store(name, Path(path)):
             start()
     note_call(noted_facts(name, Path(path)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -33,10 +34,20 @@ def graph(core: str, target: str) -> str:
 
     def sources(call: GeneratorCall) -> list[str]:
         request = _request(call)
-        # Paths relative to the current folder distinguish files with equal names in two cores.
-        return [] if request is None else [*map(shown, _input_files(request))]
+        return [] if request is None else [*map(_place, _input_files(request))]
 
     return core_graph(core, target, sources)
+
+
+def _place(path: Path) -> str:
+    """Return a path relative to the current folder or to the folder of our package, the same on every machine.
+
+    Other paths lead out of the current folder. Such paths distinguish files with equal names in two cores.
+    """
+    for root in (Path.cwd().resolve(), PACKAGE.parent):
+        if path.is_relative_to(root):
+            return str(path.relative_to(root))
+    return os.path.relpath(path)
 
 
 def affected_since(revision: str) -> dict[str, str]:

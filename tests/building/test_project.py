@@ -16,6 +16,7 @@ import yaml
 from fusesoc_firm import __version__
 from fusesoc_firm.building.cores import project_cores
 from fusesoc_firm.cli import main
+from fusesoc_firm.plugin import project as project_module
 from fusesoc_firm.plugin.answer import main as generate
 from fusesoc_firm.store.own_code import PACKAGE
 from fusesoc_firm.tools.library_path import library_root
@@ -175,6 +176,14 @@ def test_the_configuration_is_the_one_that_fusesoc_is_told(
     monkeypatch.setenv("FUSESOC_CONFIG", str(conf))
     assert main(["graph", "me:p:branch", "--format", "dot"]) == 0
     assert "me:p:branch" in capsys.readouterr().out
+
+
+def test_a_place_in_a_graph_is_not_absolute(project: Path) -> None:
+    """Files of the project, of our package and of neither."""
+    own = Path(project_module.__file__).resolve()
+    assert project_module._place(Path.cwd().resolve() / "a" / "b.vhd") == "a/b.vhd"
+    assert project_module._place(own) == "fusesoc_firm/plugin/project.py"
+    assert project_module._place(Path.cwd().resolve().parent / "other" / "c.msg") == "../other/c.msg"
 
 
 def test_graph(project: Path, capsys: Captured) -> None:

@@ -25,7 +25,7 @@ from fusesoc_firm.node.python_node import python_node
 from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.run import run_options
 from fusesoc_firm.node.software import node_software
-from fusesoc_firm.node.trace import CYCLES, WALL_TIMES, Trace
+from fusesoc_firm.node.trace import COLUMNS, CYCLES, WALL_TIMES, Trace
 from fusesoc_firm.node.trace_picture import draw_trace
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -459,8 +459,21 @@ def test_a_trace_is_drawn(tmp_path: Path) -> None:
         draw_trace(tmp_path / "trace.csv", tmp_path / name)
     drawn = (tmp_path / "one.svg").read_text(encoding="utf-8")
     assert drawn == (tmp_path / "two.svg").read_text(encoding="utf-8")
-    for text in ("a0 to z0: wall time", "a0 to z0: simulated time", "accelerator, median 1 "):
-        assert f"<!-- {text.strip()} -->" in drawn
+    for text in ("a0 to z0, wall time", "a0 to z0, simulated time", "accelerator: p50 1, p95 1, p99 1 cycles"):
+        assert f"<!-- {text}" in drawn
+
+
+def test_a_picture_of_a_trace_has_units(tmp_path: Path) -> None:
+    """Of 100 messages, the n-th takes n ms by the wall clock; a cycle is 10 ns."""
+    rows = [",".join(COLUMNS)]
+    rows += [
+        f"{n},a,z,8,8,0,0,0,{n * 10**6},{n * 10**6},0,10,10,{10 + n},10,0,{n},{(10 + n) * 10}" for n in range(1, 101)
+    ]
+    (tmp_path / "t.csv").write_text("\n".join(rows), encoding="utf-8")
+    draw_trace(tmp_path / "t.csv", tmp_path / "t.svg")
+    drawn = (tmp_path / "t.svg").read_text(encoding="utf-8")
+    for text in ("whole way: p50 50, p95 95, p99 99 ms", "hardware: p50 50, p95 95", "p50 0.6, p95 1.05, p99 1.09 us"):
+        assert text in drawn, text
 
 
 @pytest.mark.parametrize(
