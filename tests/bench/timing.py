@@ -80,6 +80,9 @@ _ARITHMETIC = (
     "firm_float_square_root",
     "firm_float_compare",
     "firm_float_clamp",
+    "firm_float_sincos",
+    "firm_float_low_pass",
+    "firm_float_pid",
     "firm_fixed_to_float",
     "firm_float_to_fixed",
 )
@@ -291,12 +294,14 @@ def _arithmetic() -> Iterator[Row]:
             for name, bits in zip(("EXPONENT_BITS", "MANTISSA_BITS"), _FLOATS[size], strict=True)
         }
         yield Row(f"firm_float_resize to {other} bits", width, _operation("firm_float_resize", generics))
+    for entity in "firm_fixed_add", "firm_fixed_multiply", "firm_fixed_divide", "firm_fixed_resize":
+        yield Row(entity, 32, _operation(entity, {}))
 
 
 def _operation(entity: str, generics: Mapping[str, int]) -> Callable[[Path], Design]:
     def make(folder: Path) -> Design:
         library = Library("firm", folder)
-        library.analyse(core_files("acc/float/float"))
+        library.analyse(core_files("acc/cordic/cordic", "acc/float/float", "acc/fixed/fixed"))
         return _synthesised(Subject(library, entity, generics))
 
     return make

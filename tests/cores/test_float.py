@@ -2,47 +2,35 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import random
 import re
-import sys
 from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.cores.models import load_model
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
 
 FLOAT = CORES / "acc" / "float"
 SEED = 2718
 COUNT = 10_000
+# Of operations that take about 100 cycles.
+COUNTS = [100, pytest.param(COUNT, marks=pytest.mark.thorough)]
 SIZES = {"float64": (11, 52), "float32": (8, 23)}
 TYPES: dict[str, Any] = {"float64": np.float64, "float32": np.float32}
 BITS: dict[str, Any] = {"float64": np.uint64, "float32": np.uint32}
-
-
-def load_model() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("firm_float_model", FLOAT / "model.py")
-    assert specification
-    assert specification.loader
-    module = importlib.util.module_from_spec(specification)
-    # Its dataclass looks for the module by name.
-    sys.modules[specification.name] = module
-    specification.loader.exec_module(module)
-    return module
-
-
-MODEL = load_model()
+MODEL = load_model("float")
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     found = Library("firm", tmp_path_factory.mktemp("float"))
-    found.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/float/float"))
+    found.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/cordic/cordic", "acc/float/float"))
     found.analyse(core_files("acc/float/float", fileset="tb"))
     return found
 
@@ -231,6 +219,83 @@ def test_conversions_between_sizes_are_those_of_numpy(library: Library, tmp_path
         check(results, rows, found, numbers.values(row[0] for row in rows).astype(TYPES[other]))
 
 
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize(("name", "fraction"), [("float64", 58), ("float32", 30)])
+def test_sine_and_cosine_are_within_the_stated_error(
+    library: Library, tmp_path: Path, name: str, fraction: int, count: int
+) -> None:
+    numbers = Numbers(name)
+    rows = numbers.several(count // 10, 1)
+    while len(rows) < count:
+        # Up to half a turn, or up to the largest legal angle, often beside a quarter turn.
+        angle = numbers.random.uniform(-1, 1) * numbers.random.choice((math.pi, 2.0**16))
+        if numbers.random.random() < 0.2:
+            angle = round(angle / (math.pi / 2)) * math.pi / 2
+        rows.append([int(TYPES[name](angle).view(BITS[name]))])
+    generics = {**size_of(numbers), "FRACTION": fraction}
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="sincos", **generics)
+    pairs = [numbers.values((bits >> numbers.width, bits & (1 << numbers.width) - 1)) for bits in found]
+    for row, pair in zip(rows, pairs, strict=True):
+        angle = float(numbers.values(row)[0])
+        if math.isnan(angle) or abs(angle) >= 2**16:
+            assert all(map(math.isnan, pair)), angle
+            continue
+        for result, exact in zip(pair, MODEL.sine_and_cosine(angle), strict=True):
+            ulp = Fraction(float(np.spacing(np.abs(result))))
+            error = abs(Fraction(float(result)) - exact)
+            assert error <= Fraction(5, 2**fraction) + ulp / 2, (angle, float(result), float(error))
+            if abs(exact) >= Fraction(1, 2):
+                assert error <= ulp, (angle, float(result), float(error / ulp))
+
+
+def samples(numbers: Numbers, operands: int, count: int) -> list[list[int]]:
+    """Rows of finite numbers about 1, the last of which restarts in one row of 50."""
+    rows = numbers.random.choices((0, 1), (49, 1), k=count)
+    several = ([numbers.random.gauss(0, 10) for _ in range(operands)] for _ in rows)
+    return [
+        [*(int(TYPES[numbers.name](number).view(BITS[numbers.name])) for number in row), restarts]
+        for row, restarts in zip(several, rows, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", SIZES)
+def test_a_low_pass_is_its_model(library: Library, tmp_path: Path, name: str, count: int) -> None:
+    numbers = Numbers(name)
+    rows = samples(numbers, 2, count)
+    for row in rows:
+        row[1] = int(TYPES[name](numbers.random.random()).view(BITS[name]))
+    rows[count // 5][0] = rows[count // 5][0] | numbers.specials[15]  # NaN, until the next restart
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="low_pass", **size_of(numbers))
+    model = MODEL.LowPass(MODEL.Format(*SIZES[name]))
+    expected = [model.step(*map(float, numbers.values(row[:2])), restarts=bool(row[2])) for row in rows]
+    check(numbers, rows, found, np.array(expected, dtype=TYPES[name]))
+    assert np.isnan(expected).any()
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", SIZES)
+def test_a_pid_controller_is_its_model(library: Library, tmp_path: Path, name: str, count: int) -> None:
+    numbers = Numbers(name)
+    rows = samples(numbers, 7, count)
+    limits = (int(TYPES[name](limit).view(BITS[name])) for limit in (-200, 250))
+    low, high = limits
+    for row in rows:
+        row[5:7] = low, high
+    rows[count // 5][1] = rows[count // 5][1] | numbers.specials[15]  # NaN, which the integral survives
+    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="pid", **size_of(numbers))
+    model = MODEL.Pid(MODEL.Format(*SIZES[name]))
+    expected = []
+    for row in rows:
+        setpoint, measured, kp, ki, kd, *ends = map(float, numbers.values(row[:7]))
+        gains = (kp, ki, kd)
+        expected.append(model.step(setpoint, measured, gains, tuple(ends), restarts=bool(row[7])))
+    check(numbers, rows, found, np.array(expected, dtype=TYPES[name]))
+    inside = sum(-200 < output < 250 for output in expected)
+    assert count // 10 < inside < count * 9 // 10
+    assert np.isnan(expected).sum() == 2
+
+
 FIXED = [(32, 0, True), (64, 0, True), (64, 0, False), (8, 0, False), (16, 8, True), (40, 30, True), (128, 100, True)]
 
 
@@ -300,9 +365,18 @@ LATENCIES = {
     "resize": (7, 8),
     "from_fixed": (8, 8),
     "to_fixed": (6, 6),
+    "sincos": (105, 76),
+    "low_pass": (45, 39),
+    "pid": (113, 98),
 }
 # Cycles from one result to the next, unless a result leaves in every cycle.
-INTERVALS = {"divide": (57, 28), "square_root": (56, 27)}
+INTERVALS = {
+    "divide": (57, 28),
+    "square_root": (56, 27),
+    "sincos": (106, 77),
+    "low_pass": (46, 40),
+    "pid": (114, 99),
+}
 
 
 @pytest.mark.parametrize("name", SIZES)
@@ -312,9 +386,11 @@ def test_latency_and_throughput(library: Library, tmp_path: Path, operation: str
     rows = [[0]] * 50
     one, three = numbers.width, 3 * numbers.width
     width = {"from_fixed": 32, "multiply_add": three, "clamp": three}
-    width |= {"square_root": one, "resize": one, "to_fixed": one}
+    width |= {"square_root": one, "resize": one, "to_fixed": one, "sincos": one, "low_pass": three, "pid": 8 * one}
     other = SIZES["float32" if name == "float64" else "float64"]
     generics = {**size_of(numbers), "OUT_EXPONENT_BITS": other[0], "OUT_MANTISSA_BITS": other[1]}
+    if operation == "sincos":
+        generics["FRACTION"] = {"float64": 58, "float32": 30}[name]
     bits = width.get(operation, 2 * numbers.width)
     _, report = operate(library, tmp_path, bits, rows, OPERATION=operation, STALLS=0, **generics)
     latency, cycles = map(int, re.findall(r"\d+", report.splitlines()[-1]))
@@ -333,21 +409,28 @@ ENTITIES = {
     "clamp": "firm_float_clamp",
     "to_fixed": "firm_float_to_fixed",
     "from_fixed": "firm_fixed_to_float",
+    "sincos": "firm_float_sincos",
+    "low_pass": "firm_float_low_pass",
+    "pid": "firm_float_pid",
 }
+OPERANDS = {"multiply": 2, "add": 2, "divide": 2, "compare": 2, "multiply_add": 3, "clamp": 3, "low_pass": 3, "pid": 8}
 
 
 @pytest.mark.parametrize("operation", ENTITIES)
 def test_netlists_have_no_latches_and_the_same_results(library: Library, tmp_path: Path, operation: str) -> None:
     numbers = Numbers("float32")
-    operands = {"multiply_add": 3, "clamp": 3, "multiply": 2, "add": 2, "divide": 2, "compare": 2}.get(operation, 1)
-    rows = random.Random(SEED).sample(numbers.several(2000, operands), 300)
-    results, _ = operate(library, tmp_path, 32, rows, OPERATION=operation, **size_of(numbers))
-    assert library.latches(ENTITIES[operation], size_of(numbers)) == []
+    count = 10 if operation in ("sincos", "low_pass", "pid") else 300
+    rows = random.Random(SEED).sample(numbers.several(2000, OPERANDS.get(operation, 1)), count)
+    sizes = size_of(numbers)
+    if operation == "sincos":
+        sizes["FRACTION"] = 30
+    results, _ = operate(library, tmp_path, 32, rows, OPERATION=operation, **sizes)
+    assert library.latches(ENTITIES[operation], sizes) == []
     netlist = Library("firm", tmp_path)
-    netlist.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/float/float"))
-    netlist.replace_by_netlist(ENTITIES[operation], size_of(numbers))
+    netlist.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/cordic/cordic", "acc/float/float"))
+    netlist.replace_by_netlist(ENTITIES[operation], sizes)
     netlist.analyse(core_files("acc/float/float", fileset="tb"))
-    assert operate(netlist, tmp_path, 32, rows, OPERATION=operation, **size_of(numbers))[0] == results
+    assert operate(netlist, tmp_path, 32, rows, OPERATION=operation, **sizes)[0] == results
 
 
 def test_the_model_has_the_results_of_numpy() -> None:

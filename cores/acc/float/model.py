@@ -36,6 +36,7 @@ class Format:
         return float(nearest) if exact > 0 else -float(-nearest)
 
 
+PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 FLOAT64 = Format(11, 52)
 FLOAT32 = Format(8, 23)
 
@@ -59,6 +60,67 @@ def clamp(number: float, low: float, high: float) -> float:
     return min(max(number, low, key=_order), high, key=_order)
 
 
+def sine_and_cosine(angle: float) -> tuple[Fraction, Fraction]:
+    """Return sine and cosine of an angle in rad, with an error below 1e-36."""
+    turns = round(Fraction(angle) / (2 * PI))
+    # To 2**-160, so that the powers remain short.
+    rest = Fraction(round((Fraction(angle) - turns * 2 * PI) * 2**160), 2**160)
+    term, sums = Fraction(1), [Fraction(1), Fraction(0)]
+    for k in range(1, 60):
+        term = Fraction(round(term * rest / k * 2**160), 2**160)
+        sums[k % 2] += term if k % 4 < 2 else -term
+    return sums[1], sums[0]
+
+
+@dataclass
+class LowPass:
+    """A low-pass filter of first order, which starts with its first sample."""
+
+    size: Format = FLOAT64
+    filtered: float | None = None
+
+    def step(self, number: float, weight: float, *, restarts: bool = False) -> float:
+        """Return the result of the next sample."""
+        before = number if restarts or self.filtered is None else self.filtered
+        difference = multiply_add(1.0, number, -before, self.size)
+        self.filtered = multiply_add(weight, difference, before, self.size)
+        return self.filtered
+
+
+@dataclass
+class Pid:
+    """A PID controller; its integral keeps its value while it would drive the output beyond a limit."""
+
+    size: Format = FLOAT64
+    integral: float = 0.0
+    before: float | None = None
+
+    def step(
+        self,
+        setpoint: float,
+        measured: float,
+        gains: tuple[float, float, float],
+        limits: tuple[float, float],
+        *,
+        restarts: bool = False,
+    ) -> float:
+        """Return the output for one sample; `gains` are kp, ki and kd, `limits` the lowest and the highest output."""
+        kp, ki, kd = gains
+        low, high = limits
+        if restarts or self.before is None:
+            self.integral, self.before = 0.0, measured
+        error = multiply_add(1.0, setpoint, -measured, self.size)
+        increased = multiply_add(ki, error, self.integral, self.size)
+        slowing = multiply_add(1.0, self.before, -measured, self.size)
+        output = multiply_add(kd, slowing, multiply_add(kp, error, increased, self.size), self.size)
+        drives_up = _is_above(output, high) and _is_above(increased, self.integral)
+        drives_down = _is_above(low, output) and _is_above(self.integral, increased)
+        if not (drives_up or drives_down):
+            self.integral = increased
+        self.before = measured
+        return clamp(output, low, high)
+
+
 def from_fixed(number: int, fraction: int = 0, size: Format = FLOAT64) -> float:
     """Return the number of units of 2**-fraction, rounded to nearest, ties to even."""
     return size.rounded(Fraction(number, 2**fraction))
@@ -80,6 +142,13 @@ def to_fixed(
 
 def _order(number: float) -> tuple[float, float]:
     return number, math.copysign(1.0, number)
+
+
+def _is_above(number: float, other: float) -> bool:
+    """Compare two numbers; NaN is above all others, and -0 below +0."""
+    if math.isnan(number) or math.isnan(other):
+        return not math.isnan(other)
+    return _order(number) > _order(other)
 
 
 def _exponent(magnitude: Fraction) -> int:

@@ -25,6 +25,8 @@ package firm_float_pkg is
   -- The mantissa with its leading bit, which is 0 for zero and subnormal numbers.
   function mantissa_of(number : std_logic_vector; exponent_bits : positive) return unsigned;
 
+  function negated(number : std_logic_vector) return std_logic_vector;
+
   -- A number, unless NaN, as an unsigned one of the same order; -0 is the one before +0.
   function order_of(number : std_logic_vector) return unsigned;
 
@@ -85,6 +87,12 @@ package body firm_float_pkg is
     end if;
     return unsigned('1' & bits(MANTISSA-1 downto 0));
   end function mantissa_of;
+
+  function negated(number : std_logic_vector) return std_logic_vector is
+    alias bits : std_logic_vector(number'length-1 downto 0) is number;
+  begin
+    return not bits(bits'left) & bits(number'length-2 downto 0);
+  end function negated;
 
   function order_of(number : std_logic_vector) return unsigned is
     alias    bits   : std_logic_vector(number'length-1 downto 0) is number;

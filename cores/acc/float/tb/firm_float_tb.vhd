@@ -20,14 +20,15 @@ entity firm_float_tb is
     VECTORS           : string   := "vectors.txt";
     RESULTS           : string   := "results.txt";
     EXPECTED          : string   := "";
-    -- add, subtract, multiply, multiply_add, divide, square_root, compare, clamp, resize, to_fixed or from_fixed.
+    -- add, subtract, multiply, multiply_add, divide, square_root, compare, clamp, resize, to_fixed, from_fixed, sincos,
+    -- low_pass or pid.
     OPERATION         : string   := "add";
     EXPONENT_BITS     : positive := 11;
     MANTISSA_BITS     : positive := 52;
     -- Of the result of resize.
     OUT_EXPONENT_BITS : positive := 8;
     OUT_MANTISSA_BITS : positive := 23;
-    -- Of fixed-point numbers.
+    -- Of fixed-point numbers; FRACTION also of sincos.
     WIDTH             : positive := 32;
     FRACTION          : natural  := 0;
     IS_SIGNED         : boolean  := true;
@@ -45,11 +46,13 @@ architecture test of firm_float_tb is
 
   function in_width return positive is
   begin
-    if OPERATION = "multiply_add" or OPERATION = "clamp" then
+    if OPERATION = "pid" then
+      return 8*NUMBER;
+    elsif OPERATION = "multiply_add" or OPERATION = "clamp" or OPERATION = "low_pass" then
       return 3*NUMBER;
     elsif OPERATION = "from_fixed" then
       return WIDTH;
-    elsif OPERATION = "square_root" or OPERATION = "resize" or OPERATION = "to_fixed" then
+    elsif OPERATION = "square_root" or OPERATION = "resize" or OPERATION = "to_fixed" or OPERATION = "sincos" then
       return NUMBER;
     end if;
     return 2*NUMBER;
@@ -63,6 +66,8 @@ architecture test of firm_float_tb is
       return WIDTH + 2;
     elsif OPERATION = "compare" then
       return 4;
+    elsif OPERATION = "sincos" then
+      return 2*NUMBER;
     end if;
     return NUMBER;
   end function out_width;
@@ -313,6 +318,77 @@ begin
       );
 
   end generate converts_from_fixed;
+
+  turns : if OPERATION = "sincos" generate
+
+    u_dut : entity firm.firm_float_sincos
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS,
+        FRACTION      => FRACTION
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_angle   => operands,
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_sine   => result(2*NUMBER-1 downto NUMBER),
+        out_cosine => result(NUMBER-1 downto 0)
+      );
+
+  end generate turns;
+
+  filters : if OPERATION = "low_pass" generate
+
+    u_dut : entity firm.firm_float_low_pass
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_number  => operands(3*NUMBER-1 downto 2*NUMBER),
+        in_weight  => operands(2*NUMBER-1 downto NUMBER),
+        in_restart => operands(0),
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_number => result
+      );
+
+  end generate filters;
+
+  controls : if OPERATION = "pid" generate
+
+    u_dut : entity firm.firm_float_pid
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk         => clk,
+        rst_n       => rst_n,
+        in_valid    => in_valid,
+        in_ready    => in_ready,
+        in_setpoint => operands(8*NUMBER-1 downto 7*NUMBER),
+        in_measured => operands(7*NUMBER-1 downto 6*NUMBER),
+        in_kp       => operands(6*NUMBER-1 downto 5*NUMBER),
+        in_ki       => operands(5*NUMBER-1 downto 4*NUMBER),
+        in_kd       => operands(4*NUMBER-1 downto 3*NUMBER),
+        in_low      => operands(3*NUMBER-1 downto 2*NUMBER),
+        in_high     => operands(2*NUMBER-1 downto NUMBER),
+        in_restart  => operands(0),
+        out_valid   => out_valid,
+        out_ready   => out_ready,
+        out_number  => result
+      );
+
+  end generate controls;
 
   clock : process
   begin
