@@ -73,6 +73,18 @@ def add_system(commands: Any) -> None:
         "firm system report robot.yaml",
         _report_system,
     )
+    report.add_argument(
+        "--html",
+        type=Path,
+        metavar="F.html",
+        help="write one page instead: diagram, ports, resources, timing, schedule and coverage of the stimuli",
+    )
+    report.add_argument(
+        "--stimuli",
+        type=Path,
+        metavar="F",
+        help="the stimuli of the page (default: stimuli.yaml beside the specification, if it exists)",
+    )
     for parser in (check, show, report):
         parser.add_argument("--json", action="store_true", help="print the result as JSON, for other programs")
     core = command(
@@ -275,11 +287,34 @@ def _draw_system(arguments: argparse.Namespace) -> None:
 def _report_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.views.report import report
 
+    if arguments.html:
+        _write_page(arguments)
+        return
     counted = report(arguments.spec, load(arguments))
     if arguments.json:
         _print_json({**asdict(counted), "generated": counted.generated, "ratio": counted.ratio})
     else:
         print(counted, end="")
+
+
+def _write_page(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.simulation.software_run import stimulated
+    from fusesoc_firm.simulation.stimuli import read_stimuli
+    from fusesoc_firm.system.views.diagram import dark_style, diagram
+    from fusesoc_firm.system.views.page import page
+    from fusesoc_firm.text.outputs import check_output, write
+    from fusesoc_firm.tools.pictures import picture
+
+    check_output(arguments.html, (".html",))
+    loaded = load(arguments)
+    path = arguments.stimuli or loaded.folder / "stimuli.yaml"
+    is_known = arguments.stimuli is not None or path.exists()
+    stimuli = read_stimuli(path, stimulated(loaded.system)) if is_known else []
+    messages = [(item.subscriber.block, item.message) for item in stimuli]
+    drawn = picture(diagram(loaded.system), "svg", dark_style()).decode()
+    reports = sorted(loaded.folder.glob("build/*/*/report.json"))
+    write(arguments.html, page(loaded.system, drawn, reports, messages))
+    print(arguments.html)
 
 
 def _print_schema(_: argparse.Namespace) -> None:

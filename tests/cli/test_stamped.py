@@ -21,7 +21,7 @@ FIELDS = {
     "geometry_msgs/TransformStamped": ("transform.rotation.w", "transform.translation.x"),
     "geometry_msgs/WrenchStamped": ("wrench.force.x", "wrench.torque.x"),
     "sensor_msgs/Imu": ("angular_velocity.z", "orientation.x"),
-    "sensor_msgs/Range": ("range", "max_range"),
+    "sensor_msgs/Range": ("max_range", "min_range"),
     "sensor_msgs/LaserScan": ("range_max", "range_min"),
     "sensor_msgs/NavSatFix": ("altitude", "latitude"),
     "sensor_msgs/Image": ("height", "width"),

@@ -11,9 +11,11 @@ import jsonschema
 import pytest
 import yaml
 
+from fusesoc_firm.cli import main
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.system.views.diagram import THEMES, dark_style, diagram
+from fusesoc_firm.system.views.page import page
 from fusesoc_firm.system.views.report import Report, report
 from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import InputError
@@ -110,6 +112,35 @@ def test_a_report_is_a_table() -> None:
 def test_a_wrapper_counts(tmp_path: Path) -> None:
     path = ROOT / "specs" / "quat2euler" / "quat2euler_hls.yaml"
     assert report(path, load_system(path, LIBRARIES)).wrappers > 0
+
+
+@needs_dot
+def test_a_page_has_diagram_ports_schedule_and_coverage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "report.html"
+    assert main(["system", "report", str(ROOT / "specs/multi_type/multi_type.yaml"), "--html", str(output)]) == 0
+    assert capsys.readouterr().out == f"{output}\n"
+    text = output.read_text(encoding="utf-8")
+    assert "<svg" in text and "<?xml" not in text and "No build for a board" in text
+    for row in (
+        "<td>in</td><td>twist_in</td><td>/twist_in</td><td>geometry_msgs/TwistStamped</td>",
+        "<td>twist</td><td>in_twist_linear_x</td><td>in</td><td>64</td>",
+        "<td>twist</td><td>out_twist_linear_x</td><td>out</td><td>64</td>",
+        "<td>image_out</td><td>3333333</td><td>2000000</td>",
+    ):
+        assert row in text, row
+
+
+def test_a_page_has_resources_and_constant_fields(tmp_path: Path) -> None:
+    report = tmp_path / "icebreaker" / "report.json"
+    report.parent.mkdir()
+    clock = '{"clk": {"achieved": 29.34, "constraint": 12.0}}'
+    cells = '{"LC": {"used": 1226, "available": 5280}, "DSP": {"used": 0, "available": 8}}'
+    report.write_text(f'{{"fmax": {clock}, "utilization": {cells}}}', encoding="utf-8")
+    messages = [("sub", {"x": 1, "y": {"z": 2}}), ("sub", {"x": 1, "y": {"z": 3}})]
+    text = page(derived(tmp_path, TEXT), "<svg/>", [report], messages)
+    assert "<td>icebreaker</td><td>clock</td><td>29.3 MHz</td><td>12.0 MHz required</td>" in text
+    assert "<td>LC</td><td>1226</td><td>of 5280</td>" in text and "DSP" not in text
+    assert "<td>sub</td><td>2</td><td>1 of 2</td><td>x</td>" in text
 
 
 SCHEMA = json_schema(Specification, "title")
