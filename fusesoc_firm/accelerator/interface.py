@@ -19,6 +19,8 @@ _FIELD = re.compile(r"([\w.\[\]]+): ")
 _OF_ONE_ROS = ("nsec", "nanosec", "seq")
 _WORDS = {"in": "input", "out": "output"}
 _KINDS = {"in": "an input", "out": "an output"}
+# The number of superfluous ports that are reported one by one.
+_MOST_PORTS = 4
 
 
 @dataclass(frozen=True)
@@ -74,8 +76,8 @@ def compare(type_: AcceleratorType, units: Sequence[Unit], faults: Diagnostics) 
     for port in unit.ports:
         if port.name in wanted:
             _compare_port(port, wanted[port.name], faults)
-        else:
-            _report_superfluous(port, missing, faults)
+    others = [port for port in unit.ports if port.name not in wanted]
+    _report_inputs([port for port in others if _is_driven(port, missing, faults)], faults)
     for absent in missing.values():
         what = f"{absent.declaration}" if is_vhdl else f"{_WORDS[absent.direction]} of {absent.bits} bits"
         faults.error(
@@ -96,17 +98,32 @@ def _compare_port(port: UnitPort, wanted: WantedPort, faults: Diagnostics) -> No
         faults.error(f"{port.name} has {_bits(port.bits)}, {wanted.origin} has {wanted.bits}", port.place)
 
 
-def _report_superfluous(port: UnitPort, missing: dict[str, WantedPort], faults: Diagnostics) -> None:
-    """Report a port that the top level does not connect; if it was probably misspelt, the other name is not missing."""
+def _is_driven(port: UnitPort, missing: dict[str, WantedPort], faults: Diagnostics) -> bool:
+    """Return whether a port that the top level does not connect is an input without a value; report other faults.
+
+    If the port was probably misspelt, the other name is not missing.
+    """
     if near := closest(port.name, missing):
         missing.pop(near)
         faults.error(f"port '{port.name}' is not in the interface", port.place, f"did you mean '{near}'?")
-    elif port.direction == "out" or not port.type:
+        return False
+    if port.direction == "out" or not port.type:
         # Legal: an output of an entity, and any port of a Verilog module.
         if port.name.rpartition("_")[2] not in _OF_ONE_ROS:
             faults.warn(f"port '{port.name}' is not in the interface, and stays open", port.place)
-    elif not port.is_optional:
-        hint = "remove it, give it a default value, or declare it under 'pins' in the specification"
+        return False
+    return not port.is_optional
+
+
+def _report_inputs(ports: Sequence[UnitPort], faults: Diagnostics) -> None:
+    """Report inputs that nothing drives; many of them are one fault, as after an edit of the specification."""
+    if len(ports) > _MOST_PORTS:
+        names = ", ".join(f"'{port.name}'" for port in ports[:_MOST_PORTS])
+        message = f"ports {names} and {len(ports) - _MOST_PORTS} more are not in the interface"
+        faults.error(message, ports[0].place, "remove them, or write the file anew with 'firm system skeleton'")
+        return
+    hint = "remove it, give it a default value, or declare it under 'pins' in the specification"
+    for port in ports:
         faults.error(f"port '{port.name}' is not in the interface", port.place, hint)
 
 

@@ -19,7 +19,9 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
+from fusesoc_firm.request.core_reader import core_name, read_core
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.tools.library_path import library_root
 
 _MESSAGE = re.compile(r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?!warning|note)(?P<text>.+)")
 _MISSING_UNIT = re.compile(r'unit "(\w+)" not found in library|cannot find resource library')
@@ -66,7 +68,7 @@ class VhdlReader:
         # What is declared in a missing unit is unknown, too, so further messages say nothing.
         if not absent or (self._known.is_complete and not any(name in self._known.generated for name in absent)):
             for text, source in messages:
-                faults.error(text, source)
+                faults.error(text, source, _core_hint(text))
         tree = self._all_entities or self._tree(paths) or self._tree(paths[-1:])
         return [unit for path in paths for unit in tree.units(path, generics)] if tree else []
 
@@ -238,3 +240,15 @@ class _Tree:
     def _place(self, item: Element, path: Path) -> SourceRef:
         name = item.get("identifier", "")
         return place(path, int(item.get("line", "1")), int(item.get("col", "1")), len(name), self._lines[path])
+
+
+def _core_hint(text: str) -> str:
+    """Return which core of this package has the unit that GHDL misses, or an empty text."""
+    found = _MISSING_UNIT.match(text)
+    if not found or not found[1]:
+        return ""
+    for path in sorted((library_root() / "cores").resolve().rglob("*.core")):
+        if f"/{found[1].lower()}.vhd\n" in path.read_text(encoding="utf-8"):
+            name = core_name(str(read_core(path).data["name"]))
+            return f"it is in {name}, on which the accelerator's core must depend"
+    return ""

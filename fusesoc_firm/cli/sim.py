@@ -6,6 +6,7 @@ import argparse
 import re
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,14 +15,16 @@ from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.simulation import Message, Report, Simulation
+    from fusesoc_firm.building.simulation import Report, Simulation
     from fusesoc_firm.system.system_core import LoadedSystem
     from fusesoc_firm.text.diagnostics import SourceRef
 
 _MOST_MESSAGES, _MOST_LINES = 10, 30
 _NARROWEST = 60
 # GHDL's errors begin with a place only.
-_ERROR = re.compile(r"(?:\b|:)error\b|^Traceback|^\S+:\d+:\d+: ", re.IGNORECASE)
+_ERROR = re.compile(r"(?:\b|:)error\b|\(assertion failure\)|^Traceback|^\S+:\d+:\d+: ", re.IGNORECASE)
+# The block's name, or a field with its value.
+_WORD = re.compile(r'[^\s="]+=(?:"(?:[^"\\]|\\.)*"|\S+)|\S+')
 # Lines of FuseSoC, Edalize and make around the message of the tool that failed.
 _NOISE = re.compile(
     r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|Setup failed|.* exited with an error)|far: "
@@ -68,7 +71,8 @@ def _sim(arguments: argparse.Namespace) -> None:
     if not report.verdict:
         if not arguments.verbose:
             _print_errors(chosen, folder, loaded)
-        fail("the simulation did not run to its end", hint=f"the whole output: {shown(chosen.build.log)}")
+        missed = "run to its end" if report.title else "begin"
+        fail(f"the simulation did not {missed}", hint=f"the whole output: {shown(chosen.build.log)}")
     if not arguments.quiet:
         if not arguments.verbose:
             _print_report(chosen, report)
@@ -184,27 +188,42 @@ def _print_report(chosen: Simulation, report: Report) -> None:
     from fusesoc_firm.tools.simulators import SIMULATORS
 
     print(f"{chosen.build.core} in {SIMULATORS[chosen.simulator].title}, {report.title}")
-    _print_messages(report.messages)
+    _print_messages(report)
     for line in (*report.faults, *report.summary):
         print(line)
 
 
-def _print_messages(messages: list[Message]) -> None:
-    """Print a table of the first messages: cycles from the first beat in, latency, message and responses."""
+def _print_messages(report: Report) -> None:
+    """Print a table of the first messages: cycles from the first beat in, latency, message and responses.
+
+    The host reports each response as the model expects it; a difference is one of the faults.
+    """
+    messages = report.messages
     width = max((_width() - 26) // 2, _NARROWEST // 2)
-    print(f"{'message':>7}  {'cycles':>6}  {'latency':>7}  {'sent':{width}}  received")
+    responses = "received" if report.is_good else "expected"
+    print(f"{'message':>7}  {'cycles':>6}  {'latency':>7}  {'sent':{width}}  {responses}")
     for item in messages[:_MOST_MESSAGES]:
         cycles, latency = (
             "" if value < 0 and not item.received else str(value) for value in (item.cycles, item.latency)
         )
-        received = item.received or ["-"]
-        print(
-            f"{item.number:7}  {cycles:>6}  {latency:>7}  {_cut(item.sent, width):{width}}  {_cut(received[0], width)}"
-        )
+        texts = [item.sent, *(item.received or ["-"])]
+        sent, *received = texts if max(map(len, texts)) <= width else _telling(texts)
+        print(f"{item.number:7}  {cycles:>6}  {latency:>7}  {_cut(sent, width):{width}}  {_cut(received[0], width)}")
         for further in received[1:]:
             print(f"{'':{26 + width}}{_cut(further, width)}")
     if len(messages) > _MOST_MESSAGES:
         print(f"    ... {len(messages) - _MOST_MESSAGES} more in the log")
+
+
+def _telling(messages: Sequence[str]) -> list[str]:
+    """Return the texts of a message and its responses, each without the fields that all of them have.
+
+    A text that has no other field is kept. The host cuts long texts, so their last words may be incomplete.
+    """
+    found = [_WORD.findall(message) for message in messages]
+    copied = set(found[0]).intersection(*found[1:])
+    kept = [[word for word in words if word not in copied and not word.endswith("...")] for words in found]
+    return [" ".join(words) if len(words) > 1 else message for words, message in zip(kept, messages, strict=True)]
 
 
 def _width() -> int:

@@ -434,7 +434,7 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
         raise NetlistError(
             "\n".join(
                 f"{place}: error: GHDL turns a {width}-bit constant into zero if only its highest {_WORD} bits are "
-                "not zero; assign the constant in two slices, or an array element by element"
+                "not zero; make it a signal that is assigned in two slices, or an array element by element"
                 for place, width in dict.fromkeys(lost)
             )
         )

@@ -54,6 +54,11 @@ class Basis:
     further: list[Fact] = field(default_factory=lambda: facts("code", [""]))
     reads: Reads = field(default_factory=Reads)
 
+    @property
+    def code(self) -> str | None:
+        """The state of our own code before its use."""
+        return next(state for kind, _, state in self.further if kind == "code")
+
     def facts(self) -> list[Fact]:
         """Return all facts of the basis."""
         return [*self.further, *self.reads.facts()]
@@ -194,7 +199,7 @@ def _key(loaded: LoadedRequest, generator: Generator, basis: Basis) -> Key:
             basis.reads.note_file(str(item.absolute()))
     inputs = dict(_named_content(item, request) for item in loaded.inputs)
     about = {"core": request.vlnv, "generator": request.command}
-    return Key(request_digest(asked, inputs, own_code.digest()), about)
+    return Key(request_digest(asked, inputs, own_code.digest(current=basis.code)), about)
 
 
 def _searched() -> list[str]:

@@ -24,9 +24,12 @@ _NEW_NANOSECONDS = 2 * 10**9
 _STARTED = time.time_ns()
 
 
-def digest(package: Path = PACKAGE) -> str:
-    """Return the SHA-256 of our files' names and contents, which is equal for all copies of the package."""
-    return _digest(package, state(package))
+def digest(package: Path = PACKAGE, current: str | None = None) -> str:
+    """Return the SHA-256 of our files' names and contents, which is equal for all copies of the package.
+
+    `current` is a `state` that the caller compares again after its use of the digest.
+    """
+    return _digest(package, current or state(package))
 
 
 def state(package: Path = PACKAGE) -> str:

@@ -45,11 +45,16 @@ _SERVED = "served"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 # Shrinking leaves a margin, so that the limit is not exceeded again immediately.
 _KEPT_OF_LIMIT = 0.8
+# A process that writes many entries looks through the store after each such part of the limit.
+_PART_OF_LIMIT = 1 / 64
 # The process that holds a lock may be stopped, or its machine may be down. This limit exceeds the time to generate a
 # core.
 _LONGEST_WAIT_SECONDS = 120
 # A temporary file of this age is from a process that was killed, since no write takes this long.
 _ABANDONED_SECONDS = 3600
+
+# The bytes that this process has written to a store since it last looked through the store, by folder.
+_unseen: dict[str, int] = {}
 
 
 @dataclass(frozen=True)
@@ -200,11 +205,19 @@ class Store:
     def _keep(self, key: Key, data: bytes) -> None:
         try:
             layout.write(self._root, place(key.digest, ENTRY), data)
-            self.shrink_if_needed()
+            self._count(len(data))
         except OSError as error:
             # Users of a read-only store expect this failure, and `firm cache show` reports it.
             if self.is_writable():
                 print(f"warning: results cannot be cached in the store {self.root}: {error.strerror}", file=sys.stderr)
+
+    def _count(self, size: int) -> None:
+        """Note that this process wrote `size` bytes; after its first write and then at times, shrink if needed."""
+        unseen = _unseen.get(self._root, self.limit) + size
+        if unseen > self.limit * _PART_OF_LIMIT:
+            self.shrink_if_needed()
+            unseen = 0
+        _unseen[self._root] = unseen
 
     def shrink_if_needed(self) -> None:
         """Remove old files if the store exceeds its limit, and abandoned temporary files. May raise `OSError`."""

@@ -11,6 +11,7 @@ from fusesoc_firm.accelerator.unit import Libraries
 from fusesoc_firm.cli import main
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
+from tests.hdl.ghdl import CORES
 
 _GENERIC = "generic (WIDTH : positive; LEVEL : natural);\n  port ("
 # A text of the source, its replacement, a text in the line that is reported, and a part of the message.
@@ -176,6 +177,21 @@ def test_the_width_of_a_generic_is_known() -> None:
     source.write_text(text.replace(parts[0], new), encoding="utf-8")
     with pytest.raises(InputError, match=r"in_data_axis_tdata has 32 bits, sensor_msgs/Image\.data has 8"):
         check_accelerators(load_beside(Path("img/img.yaml")), Libraries)
+
+
+def test_many_superfluous_ports_are_one_fault() -> None:
+    ports = "".join(f"    extra_{number} : in std_logic;\n" for number in range(9))
+    (fault,) = diagnostics("vhdl", "    rst_n : in", f"{ports}    rst_n : in")
+    assert fault.message.endswith("'extra_3' and 5 more are not in the interface")
+    assert "firm system skeleton" in fault.hint
+
+
+def test_the_core_of_a_missing_unit_is_named() -> None:
+    use = "library firm;\nuse firm.firm_float_pkg.all;\n"
+    old = "architecture rtl of img is"
+    others = Libraries([(CORES / "axis/rtl/firm_axis_pkg.vhd", "firm")], is_complete=True)
+    (fault, *_) = diagnostics("vhdl", old, use + old, others)
+    assert fault.hint == "it is in robot:acc:firm_float, on which the accelerator's core must depend"
 
 
 def test_without_the_program_the_check_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

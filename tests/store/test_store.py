@@ -336,6 +336,17 @@ def test_within_the_limit_nothing_goes(tmp_path: Path) -> None:
     assert all(find(tmp_path, request) is not None for request in requests)
 
 
+def test_a_process_that_writes_much_looks_through_the_store_at_times(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[int] = []
+    monkeypatch.setattr(Store, "shrink_if_needed", lambda store: looks.append(store.limit))
+    for number in range(20):
+        obtain(tmp_path, {"x": bytes(10_000)}, f"request {number}", limit=64 * 50_000)
+    # After the first entry, and after 5 further ones each.
+    assert len(looks) in (4, 5)
+
+
 def test_a_limit_of_nothing_keeps_nothing(tmp_path: Path) -> None:
     assert obtain(tmp_path, limit=0) == Entry(FILES, False)
     assert stored(tmp_path) == {}
@@ -348,7 +359,7 @@ def test_what_a_killed_process_left_is_removed_after_an_hour(tmp_path: Path) -> 
     old.write_bytes(b"half")
     new.write_bytes(b"half")
     os.utime(old, (time.time() - 3700,) * 2)
-    obtain(tmp_path, request="cd" + "0" * 62)
+    Store(tmp_path, LARGE).shrink_if_needed()
     assert not old.exists()
     assert new.exists()
 

@@ -156,7 +156,11 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
     ):
         for problem in _problems(side.frame):
             message = f"'{name}' has the type HLS, which supports only {problem}"
-            faults.error(message, item.message.source, "write this accelerator in VHDL")
+            faults.error(
+                message,
+                item.message.source,
+                "write this accelerator in VHDL, or take messages without strings and headers",
+            )
 
 
 def _problems(frame: Frame) -> list[str]:
