@@ -19,12 +19,13 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
-from fusesoc_firm.request.core_reader import core_name, read_core
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.tools.library_path import library_root
 
 _MESSAGE = re.compile(r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?!warning|note)(?P<text>.+)")
 _MISSING_UNIT = re.compile(r'unit "(\w+)" not found in library|cannot find resource library')
+# The name of a core of this package, without its version.
+_CORE = re.compile(r"^name: (\w+:\w+:\w+)", re.MULTILINE)
 _ARCHITECTURE = re.compile(
     r"^[ \t]*architecture\s+\w+\s+of\s+\w+\s+is\b.*?"
     r"(?=^[ \t]*(?:architecture\s+\w+\s+of|library\s|entity\s+\w+\s+is|package\s|configuration\s+\w+\s+of)|\Z)",
@@ -247,8 +248,6 @@ def _core_hint(text: str) -> str:
     found = _MISSING_UNIT.match(text)
     if not found or not found[1]:
         return ""
-    for path in sorted((library_root() / "cores").resolve().rglob("*.core")):
-        if f"/{found[1].lower()}.vhd\n" in path.read_text(encoding="utf-8"):
-            name = core_name(str(read_core(path).data["name"]))
-            return f"it is in {name}, on which the accelerator's core must depend"
-    return ""
+    texts = (path.read_text(encoding="utf-8") for path in (library_root() / "cores").resolve().rglob("*.core"))
+    name = next((match[1] for text in texts if f"/{found[1]}.vhd\n" in text and (match := _CORE.search(text))), "")
+    return f"it is in {name}, on which the accelerator's core must depend" if name else ""
