@@ -21,11 +21,9 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.text.render import render
-from tests.frame.oracle import Oracle
-from tests.frame.samples import AWKWARD_VARIABLE
+from tests.converter.simulated.samples import ORACLES
 from tests.hdl.ghdl import Library, core_files
 
-ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in (ROS1, ROS2)}
 # Streams alone, arrays of strings, and arrays of messages with arrays of strings.
 NAMES = ["sensor_msgs/JointState", "awkward_msgs/Deep", "sensor_msgs/Image", "diagnostic_msgs/DiagnosticArray"]
 CASES = [(ROS2, name, width) for name in NAMES for width in (64, 8)] + [(ROS1, name, 64) for name in NAMES[2:]]
