@@ -17,18 +17,9 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.stimuli import KINDS, TYPICAL
+from tests.converter.simulated.samples import ORACLES, case, framed, stimuli
 from tests.converter.simulated.subscribers import SubscriberBench
-from tests.converter.simulated.test_variable_converters import (
-    ORACLES,
-    case,
-    codes,
-    framed,
-    outcomes,
-    serialise,
-    stimuli,
-    troubled,
-    verdict,
-)
+from tests.converter.simulated.test_variable_converters import codes, outcomes, serialise, troubled, verdict
 
 SEED = 20261123
 CASES = [
