@@ -58,6 +58,7 @@ def test_a_message_that_is_passed_through_makes_no_loop(tmp_path: Path, ros: Mid
     _look(tmp_path, "\n".join(netlists), "top", "scc -expect 0")
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("width", [64, 8])
 @pytest.mark.parametrize("name", ["sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray"])
 def test_with_slices_no_ready_reaches_the_window(tmp_path: Path, name: str, width: int) -> None:
