@@ -47,7 +47,7 @@ from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
-from fusesoc_firm.system.hardware.hls import WRAPPER_TEMPLATE, wrapper_configuration
+from fusesoc_firm.system.hardware.hls import wrapper
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, registers_configuration
 from fusesoc_firm.system.hardware.status import (
     REGISTERS_TEMPLATE,
@@ -242,8 +242,8 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
         configuration = payload_length_configuration(frame, suffix)
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
     for type_ in system.kernels:
-        configuration = wrapper_configuration(type_)
-        yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
+        made = wrapper(type_)
+        yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, made.template, dict(made.context))
     if system.status:
         configuration = registers_configuration(status_registers(loaded), identity(loaded).signatures)
         yield Artifact(f"{status_entity(system)}.vhd", Part.COMPONENTS, REGISTERS_TEMPLATE, configuration)
