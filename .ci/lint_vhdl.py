@@ -60,9 +60,13 @@ CALLS: Sequence[tuple[str, str, Mapping[str, object]]] = (
 
 
 def generate(call: tuple[str, str, Mapping[str, object]]) -> None:
-    """Call a generator as FuseSoC does, in a folder of `SAMPLES`."""
+    """Call a generator of a core in specs as FuseSoC does."""
     core, name, changes = call
-    path = ROOT / "specs" / f"{core}.core"
+    call_generator(ROOT / "specs" / f"{core}.core", name, changes)
+
+
+def call_generator(path: Path, name: str, changes: Mapping[str, object]) -> None:
+    """Call a generator of a core as FuseSoC does, in a folder of `SAMPLES`."""
     entry = yaml.safe_load(path.read_text(encoding="utf-8").partition("\n")[2])["generate"][name]
     folder = SAMPLES / f"{path.stem}-{name}"
     folder.mkdir(parents=True)
@@ -82,6 +86,17 @@ def write_skeletons() -> None:
     folder.mkdir(parents=True)
     shutil.copy(ROOT / "specs" / "multi_type" / "multi_type.yaml", folder)
     run(sys.executable, "-m", "fusesoc_firm.cli", "system", "skeleton", "multi_type.yaml", cwd=folder)
+
+
+def write_streams() -> None:
+    """Write a system with a C++ function that has streams, and its simulation."""
+    folder = SAMPLES / "project" / "streams"
+    folder.parent.mkdir(parents=True)
+    messages = ["--in", "sensor_msgs/Range", "--out", "std_msgs/String"]
+    options = [*messages, "--language", "hls", "--width", "64"]
+    run(sys.executable, "-m", "fusesoc_firm.cli", "init", folder.name, *options, cwd=folder.parent)
+    for name in "system", "simulation":
+        call_generator(folder / "streams.core", name, {})
 
 
 def write_loop() -> None:
@@ -111,6 +126,7 @@ def samples() -> list[Path]:
     with ThreadPoolExecutor(cpu_count()) as pool:
         list(pool.map(generate, CALLS))
     write_skeletons()
+    write_streams()
     write_loop()
     write_registers()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]

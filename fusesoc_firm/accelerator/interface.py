@@ -77,7 +77,7 @@ def compare(type_: AcceleratorType, units: Sequence[Unit], faults: Diagnostics) 
         if port.name in wanted:
             _compare_port(port, wanted[port.name], faults)
     others = [port for port in unit.ports if port.name not in wanted]
-    _report_inputs([port for port in others if _is_driven(port, missing, faults)], faults)
+    _report_inputs([port for port in others if _lacks_driver(port, missing, faults)], faults)
     for absent in missing.values():
         what = f"{absent.declaration}" if is_vhdl else f"{_WORDS[absent.direction]} of {absent.bits} bits"
         faults.error(
@@ -98,7 +98,7 @@ def _compare_port(port: UnitPort, wanted: WantedPort, faults: Diagnostics) -> No
         faults.error(f"{port.name} has {_bits(port.bits)}, {wanted.origin} has {wanted.bits}", port.place)
 
 
-def _is_driven(port: UnitPort, missing: dict[str, WantedPort], faults: Diagnostics) -> bool:
+def _lacks_driver(port: UnitPort, missing: dict[str, WantedPort], faults: Diagnostics) -> bool:
     """Return whether a port that the top level does not connect is an input without a value; report other faults.
 
     If the port was probably misspelt, the other name is not missing.

@@ -11,11 +11,13 @@ from pathlib import Path
 from fusesoc_firm.request.request import GeneratedFile
 from fusesoc_firm.system.derived.cpp_function import kernel_entity, library_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType
-from fusesoc_firm.system.hardware.hls import KERNEL_TEMPLATE, SHIM_TEMPLATE, kernel_configuration
+from fusesoc_firm.system.hardware.hls import kernel, shim
 from fusesoc_firm.text.diagnostics import fail
-from fusesoc_firm.text.render import render
+from fusesoc_firm.text.render import Rendering, render
 
 _COMPILER = "g++"
+# The name under which HLS tools have their own.
+_STREAM_HEADER = "hls_stream.h"
 # Results must not depend on the processor (no contraction to fused operations), and the file must not depend on the
 # build (no build id, no symbols that name temporary files).
 _FLAGS = (
@@ -52,16 +54,18 @@ def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, Genera
 
     May raise `InputError`.
     """
-    configuration = kernel_configuration(accelerator)
     library = library_name(accelerator)
-    shim = render(SHIM_TEMPLATE, configuration)
     return {
-        f"{kernel_entity(accelerator)}.vhd": GeneratedFile(render(KERNEL_TEMPLATE, configuration), "vhdlSource-93"),
-        library: GeneratedFile(_compile(accelerator, folder, shim), "user", copyto=library),
+        f"{kernel_entity(accelerator)}.vhd": GeneratedFile(_text(kernel(accelerator)), "vhdlSource-93"),
+        library: GeneratedFile(_compile(accelerator, folder, _text(shim(accelerator))), "user", copyto=library),
     }
 
 
-def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
+def _text(rendering: Rendering) -> str:
+    return render(rendering.template, rendering.context)
+
+
+def _compile(accelerator: AcceleratorType, folder: Path, program: str) -> bytes:
     """Return the library's bytes, which do not depend on the folder of the sources."""
     first, *others = accelerator.accelerator.sources
     name = accelerator.accelerator.name
@@ -69,9 +73,10 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
     above = (folder / first).resolve().parent
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary)
-        (place / "kernel.cpp").write_text(shim, encoding="utf-8")
+        (place / "kernel.cpp").write_text(program, encoding="utf-8")
+        (place / _STREAM_HEADER).write_text(render(f"hls/{_STREAM_HEADER}", {}), encoding="utf-8")
         # Without a relative path, `assert` would add the folder's name to the library.
-        options = ["-I", str(above), f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
+        options = ["-I", str(above), "-I", ".", f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
         command = [_COMPILER, *_FLAGS, "kernel.cpp", *units, *options]
         try:
             result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)

@@ -160,3 +160,25 @@ def yaml_of(value: Any) -> str:
     if isinstance(value, bytes | list):
         return "[" + ", ".join(map(yaml_of, value)) + "]"
     return f"'{value}'" if isinstance(value, str) else repr(value)
+
+
+def break_frames(made: GeneratedSystem, source: random.Random, size: int, lanes: int) -> None:
+    """Cut two of three frames with `size` bytes of pixels: in their header, or among the pixels."""
+    stimuli, answers = (made.folder / f"{file}.txt" for file in ("stimulus", "expected"))
+    frames, expected = (re.split(r"^[<>] .*\n", file.read_text(encoding="ascii"), flags=re.MULTILINE)[1:]
+                        for file in (stimuli, answers))  # fmt: skip
+    pixels = len(bytes.fromhex(frames[0])) - size
+    sent, wanted, errors = "", "", 0
+    for number, (frame, answer) in enumerate(zip(frames, expected, strict=True)):
+        data, shown = bytes.fromhex(frame), answer
+        if number % 3 == 0:
+            data, shown, errors = data[: source.randrange(6, pixels - 2 * lanes)], "", errors + 1
+        elif number % 3 == 1:
+            # Not among the beats that all blocks take before the last one has announced its image.
+            data = data[: source.randrange(pixels + 100 * lanes, len(data) - lanes)]
+            id_ = bytes.fromhex(answer)[0]
+            shown, errors = f"{id_:02x}\n! aborted {id_} 10", errors + 2
+        sent += f"> {number}\n  {data.hex()}\n"
+        wanted += f"< @{number} {number}\n  {shown}\n" if shown else ""
+    stimuli.write_text(sent, encoding="ascii")
+    answers.write_text(f"! frame_error {errors}\n{wanted}", encoding="ascii")

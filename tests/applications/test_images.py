@@ -17,6 +17,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.applications.images import (
     SPECS,
     Message,
+    break_frames,
     broken_images,
     built,
     copied,
@@ -120,24 +121,7 @@ def test_an_image_that_breaks_off_does_not_harm_the_next(tmp_path: Path, name: s
     channels, lanes = CHANNELS[name], width // 8
     messages = [image("ROS", source, 30, 50, channels) for _ in range(6)]
     made = fed(copied(tmp_path, name, width), to_camera(messages))
-    stimuli, answers = (made.folder / f"{file}.txt" for file in ("stimulus", "expected"))
-    frames, expected = (re.split(r"^[<>] .*\n", file.read_text(encoding="ascii"), flags=re.MULTILINE)[1:]
-                        for file in (stimuli, answers))  # fmt: skip
-    pixels = len(bytes.fromhex(frames[0])) - 30 * 50 * channels
-    sent, wanted, errors = "", "", 0
-    for number, (frame, answer) in enumerate(zip(frames, expected, strict=True)):
-        data, shown = bytes.fromhex(frame), answer
-        if number % 3 == 0:
-            data, shown, errors = data[: source.randrange(6, pixels - 2 * lanes)], "", errors + 1
-        elif number % 3 == 1:
-            # Not among the beats that all blocks take before the last one has announced its image.
-            data = data[: source.randrange(pixels + 100 * lanes, len(data) - lanes)]
-            id_ = bytes.fromhex(answer)[0]
-            shown, errors = f"{id_:02x}\n! aborted {id_} 10", errors + 2
-        sent += f"> {number}\n  {data.hex()}\n"
-        wanted += f"< @{number} {number}\n  {shown}\n" if shown else ""
-    stimuli.write_text(sent, encoding="ascii")
-    answers.write_text(f"! frame_error {errors}\n{wanted}", encoding="ascii")
+    break_frames(made, source, 30 * 50 * channels, lanes)
     check(made, 0, 40)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cores import operations
 from tests.cores.models import load_model
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
 
@@ -31,7 +32,7 @@ SIZES = [
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     found = Library("firm", tmp_path_factory.mktemp("fixed"))
-    found.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/fixed/fixed"))
+    found.analyse(core_files(*operations.CORES_OF_BENCHES, "acc/fixed/fixed"))
     found.analyse(core_files("acc/fixed/fixed", fileset="tb"))
     return found
 
@@ -55,17 +56,7 @@ def generics_of(a: Sequence[int], b: Sequence[int], out: Sequence[int]) -> dict[
 def operate(
     library: Library, folder: Path, widths: Sequence[int], rows: Sequence[Sequence[int]], **generics: Generic
 ) -> tuple[list[int], str]:
-    """The results of the bench as bits, and its report."""
-    lines = (
-        "".join(format(number % 2**width, f"0{width}b") for number, width in zip(row, widths, strict=True))
-        for row in rows
-    )
-    (folder / "vectors.txt").write_text("\n".join(lines) + "\n")
-    paths = {"VECTORS": str(folder / "vectors.txt"), "RESULTS": str(folder / "results.txt")}
-    print(f"seed {SEED}")
-    found = library.run("firm_fixed_tb", {"SEED": SEED, **paths, **generics})
-    assert found.exit_code == 0, found.output
-    return [int(line, 2) for line in (folder / "results.txt").read_text().split()], found.output
+    return operations.operate(library, "firm_fixed_tb", folder, widths, rows, SEED=SEED, **generics)
 
 
 def check(rows: Sequence[Sequence[int]], found: Sequence[int], expected: Sequence[tuple[int, ...]], width: int) -> None:
@@ -151,7 +142,7 @@ def test_netlists_have_no_latches_and_the_same_results(library: Library, tmp_pat
     results, _ = operate(library, tmp_path, (16, 16), rows, OPERATION=operation, **sizes)
     assert library.latches(entity, generics) == []
     netlist = Library("firm", tmp_path)
-    netlist.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/fixed/fixed"))
+    netlist.analyse(core_files(*operations.CORES_OF_BENCHES, "acc/fixed/fixed"))
     netlist.replace_by_netlist(entity, generics)
     netlist.analyse(core_files("acc/fixed/fixed", fileset="tb"))
     assert operate(netlist, tmp_path, (16, 16), rows, OPERATION=operation, **sizes)[0] == results

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.cores import operations
 from tests.cores.models import load_model
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
 
@@ -33,7 +34,7 @@ MODEL = load_model("float")
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     found = Library("firm", tmp_path_factory.mktemp("float"))
-    found.analyse(core_files("axis/package", "sim/checker", "sim/host", "acc/cordic/cordic", "acc/float/float"))
+    found.analyse(core_files(*operations.CORES_OF_BENCHES, "acc/cordic/cordic", "acc/float/float"))
     found.analyse(core_files("acc/float/float", fileset="tb"))
     return found
 
@@ -106,14 +107,7 @@ class Numbers:
 def operate(
     library: Library, folder: Path, width: int, rows: Sequence[Sequence[int]], **generics: Generic
 ) -> tuple[list[int], str]:
-    """The results of the bench as integers, and its report."""
-    lines = ("".join(format(number, f"0{width}b") for number in row) for row in rows)
-    (folder / "vectors.txt").write_text("\n".join(lines) + "\n")
-    paths = {"VECTORS": str(folder / "vectors.txt"), "RESULTS": str(folder / "results.txt")}
-    print(f"seed {SEED}")
-    found = library.run("firm_float_tb", {"SEED": SEED, **paths, **generics})
-    assert found.exit_code == 0, found.output
-    return [int(line, 2) for line in (folder / "results.txt").read_text().split()], found.output
+    return operations.operate(library, "firm_float_tb", folder, [width], rows, SEED=SEED, **generics)
 
 
 def check(numbers: Numbers, rows: Sequence[Sequence[int]], found: Sequence[int], expected: Any) -> None:
@@ -430,7 +424,7 @@ def test_netlists_have_no_latches_and_the_same_results(library: Library, tmp_pat
     results, _ = operate(library, tmp_path, 32, rows, OPERATION=operation, **sizes)
     assert library.latches(ENTITIES[operation], sizes) == []
     netlist = Library("firm", tmp_path)
-    files = core_files("axis/package", "sim/checker", "sim/host", "acc/cordic/cordic", "acc/float/float")
+    files = core_files(*operations.CORES_OF_BENCHES, "acc/cordic/cordic", "acc/float/float")
     netlist.analyse(files)
     netlist.replace_by_netlist(ENTITIES[operation], sizes)
     # Those that may use the replaced entity.

@@ -18,7 +18,7 @@ from tests.errors.test_spec_errors import SPECIFICATIONS, derive_file
 PACKAGE = Path(sys.modules["fusesoc_firm"].__path__[0])
 # The modules that read and check a specification.
 BESIDE = """
-    text/yaml_text.py text/yaml_sections.py frame/select.py converter/limits.py message/library.py
+    text/yaml_text.py text/yaml_sections.py frame/select.py message/library.py
 """.split()
 SOURCES = (*sorted((PACKAGE / "system").rglob("*.py")), *(PACKAGE / name for name in BESIDE))
 # The calls that report faults, and functions that report faults outside the specification's text.

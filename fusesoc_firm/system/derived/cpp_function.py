@@ -8,6 +8,8 @@ shared library.
 The function has the name of its file. The parameters are the inputs' fields by value, followed by the outputs' fields
 by pointer or reference, in wire order. The parameters should be named `<field>_in` and `<field>_out`; these names
 become the ports' names. An array of fixed size is a C++ array, of which each element is a port: `<field>_in_0`.
+
+If a message has strings or arrays of variable size, all parameters are streams instead: see `cpp_stream`.
 """
 
 from __future__ import annotations
@@ -16,11 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
-from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports
-from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.system.derived.cpp_stream import Channel, channels, is_streamed, stream_problems
 from fusesoc_firm.system.derived.model import AcceleratorType, MessageSide
-from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
 AP_PORTS = ("ap_clk", "ap_rst", "ap_start", "ap_done", "ap_idle", "ap_ready")
@@ -106,6 +107,11 @@ def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argume
     return _arguments(inputs, names), _arguments(outputs, names[len(inputs) :])
 
 
+def streams(accelerator: AcceleratorType) -> tuple[list[Channel], list[Channel]]:
+    """Return the inputs and outputs of a function with streams; the accelerator must have passed `check_kernel`."""
+    return channels(accelerator, _CPP_TYPES, AP_PORTS)
+
+
 def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[str]) -> list[Argument]:
     found: list[Argument] = []
     for (side, field), name in zip(fields, names, strict=False):
@@ -128,10 +134,18 @@ def _elements(name: str, signal: str, field: FieldPort, word: int) -> tuple[Elem
 
 def prototype(accelerator: AcceleratorType) -> str:
     """Return the required declaration of the function."""
+    if is_streamed(accelerator):
+        inputs, outputs = streams(accelerator)
+        listed = ", ".join(f"hls::stream<{item.cpp_type}> &{item.port}" for item in inputs + outputs)
+        return f"void {function_name(accelerator)}({listed})"
+    return f"void {function_name(accelerator)}({', '.join(_parameters(accelerator))})"
+
+
+def _parameters(accelerator: AcceleratorType) -> list[str]:
+    """Return the declarations of the parameters of a function without streams."""
     inputs, outputs = arguments(accelerator)
     parameters = [f"{cpp_type(item)} {item.port}{_size(item)}" for item in inputs]
-    parameters += [f"{cpp_type(item)} {'' if item.count else '*'}{item.port}{_size(item)}" for item in outputs]
-    return f"void {function_name(accelerator)}({', '.join(parameters)})"
+    return parameters + [f"{cpp_type(item)} {'' if item.count else '*'}{item.port}{_size(item)}" for item in outputs]
 
 
 def _size(argument: Argument) -> str:
@@ -139,7 +153,7 @@ def _size(argument: Argument) -> str:
 
 
 def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
-    """Note an illegal function name, and messages that cannot be passed in plain parameters."""
+    """Note an illegal function name, and messages that a C++ function cannot take."""
     name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
     function = function_name(accelerator)
     if identifier(function) != function:
@@ -150,26 +164,23 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
         lacking = "output" if accelerator.inputs else "input"
         message = f"'{name}' has the type HLS, which needs at least one input and one output"
         faults.error(message, name.source, f"the accelerator's interface has no '{lacking}'")
+    _check_messages(accelerator, faults)
+
+
+def _check_messages(accelerator: AcceleratorType, faults: Diagnostics) -> None:
+    """Note messages that streams cannot carry, and further inputs of variable size."""
     interface = accelerator.accelerator.interface
-    for side, item in zip(
-        (*accelerator.inputs, *accelerator.outputs), (*interface.input, *interface.output), strict=True
-    ):
-        for problem in _problems(side.frame):
+    name = accelerator.accelerator.name
+    sides = (*accelerator.inputs, *accelerator.outputs)
+    for side, item in zip(sides, (*interface.input, *interface.output), strict=True):
+        for problem in stream_problems(side.frame):
             message = f"'{name}' has the type HLS, which supports only {problem}"
-            faults.error(
-                message,
-                item.message.source,
-                "write this accelerator in VHDL, or take messages without strings and headers",
-            )
-
-
-def _problems(frame: Frame) -> list[str]:
-    """Return the parts of a message that parameters cannot carry."""
-    try:
-        check_fixed_size(frame)
-    except InputError as error:
-        return [f"messages of fixed size, but {fault.message}" for fault in error.diagnostics]
-    return []
+            hint = "write this accelerator in VHDL, or take messages without arrays of messages or strings"
+            faults.error(message, item.message.source, hint)
+    varying = [number for number, side in enumerate(accelerator.inputs) if not side.frame.is_fixed_size]
+    for number in varying[1:]:
+        message = f"'{name}' has the type HLS, which supports only one input of variable size"
+        faults.error(message, interface.input[number].message.source, "write this accelerator in VHDL")
 
 
 def cpp_type(argument: Argument) -> str:

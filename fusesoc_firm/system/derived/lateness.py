@@ -19,16 +19,18 @@ def with_lateness_buffers(system: DerivedSystem, project: Project, faults: Diagn
     """
     if project.lateness_buffers == NOT_ADDED:
         return system
-    publishers = list(system.publishers)
-    for bound in bounds_of(system):
-        place = next(place for place, item in enumerate(publishers) if item.block == bound.task.name)
+    bounds = bounds_of(system)
+    if not bounds:
+        return system
+    publishers = []
+    for publisher, bound in zip(system.publishers, bounds, strict=True):
         late = bound.buffer or 0
         if late > _MOST_BYTES:
             faults.warn(
-                f"'{bound.task.name}' has no FIFO for the time in which its frames are late: it needs {late:,} bytes",
+                f"'{publisher.block}' has no FIFO for the time in which its frames are late: it needs {late:,} bytes",
                 project.place("scheduler"),
                 f"at most {_MOST_BYTES:,} bytes are added; choose another scheduler, or longer periods",
             )
-        else:
-            publishers[place] = replace(publishers[place], late_bytes=late)
+            late = 0
+        publishers.append(replace(publisher, late_bytes=late))
     return replace(system, publishers=tuple(publishers))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import PurePosixPath
 
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived.cpp_function import (
@@ -13,35 +12,44 @@ from fusesoc_firm.system.derived.cpp_function import (
     Element,
     arguments,
     cpp_type,
-    function_name,
-    kernel_entity,
-    library_name,
 )
+from fusesoc_firm.system.derived.cpp_stream import is_streamed
 from fusesoc_firm.system.derived.model import AcceleratorType
-from fusesoc_firm.system.derived.sides import accelerator_ports
-from fusesoc_firm.text.render import Context
+from fusesoc_firm.system.hardware.hls_names import declarations, named
+from fusesoc_firm.system.hardware.hls_stream import stream_kernel, stream_shim, stream_wrapper
+from fusesoc_firm.text.render import Context, Rendering
 
-WRAPPER_TEMPLATE = "vhdl/hls_wrapper.vhd"
-KERNEL_TEMPLATE = "vhdl/hls_kernel.vhd"
-SHIM_TEMPLATE = "hls/kernel.cpp"
+_WRAPPER_TEMPLATE = "vhdl/hls_wrapper.vhd"
+_KERNEL_TEMPLATE = "vhdl/hls_kernel.vhd"
+_SHIM_TEMPLATE = "hls/kernel.cpp"
 
 
-def wrapper_configuration(accelerator: AcceleratorType) -> Context:
-    """Return the configuration of the wrapper, which adds an accelerator's message sides to the kernel."""
+def wrapper(accelerator: AcceleratorType) -> Rendering:
+    """Return the template and configuration of the wrapper, which adds an accelerator's message sides to the kernel."""
+    if is_streamed(accelerator):
+        return stream_wrapper(accelerator)
+    return Rendering(_WRAPPER_TEMPLATE, _wrapper_configuration(accelerator))
+
+
+def kernel(accelerator: AcceleratorType) -> Rendering:
+    """Return the template and configuration of the simulated kernel."""
+    return stream_kernel(accelerator) if is_streamed(accelerator) else _simulated(accelerator, _KERNEL_TEMPLATE)
+
+
+def shim(accelerator: AcceleratorType) -> Rendering:
+    """Return the template and configuration of the C++ between the simulated kernel and the function."""
+    return stream_shim(accelerator) if is_streamed(accelerator) else _simulated(accelerator, _SHIM_TEMPLATE)
+
+
+def _simulated(accelerator: AcceleratorType, template: str) -> Rendering:
+    return Rendering(template, _kernel_configuration(accelerator))
+
+
+def _wrapper_configuration(accelerator: AcceleratorType) -> Context:
     inputs, outputs = arguments(accelerator)
     return {
-        "entity": accelerator.entity,
-        "function": function_name(accelerator),
-        "kernel": kernel_entity(accelerator),
-        "message_ports": [
-            {
-                "name": f"{prefix}{port.name}",
-                "direction": "out" if port.is_output else "in",
-                "type": vhdl_type(port.width),
-                "comment": port.comment,
-            }
-            for prefix, port in accelerator_ports(accelerator)
-        ],
+        **named(accelerator),
+        "message_ports": declarations(accelerator),
         "input_sides": [side.prefix for side in accelerator.inputs],
         "output_sides": [{"prefix": side.prefix, "number": n} for n, side in enumerate(accelerator.outputs)],
         "output_count": len(accelerator.outputs),
@@ -60,16 +68,12 @@ def _kernel_port(element: Element) -> Context:
     return {"port": element.port, "signal": element.signal, "bits": element.bits, "is_bit": element.is_bit}
 
 
-def kernel_configuration(accelerator: AcceleratorType) -> Context:
-    """Return the configuration of the simulated kernel, and of the shim between it and the C++ function."""
+def _kernel_configuration(accelerator: AcceleratorType) -> Context:
     inputs, outputs = arguments(accelerator)
     values, results = _elements(inputs), _elements(outputs)
     column = max(len(name) for name in [*AP_PORTS, *(f"{element.port}_ap_vld" for element in [*values, *results])])
     return {
-        "function": function_name(accelerator),
-        "kernel": kernel_entity(accelerator),
-        "source": str(PurePosixPath(accelerator.accelerator.sources[0]).name),
-        "library": library_name(accelerator),
+        **named(accelerator),
         "inputs": [_element(element, column) for element in values],
         "outputs": [_element(element, column) for element in results],
         "parameters": [_parameter(argument) for argument in inputs],

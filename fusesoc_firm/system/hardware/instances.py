@@ -66,7 +66,8 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
     return {
         **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
-        **_part_of_manager(converter, system),
+        "id": converter.id,
+        "id_byte": converter.id % 256,
         "beats": _beats(names, converter, system),
         "late": _late(names, converter, system) if converter.late_bytes else None,
         "max_length": {"bytes": converter.max_length} if converter.max_length else None,
@@ -85,11 +86,6 @@ def _watched(names: Names, converter: Converter, system: DerivedSystem) -> dict[
         "id": converter.id,
         "out": error_of(converter, system),
     }
-
-
-def _part_of_manager(converter: Converter, system: DerivedSystem) -> dict[str, int]:
-    """Return a publisher's place among the Manager's inputs."""
-    return {"id": converter.id, "id_byte": converter.id % 256, "place": system.places[converter.id]}
 
 
 def _beats(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:

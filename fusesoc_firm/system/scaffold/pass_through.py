@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 
 from fusesoc_firm.converter.message_ports import ElementPorts, StreamPorts, message_side
 from fusesoc_firm.converter.ports import field_ports
-from fusesoc_firm.converter.program import Block, Header, Open, has_bytes, subscriber_program
+from fusesoc_firm.converter.program import has_bytes
+from fusesoc_firm.converter.segments import segments_of
 from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
 from fusesoc_firm.system.derived.model import AcceleratorType, LengthSource, MessageSide
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH
@@ -35,15 +36,6 @@ class Wires:
     ready: dict[str, str] = field(default_factory=dict)
     segments: tuple[int | None, ...] = ()
     paths: frozenset[Path] = frozenset()
-
-
-@dataclass
-class _Segments:
-    """The number of the segment with each field's value, and of the segment after which each part begins."""
-
-    fields: dict[Path, int] = field(default_factory=dict)
-    parts: dict[Path, int] = field(default_factory=dict)
-    count: int = 1
 
 
 def wires_of(type_: AcceleratorType) -> list[Wires]:
@@ -159,7 +151,7 @@ def _is_equal(node: FrameField | Data | Loop, other: FrameField | Data | Loop) -
 
 def _is_in_order(side: MessageSide, output: MessageSide, parts: Sequence[Data | Loop]) -> bool:
     """Whether the publisher needs, up to each part, only fields that the subscriber has before that part."""
-    given, needed = _segments(side.frame), _segments(output.frame)
+    given, needed = segments_of(side.frame), segments_of(output.frame)
     latest = _latest(side, output, parts)
     bounds = ((given.fields[path], latest[needed.fields[path]]) for path in _fields([side], output)[1])
     return all(bound is None or segment <= bound for segment, bound in bounds)
@@ -170,27 +162,11 @@ def _latest(side: MessageSide, output: MessageSide, parts: Sequence[Data | Loop]
 
     The input's later segments become valid only after the output has taken the part.
     """
-    given, needed = _segments(side.frame), _segments(output.frame)
+    given, needed = segments_of(side.frame), segments_of(output.frame)
     bounds = [(needed.parts[part.path], given.parts[part.path]) for part in parts]
     return tuple(
         min((bound for place, bound in bounds if place >= number), default=None) for number in range(needed.count)
     )
-
-
-def _segments(frame: Frame) -> _Segments:
-    """Return the segments of the fields and parts of a message of variable size, outside of its arrays' elements."""
-    found = _Segments()
-    program = subscriber_program(frame)
-    last = 0
-    for step in program.steps:
-        if isinstance(step, Block) and not step.scope and step.segment:
-            found.fields |= {leaf.path: step.segment.number for leaf in step.fields}
-        if isinstance(step, Header | Block | Open) and step.completes and not step.completes.scope:
-            last = step.completes.number
-        if isinstance(step, Open) and not step.scope and step.part.is_used:
-            found.parts[step.part.path] = last
-    found.count = program.segments()
-    return found
 
 
 def _part_ports(frame: Frame, other: Frame, part: Data | Loop) -> Iterator[tuple[str, str, bool]]:

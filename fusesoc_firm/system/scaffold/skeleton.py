@@ -15,10 +15,12 @@ from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.length import sent_length_of
 from fusesoc_firm.frame.model import Loop, Node
 from fusesoc_firm.system.derived.cpp_function import arguments, function_name, prototype
+from fusesoc_firm.system.derived.cpp_stream import is_streamed
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, MessageSide
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, SidePort, accelerator_ports
 from fusesoc_firm.system.scaffold.pass_through import Wires, wires_of
 from fusesoc_firm.system.scaffold.python_skeleton import python_skeleton
+from fusesoc_firm.system.scaffold.stream_skeleton import STREAM_TEMPLATE, stream_function
 from fusesoc_firm.system.written.specification import SOFTWARE, Pin
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 from fusesoc_firm.text.render import Context, render
@@ -79,6 +81,8 @@ def skeleton(type_: AcceleratorType) -> str:
         template, configuration = language.template, _entity(type_, language)
     elif type_.accelerator.type == SOFTWARE:
         template, configuration = _SOFTWARE_TEMPLATE, python_skeleton(type_)
+    elif is_streamed(type_):
+        template, configuration = STREAM_TEMPLATE, stream_function(type_)
     else:
         template, configuration = _FUNCTION_TEMPLATE, _function(type_)
     return render(template, {**configuration, "purpose": _purpose(type_)})

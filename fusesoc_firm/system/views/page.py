@@ -86,7 +86,12 @@ def _schedule(system: DerivedSystem) -> Table:
         known = (times.period, times.deadline, times.transfer_time) if times else (None,) * 3
         found = (*known, bound.response if bound else None)
         rows.append((publisher.block, *("unknown" if cycles is None else cycles for cycles in found)))
-    return Table("Schedule", columns, rows, f"Scheduler: {system.scheduling.policy}. Times are in cycles of clk.")
+    return Table("Schedule", columns, rows, f"Scheduler: {_scheduler(system)}. Times are in cycles of clk.")
+
+
+def _scheduler(system: DerivedSystem) -> str:
+    groups = [f"{group.policy} of {', '.join(group.blocks)}" for group in system.scheduling.groups]
+    return f"{system.scheduling.policy}{' among ' if groups else ''}{'; '.join(groups)}"
 
 
 def _resources(reports: Iterable[Path]) -> Table:

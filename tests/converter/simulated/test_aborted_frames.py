@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import random
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.faults import Fault
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
-from tests.converter.simulated.subscribers import LENGTH_BYTES, Beat, Subscriber, SubscriberBench
-from tests.frame.oracle import Oracle
-from tests.frame.samples import AWKWARD_VARIABLE
+from tests.converter.simulated.samples import ORACLES, case, framed, typical
+from tests.converter.simulated.subscribers import Beat, Subscriber, SubscriberBench
 
 SEED = 20261125
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
-ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in (ROS1, ROS2)}
 TYPES = [
     (ROS1, "std_msgs/UInt16"),
     (ROS1, "geometry_msgs/Pose"),
@@ -34,23 +27,6 @@ TYPES = [
     (ROS2, "awkward_msgs/Bounded"),
     (ROS2, "awkward_msgs/Deep"),
 ]
-
-
-def case(ros: Middleware, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> SubscriberBench:
-    return SubscriberBench(tmp_path_factory.mktemp("subscribers"))
-
-
-def framed(ros: Middleware, name: str) -> bytes:
-    """A typical message as a frame, without the id."""
-    closure = ORACLES[ros].closure(name)
-    value = Stimuli(closure, ros, random.Random(f"{SEED} {name}")).message(parse_name(name), TYPICAL)
-    payload = encode(ORACLES[ros].frame(name), value)
-    return len(payload).to_bytes(LENGTH_BYTES, "little") + payload
 
 
 def aborted(subscriber: Subscriber, frame: bytes, place: int) -> list[Beat]:
@@ -69,12 +45,12 @@ def aborted(subscriber: Subscriber, frame: bytes, place: int) -> list[Beat]:
     ],
 )
 def test_an_aborted_frame_is_not_delivered(
-    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
+    subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """After every byte of it, its last one included; a good frame follows each."""
     print(f"seed {SEED}")
-    subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
-    frame = framed(ros, name)
+    subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)
+    frame = framed(typical(ros, name, SEED))
     good = subscriber.beats(frame)
     message = subscriber.run_beats(tmp_path, good)
     places = range(1, len(frame) + 1)
@@ -89,10 +65,10 @@ def test_an_aborted_frame_is_not_delivered(
 
 @pytest.mark.parametrize("width", [16, 64])
 @pytest.mark.parametrize("name", ["geometry_msgs/Point", "sensor_msgs/JointState"])
-def test_an_abort_may_come_with_no_byte(bench: SubscriberBench, tmp_path: Path, name: str, width: int) -> None:
+def test_an_abort_may_come_with_no_byte(subscribers: SubscriberBench, tmp_path: Path, name: str, width: int) -> None:
     """Nor does `tuser` before the last beat say anything."""
-    subscriber = bench.subscriber(ORACLES[ROS1].frame(name), width)
-    good = subscriber.beats(framed(ROS1, name))
+    subscriber = subscribers.subscriber(ORACLES[ROS1].frame(name), width)
+    good = subscriber.beats(framed(typical(ROS1, name, SEED)))
     message = subscriber.run_beats(tmp_path, good)
     report = f"frame_error {Fault.ABORTED.value}"
     for place in range(1, len(good)):

@@ -6,24 +6,18 @@ import random
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.faults import Fault
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
+from tests.converter.simulated.samples import ORACLES, case, framed, typical
 from tests.converter.simulated.subscribers import LENGTH_BYTES, Beat, SubscriberBench
-from tests.frame.oracle import Oracle
-from tests.frame.samples import AWKWARD_VARIABLE
 
 SEED = 20261123
 # At 8 bits, every beat holds its byte.
 WIDTHS = (16, 32, 64, 128, 256, 512)
-ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in (ROS1, ROS2)}
 TYPES = [
     (ROS1, "std_msgs/UInt16"),
     (ROS1, "geometry_msgs/Pose"),
@@ -36,23 +30,6 @@ TYPES = [
     (ROS2, "awkward_msgs/Bounded"),
     (ROS2, "awkward_msgs/Deep"),
 ]
-
-
-def case(ros: Middleware, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> SubscriberBench:
-    return SubscriberBench(tmp_path_factory.mktemp("subscribers"))
-
-
-def framed(ros: Middleware, name: str) -> bytes:
-    """A typical message as a frame, without the id."""
-    frame = ORACLES[ros].frame(name)
-    value = Stimuli(ORACLES[ros].closure(name), ros, random.Random(f"{SEED} {name}")).message(parse_name(name), TYPICAL)
-    payload = encode(frame, value)
-    return len(payload).to_bytes(LENGTH_BYTES, "little") + payload
 
 
 def broken(beats: Sequence[Beat], place: int, lanes: int, chance: random.Random) -> Iterator[list[Beat]]:
@@ -84,13 +61,13 @@ def broken(beats: Sequence[Beat], place: int, lanes: int, chance: random.Random)
     ],
 )
 def test_a_broken_beat_costs_its_frame_alone(
-    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
+    subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """At every place of a frame, a good frame after each."""
     print(f"seed {SEED}")
     chance = random.Random(f"{SEED} {name} {width}")
-    subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
-    good = subscriber.beats(framed(ros, name))
+    subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)
+    good = subscriber.beats(framed(typical(ros, name, SEED)))
     message = subscriber.run_beats(tmp_path, good)
     frames = [frame for place in range(len(good)) for frame in broken(good, place, width // 8, chance)]
     beats = [beat for frame in frames for beat in (*frame, *good)]
@@ -105,10 +82,10 @@ def test_a_broken_beat_costs_its_frame_alone(
 @pytest.mark.parametrize("width", [16, 64])
 @pytest.mark.parametrize(("ros", "name"), [(ROS1, "std_msgs/String"), (ROS1, "geometry_msgs/Point")])
 def test_a_null_beat_after_the_payload_is_one_too_many(
-    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
+    subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     lanes = width // 8
-    subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
+    subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)
     text = b"\x0b\x00\x00\x00hello world" if name == "std_msgs/String" else bytes(range(24))
     good = subscriber.beats(len(text).to_bytes(LENGTH_BYTES, "little") + text)
     message = subscriber.run_beats(tmp_path, good)

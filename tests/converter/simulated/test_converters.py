@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,6 +11,7 @@ from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from tests.converter.simulated.converters import PUBLISHER, ConverterBench, Sent, printed, troubled_frames
+from tests.converter.simulated.samples import case
 from tests.frame.samples import AWKWARD
 from tests.hdl.frames import traffic
 
@@ -39,10 +39,6 @@ _KINDS = (
     (ROS2, "awkward_msgs/Carry253"),
     (ROS2, "awkward_msgs/Carry255"),
 )
-
-
-def case(ros: Middleware, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
 
 
 # Every message at 8 bits, and every kind at every width; with broken frames where the header lies in three beats (16

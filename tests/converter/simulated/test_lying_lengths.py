@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import random
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.faults import Fault
 from fusesoc_firm.frame.length import DEFAULT_LONGEST, longest_payload
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
-from tests.converter.simulated.subscribers import LENGTH_BYTES, SubscriberBench
-from tests.frame.oracle import Oracle
-from tests.frame.samples import AWKWARD_VARIABLE
+from tests.converter.simulated.samples import ORACLES, case, framed, typical
+from tests.converter.simulated.subscribers import SubscriberBench
 
 SEED = 20261124
 LIE = 2**32 - 1
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
-ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in (ROS1, ROS2)}
 TYPES = [
     (ROS1, "std_msgs/String"),
     (ROS1, "sensor_msgs/JointState"),
@@ -37,34 +30,15 @@ TYPES = [
 ]
 
 
-def case(ros: Middleware, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> SubscriberBench:
-    return SubscriberBench(tmp_path_factory.mktemp("subscribers"))
-
-
-def framed(payload: bytes, length: int) -> bytes:
-    return length.to_bytes(LENGTH_BYTES, "little") + payload
-
-
-def typical(ros: Middleware, name: str) -> bytes:
-    closure = ORACLES[ros].closure(name)
-    value = Stimuli(closure, ros, random.Random(f"{SEED} {name}")).message(parse_name(name), TYPICAL)
-    return encode(ORACLES[ros].frame(name), value)
-
-
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), [case(ros, name, width) for ros, name in TYPES for width in WIDTHS])
 def test_a_lying_length_is_refused(
-    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
+    subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """Good frames around it come through; nothing of the refused frame leaves, and it costs no more than its beats."""
-    subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
-    payload = typical(ros, name)
-    good, lie = framed(payload, len(payload)), framed(payload, LIE)
+    subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)
+    payload = typical(ros, name, SEED)
+    good, lie = framed(payload), framed(payload, LIE)
     message = subscriber.run(tmp_path, [good])
     alone = cycles(tmp_path)
     report = f"frame_error {Fault.TOO_LONG.value}"
@@ -74,13 +48,13 @@ def test_a_lying_length_is_refused(
 
 
 @pytest.mark.parametrize("width", [8, 64])
-def test_the_limit_is_the_longest_payload(bench: SubscriberBench, tmp_path: Path, width: int) -> None:
+def test_the_limit_is_the_longest_payload(subscribers: SubscriberBench, tmp_path: Path, width: int) -> None:
     """One byte more than the bounds, or the default, is refused; lengths up to it are faults of other kinds."""
     for ros, name in ((ROS2, "std_msgs/String"), (ROS2, "awkward_msgs/Bounded")):
         frame = ORACLES[ros].frame(name)
-        payload, longest = typical(ros, name), longest_payload(frame)
+        payload, longest = typical(ros, name, SEED), longest_payload(frame)
         frames = [framed(payload, length) for length in (longest, longest + 1, 2**31, len(payload))]
-        events = bench.subscriber(frame, width).run(tmp_path, frames)
+        events = subscribers.subscriber(frame, width).run(tmp_path, frames)
         reports = [event for event in events if event.startswith("frame_error")]
         assert reports[1:] == [f"frame_error {Fault.TOO_LONG.value}"] * 2
         assert reports[0] != reports[1]

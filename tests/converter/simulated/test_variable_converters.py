@@ -17,14 +17,13 @@ from fusesoc_firm.frame.select import select
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import KINDS, TYPICAL, Stimuli
+from fusesoc_firm.verify.stimuli import KINDS, TYPICAL
+from tests.converter.simulated.samples import ORACLES, case, framed, stimuli
 from tests.converter.simulated.subscribers import LENGTH_BYTES, SubscriberBench
-from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD_VARIABLE
 
 SEED = 20240711
 
-ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in (ROS1, ROS2)}
 _FROM_DISTRIBUTIONS = {
     ROS1: """
         std_msgs/String std_msgs/Header sensor_msgs/Image sensor_msgs/PointCloud2 sensor_msgs/JointState
@@ -37,10 +36,6 @@ _FROM_DISTRIBUTIONS = {
         shape_msgs/SolidPrimitive""".split(),
 }
 _NAMES = {ros: [*_FROM_DISTRIBUTIONS[ros], *AWKWARD_VARIABLE[ros]] for ros in (ROS1, ROS2)}
-
-
-def case(ros: Middleware, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
 
 
 def is_variable(ros: Middleware, name: str) -> bool:
@@ -75,15 +70,6 @@ NETLISTS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> SubscriberBench:
-    return SubscriberBench(tmp_path_factory.mktemp("subscribers"))
-
-
-def stimuli(ros: Middleware, name: str, seed: object) -> Stimuli:
-    return Stimuli(ORACLES[ros].closure(name), ros, random.Random(f"{seed} {name}"))
-
-
 def serialise(ros: Middleware, name: str, value: Mapping[str, Any]) -> bytes:
     """What rosbags makes of a value; it knows no wstring, for which our codec stands in, checked elsewhere."""
     if name == "awkward_msgs/Unicode":
@@ -91,18 +77,14 @@ def serialise(ros: Middleware, name: str, value: Mapping[str, Any]) -> bytes:
     return ORACLES[ros].serialise(name, value)
 
 
-def framed(payload: bytes) -> bytes:
-    return len(payload).to_bytes(LENGTH_BYTES, "little") + payload
-
-
 @pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("stall", [0, 40])
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_messages_come_through_under_stalls(
-    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int, stall: int
+    subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int, stall: int
 ) -> None:
     """Fields, lengths, streams and elements are those that rosbags serialised, in wire order."""
-    subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
+    subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)
     print(f"seed {SEED}")
     source = stimuli(ros, name, SEED)
     frames, expected = [], []
@@ -154,11 +136,11 @@ def test_what_is_not_used_is_skipped(
 @pytest.mark.parametrize("stall", [0, 35])
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_broken_frames_hurt_no_other(
-    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int, stall: int
+    subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int, stall: int
 ) -> None:
     """Every good frame gives its message, every other one a frame_error, and the next frame is right again."""
     frame = ORACLES[ros].frame(name)
-    subscriber = bench.subscriber(frame, width)
+    subscriber = subscribers.subscriber(frame, width)
     print(f"seed {SEED}")
     chance = random.Random(f"{SEED} {name} {stall}")
     source = stimuli(ros, name, f"{SEED} {stall}")
@@ -179,11 +161,11 @@ def test_broken_frames_hurt_no_other(
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_every_length_of_a_frame(
-    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
+    subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """Cut behind each byte, with the length of the whole message and with its own, a good one behind each."""
     frame = ORACLES[ros].frame(name)
-    subscriber = bench.subscriber(frame, width)
+    subscriber = subscribers.subscriber(frame, width)
     value = stimuli(ros, name, SEED).message(parse_name(name), TYPICAL)
     payload = serialise(ros, name, value)
     whole = framed(payload)
@@ -197,8 +179,8 @@ def test_every_length_of_a_frame(
     assert [line for line in events if line.startswith("message")].count(message[-1]) >= len(frames) // 2
 
 
-def test_a_cut_stream_is_closed(bench: SubscriberBench, tmp_path: Path) -> None:
-    subscriber = bench.subscriber(ORACLES[ROS1].frame("std_msgs/String"), 8)
+def test_a_cut_stream_is_closed(subscribers: SubscriberBench, tmp_path: Path) -> None:
+    subscriber = subscribers.subscriber(ORACLES[ROS1].frame("std_msgs/String"), 8)
     whole = framed(b"\x05\x00\x00\x00hello")
     events = subscriber.run(tmp_path, [whole[:-2], whole])
     assert events == ["data " + b"hel".hex(), "frame_error 2", "data " + b"hello".hex(), "message 00000009 00000005"]
@@ -217,17 +199,17 @@ def test_a_cut_stream_is_closed(bench: SubscriberBench, tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("width", [8, 64])
-def test_codes(bench: SubscriberBench, tmp_path: Path, payload: bytes, code: int | None, width: int) -> None:
-    subscriber = bench.subscriber(ORACLES[ROS2].frame("std_msgs/String"), width)
+def test_codes(subscribers: SubscriberBench, tmp_path: Path, payload: bytes, code: int | None, width: int) -> None:
+    subscriber = subscribers.subscriber(ORACLES[ROS2].frame("std_msgs/String"), width)
     events = subscriber.run(tmp_path, [framed(payload)])
     assert codes(events) == ([] if code is None else [code])
     assert outcomes(events) == [code is None]
 
 
 @pytest.mark.parametrize("width", [8, 128])
-def test_a_stream_takes_a_beat_in_every_cycle(bench: SubscriberBench, tmp_path: Path, width: int) -> None:
+def test_a_stream_takes_a_beat_in_every_cycle(subscribers: SubscriberBench, tmp_path: Path, width: int) -> None:
     """Behind strings of any length, so that the data start in any lane."""
-    subscriber = bench.subscriber(ORACLES[ROS1].frame("sensor_msgs/Image"), width)
+    subscriber = subscribers.subscriber(ORACLES[ROS1].frame("sensor_msgs/Image"), width)
     size, lanes = 8000, width // 8
     for letters in range(0, lanes, 5):
         value = stimuli(ROS1, "sensor_msgs/Image", SEED).message(parse_name("sensor_msgs/Image"), TYPICAL)
@@ -241,10 +223,10 @@ def test_a_stream_takes_a_beat_in_every_cycle(bench: SubscriberBench, tmp_path: 
 
 
 @pytest.mark.parametrize(("width", "most"), [(8, 22), (16, 9 + 4 + 1)])
-def test_a_count_takes_one_cycle(bench: SubscriberBench, tmp_path: Path, width: int, most: int) -> None:
+def test_a_count_takes_one_cycle(subscribers: SubscriberBench, tmp_path: Path, width: int, most: int) -> None:
     """An element of a byte and four counts takes a cycle for each count, and one for its end, beside its beats."""
     name = "diagnostic_msgs/DiagnosticArray"
-    subscriber = bench.subscriber(ORACLES[ROS1].frame(name), width)
+    subscriber = subscribers.subscriber(ORACLES[ROS1].frame(name), width)
     status = {"level": 0, "name": "", "message": "", "hardware_id": "", "values": []}
     cycles = []
     for count in (2, 12):
@@ -256,8 +238,8 @@ def test_a_count_takes_one_cycle(bench: SubscriberBench, tmp_path: Path, width: 
 
 @pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
-def test_they_are_latch_free(bench: SubscriberBench, ros: Middleware, name: str, width: int) -> None:
-    subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
+def test_they_are_latch_free(subscribers: SubscriberBench, ros: Middleware, name: str, width: int) -> None:
+    subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)
     assert subscriber.library.latches(subscriber.entity) == []
 
 

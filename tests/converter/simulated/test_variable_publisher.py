@@ -23,6 +23,7 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL
 from tests.converter.simulated.publishers import ID, SHORT, Publisher, PublisherBench
+from tests.converter.simulated.samples import case
 from tests.frame.variable_samples import PACKAGE, VARIABLE
 from tests.hdl.ghdl import Library, core_files
 
@@ -42,10 +43,6 @@ _FROM_DISTRIBUTIONS = {
 # Texts alone, numbers of each size, arrays of texts and of messages, arrays in arrays, elements without bytes.
 _KINDS = ("Text", "Sizes", "Texts", "Plains", "Nameds", "Tree", "Hollow", "Words")
 _LEFT_OUT = ("Plain", "Nothing", "Flag", "Giant")
-
-
-def case(ros: Middleware, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
 
 
 _AWKWARD = {ros: [name for name in VARIABLE[ros] if name.partition("/")[2] not in _LEFT_OUT] for ros in (ROS1, ROS2)}

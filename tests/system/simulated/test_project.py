@@ -123,7 +123,7 @@ def test_a_fault_in_the_new_specification_names_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["init", "turn", "--in", "std_msgs/String", "--out", "std_msgs/UInt8", "--language", "hls"]) == 1
+    assert main(["init", "turn", "--in", "nav_msgs/Path", "--out", "std_msgs/UInt8", "--language", "hls"]) == 1
     assert capsys.readouterr().err.startswith("error: 'turn' has the type HLS")
 
 
