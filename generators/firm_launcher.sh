@@ -1,10 +1,14 @@
 # Start a program of a build, in the build's work folder: sh firm_launcher.sh PROGRAM ARGUMENT...
 #
 # The package's launcher finds programs of PyPI, names the package of a missing one, and notes in manifest.json which
-# one has run. It is in Python, whose start takes longer than many a step of a build. So it leaves the path of a program
-# that it has noted in .firm_noted, and until FuseSoC sets the build up again, that file changes or the manifest is
-# removed, the program is started from here. So is what was built here, such as ./Vtop, and everything if no Python has
-# the package.
+# one has run. It is in Python, whose start takes longer than many a step of a build, so it runs as rarely as possible:
+#
+# * In a build's folder, it leaves the path of a program that it has noted in .firm_noted. Until FuseSoC sets the build
+#   up again, that file changes or the manifest is removed, the program is started from here.
+# * In the user's cache, it leaves a note of each program: what goes into the manifest, and the files that decide that.
+#   While these are unchanged, other builds take the note.
+#
+# What was built here, such as ./Vtop, is started from here, and so is everything if no Python has the package.
 program=$1
 case $program in
   */*) exec "$@" ;;
@@ -17,6 +21,69 @@ if [ -s manifest.json ] && [ "$noted" -nt Makefile ] && read -r path <"$noted" &
   exec "$@"
 fi
 
+# Print what decides in which Python the package is found: variables, and how FuseSoC, above make, was started.
+environment_of_build() {
+  process=$PPID
+  while read -r _ name _ above _ <"/proc/$process/stat"; do
+    case $name in
+      '(make)' | '(gmake)' | '(sh)' | '(dash)' | '(bash)') process=$above ;;
+      *) break ;;
+    esac
+  done
+  words=$(tr '\0' '\n' <"/proc/$process/cmdline" | sed 2q) && [ -n "$words" ] || return
+  case $words in
+    /*"
+/"*) ;;
+    *) words="$words $(readlink "/proc/$process/cwd")" || return ;;
+  esac
+  echo "$PATH $PYTHONPATH $FUSESOC_FIRM_PYTHON" "$words" | tr '\n' ' '
+}
+
+# Add the entries of a note to the manifest, which is locked.
+add_to_manifest() {
+  [ -s manifest.json ] && manifest=manifest.json || manifest=/dev/null
+  LC_ALL=C awk '
+    /^    "/ { name = $0; text[name] = ""; comma = "" }
+    /^    / { line = $0; sub(/^    },$/, "    }", line); text[name] = text[name] comma line; comma = "\n" }
+    END {
+      print "{\n  \"tools\": {"
+      for (name in text) {
+        for (i = ++count; i > 1 && names[i - 1] > name; i--) names[i] = names[i - 1]
+        names[i] = name
+      }
+      for (i = 1; i <= count; i++) print text[names[i]] (i < count ? "," : "")
+      print "  }\n}"
+    }' "$manifest" "$note" >manifest.part || return
+  cmp -s manifest.part manifest.json && rm manifest.part || mv manifest.part manifest.json
+}
+
+# Take the user's note of the program. Fail unless it holds here. Its lines: the environment, the package's folder,
+# the files that decide the facts, the program first, an empty line, and the entries.
+take_note() {
+  [ -f "$note" ] || return
+  set --
+  {
+    IFS= read -r known && IFS= read -r package
+    while IFS= read -r line && [ -n "$line" ]; do set -- "$@" "$line"; done
+  } <"$note"
+  [ "$known" = "$environment" ] && [ "$1" = "$(command -v "$program")" ] || return
+  newer=$(find "$@" -maxdepth 0 -cnewer "$note" 2>&1; find "$package" -name __pycache__ -prune -o -cnewer "$note" -print 2>&1)
+  [ -z "$newer" ] && mkdir -p .firm_noted && (flock 9 && add_to_manifest) 9<. && echo "$1" >"$noted"
+}
+
+# Outputs that must be removed after a failure, see the package's launcher.
+note=
+case " $* " in
+  *' --asc '* | *' --textcfg '* | *' --write '*) ;;
+  *)
+    cache=${FUSESOC_FIRM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/fusesoc_firm}
+    if environment=$(environment_of_build 2>/dev/null); then
+      note=$cache/programs/$program
+      take_note 2>/dev/null && exec "$@"
+    fi
+    ;;
+esac
+
 python=$(python3 firm_python.py)
 [ -n "$python" ] || exec "$@"
-FIRM_NOTED=$noted exec "$python" -m fusesoc_firm.tools.launcher "$@"
+FIRM_NOTED=$noted FIRM_NOTE=$note FIRM_ENVIRONMENT=$environment exec "$python" -m fusesoc_firm.tools.launcher "$@"

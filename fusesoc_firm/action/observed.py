@@ -3,6 +3,7 @@
     program     the SHA-256 of the program that PATH finds under this name
     file        the SHA-256 of the content
     folder      the names in the folder
+    modules     the names in a folder on Python's path that an import can find
     there       `file` or `folder`, or nothing for a missing path
 
 A stored result is valid while no state differs.
@@ -14,8 +15,10 @@ import hashlib
 import os
 import shutil
 import stat
-from collections.abc import Iterable
+import sys
+from collections.abc import Callable, Iterable
 from functools import cache
+from importlib.machinery import all_suffixes
 
 from fusesoc_firm.action.contents import Contents
 from fusesoc_firm.action.trace import Trace
@@ -25,6 +28,7 @@ Fact = tuple[str, str, str | None]
 
 # Python adds this folder beside each imported module.
 _BYTE_CODE = "__pycache__"
+_MODULES = tuple(all_suffixes())
 
 
 def facts_of(trace: Trace, contents: Contents, search: str) -> list[Fact]:
@@ -35,7 +39,7 @@ def facts_of(trace: Trace, contents: Contents, search: str) -> list[Fact]:
         is_found = os.path.dirname(path) in folders
         names["program" if is_found else "file", os.path.basename(path) if is_found else path] = None
     names |= {("file", _source(path)): None for path in sorted(trace.read)}
-    names |= {("folder", path): None for path in sorted(trace.listed)}
+    names |= {("modules" if path in sys.path else "folder", path): None for path in sorted(trace.listed)}
     known = {name for _, name in names}
     names |= {("there", path): None for path in sorted(trace.asked) if path not in known and _BYTE_CODE not in path}
     return [(kind, name, state(kind, name, contents, search)) for kind, name in names]
@@ -55,6 +59,8 @@ def state(kind: str, name: str, contents: Contents, search: str) -> str | None:
         return contents.digest(name)
     if kind == "folder":
         return _names(name)
+    if kind == "modules":
+        return _names(name, _is_importable)
     return _kind(name)
 
 
@@ -63,11 +69,20 @@ def _found(name: str, search: str) -> str | None:
     return shutil.which(name, path=search)
 
 
-def _names(path: str) -> str | None:
+def _names(path: str, is_counted: Callable[[str], bool] = lambda _: True) -> str | None:
     try:
-        return hashlib.sha256("\0".join(sorted({*os.listdir(path)} - {_BYTE_CODE})).encode()).hexdigest()
+        names = sorted(name for name in {*os.listdir(path)} - {_BYTE_CODE} if is_counted(name))
     except OSError:
         return None
+    return hashlib.sha256("\0".join(names).encode()).hexdigest()
+
+
+def _is_importable(name: str) -> bool:
+    """Return whether an import of a module or package may find this name in a folder on Python's path.
+
+    Python lists these folders, such as a checkout or the installed packages, but looks only for modules in them.
+    """
+    return name.isidentifier() or name.endswith(_MODULES)
 
 
 def _kind(path: str) -> str | None:

@@ -23,7 +23,7 @@ _OTHER = {
     "sandbox": "--sandbox",
 }
 # Kinds of facts whose names say enough; a missing path that appears is named by its path.
-_KINDS = {"program": "the program ", "file": "", "folder": "the names in ", "there": ""}
+_KINDS = {"program": "the program ", "file": "", "folder": "the names in ", "modules": "the modules in ", "there": ""}
 
 
 def remember(action: Action, facts: tuple[Fact, ...], results: Results) -> None:

@@ -13,6 +13,7 @@ from fusesoc_firm.converter.configuration import publisher_entity, subscriber_en
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
+from fusesoc_firm.converter.pipeline import BORDERS, NONE, pipeline_of
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
@@ -71,6 +72,8 @@ _FILE_TYPES = {
     ".svh": "systemVerilogSource",
 }
 _INCLUDE_SUFFIXES = (".vh", ".svh")
+# Hz. Without register slices, a system in which messages of variable size are passed through reaches 99 MHz on an ECP5.
+_SLICED_ABOVE = 100 * 10**6
 
 
 @dataclass(frozen=True)
@@ -220,13 +223,19 @@ def artifacts(loaded: LoadedSystem) -> list[Artifact]:
     return list({item.path: item for item in _artifacts(loaded)}.values())
 
 
+def _least_pipeline(system: DerivedSystem) -> str:
+    """Return the register stages that the frequency of clk needs."""
+    return BORDERS if system.clock is not None and system.clock > _SLICED_ABOVE else NONE
+
+
 def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     system = loaded.system
     for path, configuration in constants_configurations(loaded.messages()):
         yield Artifact(path, Part.CONVERTERS, CONSTANTS_TEMPLATE, configuration)
     for item in system.subscribers:
         entity = subscriber_entity(item.frame, item.suffix)
-        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity))
+        pipeline = pipeline_of(item.frame, system.pipeline, _least_pipeline(system))
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity, pipeline))
     for item in system.publishers:
         entity = publisher_entity(item.frame, item.suffix)
         yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *publisher_source(item.frame, system.width, entity))

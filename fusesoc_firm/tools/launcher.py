@@ -16,28 +16,39 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.tools.interrupts import accept_interrupts
-from fusesoc_firm.tools.manifest import note
+from fusesoc_firm.tools.manifest import note, note_for_other_builds
 from fusesoc_firm.tools.programs import find, ways
 
 # The options that precede the name of an output file.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
-# Variables from `firm_launcher.sh`: the file that shows that a program is in the manifest, and the program's path.
-_NOTED = "FIRM_NOTED"
+# Variables from `firm_launcher.sh`: the file that shows that a program is in the manifest, and the program's path; the
+# user's note of the program, and what decides in which Python the package is found.
+_NOTED, _NOTE, _ENVIRONMENT = "FIRM_NOTED", "FIRM_NOTE", "FIRM_ENVIRONMENT"
+# The clock of a file system may be late by this.
+_TICK_NANOSECONDS = 20 * 10**6
 
 
-def launch(program: str, arguments: Sequence[str]) -> int:
-    """Run a program until it ends, and return the exit status. Raise `InputError` if the program is not installed."""
+def launch(program: str, arguments: Sequence[str], user_note: Path | None = None, environment: str = "") -> int:
+    """Run a program until it ends, and return the exit status. Raise `InputError` if the program is not installed.
+
+    `user_note` is where other builds in this `environment` find the program's entries in the manifest.
+    """
+    started = time.time_ns() - _TICK_NANOSECONDS
     path = find(program)
     if path is None:
         fail(f"the program '{program}' is not installed", hint=ways(program))
     status = _run([str(path), *arguments])
-    note(program, Path())
+    entries = note(program, Path())
+    # A program beside the interpreter depends on this Python.
+    if user_note and shutil.which(program) and path.is_absolute():
+        note_for_other_builds(user_note, environment, path, entries, started)
     if status:
         for option, value in pairwise(arguments):
             if option in _OUTPUTS:
@@ -84,9 +95,9 @@ def starts_everything() -> bool:
 def main(arguments: Sequence[str]) -> int:
     """Run `firm tool` without loading the other commands, since a build starts about a dozen programs."""
     accept_interrupts()
-    noted = os.environ.pop(_NOTED, "")
+    noted, user_note, environment = (os.environ.pop(name, "") for name in (_NOTED, _NOTE, _ENVIRONMENT))
     try:
-        status = launch(arguments[0], arguments[1:])
+        status = launch(arguments[0], arguments[1:], Path(user_note) if user_note else None, environment)
         if noted:
             _leave_to_the_shell(arguments, Path(noted))
         return status

@@ -7,29 +7,55 @@ contains no dates and no paths, so equal tools and builds result in equal manife
 from __future__ import annotations
 
 import json
+import os
+import sys
 import tempfile
+from contextlib import suppress
+from importlib import metadata
 from pathlib import Path
 
+from fusesoc_firm.store.own_code import PACKAGE
 from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.tools.programs import PROGRAMS, facts_of, find, packages
 
 FILE = "manifest.json"
 _PACKAGES = ("edalize", "fusesoc", "fusesoc-firm")
+# As in Linux.
+_MOST_LINKS = 40
 
 
-def note(program: str, folder: Path) -> None:
+def note(program: str, folder: Path) -> str:
     """Record a program that has run in a folder, and the packages that started it, in the folder's manifest.
 
-    Unknown programs, such as mkdir, are not recorded. Several programs may be recorded at the same time.
+    Several programs may be recorded at the same time. Return the text of the new entries; it is empty for an unknown
+    program, such as mkdir, which is not recorded.
     """
     if program not in PROGRAMS:
-        return
+        return ""
     programs = (program, *PROGRAMS[program].starts)
     found = packages(_PACKAGES) | {name: facts_of(name, path) for name in programs if (path := find(name))}
     # The lock is on the folder itself, so no lock file remains.
     with locked(folder):
-        tools = read(folder) | found
-        _replace(folder / FILE, json.dumps({"tools": tools}, indent=2, sort_keys=True) + "\n")
+        _replace(folder / FILE, _text(read(folder) | found))
+    # Without the lines of the braces around the entries.
+    return "".join(_text(found).splitlines(keepends=True)[2:-2])
+
+
+def note_for_other_builds(path: Path, environment: str, program: Path, entries: str, started: int) -> None:
+    """Write a program's entries to the user's cache, where `firm_launcher.sh` finds them for other builds.
+
+    The note holds in an `environment` while no file that decides the entries changes after the time `started`, in
+    nanoseconds. A folder that cannot be written is ignored.
+    """
+    places = {name: str(metadata.distribution(name).locate_file("")) for name in _PACKAGES}
+    starts = PROGRAMS[program.name].starts if program.name in PROGRAMS else ()
+    files = [program, *filter(None, map(find, starts))]
+    decisive = [*(link for file in files for link in _links(file)), Path(sys.executable), *map(Path, places.values())]
+    lines = (environment, str(PACKAGE), *dict.fromkeys(map(str, decisive)), "")
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _replace(path, "".join(f"{line}\n" for line in lines) + entries)
+        os.utime(path, ns=(started, started))
 
 
 def read(folder: Path) -> dict[str, dict[str, str]]:
@@ -39,6 +65,18 @@ def read(folder: Path) -> dict[str, dict[str, str]]:
     except (OSError, ValueError, LookupError, TypeError):
         return {}
     return dict(tools) if isinstance(tools, dict) else {}
+
+
+def _links(path: Path) -> list[Path]:
+    """Return a path, the links to which it leads one after the other, and the file at their end."""
+    found = [path]
+    while found[-1].is_symlink() and len(found) < _MOST_LINKS:
+        found.append(found[-1].parent / found[-1].readlink())
+    return found
+
+
+def _text(tools: dict[str, dict[str, str]]) -> str:
+    return json.dumps({"tools": tools}, indent=2, sort_keys=True) + "\n"
 
 
 def _replace(path: Path, text: str) -> None:

@@ -159,6 +159,35 @@ def test_a_header_that_appears_is_noticed(folder: Path, results: Results) -> Non
 
 
 @needs_strace
+def test_only_modules_count_in_a_folder_on_pythons_path(
+    folder: Path, results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python lists such a folder, such as a checkout, at the first import; other files in it decide nothing."""
+    modules = tmp_path / "modules"
+    modules.mkdir()
+    monkeypatch.syspath_prepend(str(modules))
+    asked = action("import importlib.util as util; util.find_spec('missing')", folder, PYTHONPATH=str(modules))
+    assert run(asked, results) == ""
+    for name in (".cache", "build-1"):
+        (modules / name).mkdir()
+    (modules / "notes.txt").write_text("")
+    assert look_up(asked, results, Contents())
+    (modules / "other.py").write_text("")
+    assert not look_up(asked, results, Contents())
+
+
+@needs_strace
+def test_all_names_count_in_another_folder_that_a_step_lists(folder: Path, results: Results, tmp_path: Path) -> None:
+    listed = tmp_path / "listed"
+    listed.mkdir()
+    asked = action(f"import os; os.listdir({str(listed)!r})", folder)
+    assert run(asked, results) == ""
+    assert look_up(asked, results, Contents())
+    (listed / "notes.txt").write_text("")
+    assert not look_up(asked, results, Contents())
+
+
+@needs_strace
 def test_a_step_with_other_bytes_in_a_second_run_is_named_and_not_stored(folder: Path, results: Results) -> None:
     code = "import os; open('out', 'w').write('same'); open('noise', 'wb').write(os.urandom(8)); os.unlink('in')"
     asked = action(code, folder, twice="1")

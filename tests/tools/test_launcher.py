@@ -198,3 +198,71 @@ def test_without_a_python_that_has_the_package_programs_are_started_all_the_same
     program(alone, "python3", "true")
     program(alone, "icepack", "exit 6")
     assert start(build, "icepack") == (6, "", 0)
+
+
+# What `firm_launcher.sh` needs to take a note of the user's cache.
+COMMANDS = ("awk", "cmp", "flock", "mkdir", "mv", "readlink", "rm", "sed", "tr")
+
+
+@pytest.fixture
+def other_build(alone: Path, build: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The work folder of another build of the same user."""
+    for name in COMMANDS:
+        found = shutil.which(name, path="/usr/bin:/bin") or pytest.skip(f"{name} is not installed")
+        (alone / name).symlink_to(found)
+    monkeypatch.setenv("FUSESOC_FIRM_CACHE", str(tmp_path / "cache"))
+    return Path(shutil.copytree(build, tmp_path / "other"))
+
+
+def settle() -> None:
+    """Wait until the clock of the file system has passed all notes, so that a change is younger than them."""
+    time.sleep(0.05)
+
+
+def test_another_build_takes_the_users_note(alone: Path, build: Path, other_build: Path) -> None:
+    for name in ("icepack", "icetime"):
+        program(alone, name, 'echo "$1"; exit 5')
+    settle()
+    for name in ("icepack", "icetime"):
+        assert start(build, name, "a")[2] == 2
+        assert start(other_build, name, "a") == (5, "a\n", 0)
+        assert (other_build / manifest.FILE).read_bytes() == (build / manifest.FILE).read_bytes()
+    assert {"icepack", "icetime", "fusesoc-firm"} <= manifest.read(build).keys()
+    assert start(other_build, "icepack", "b") == (5, "b\n", 0)
+    assert not (other_build / "manifest.part").exists()
+
+
+@pytest.mark.parametrize("change", ["program", "link", "environment", "interpreter"])
+def test_a_note_does_not_hold_after_a_change(
+    alone: Path, build: Path, other_build: Path, change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("one", "two"):
+        program(tmp_path / "programs", name, f"echo {name}")
+    (alone / "icepack").symlink_to(tmp_path / "programs" / "one")
+    settle()
+    assert start(build, "icepack") == (0, "one\n", 2)
+    settle()
+    if change == "program":
+        program(tmp_path / "programs", "one", "echo new")
+    elif change == "link":
+        (alone / "icepack").unlink()
+        (alone / "icepack").symlink_to(tmp_path / "programs" / "two")
+    elif change == "environment":
+        monkeypatch.setenv("FUSESOC_FIRM_PYTHON", "/other/python")
+    else:
+        note = tmp_path / "cache" / "programs" / "icepack"
+        note.write_text(note.read_text().replace(f"{sys.base_prefix}/bin/python3", "/missing/python"))
+    assert start(other_build, "icepack")[2] == 2
+    assert manifest.read(other_build)["icepack"] == manifest.read(build)["icepack"] or change in ("program", "link")
+
+
+def test_notes_of_several_programs_at_the_same_time_all_arrive(alone: Path, build: Path, other_build: Path) -> None:
+    names = ("ecppack", "ghdl", "icepack", "icetime", "iverilog", "vvp", "yosys")
+    for name in names:
+        program(alone, name, "exit 0")
+    settle()
+    for name in names:
+        assert start(build, name)[0] == 0
+    started = [subprocess.Popen(["/bin/sh", "firm_launcher.sh", name], cwd=other_build) for name in names]
+    assert [process.wait() for process in started] == [0] * len(names)
+    assert (other_build / manifest.FILE).read_bytes() == (build / manifest.FILE).read_bytes()

@@ -125,6 +125,7 @@ def derive(
         link=link,
         status=status_of(project, link, max(len(subscribers), len(publishers)), faults),
         tree=tree,
+        pipeline=None if project.pipeline is None else str(project.pipeline),
         watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),
     )
     check_entities(system, parts.blocks, faults)

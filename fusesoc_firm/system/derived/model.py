@@ -313,7 +313,8 @@ class DerivedSystem:
 
     Without a `link`, the streams are ports of the system. Converters, accelerators and connections in software are not
     included. `names` maps each accelerator's message sides to their names outside the accelerator: `<block>_in`,
-    `<block>_out1` and so on. If ids have two bytes, `tree` is the Manager of Managers.
+    `<block>_out1` and so on. If ids have two bytes, `tree` is the Manager of Managers. `pipeline` is the key's value,
+    if it is given.
     """
 
     name: str
@@ -332,6 +333,7 @@ class DerivedSystem:
     status: StatusAccess | None = None
     watchdog: int = 0
     tree: Tree | None = None
+    pipeline: str | None = None
 
     @property
     def id_bytes(self) -> int:

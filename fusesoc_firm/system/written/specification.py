@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.message.middleware import MIDDLEWARES
 from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
@@ -136,6 +137,12 @@ class Project(Section):
         "cycles of clk after which a publisher that stops in the middle of a frame is cut off; 0: never",
         form="integer",
         default=1 << 20,
+        is_asked=False,
+    )
+    pipeline: Text | None = key(
+        "register stages of subscribers of variable size (default: borders if clock is above 100 MHz, otherwise none;"
+        " full for messages with more than 256 bytes of fields)",
+        choices=PIPELINES,
         is_asked=False,
     )
     interconnect: Text = key(
