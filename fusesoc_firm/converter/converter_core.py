@@ -15,7 +15,8 @@ from fusesoc_firm.converter.constants import (
     constants_package,
 )
 from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_configuration
-from fusesoc_firm.converter.order import Order, Selection, order_of_config, order_of_message
+from fusesoc_firm.converter.order import ENTITIES, Order, Selection, order_of_config, order_of_message
+from fusesoc_firm.converter.pipeline import pipeline_of
 from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary, libraries
@@ -52,9 +53,13 @@ def converters_core(order: Order) -> GeneratedCore:
     files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
     interfaces: dict[str, GeneratedFile] = {}
     for wanted in order.messages:
-        for direction, files_of in (("subscriber", subscriber_files), ("publisher", publisher_files)):
+        frames = [wanted.frame]
+        if "subscriber" in wanted.interfaces:
+            files |= subscriber_files(frames, order.width, order.prefix, order.pipeline)
+        if "publisher" in wanted.interfaces:
+            files |= publisher_files(frames, order.width, order.prefix)
+        for direction in ENTITIES:
             if direction in wanted.interfaces:
-                files |= files_of([wanted.frame], order.width, order.prefix)
                 converter = order.entity(wanted.frame, direction)
                 vhdl = str(files[f"{converter}.vhd"].content)
                 interfaces |= _interface_files(wanted.interfaces[direction], converter, vhdl, wanted.frame)
@@ -79,10 +84,15 @@ def constants_configurations(
         yield f"{package}.vhd", constants_configuration(name, definitions, package)
 
 
-def subscriber_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
-    """Return `<prefix>_axis_to_<pkg>_<type>.vhd` for each frame."""
+def subscriber_files(
+    frames: Iterable[Frame], width: int, prefix: str = "", pipeline: str | None = None
+) -> dict[str, GeneratedFile]:
+    """Return `<prefix>_axis_to_<pkg>_<type>.vhd` for each frame; for `pipeline`, see `pipeline_of`."""
     entities = {subscriber_entity(frame, prefix=prefix): frame for frame in frames}
-    return {f"{entity}.vhd": _file(subscriber_source(frame, width, entity)) for entity, frame in entities.items()}
+    return {
+        f"{entity}.vhd": _file(subscriber_source(frame, width, entity, pipeline_of(frame, pipeline)))
+        for entity, frame in entities.items()
+    }
 
 
 def publisher_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
@@ -97,15 +107,17 @@ def _file(source: ConverterSource) -> GeneratedFile:
 
 def order_of_request(request: Request) -> Order:
     """Return the order of a request, which names either a message or a configuration file."""
-    config, ros, width = (request.parameters.get(name) for name in ("config", "ros", "width"))
+    config, ros, width, pipeline = (request.parameters.get(name) for name in ("config", "ros", "width", "pipeline"))
+    chosen = None if pipeline is None else str(pipeline)
     if config is not None:
-        return order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
+        order = order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
+        return replace(order, pipeline=chosen)
     assert isinstance(ros, int) and isinstance(width, int)
     library = MessageLibrary(middleware_of(ros), *library_sources(request))
     message, direction = str(request.parameters["message"]), str(request.parameters["direction"])
     selection = Selection(request.listed("include"), request.listed("exclude"))
     order = order_of_message(message, direction, width, library, selection)
-    return replace(order, prefix=str(request.parameters.get("name") or ""))
+    return replace(order, prefix=str(request.parameters.get("name") or ""), pipeline=chosen)
 
 
 def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:

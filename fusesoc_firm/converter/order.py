@@ -55,7 +55,7 @@ class Order:
     """All requested messages, each once, for streams of `width` bits; `files` are the files that were read.
 
     `libraries` are the libraries of the messages. `prefix` precedes the names of all design units that the user did not
-    name.
+    name. `pipeline` is one of `PIPELINES`, or None for that which each message needs.
     """
 
     title: str
@@ -64,6 +64,7 @@ class Order:
     files: tuple[Input, ...]
     libraries: Mapping[Middleware, MessageLibrary]
     prefix: str = ""
+    pipeline: str | None = None
 
     def entity(self, frame: Frame, direction: str) -> str:
         """Return the entity name of a frame's converter in this direction."""

@@ -17,6 +17,7 @@ from fusesoc_firm.converter.configuration import (
     subscriber_configuration,
     subscriber_entity,
 )
+from fusesoc_firm.converter.pipeline import NONE
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.text.render import Context
 
@@ -28,8 +29,11 @@ class ConverterSource(NamedTuple):
     configuration: Context
 
 
-def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
-    """Return the source of a subscriber; `entity` is by default `subscriber_entity`. May raise `InputError`."""
+def subscriber_source(frame: Frame, width: int, entity: str = "", pipeline: str = NONE) -> ConverterSource:
+    """Return the source of a subscriber; `entity` is by default `subscriber_entity`. May raise `InputError`.
+
+    `pipeline` is one of `PIPELINES`; subscribers of fixed size are the same with all of them.
+    """
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, entity))
@@ -38,7 +42,7 @@ def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSo
         variable_subscriber_configuration,
     )
 
-    configuration = variable_subscriber_configuration(frame, width, entity or subscriber_entity(frame))
+    configuration = variable_subscriber_configuration(frame, width, entity or subscriber_entity(frame), pipeline)
     return ConverterSource(VARIABLE_SUBSCRIBER_TEMPLATE, configuration)
 
 

@@ -15,6 +15,7 @@ from fusesoc_firm.converter.message_ports import (
     message_side,
     port_declarations,
 )
+from fusesoc_firm.converter.pipeline import FULL, NONE
 from fusesoc_firm.converter.ports import FieldPort
 from fusesoc_firm.converter.program import (
     Block,
@@ -72,9 +73,9 @@ class _Window(Lanes):
         return 0
 
 
-def variable_subscriber_configuration(frame: Frame, width: int, entity: str) -> Context:
-    """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
-    made = _Subscriber(subscriber_program(frame), message_side(frame), _Window(width))
+def variable_subscriber_configuration(frame: Frame, width: int, entity: str, pipeline: str = NONE) -> Context:
+    """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits; `pipeline` is one of `PIPELINES`."""
+    made = _Subscriber(subscriber_program(frame), message_side(frame), _Window(width), pipeline)
     return {"entity": entity, **made.configuration()}
 
 
@@ -83,6 +84,12 @@ class _Subscriber:
     program: Program
     side: MessageSide
     window: _Window
+    pipeline: str
+
+    @property
+    def stores_late(self) -> bool:
+        """Whether fields are stored in the cycle after their beat."""
+        return self.pipeline == FULL
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -127,9 +134,11 @@ class _Subscriber:
             "fields": [field for _, block, named in self._stores for field in self._field_slices(block, named)],
             "streams": (streams := self._streams()),
             "stream_count": len(streams),
-            "stores": [
-                _store(place, block, *item, self.lanes) for place, block, named in self._stores for item in named
-            ],
+            "is_cut": self.pipeline != NONE,
+            "is_sliced": self.pipeline != NONE and bool(streams),
+            "stores_late": self.stores_late,
+            "stores": (stores := list(self._stored())),
+            "has_windows": any(store["windows"] for store in stores),
             "opened": [found for place, step in enumerate(self.steps) for found in self._opened(place, step)],
             "completions": [
                 {"step": place, "bit": bit}
@@ -325,6 +334,27 @@ class _Subscriber:
                 found.append((place, step, named))
         return found
 
+    def _stored(self) -> Iterator[Context]:
+        """All registers of fields, with the beats in which they store bytes."""
+        for place, block, named in self._stores:
+            for name, store in named:
+                yield self._store(place, block, name, store)
+
+    def _store(self, place: int, block: Block, name: str, store: Store) -> Context:
+        """A register, with the beats of a block in which the register stores lanes of the window."""
+        data, beat = ("stored_bytes_r", "stored_beat_r") if self.stores_late else ("window_bytes", "beat_r")
+        beats = ranges(store.beats)
+        is_always = beats == [(0, -(-block.size // self.lanes) - 1)]
+        windows = [] if is_always else [within(beat, *window) for window in beats]
+        return {
+            "step": place,
+            "register": name,
+            "bits": store.bits,
+            "windows": windows,
+            "is_parted": len(windows) > 1,
+            "data": store_data(name, store, data),
+        }
+
     def _field_slices(self, block: Block, named: Sequence[tuple[str, Store]]) -> Iterator[Context]:
         """The slices of ports with their positions in the stores."""
         places = StoreMap(self.window, [store for _, store in named])
@@ -371,18 +401,3 @@ class _Subscriber:
         if self.side.element(loop).segments is None:
             return ""
         return f"segment_valid_{self._number(loop)}_r({segment.number})"
-
-
-def _store(place: int, block: Block, name: str, store: Store, lanes: int) -> Context:
-    """A register, with the beats of a block in which the register stores lanes of the window."""
-    beats = ranges(store.beats)
-    is_always = beats == [(0, -(-block.size // lanes) - 1)]
-    windows = [] if is_always else [within("beat_r", *window) for window in beats]
-    return {
-        "step": place,
-        "register": name,
-        "bits": store.bits,
-        "windows": windows,
-        "is_parted": len(windows) > 1,
-        "data": store_data(name, store, "window_bytes"),
-    }

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.request import message_core
 from fusesoc_firm.request.parameters import Parameter
 from fusesoc_firm.request.request import GeneratedCore, LoadedRequest, Request
@@ -112,6 +113,13 @@ GENERATORS: Mapping[str, Generator] = {
                 "str",
                 "prefix for the names of all generated units, such as left; required for a second core of a message",
                 rule=(PREFIX_RULE, is_prefix),
+            ),
+            Parameter(
+                "pipeline",
+                "str",
+                "register stages of subscribers of variable size (default: full if the message has more than 256 bytes"
+                " of fields, otherwise none)",
+                choices=PIPELINES,
             ),
             Parameter("include", "list", "fields with ports, such as pose.position (default: all fields)"),
             Parameter("exclude", "list", "fields without ports; a publisher sends the default values of these fields"),

@@ -13,6 +13,7 @@ from fusesoc_firm.converter.configuration import publisher_entity, subscriber_en
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
+from fusesoc_firm.converter.pipeline import BORDERS, NONE, pipeline_of
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
@@ -45,6 +46,7 @@ from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import wrapper
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, registers_configuration
@@ -70,6 +72,8 @@ _FILE_TYPES = {
     ".svh": "systemVerilogSource",
 }
 _INCLUDE_SUFFIXES = (".vh", ".svh")
+# Hz. Without register slices, a system in which messages of variable size are passed through reaches 99 MHz on an ECP5.
+_SLICED_ABOVE = 100 * 10**6
 
 
 @dataclass(frozen=True)
@@ -219,13 +223,19 @@ def artifacts(loaded: LoadedSystem) -> list[Artifact]:
     return list({item.path: item for item in _artifacts(loaded)}.values())
 
 
+def _least_pipeline(system: DerivedSystem) -> str:
+    """Return the register stages that the frequency of clk needs."""
+    return BORDERS if system.clock is not None and system.clock > _SLICED_ABOVE else NONE
+
+
 def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     system = loaded.system
     for path, configuration in constants_configurations(loaded.messages()):
         yield Artifact(path, Part.CONVERTERS, CONSTANTS_TEMPLATE, configuration)
     for item in system.subscribers:
         entity = subscriber_entity(item.frame, item.suffix)
-        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity))
+        pipeline = pipeline_of(item.frame, system.pipeline, _least_pipeline(system))
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity, pipeline))
     for item in system.publishers:
         entity = publisher_entity(item.frame, item.suffix)
         yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *publisher_source(item.frame, system.width, entity))
@@ -235,6 +245,9 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for type_ in system.kernels:
         made = wrapper(type_)
         yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, made.template, dict(made.context))
+    for type_ in system.accelerator_types:
+        if type_.inner:
+            yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, BYPASS_TEMPLATE, bypass_configuration(type_))
     if system.status:
         configuration = registers_configuration(status_registers(loaded), identity(loaded).signatures)
         yield Artifact(f"{status_entity(system)}.vhd", Part.COMPONENTS, REGISTERS_TEMPLATE, configuration)
@@ -264,10 +277,11 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a loaded system, with its files in compilation order; may raise `InputError`."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
-    top = f"{system.entity}.vhd"
-    files = {path: file for path, file in made.items() if path != top}
+    # Units that instantiate the user's follow them.
+    after = [*(f"{type_.entity}.vhd" for type_ in system.accelerator_types if type_.inner), f"{system.entity}.vhd"]
+    files = {path: file for path, file in made.items() if path not in after}
     files |= _sources(system.accelerator_types, loaded.folder)
-    files[top] = made[top]
+    files |= {path: made[path] for path in after}
     if loaded.board:
         files |= _board_files(loaded, loaded.board)
     return GeneratedCore(f"System {system.name}", files)

@@ -41,8 +41,8 @@ _ARITHMETIC_TITLE = "Arithmetic of accelerators, MHz"
 _LOOP_TITLE = f"Manager with its scheduler, {MANAGER_WIDTH} bits, MHz"
 _COLUMNS = ("design", "bits", "MHz", "of each seed", "LUT4", "FF", "bar", "result", "stretch")
 _NOTES = {
-    _SYSTEMS_TITLE: """In the systems of a subscriber and a publisher for each message, messages are passed through. The
-        others are the demo systems.""",
+    _SYSTEMS_TITLE: """In the systems of a subscriber and a publisher for each message, messages are passed through, and
+        `clock` in the specification is the bar. The others are the demo systems.""",
     _ARITHMETIC_TITLE: """The entities of [Arithmetic](../reference/arithmetic.md) for float64 and float32, with
         fixed-point numbers of 32 bits. Multipliers (MULT18X18D) are not counted.""",
     _LOOP_TITLE: "The path from a grant through the Manager and back to the scheduler is included.",
@@ -210,14 +210,15 @@ def _converter(converter: Converter) -> Callable[[Path], Design]:
 def _systems() -> Iterator[Row]:
     for messages, width, bar, stretch in _PASSED:
         label = " + ".join(message.partition("/")[2] for message in messages)
-        yield Row(f"pass-through {label}", width, _passed(messages, width), bar, stretch)
+        yield Row(f"pass-through {label}", width, _passed(messages, width, bar), bar, stretch)
     for name, (bar, stretch) in _DEMOS.items():
         yield Row(name, None, _demo(name), bar, stretch)
 
 
-def _passed(messages: Sequence[str], width: int) -> Callable[[Path], Design]:
+def _passed(messages: Sequence[str], width: int, bar: float) -> Callable[[Path], Design]:
     def make(folder: Path) -> Design:
-        specification = PassThrough("humble", messages, count=0, seed=0, width=width).specification(folder)
+        passed = PassThrough("humble", messages, count=0, seed=0, width=width, megahertz=bar)
+        specification = passed.specification(folder)
         work = generate_system(specification, folder / "system")
         file = netlist(work[-1].stem, folder, work, core_files(*HARDWARE))
         return Design(file.read_text(encoding="utf-8"), work[-1].stem)

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.message.middleware import MIDDLEWARES
 from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
@@ -45,6 +46,7 @@ NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
 # What a subscriber's full queue does with a further frame.
 BLOCK, DROP_NEWEST, DROP_OLDEST = OVERFLOWS = ("block", "drop_newest", "drop_oldest")
+PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 # Whether the top level has a synchroniser after an input pin, or a FIFO after a publisher.
@@ -137,6 +139,12 @@ class Project(Section):
         default=1 << 20,
         is_asked=False,
     )
+    pipeline: Text | None = key(
+        "register stages of subscribers of variable size (default: borders if clock is above 100 MHz, otherwise none;"
+        " full for messages with more than 256 bytes of fields)",
+        choices=PIPELINES,
+        is_asked=False,
+    )
     interconnect: Text = key(
         "connection between host and system: streams for a DMA engine, or a serial link",
         choices=(AXI_STREAM, *LINKS),
@@ -166,6 +174,9 @@ class OutputType(InterfaceType):
     """A message that an accelerator sends."""
 
     length: Text | None = key("source of the payload's length, if the size is variable", choices=LENGTHS)
+    others: Text | None = key(
+        "pass: the fields that are not selected are those of the input, which has the same message", choices=(PASS,)
+    )
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ class PassThrough:
     count: int
     seed: int
     width: int = 64
+    megahertz: float | None = None
 
     @cached_property
     def ros(self) -> Middleware:
@@ -44,7 +45,8 @@ class PassThrough:
 
     def specification(self, folder: Path) -> Path:
         """The system: each message has a subscriber that is called after it, and a publisher."""
-        lines = [f"project: {{name: pass_{self.distribution}, width: {self.width}}}", "blocks:"]
+        clock = f", clock: {self.megahertz:g} MHz" if self.megahertz else ""
+        lines = [f"project: {{name: pass_{self.distribution}, width: {self.width}{clock}}}", "blocks:"]
         for name in self.names:
             kind = f"middleware: ROS{self.ros.number}, message: {name}"
             block = _block(name)

@@ -18,6 +18,7 @@ from typing import Any
 
 from fusesoc_firm.converter.configuration import subscriber_entity
 from fusesoc_firm.converter.message_ports import message_ports, message_side, segment_count
+from fusesoc_firm.converter.pipeline import NONE, pipeline_of
 from fusesoc_firm.converter.program import has_bytes
 from fusesoc_firm.converter.sources import subscriber_source
 from fusesoc_firm.converter.vhdl import vhdl_type
@@ -49,6 +50,7 @@ class SubscriberBench:
     """GHDL's libraries in one directory."""
 
     directory: pathlib.Path
+    pipeline: str | None = None
     made: dict[tuple[Frame, int], Subscriber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -58,7 +60,7 @@ class SubscriberBench:
         """The subscriber with its bench, analysed once."""
         if (frame, width) not in self.made:
             library = Library(f"ros{frame.ros.number}_{width}", self.directory)
-            made = Subscriber(library, frame, width)
+            made = Subscriber(library, frame, width, pipeline_of(frame, self.pipeline))
             made.analyse()
             self.made[frame, width] = made
         return self.made[frame, width]
@@ -71,6 +73,7 @@ class Subscriber:
     library: Library
     frame: Frame
     width: int
+    pipeline: str = NONE
 
     @property
     def entity(self) -> str:
@@ -80,7 +83,9 @@ class Subscriber:
         folder = self.library.directory / self.library.name
         folder.mkdir(exist_ok=True)
         file = folder / f"{self.entity}.vhd"
-        file.write_text(render(*subscriber_source(self.frame, self.width, self.entity)), encoding="ascii")
+        file.write_text(
+            render(*subscriber_source(self.frame, self.width, self.entity, self.pipeline)), encoding="ascii"
+        )
         self.library.analyse([file])
         self.analyse_bench()
 

@@ -14,6 +14,7 @@ import pytest
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.message_ports import message_ports
+from fusesoc_firm.converter.pipeline import BORDERS, FULL, NONE
 from fusesoc_firm.converter.variable_publisher import VARIABLE_PUBLISHER_TEMPLATE, variable_publisher_configuration
 from fusesoc_firm.converter.variable_subscriber import VARIABLE_SUBSCRIBER_TEMPLATE, variable_subscriber_configuration
 from fusesoc_firm.frame.model import Frame
@@ -57,6 +58,19 @@ def test_a_message_that_is_passed_through_makes_no_loop(tmp_path: Path, ros: Mid
     _look(tmp_path, "\n".join(netlists), "top", "scc -expect 0")
 
 
+@pytest.mark.one_in(4)
+@pytest.mark.parametrize("width", [64, 8])
+@pytest.mark.parametrize("name", ["sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray"])
+def test_with_slices_no_ready_reaches_the_window(tmp_path: Path, name: str, width: int) -> None:
+    """Without them each one does, so the search finds such paths."""
+    frame = ORACLES[ROS2].frame(name)
+    ready = [port.name for port in message_ports(frame, width) if port.is_reverse]
+    for pipeline, assertion in (NONE, "-assert-any"), (BORDERS, "-assert-none"), (FULL, "-assert-none"):
+        netlist = _subscriber(frame, width, tmp_path / pipeline, pipeline)
+        reached = [f"select {assertion} i:{port} %co*:-$_DFF_P_ w:u_window.* %i" for port in ready]
+        _look(tmp_path, netlist, subscriber_entity(frame), "; ".join(reached))
+
+
 def _no_output_behind(inputs: list[str]) -> str:
     """Yosys' commands that fail if inputs reach an output without a register in between, or are not there."""
     found = " ".join(f"i:{port}" for port in inputs) + " %u" * (len(inputs) - 1)
@@ -71,9 +85,9 @@ def _look(directory: Path, netlist: str, top: str, command: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def _subscriber(frame: Frame, width: int, directory: Path) -> str:
+def _subscriber(frame: Frame, width: int, directory: Path, pipeline: str = NONE) -> str:
     entity = subscriber_entity(frame)
-    configuration = variable_subscriber_configuration(frame, width, entity)
+    configuration = variable_subscriber_configuration(frame, width, entity, pipeline)
     return _netlist(VARIABLE_SUBSCRIBER_TEMPLATE, entity, configuration, directory / "subscriber")
 
 
@@ -84,7 +98,7 @@ def _publisher(frame: Frame, width: int, directory: Path) -> str:
 
 
 def _netlist(template: str, entity: str, configuration: Any, directory: Path) -> str:
-    directory.mkdir()
+    directory.mkdir(parents=True)
     Library("firm", directory).analyse(core_files("axis/package", "axis/axis"))
     file = directory / f"{entity}.vhd"
     file.write_text(render(template, configuration), encoding="ascii")

@@ -77,9 +77,11 @@ def pass_through(system: PassThrough, folder: Path) -> None:
 
 
 @pytest.mark.one_in(2)
+@pytest.mark.parametrize("megahertz", [None, 150.0])
 @pytest.mark.parametrize("distribution", FEW)
-def test_what_passes_through_is_the_same(tmp_path: Path, distribution: str) -> None:
-    pass_through(PassThrough(distribution, FEW[distribution], 6, SEED), tmp_path)
+def test_what_passes_through_is_the_same(tmp_path: Path, distribution: str, megahertz: float | None) -> None:
+    """With a fast clock, through register slices at the subscribers."""
+    pass_through(PassThrough(distribution, FEW[distribution], 6, SEED, megahertz=megahertz), tmp_path)
 
 
 @pytest.mark.thorough
