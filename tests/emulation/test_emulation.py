@@ -73,13 +73,13 @@ def _twist(chance: random.Random, number: int) -> dict[str, Any]:
 
 def _scan(chance: random.Random, number: int) -> dict[str, Any]:
     limits = ("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time", "range_min", "range_max")
-    ranges = [chance.randrange(256) / 8 for _ in range(chance.randrange(200))]
+    ranges = [chance.randrange(256) / 8 for _ in range(chance.randrange(60))]
     values = {name: chance.randrange(100) / 4 for name in limits}
     return {"scan_in": {"header": _header(chance, number), **values, "ranges": ranges, "intensities": ranges[::2]}}
 
 
 def _image(chance: random.Random, number: int) -> dict[str, Any]:
-    height, width = chance.randrange(30), chance.randrange(40)
+    height, width = chance.randrange(16), chance.randrange(24)
     image = {"height": height, "width": width, "encoding": "mono8", "is_bigendian": 0, "step": width}
     return {"image_in": {"header": _header(chance, number), **image, "data": list(chance.randbytes(height * width))}}
 
