@@ -55,25 +55,34 @@ class FaultyRow:
         assert found is None, f"no such frame was sent: {found.hex()}"
 
 
-def faulty_row(faults: int, longest: int, seed: int) -> FaultyRow:
-    """A row of frames with payloads of 0 to `longest` bytes, many of them zero; prints the seed."""
-    print(f"faults from seed {seed}")
+def right_row(faults: int, longest: int, seed: int) -> FaultyRow:
+    """A row of frames with payloads of 4 to `longest` bytes, many of them zero, before the faults; prints the seed."""
+    print(f"frames from seed {seed}")
     source = random.Random(seed)
-    frames, pieces = [], [b"\0"]
+    frames = []
     for number in range(3 * faults + 1):
         # The number tells a frame from all others.
         payload = bytes(source.choices((0, 1, 255, source.randrange(256)), k=source.randint(0, longest - 4)))
-        frame = Frame(source.randrange(256), number.to_bytes(4, "big") + payload).to_bytes()
-        frames.append(frame)
-        piece = coded(frame)
-        if number % 3 == 0 and number < 3 * faults:
-            place = source.randrange(len(piece))
-            kind = source.choice(_KINDS)
-            inner = {
-                "lost": b"",
-                "doubled": 2 * piece[place : place + 1],
-                "flipped": bytes([piece[place] ^ source.choice([1 << source.randrange(8), source.randrange(1, 256)])]),
-            }[kind]
-            piece = piece[:place] + inner + piece[place + 1 :]
-        pieces.append(piece)
-    return FaultyRow(frames, b"".join(pieces))
+        frames.append(Frame(source.randrange(256), number.to_bytes(4, "big") + payload).to_bytes())
+    return FaultyRow(frames, b"\0" + b"".join(map(coded, frames)))
+
+
+def faulty_row(faults: int, longest: int, seed: int) -> FaultyRow:
+    """The row of these frames with so many faults."""
+    row = right_row(faults, longest, seed)
+    source = random.Random(seed + 1)
+    pieces = [coded(frame) for frame in row.frames]
+    for number in range(0, 3 * faults, 3):
+        pieces[number] = _spoiled(pieces[number], source)
+    return FaultyRow(row.frames, b"\0" + b"".join(pieces))
+
+
+def _spoiled(piece: bytes, source: random.Random) -> bytes:
+    place = source.randrange(len(piece))
+    kind = source.choice(_KINDS)
+    inner = {
+        "lost": b"",
+        "doubled": 2 * piece[place : place + 1],
+        "flipped": bytes([piece[place] ^ source.choice([1 << source.randrange(8), source.randrange(1, 256)])]),
+    }[kind]
+    return piece[:place] + inner + piece[place + 1 :]

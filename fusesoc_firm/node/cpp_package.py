@@ -132,6 +132,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "subscriber_count": len(loaded.system.subscribers),
         "publisher_count": len(loaded.system.publishers),
         "queue_depth": _QUEUE_DEPTH,
+        "digest": description.digest,
         "definitions": [*_definitions(description)],
         "subscribers": [_row(topic) for topic in description.subscribers],
         "publishers": [_row(topic) for topic in description.publishers],

@@ -46,6 +46,7 @@ from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import wrapper
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, registers_configuration
@@ -244,6 +245,9 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for type_ in system.kernels:
         made = wrapper(type_)
         yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, made.template, dict(made.context))
+    for type_ in system.accelerator_types:
+        if type_.inner:
+            yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, BYPASS_TEMPLATE, bypass_configuration(type_))
     if system.status:
         configuration = registers_configuration(status_registers(loaded), identity(loaded).signatures)
         yield Artifact(f"{status_entity(system)}.vhd", Part.COMPONENTS, REGISTERS_TEMPLATE, configuration)
@@ -273,10 +277,11 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a loaded system, with its files in compilation order; may raise `InputError`."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
-    top = f"{system.entity}.vhd"
-    files = {path: file for path, file in made.items() if path != top}
+    # Units that instantiate the user's follow them.
+    after = [*(f"{type_.entity}.vhd" for type_ in system.accelerator_types if type_.inner), f"{system.entity}.vhd"]
+    files = {path: file for path, file in made.items() if path not in after}
     files |= _sources(system.accelerator_types, loaded.folder)
-    files[top] = made[top]
+    files |= {path: made[path] for path in after}
     if loaded.board:
         files |= _board_files(loaded, loaded.board)
     return GeneratedCore(f"System {system.name}", files)

@@ -153,18 +153,26 @@ def _build(design: Design, template: str, configuration: dict[str, Any], generic
 
 def verilate(library: Library, entity: str, bench: str, generics: Mapping[str, Generic] | None = None) -> Path:
     """The program of an entity's netlist and a bench in C++, in the library's folder; raises `ModelError`."""
-    folder = library.directory
-    netlist = library.synthesise(entity, generics, "verilog")
+    return compiled(library.synthesise(entity, generics, "verilog"), entity, bench, library.directory)
+
+
+def compiled(netlist: str, top: str, bench: str, folder: Path, headers: Sequence[Path] = ()) -> Path:
+    """The program of a netlist in Verilog and a bench in C++, which may include the files of the folders `headers`.
+
+    Raises `ModelError`.
+    """
     (folder / "netlist.v").write_text(netlist, encoding="utf-8")
     (folder / "bench.cpp").write_text(bench, encoding="ascii")
-    command = ["verilator", "--cc", "--exe", "--build", "-O3", "-CFLAGS", f"-I{_HERE}", "-Wno-fatal"]
+    command = ["verilator", "--cc", "--exe", "--build", "-O3", "-Wno-fatal"]
+    for path in (_HERE, *headers):
+        command += ["-CFLAGS", f"-I{path}"]
     for option in ("OPT_FAST=-O2", "OPT_SLOW=-O0", "OPT_GLOBAL=-O0"):
         command += ["-MAKEFLAGS", option]
-    command += ["-Wno-INITIALDLY", "--top-module", entity, "--Mdir", "model", "netlist.v", "bench.cpp"]
+    command += ["-Wno-INITIALDLY", "--top-module", top, "--Mdir", "model", "netlist.v", "bench.cpp"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise ModelError(done.stdout + done.stderr)
-    return folder / "model" / f"V{entity}"
+    return folder / "model" / f"V{top}"
 
 
 def _execute(command: Sequence[str], folder: Path) -> str:

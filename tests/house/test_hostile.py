@@ -318,6 +318,7 @@ struct System {
   std::string name;
   unsigned width, subscriber_count, publisher_count;
   std::size_t queue_depth;
+  std::string digest;
   std::vector<Topic> subscribers, publishers;
   Software software{};
 };

@@ -147,7 +147,7 @@ def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator
 
     For simulators that do not read VHDL, the targets translate the design unit `unit` with all subunits.
     """
-    has_verilog = any(item.is_component for item in system.accelerator_types)
+    has_verilog = any(item.own.is_component for item in system.accelerator_types)
     sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
     is_system_verilog = any(source.endswith((".sv", ".svh")) for source in sources)
     kind, bench, suffix = ("live", "verilog_pipe", "live") if is_live else ("sim", "verilog_host", "tb")

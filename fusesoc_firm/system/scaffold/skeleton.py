@@ -71,7 +71,7 @@ def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
         paths = [folder / source for source in type_.accelerator.sources]
         # Software in another program has no sources.
         if paths and not any(path.exists() for path in paths):
-            texts[paths[0]] = skeleton(type_)
+            texts[paths[0]] = skeleton(type_.own)
     return texts
 
 

@@ -26,6 +26,8 @@
 #include <vector>
 
 #include <firm/node.hpp>
+#include <firm/open_transport.hpp>
+#include <firm/status.hpp>
 #include <firm/topic.hpp>
 
 namespace firm {
@@ -43,13 +45,14 @@ struct Software {
 };
 
 // The system as its node sees it: the width of its streams in bits, the number of subscribers and publishers, the
-// default queue depth in messages, the topics, and the software.
+// default queue depth in messages, the digest of its hardware, the topics, and the software.
 struct System {
   std::string name;
   unsigned width;
   unsigned subscriber_count;
   unsigned publisher_count;
   std::size_t queue_depth;
+  std::string digest;  // empty if the status is not read by frames
   std::vector<Topic> subscribers;
   std::vector<Topic> publishers;
   Software software{};
@@ -219,7 +222,7 @@ class Engines {
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
     configuration.log = &std::cerr;
     configuration.trace = trace;
-    hardware_ = std::make_unique<Node>(configuration, arguments.transport, by_id(from_hardware_));
+    hardware_ = std::make_unique<Node>(configuration, opener(system, arguments.transport), by_id(from_hardware_));
     for (const auto& topic : system.publishers) {
       if (topic.id) from_hardware_.at(*topic.id) = publish_.at(topic.name);
     }
@@ -270,6 +273,15 @@ class Engines {
 
  private:
   static constexpr std::chrono::seconds kSilence{1};
+
+  // Return a function that opens the hardware, and refuses that of another system.
+  static Node::Open opener(const System& system, const std::string& address) {
+    return [&system, address](const TransportOptions& options) {
+      auto transport = open_transport(address, options);
+      if (!system.digest.empty()) check_digest(*transport, system.digest, system.name);
+      return transport;
+    };
+  }
 
   static Node::Publish by_id(const std::vector<MessageHandler>& handlers) {
     return [&handlers](unsigned id, const std::uint8_t* payload, std::size_t size) { handlers.at(id)(payload, size); };

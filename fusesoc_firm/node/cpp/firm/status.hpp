@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// The status of hardware, read and written by frames of the status id (docs/reference/status.md):
+//
+//     auto transport = firm::open_transport("uart:/dev/ttyUSB1:1000000");
+//     const firm::Status status = firm::read_status(*transport);
+//     status.channels[0].faults[1];                 // frames of subscriber 0 that ended early (firm/faults.hpp)
+//
+// The hardware tells its dimensions, so no specification is needed. While a node uses the transport, nothing else may
+// read it. The counterpart in Python is fusesoc_firm/node/status.py. C++17, no dependencies except POSIX.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <firm/transport.hpp>
+
+namespace firm {
+
+constexpr std::uint8_t kStatusId = 255;
+// The highest code of a fault; `ChannelStatus::faults` begins with the unused code 0.
+constexpr std::size_t kFaultCodes = 12;
+
+// The registers that are alike in all systems.
+namespace status_register {
+constexpr std::uint32_t kMagic = 0x00, kShape = 0x04, kControl = 0x08, kInterrupt = 0x0C, kInterruptEnable = 0x10;
+constexpr std::uint32_t kLastFault = 0x14, kIdErrors = 0x18, kLinkErrors = 0x1C, kLost = 0x20, kDigest = 0x30;
+constexpr std::uint32_t kChannels = 0x8000, kChannelBytes = 0x40;
+constexpr std::uint32_t kSignature = 0x00, kFrames = 0x34, kLongestWait = 0x38;
+}  // namespace status_register
+
+// What is counted of a subscriber or publisher; `longest_wait` is in cycles.
+struct ChannelStatus {
+  std::uint32_t signature = 0;
+  std::array<std::uint32_t, kFaultCodes + 1> faults{};
+  std::uint32_t frames = 0;
+  std::uint32_t longest_wait = 0;
+};
+
+// The status of a system. The channels are the subscribers by id, then the publishers by id.
+struct Status {
+  unsigned subscribers = 0;
+  unsigned publishers = 0;
+  unsigned last_fault = 0;  // its code, or 0 before the first fault
+  unsigned last_channel = 0;
+  std::uint32_t id_errors = 0;
+  std::uint32_t link_errors = 0;
+  std::uint32_t lost = 0;  // faults that were not counted in a channel
+  std::string digest;
+  std::vector<ChannelStatus> channels;
+};
+
+// Accesses registers one after the other.
+class StatusAccess {
+ public:
+  explicit StatusAccess(Transport& transport, std::chrono::nanoseconds patience = std::chrono::seconds(5))
+      : transport_(transport), patience_(patience) {}
+
+  // Return the word of the register at an address. Throws TransportError if there is no answer.
+  std::uint32_t read(std::uint32_t address) { return access(address, 0); }
+
+  // Write a word; return the word before. Throws TransportError if there is no answer.
+  std::uint32_t write(std::uint32_t address, std::uint32_t word) { return access(address | kWrite, word); }
+
+ private:
+  static constexpr std::uint32_t kWrite = 1u << 31;
+  static constexpr std::size_t kPayloadBytes = 8;
+
+  // Frames other than the answer are dropped.
+  std::uint32_t access(std::uint32_t address, std::uint32_t word) {
+    Bytes request(kPayloadBytes);
+    put(request, 0, address);
+    put(request, 4, word);
+    request = pack_frame(kStatusId, request.data(), request.size());
+    transport_.send(request.data(), request.size());
+    const auto end = std::chrono::steady_clock::now() + patience_;
+    for (auto left = patience_; left.count() > 0; left = end - std::chrono::steady_clock::now()) {
+      const auto burst = transport_.receive(left);
+      if (!burst) break;
+      if (is_answer(burst->data, address)) return word_of(burst->data, kFrameHeaderBytes + 4);
+    }
+    throw TransportError("the hardware did not answer: it has no status, or is stalled");
+  }
+
+  static bool is_answer(const Bytes& frame, std::uint32_t address) {
+    return frame.size() == kFrameHeaderBytes + kPayloadBytes && frame[0] == kStatusId &&
+           payload_length(frame.data()) == kPayloadBytes && word_of(frame, kFrameHeaderBytes) == address;
+  }
+
+  static void put(Bytes& bytes, std::size_t place, std::uint32_t word) {
+    for (unsigned shift = 0; shift < 32; shift += 8) bytes[place++] = static_cast<std::uint8_t>(word >> shift);
+  }
+
+  static std::uint32_t word_of(const Bytes& bytes, std::size_t place) {
+    std::uint32_t word = 0;
+    for (unsigned shift = 0; shift < 32; shift += 8) word |= static_cast<std::uint32_t>(bytes[place++]) << shift;
+    return word;
+  }
+
+  Transport& transport_;
+  const std::chrono::nanoseconds patience_;
+};
+
+// Return the digest of the hardware's system, 32 hexadecimal digits. Throws TransportError.
+inline std::string read_digest(Transport& transport) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  constexpr unsigned kWords = 4;
+  StatusAccess access(transport);
+  std::string digest;
+  for (unsigned number = kWords; number-- > 0;) {
+    const std::uint32_t word = access.read(status_register::kDigest + 4 * number);
+    for (unsigned shift = 32; shift > 0; shift -= 4) digest += kDigits[word >> (shift - 4) & 15u];
+  }
+  return digest;
+}
+
+// Throws TransportError if the hardware is not that of a system, whose digest is `expected`.
+inline void check_digest(Transport& transport, const std::string& expected, const std::string& system) {
+  const std::string found = read_digest(transport);
+  if (found != expected) {
+    throw TransportError("the hardware is not that of '" + system + "': its digest is " + found +
+                         ", and the specification's is " + expected);
+  }
+}
+
+// Return the status of hardware. Throws TransportError if it does not answer, or if its registers are unknown.
+inline Status read_status(Transport& transport) {
+  constexpr std::uint32_t kMark = 0x4D524946, kVersion = 1;
+  namespace at = status_register;
+  StatusAccess access(transport);
+  const std::uint32_t mark = access.read(at::kMagic), shape = access.read(at::kShape);
+  if (mark != kMark || shape >> 24 != kVersion) throw TransportError("the hardware has another kind of status");
+  Status status;
+  status.subscribers = shape & 0xFFFu;
+  status.publishers = shape >> 12 & 0xFFFu;
+  const std::uint32_t last = access.read(at::kLastFault);
+  status.last_fault = last & 0xFu;
+  status.last_channel = last >> 4;
+  status.id_errors = access.read(at::kIdErrors);
+  status.link_errors = access.read(at::kLinkErrors);
+  status.lost = access.read(at::kLost);
+  status.digest = read_digest(transport);
+  status.channels.resize(status.subscribers + status.publishers);
+  std::uint32_t base = at::kChannels;
+  for (auto& channel : status.channels) {
+    channel.signature = access.read(base + at::kSignature);
+    for (std::uint32_t code = 1; code <= kFaultCodes; ++code) channel.faults[code] = access.read(base + 4 * code);
+    channel.frames = access.read(base + at::kFrames);
+    channel.longest_wait = access.read(base + at::kLongestWait);
+    base += at::kChannelBytes;
+  }
+  return status;
+}
+
+}  // namespace firm
