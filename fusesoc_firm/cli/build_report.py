@@ -144,7 +144,7 @@ class Report:
     def _show(self) -> None:
         failed = self._counts()[_FAILED]
         now = ", ".join(map(str, dict.fromkeys(self._running)))
-        self._bar.set_postfix_str(f"{now}{f', {failed} failed' if failed else ''}", refresh=False)
+        self._bar.set_postfix_str(f"{now}{f', {failed} failed' if failed else ''}")
 
     def _event(self, event: str, **facts: Any) -> None:
         if self._events:

@@ -99,7 +99,7 @@ def _library_rows(name: str, library: Library) -> list[tuple[str, ...]]:
     again = library.run()
     unchanged = processor_time() - before
     plain = sum(
-        _fusesoc(library.folder, ["--build-root", "plain", "run", "--build", f"--target={target}", core], "")
+        _fusesoc(library.folder, ["run", "--build-root", "plain", "--build", f"--target={target}", core], "")
         for core, target in (build.split(" ") for build in states)
     )
     count, ran = str(len(states)), [sum(step != "cached" for step in steps) for steps in states.values()]
