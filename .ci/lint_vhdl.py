@@ -88,15 +88,24 @@ def write_skeletons() -> None:
     run(sys.executable, "-m", "fusesoc_firm.cli", "system", "skeleton", "multi_type.yaml", cwd=folder)
 
 
-def write_streams() -> None:
-    """Write a system with a C++ function that has streams, and its simulation."""
-    folder = SAMPLES / "project" / "streams"
-    folder.parent.mkdir(parents=True)
-    messages = ["--in", "sensor_msgs/Range", "--out", "std_msgs/String"]
-    options = [*messages, "--language", "hls", "--width", "64"]
-    run(sys.executable, "-m", "fusesoc_firm.cli", "init", folder.name, *options, cwd=folder.parent)
-    for name in "system", "simulation":
-        call_generator(folder / "streams.core", name, {})
+# New projects whose units around the accelerator no system in specs has: their options and generators.
+PROJECTS = {
+    "streams": (
+        ["--in", "sensor_msgs/Range", "--out", "std_msgs/String", "--language", "hls", "--width", "64"],
+        ("system", "simulation"),
+    ),
+    "part": (["--in", "geometry_msgs/PoseStamped", "--include", "pose.position.z", "--width", "64"], ("system",)),
+}
+
+
+def write_projects() -> None:
+    """Write the systems of new projects."""
+    for project, (options, generators) in PROJECTS.items():
+        folder = SAMPLES / "projects" / project
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        run(sys.executable, "-m", "fusesoc_firm.cli", "init", folder.name, *options, cwd=folder.parent)
+        for name in generators:
+            call_generator(folder / f"{project}.core", name, {})
 
 
 def write_loop() -> None:
@@ -126,7 +135,7 @@ def samples() -> list[Path]:
     with ThreadPoolExecutor(cpu_count()) as pool:
         list(pool.map(generate, CALLS))
     write_skeletons()
-    write_streams()
+    write_projects()
     write_loop()
     write_registers()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]

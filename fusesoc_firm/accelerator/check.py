@@ -43,7 +43,7 @@ def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries])
 
 def _by_language(loaded: LoadedSystem) -> Iterator[tuple[str, list[AcceleratorType]]]:
     for language in _PROGRAMS:
-        if types := [item for item in loaded.system.accelerator_types if item.accelerator.type == language]:
+        if types := [item.own for item in loaded.system.accelerator_types if item.accelerator.type == language]:
             yield language, types
 
 

@@ -51,11 +51,15 @@ def build_in_this_process(
 def save_time(answer: Answer) -> None:
     """Avoid two costs of FuseSoC for each generated core: a generator process, and recompiling a schema.
 
-    The change applies to this process and its copies, and only shortens builds: if FuseSoC lacks the replaced names,
-    builds take longer.
+    The change applies to this process and its copies, and only shortens builds. FuseSoC with
+    `docs/upstream/fusesoc-generators.patch` has a seam for the first and needs no help for the second. In the releases
+    up to 2.4.7, two names are replaced; if FuseSoC lacks these names, builds take longer.
     """
     from fusesoc import edalizer
 
+    if hasattr(edalizer, "Ttptttg") and hasattr(edalizer.Ttptttg, "launcher"):
+        edalizer.Ttptttg.launcher = _answering(edalizer.Ttptttg.launcher, answer)
+        return
     if hasattr(edalizer, "Launcher"):
         edalizer.Launcher = _answering(edalizer.Launcher, answer)
     if hasattr(edalizer, "Core2Parser"):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fusesoc_firm.system.scaffold.project import Project
 
 # The options that describe a new system, which an example has already.
-_DESCRIBING = ("input", "output", "ros", "language", "width", "from_bag", "limit")
+_DESCRIBING = ("input", "output", "include", "ros", "language", "width", "from_bag", "limit")
 _OPTIONS = {"input": "--in", "output": "--out", "from_bag": "--from-bag"}
 
 
@@ -48,6 +48,13 @@ def add_init(commands: Any) -> None:
         dest="output",
         metavar="TYPE|TOPIC",
         help="the message that is sent, or a topic in the bag with this message (default: asked)",
+    )
+    init.add_argument(
+        "--include",
+        action="append",
+        metavar="FIELD",
+        help="a field that the accelerator changes, such as pose.position.z, while the others of the message pass; "
+        "may be repeated, and --out is then the message of --in",
     )
     init.add_argument("--ros", choices=("1", "2"), help="the ROS version (default: 2)")
     init.add_argument(
@@ -104,7 +111,7 @@ def _start(arguments: argparse.Namespace) -> None:
     recording = _recording(arguments)
     places = [recording.path] if recording and recording.has_definitions else []
     known = libraries([*arguments.path, *places], os.environ, arguments.distro)
-    project = _project(arguments, known, recording)
+    project = replace(_project(arguments, known, recording), include=tuple(arguments.include or ()))
     if recording:
         project = replace(project, stimuli=recording.stimuli(project, known[recording.ros], arguments.limit))
     folder = Path(project.name)
@@ -143,13 +150,15 @@ def _project(arguments: argparse.Namespace, known: Libraries, recording: Recordi
         answers["ros"] = str(recording.ros.number)
         if not {"in", "out"} <= answers.keys():
             print(*recording.table, sep="\n")
+    topics = {topic: str(message) for topic, (message, _) in recording.topics.items()} if recording else {}
+    if arguments.include and arguments.input:
+        answers.setdefault("out", topics.get(arguments.input, arguments.input))
     if {"name", "in", "out"} <= answers.keys():
         answers = {"ros": "2", "language": "vhdl", "width": "8"} | answers
 
     def names(ros: int) -> Sequence[str]:
         return [] if {"in", "out"} <= answers.keys() else [str(name) for name in known[middleware_of(ros)].names()]
 
-    topics = {topic: str(message) for topic, (message, _) in recording.topics.items()} if recording else {}
     return ask(answers, asker(), names, [str(width) for width in WIDTHS], topics)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import check_sources, command, core_folders, natural, print_warnings
+from fusesoc_firm.cli.common import check_sources, coloured, command, core_folders, natural, print_warnings
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.outputs import shown
 
@@ -75,11 +75,11 @@ def _sim(arguments: argparse.Namespace) -> None:
         fail(f"the simulation did not {missed}", hint=f"the whole output: {shown(chosen.build.log)}")
     if not arguments.quiet:
         if not arguments.verbose:
-            _print_report(chosen, report)
+            _print_report(chosen, report, loaded)
         print(f"log:   {shown(chosen.build.log)}")
         if chosen.waves:
             print(f"waves: {shown(chosen.waves)}")
-    print(report.verdict, flush=True)
+    print(coloured(report.verdict, is_good=report.is_good), flush=True)
     if not report.is_good or report.status:
         sys.exit(1)
 
@@ -184,13 +184,26 @@ def _origin(copy: re.Match[str], work_root: Path, loaded: LoadedSystem) -> Sourc
     return origin(loaded, Path(copy["path"]).stem, lines, int(copy["line"]))
 
 
-def _print_report(chosen: Simulation, report: Report) -> None:
+def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | None) -> None:
     from fusesoc_firm.tools.simulators import SIMULATORS
 
     print(f"{chosen.build.core} in {SIMULATORS[chosen.simulator].title}, {report.title}")
     _print_messages(report)
-    for line in (*report.faults, *report.summary):
+    for line in _with_fields(chosen, report.faults, loaded):
+        print(coloured(line, is_good=False))
+    for line in report.summary:
         print(line)
+
+
+def _with_fields(chosen: Simulation, faults: Sequence[str], loaded: LoadedSystem | None) -> list[str]:
+    """Return the faults with the names of the fields of wrong bytes, if the system is known."""
+    from fusesoc_firm.simulation.host_files import with_field
+
+    path = chosen.build.work_root / "expected.txt"
+    if loaded is None or not path.is_file():
+        return [*faults]
+    expected = path.read_text(encoding="ascii")
+    return [with_field(fault, expected, loaded.system.publishers, loaded.system.id_bytes) for fault in faults]
 
 
 def _print_messages(report: Report) -> None:

@@ -51,6 +51,8 @@ _COUNTER_BITS = 32
 _LARGEST_NATURAL = 2**31 - 1
 _ZEROS = "(others => '0')"
 _ALWAYS = ""
+# From here on, the multiplexer of all words has so many levels that nothing may follow it.
+_MANY_PLACES = 80
 
 
 def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> Context:
@@ -235,8 +237,22 @@ class _Publisher:
             "has_extra_bits": extra_bits > 0,
             "near_bits": self._near_bits,
             "step_bits": max(2, self.lanes).bit_length(),
-            "counts_data": _any_area(area for area in self._counts if isinstance(_part(area), Data)),
+            "counts_data": _any_area(self._data_counts),
+            "count_words": self._count_words(),
+            "count_word_bits": min(self.width, _COUNTER_BITS),
         }
+
+    def _count_words(self) -> list[Context]:
+        """The words of streams' counts, if a tree of their own is faster: that of all words has many levels."""
+        if self.places.end < _MANY_PLACES:
+            return []
+        places = [place for area in self._data_counts for place in range(area.first, area.last + 1)]
+        bits = min(self.width, _COUNTER_BITS)
+        return [{"place": place, "high": self.width * place + bits - 1, "low": self.width * place} for place in places]
+
+    @property
+    def _data_counts(self) -> list[Area]:
+        return [area for area in self._counts if isinstance(_part(area), Data)]
 
     @property
     def _near_bits(self) -> int:

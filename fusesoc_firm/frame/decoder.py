@@ -24,13 +24,22 @@ def used_bytes(frame: Frame, payload: bytes) -> bytes:
     Raise `CodecError` like `decode`.
     """
     used = bytearray(len(payload))
-    for first, end in _read(frame, payload)[1]:
+    for first, end, _ in _read(frame, payload)[1]:
         used[first:end] = b"\1" * (end - first)
     return bytes(used)
 
 
-def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int]]]:
-    """Return the message, and the (first, end) ranges of the payload bytes that carry the message."""
+def field_at(frame: Frame, payload: bytes, offset: int) -> str:
+    """Return the dotted name of the field with the byte at `offset`, or "" for the prefix and padding.
+
+    Raise `CodecError` like `decode`.
+    """
+    ranges = _read(frame, payload)[1]
+    return next((dotted(names) for first, end, names in ranges if first <= offset < end), "")
+
+
+def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int, tuple[str, ...]]]]:
+    """Return the message, and the (first, end, names) ranges of the payload bytes that carry the message."""
     if frame.is_fixed_size and not 0 <= len(payload) - frame.payload_bytes <= frame.trailing_bytes:
         raise CodecError(f"the payload of {frame.message} must have {frame.payload_bytes} bytes, not {len(payload)}")
     checked = payload[: frame.checked_prefix]
@@ -44,11 +53,14 @@ def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int,
 
 
 class _Reader:
-    """A reader that is at `position` in a payload; `used` lists the (first, end) ranges that carry values."""
+    """A reader that is at `position` in a payload; `used` lists the (first, end) ranges that carry values.
+
+    The names on the path to its field follow each range; the prefix has none.
+    """
 
     def __init__(self, frame: Frame, payload: bytes) -> None:
         self.position = 0
-        self.used = [(0, len(frame.prefix))]
+        self.used: list[tuple[int, int, tuple[str, ...]]] = [(0, len(frame.prefix), ())]
         self._frame = frame
         self._payload = payload
 
@@ -120,7 +132,7 @@ class _Reader:
         first, self.position = self.position, self.position + size
         if self.position > len(self._payload):
             self._fail(f" within '{dotted(names)}'")
-        self.used.append((first, self.position))
+        self.used.append((first, self.position, names))
         return self._payload[first : self.position]
 
     def _fail(self, where: str) -> None:

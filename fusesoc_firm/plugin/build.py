@@ -21,6 +21,7 @@ from fusesoc_firm.plugin.answer import answer_from_store, noted_facts
 from fusesoc_firm.plugin.batch import prepare
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.plugin.project import check_locked
+from fusesoc_firm.store import own_code
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.workers import cluster_workers
 
@@ -111,6 +112,7 @@ def _pool(plan: Plan, how: How, listener: Listener, words: tuple[str, ...], run_
         with closing(prepare(calls, jobs)) as steps:
             for number, _ in enumerate(steps, start=1):
                 listener.progress(f"generated {number} of {len(calls)}")
+        own_code.keep_state()
         save_time(_answer)
     return Pool(words, jobs, listener.tell, how.limits, listener.begin, run_build)
 

@@ -21,6 +21,7 @@ import os
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 from fusesoc_firm.plugin.run import message_folders, run_of, write_core
 from fusesoc_firm.store import facts
@@ -76,7 +77,7 @@ def answer(command: str, arguments: Sequence[str], run: str = "") -> bool:
 def call_digest(command: str, call: bytes) -> str:
     """Return the name of a call's note: a digest of FuseSoC's file for the call and of the Python in use."""
     searched = [os.environ.get(name) for name in SEARCHED]
-    python = [sys.version, os.uname().machine, _c_library(), _packages(), str(PACKAGE)]
+    python = [sys.version, os.uname().machine, _c_library(), _packages(tuple(sys.path)), str(PACKAGE)]
     return digest_of([command, digest(call), searched, python])
 
 
@@ -103,10 +104,11 @@ def state(kind: str, name: str, run: str) -> str | None:
         return None
 
 
-def _packages() -> list[list[object]]:
+@lru_cache(maxsize=1)
+def _packages(folders: tuple[str, ...]) -> list[list[object]]:
     """Return every installed version of the packages that we import, for each folder on Python's path."""
     found: list[list[object]] = []
-    for folder in sys.path:
+    for folder in folders:
         try:
             with os.scandir(folder or ".") as entries:
                 named = [(entry.name.lower(), entry) for entry in entries if entry.name.endswith("-info")]

@@ -25,6 +25,7 @@ def environment_files(
         f"{system.entity}_tb",
         f"{system.entity}_live",
         *(item.entity for item in system.accelerator_types),
+        *(item.own.entity for item in system.accelerator_types),
     }
     files: dict[PurePosixPath, GeneratedFile] = {}
     for path, source in paths.items():

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any
 
-from fusesoc_firm.frame.codec import pack_frame, used_bytes
+from fusesoc_firm.frame.codec import field_at, pack_frame, used_bytes
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.simulation.reference import Response
 from fusesoc_firm.simulation.stimuli import Stimulus
@@ -15,6 +16,7 @@ from fusesoc_firm.system.derived.model import Converter, Topic
 
 _BYTES_A_LINE = 32
 _LABEL_WIDTH = 160
+_WRONG_BYTE = re.compile(r"fault in cycle \d+: '(?P<label>.*)': byte (?P<byte>\d+)")
 
 
 def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter], id_bytes: int = ID_BYTES) -> str:
@@ -38,6 +40,29 @@ def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]
         used = b"\1" * (id_bytes + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
         lines += _hex_lines(pack_frame(ids[publisher.block], response.payload, id_bytes), used)
     return "\n".join(lines) + "\n"
+
+
+def with_field(fault: str, expected: str, publishers: Iterable[Converter], id_bytes: int = ID_BYTES) -> str:
+    """Return a fault of the host with the name of the wrong byte's field, if it is known: `byte 32 (vector.y): ...`.
+
+    `expected` is the text of the file of expected frames.
+    """
+    match = _WRONG_BYTE.match(fault)
+    frame = _frame_of(match["label"], expected) if match else b""
+    offset = int(match["byte"]) - id_bytes - LENGTH_BYTES if match else -1
+    if match is None or not frame or offset < 0:
+        return fault
+    (topic,) = (item for item in publishers if item.block == match["label"].partition(" ")[0])
+    name = field_at(topic.frame, frame[id_bytes + LENGTH_BYTES :], offset)
+    return f"{fault[: match.end()]} ({name}){fault[match.end() :]}" if name else fault
+
+
+def _frame_of(label: str, expected: str) -> bytes:
+    """Return the first expected frame with a label, with zeros for padding; no bytes if there is none."""
+    lines = iter(expected.splitlines())
+    if not any(re.fullmatch(rf"< (@\d+ )?{re.escape(label)}", line) for line in lines):
+        return b""
+    return bytes.fromhex("".join(takewhile(lambda line: line.startswith("  "), lines)).replace("..", "00"))
 
 
 def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:

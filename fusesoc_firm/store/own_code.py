@@ -22,6 +22,8 @@ _LEFT_OUT = ("__pycache__", "demos", "docs", "library")
 # File times are too coarse to distinguish two edits within this period.
 _NEW_NANOSECONDS = 2 * 10**9
 _STARTED = time.time_ns()
+# The state from `keep_state`, if that was called.
+_kept: list[str] = []
 
 
 def digest(package: Path = PACKAGE, current: str | None = None) -> str:
@@ -38,6 +40,8 @@ def state(package: Path = PACKAGE) -> str:
     The value is computed from names, sizes and times, which is much faster than `digest`. If a file is so new at the
     start of this process that its time may be unreliable, its content is used instead.
     """
+    if package == PACKAGE and _kept:
+        return _kept[0]
     found = []
     for name, entry in _files(str(package)):
         status = entry.stat()
@@ -45,6 +49,15 @@ def state(package: Path = PACKAGE) -> str:
         content = _content(entry.path) if max(times) > _STARTED - _NEW_NANOSECONDS else ""
         found.append([name, status.st_size, *times, content])
     return hashlib.sha256(json.dumps(sorted(found)).encode()).hexdigest()
+
+
+def keep_state() -> None:
+    """Use the current state for the rest of this process and for its copies.
+
+    Builds then take results for this state from the store, although a file is edited meanwhile. A process that
+    generates must not call this.
+    """
+    _kept[:] = [state()]
 
 
 def names(package: Path = PACKAGE) -> list[str]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property, partial
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
@@ -46,6 +47,7 @@ from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import wrapper
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, registers_configuration
@@ -60,6 +62,7 @@ from fusesoc_firm.system.written.specification import Accelerator, Specification
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
+from fusesoc_firm.text.yaml_text import Text
 
 # FuseSoC's file types by suffix, and the suffixes of files that are not compiled separately.
 _FILE_TYPES = {
@@ -70,6 +73,8 @@ _FILE_TYPES = {
     ".sv": "systemVerilogSource",
     ".svh": "systemVerilogSource",
 }
+# Parameters of a call that replace keys of the project.
+_REPLACING = ("interconnect", "clock")
 _INCLUDE_SUFFIXES = (".vh", ".svh")
 # Hz. Without register slices, a system in which messages of variable size are passed through reaches 99 MHz on an ECP5.
 _SLICED_ABOVE = 100 * 10**6
@@ -110,29 +115,32 @@ class LoadedSystem:
         return list(dict.fromkeys(found))
 
 
+def _unchanged(specification: Specification) -> Specification:
+    return specification
+
+
 def load_system(
     path: Path,
     libraries: Mapping[Middleware, MessageLibrary],
     *,
     needs_sources: bool = True,
-    board: Board | None = None,
+    changed: Callable[[Specification], Specification] = _unchanged,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """Read a specification and derive its system, optionally for a board; raise `InputError` with all faults.
+    """Read a specification and derive its system; raise `InputError` with all faults.
 
-    Missing source files of accelerators are an error only if `needs_sources` is set. Messages in the `paths` of the
-    specification take precedence over messages in `libraries`.
+    The system is that of the `changed` specification, such as for a board. Missing source files of accelerators are an
+    error only if `needs_sources` is set. Messages in the `paths` of the specification take precedence over messages in
+    `libraries`.
     """
     faults = Diagnostics()
-    specification = read_specification(path, str(path), faults)
-    if board:
-        specification = on_board(specification, board)
+    specification = changed(read_specification(path, str(path), faults))
     own = {str(item): item.source for item in specification.paths}
     spoken = {MIDDLEWARES[word] for word in specification.middlewares if word in MIDDLEWARES} or {*libraries}
     needed = Libraries({ros: partial(libraries.__getitem__, ros) for ros in libraries if ros in spoken})
     libraries = with_paths(needed, own, path.parent, core_folders, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
-    return LoadedSystem(specification, path.parent, libraries, system, board, faults.warnings)
+    return LoadedSystem(specification, path.parent, libraries, system, None, faults.warnings)
 
 
 def with_paths(
@@ -166,12 +174,21 @@ def with_paths(
 
 def load_requested(request: Request) -> LoadedSystem:
     """Return the system of a generator call."""
-    return load_system(
+    board = _board(request)
+    given = {name: str(value) for name in _REPLACING if (value := request.parameters.get(name))}
+    loaded = load_system(
         specification_path(request),
         libraries(*library_sources(request)),
-        board=_board(request),
+        changed=lambda written: with_keys(on_board(written, board) if board else written, given),
         core_folders=request.message_folders.of,
     )
+    return replace(loaded, board=board)
+
+
+def with_keys(specification: Specification, values: Mapping[str, str]) -> Specification:
+    """Return the specification with other values of some of the project's keys."""
+    texts: dict[str, Any] = {name: Text(value) for name, value in values.items()}
+    return replace(specification, project=replace(specification.project, **texts))
 
 
 def specification_path(request: Request) -> Path:
@@ -244,6 +261,9 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for type_ in system.kernels:
         made = wrapper(type_)
         yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, made.template, dict(made.context))
+    for type_ in system.accelerator_types:
+        if type_.inner:
+            yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, BYPASS_TEMPLATE, bypass_configuration(type_))
     if system.status:
         configuration = registers_configuration(status_registers(loaded), identity(loaded).signatures)
         yield Artifact(f"{status_entity(system)}.vhd", Part.COMPONENTS, REGISTERS_TEMPLATE, configuration)
@@ -273,10 +293,11 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a loaded system, with its files in compilation order; may raise `InputError`."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
-    top = f"{system.entity}.vhd"
-    files = {path: file for path, file in made.items() if path != top}
+    # Units that instantiate the user's follow them.
+    after = [*(f"{type_.entity}.vhd" for type_ in system.accelerator_types if type_.inner), f"{system.entity}.vhd"]
+    files = {path: file for path, file in made.items() if path not in after}
     files |= _sources(system.accelerator_types, loaded.folder)
-    files[top] = made[top]
+    files |= {path: made[path] for path in after}
     if loaded.board:
         files |= _board_files(loaded, loaded.board)
     return GeneratedCore(f"System {system.name}", files)

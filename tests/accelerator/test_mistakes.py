@@ -92,10 +92,20 @@ VHDL = [
     # syntax, names and types in the architecture
     ("  is_there <= in_msg_valid;", "  is_there <= in_msg_valid", "is_there", "';' expected at end of signal"),
     ("end entity;", "end entiti;", "end entiti", 'misspelling, "img" expected'),
-    ("      end if;\n    end if;", "      end if;", "end process", "'if' is expected instead of 'process'"),
+    (
+        "begin\n\n",
+        "begin\n  p : process (clk)\n  begin\n    if clk = '1' then\n  end process;\n",
+        "end process",
+        "'if' is expected instead of 'process'",
+    ),
     ("  is_there <= in_msg_valid;", "  is_there <= in_msg_vald;", "in_msg_vald", 'no declaration for "in_msg_vald"'),
-    ("  in_msg_ready <= done;", "  in_msg_ready <= is_sent;", "<= is_sent;", "can't match 'is_sent'"),
-    ("  in_msg_ready <= done;", "  in_msg_valid <= done;", "in_msg_valid <= done", "can't be assigned"),
+    (
+        "  in_msg_ready <= is_there and",
+        "  in_msg_ready <= in_segment_valid and",
+        "in_segment_valid and",
+        'operator "and"',
+    ),
+    ("  in_msg_ready <= is_there", "  in_msg_valid <= is_there", "in_msg_valid <= is_there", "can't be assigned"),
     ("begin\n\n", "begin\n  u : entity work.adder;\n", "work.adder", 'unit "adder" not found'),
     ("use ieee.std_logic_1164.all;", "use ieee.std_logic_1146.all;", "1146", 'unit "std_logic_1146" not found'),
     ("architecture rtl of img", "architecture rtl of image", "of image", "entity 'image' was not analysed"),
@@ -113,8 +123,8 @@ VERILOG = [
     ("  input  wire        in_msg_valid,\n", "", "module img", "no port 'in_msg_valid' for sensor_msgs/Image"),
     ("  input  wire rst_n,", "  input  wire rst_n,\n  input wire enable,", "enable", "port 'enable' is not in"),
     ("  input  wire rst_n,", "  input  wire rst_n", "in_payload_length", "syntax error"),
-    ("  assign in_msg_ready = done;", "  assign in_msg_ready = done", "assign is_sent", "syntax error"),
-    ("in_msg_ready = done;", "in_msg_ready = dome;", "dome", "'dome' is not declared"),
+    ("is_there && out_msg_ready;", "is_there && out_msg_ready", "assign out_segment_valid", "syntax error"),
+    ("in_msg_ready = is_there", "in_msg_ready = is_their", "is_their", "'is_their' is not declared"),
     ("endmodule", "", "", "syntax error"),
 ]
 

@@ -162,8 +162,10 @@ def yaml_of(value: Any) -> str:
     return f"'{value}'" if isinstance(value, str) else repr(value)
 
 
-def break_frames(made: GeneratedSystem, source: random.Random, size: int, lanes: int) -> None:
-    """Cut two of three frames with `size` bytes of pixels: in their header, or among the pixels."""
+def break_frames(
+    made: GeneratedSystem, source: random.Random, size: int, lanes: int, *, in_header: bool = True
+) -> None:
+    """Cut two of three frames with `size` bytes of pixels: one `in_header`, if wanted, the others among the pixels."""
     stimuli, answers = (made.folder / f"{file}.txt" for file in ("stimulus", "expected"))
     frames, expected = (re.split(r"^[<>] .*\n", file.read_text(encoding="ascii"), flags=re.MULTILINE)[1:]
                         for file in (stimuli, answers))  # fmt: skip
@@ -171,9 +173,9 @@ def break_frames(made: GeneratedSystem, source: random.Random, size: int, lanes:
     sent, wanted, errors = "", "", 0
     for number, (frame, answer) in enumerate(zip(frames, expected, strict=True)):
         data, shown = bytes.fromhex(frame), answer
-        if number % 3 == 0:
+        if number % 3 == 0 and in_header:
             data, shown, errors = data[: source.randrange(6, pixels - 2 * lanes)], "", errors + 1
-        elif number % 3 == 1:
+        elif number % 3 < 2:
             # Not among the beats that all blocks take before the last one has announced its image.
             data = data[: source.randrange(pixels + 100 * lanes, len(data) - lanes)]
             id_ = bytes.fromhex(answer)[0]

@@ -29,17 +29,22 @@ FIELDS = {
 
 
 @pytest.mark.one_in(30, 10)
+@pytest.mark.parametrize("is_part", [False, True], ids=["whole", "part"])
 @pytest.mark.parametrize("tool", ["ghdl", "icarus", "verilator"])
 @pytest.mark.parametrize("message", FIELDS)
-def test_one_field_is_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, message: str, tool: str) -> None:
+def test_one_field_is_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, message: str, tool: str, is_part: bool
+) -> None:
+    """The accelerator has all fields, or only the two; the others then pass by."""
     if not shutil.which({"icarus": "iverilog"}.get(tool, tool)):
         pytest.skip(f"no {tool}")
     monkeypatch.chdir(tmp_path)
     for name in ("HOME", "XDG_CONFIG_HOME"):
         monkeypatch.setenv(name, str(tmp_path))
     monkeypatch.setenv("FUSESOC_CORES", "")
-    assert main(["init", "change", "--in", message, "--out", message]) == 0
     changed, source = FIELDS[message]
+    options = ["--include", changed, "--include", source] if is_part else ["--out", message]
+    assert main(["init", "change", "--in", message, *options]) == 0
     # One line of the skeleton is changed, and one is added to the model.
     _edit("change/rtl/change.vhd", rf"out_{_port(changed)} <= .*", f"out_{_port(changed)} <= in_{_port(source)};")
     _edit("change/model.py", r"    return ", f"    answer{_place(changed)} = message{_place(source)}\n    return ")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -413,6 +414,36 @@ def test_what_the_store_has_is_answered_in_the_process_of_fusesoc(project: Path,
     assert build(project, *arguments, PATH=path, FUSESOC_FIRM_PYTHON=str(calls.parent / "python3"))[0] == 0
     assert calls.read_text().split().count("firm_generator.py") >= 2
     assert hasattr(edalizer, "Launcher") and hasattr(edalizer, "Core2Parser")
+
+
+UPSTREAM = REPOSITORY / "docs" / "upstream" / "fusesoc-generators.patch"
+SEAM = """\
+from fusesoc import edalizer, utils
+from fusesoc.capi2 import coreparser
+from fusesoc_firm.building.process import save_time
+save_time(lambda line, start: print("asked", *line) or start())
+assert edalizer.Launcher is utils.Launcher and edalizer.Core2Parser is coreparser.Core2Parser
+edalizer.Ttptttg.launcher("echo", ["started"], cwd=".").run()
+"""
+
+
+@pytest.mark.skipif(not shutil.which("patch"), reason="patch is not installed")
+def test_fusesoc_with_our_change_needs_no_replaced_names(project: Path, calls: Path, tmp_path: Path) -> None:
+    """The change that we propose to FuseSoC applies to the installed release, and gives `firm build` its seam."""
+    package = Path(edalizer.__file__).parent
+    shutil.copytree(package, tmp_path / "changed" / "fusesoc", ignore=shutil.ignore_patterns("__pycache__"))
+    subprocess.run(["patch", "-p1", "-i", UPSTREAM], cwd=tmp_path / "changed", check=True, capture_output=True)
+    paths = {"PYTHONPATH": f"{tmp_path / 'changed'}:{REPOSITORY}"}
+    done = subprocess.run(
+        [sys.executable, "-c", SEAM], env={**os.environ, **paths}, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["asked", "echo", "started", "started"]
+    arguments = ("one", "--target", "sim", "good", "--setup")
+    for _ in range(2):
+        calls.write_text("")
+        status, *_ = build(project, *arguments, PATH=f"{calls.parent}:{os.environ['PATH']}", **paths)
+        assert status == 0
+    assert calls.read_text().split() == ["actor.py"]
 
 
 def test_many_instances_are_generated_before_fusesoc_asks(project: Path, calls: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -10,8 +11,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -23,6 +25,7 @@ from fusesoc_firm.action.tree import tree_of
 from fusesoc_firm.store.server import Server
 from fusesoc_firm.store.store import Store
 from fusesoc_firm.tools.library_path import library_root
+from tests.certificates import needs_openssl, tls_files, write_certificates
 from tests.hdl.ghdl import REPOSITORY
 from tests.house.test_build import wait_until
 from tests.store.test_remote import SECRET, served
@@ -409,21 +412,33 @@ def apart(folder: Path, scheduler: str) -> list[str]:
 @pytest.fixture
 def machines(tmp_path: Path) -> Iterator[str]:
     """Two workers in namespaces that share no folder but the installation; yield the scheduler's address."""
+    with workers_apart(tmp_path, "tcp://") as address:
+        yield address
+
+
+@contextmanager
+def workers_apart(folder: Path, protocol: str, security: Any = None) -> Iterator[str]:
+    """Start the workers of `machines`, with the environment of this process."""
     distributed = pytest.importorskip("distributed", reason="no distributed; make test installs it")
     with (
         ExitStack() as stack,
         distributed.LocalCluster(
-            n_workers=0, host="127.0.0.1", protocol="tcp://", dashboard_address=":0", processes=False
+            n_workers=0,
+            host="127.0.0.1",
+            protocol=protocol,
+            dashboard_address=":0",
+            processes=False,
+            security=security,
         ) as cluster,
     ):
         for number in range(2):
             own = {
-                "FUSESOC_FIRM_CACHE": f"{tmp_path}/own/{number}",
+                "FUSESOC_FIRM_CACHE": f"{folder}/own/{number}",
                 "PYTHONPATH": str(REPOSITORY),
-                "TMPDIR": str(tmp_path),
+                "TMPDIR": str(folder),
             }
             process = subprocess.Popen(
-                apart(tmp_path, cluster.scheduler_address),
+                apart(folder, cluster.scheduler_address),
                 cwd="/",
                 env={**os.environ, **own},
                 stderr=subprocess.DEVNULL,
@@ -472,6 +487,92 @@ def test_a_cluster_without_a_shared_folder(library: Path, machines: str) -> None
         running.send_signal(signal.SIGINT)
         assert running.wait() == 130
         wait_until(lambda: not simulations(library))
+
+
+@pytest.mark.check
+@pytest.mark.xdist_group("dask")
+@needs_openssl
+@pytest.mark.skipif(not can_sandbox(), reason="bwrap is not installed or not permitted")
+def test_a_cluster_behind_tls_without_a_shared_folder(
+    library: Path, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Scheduler, workers and command have certificates of one authority; without one, the command is refused."""
+    distributed = pytest.importorskip("distributed", reason="no distributed; make test installs it")
+    folder = tmp_path_factory.mktemp("certificates")
+    write_certificates(folder)
+    files = tls_files(folder, "node", "ca")
+    names = {
+        f"DASK_DISTRIBUTED__COMM__TLS__{name.replace('.', '__').replace('-', '_').upper()}": name for name in files
+    }
+    for variable, name in names.items():
+        monkeypatch.setenv(variable, files[name])
+    keys = {f"distributed.comm.tls.{name}": value for name, value in files.items()}
+    token = {"FUSESOC_FIRM_REMOTE_TOKEN": SECRET}
+    with (
+        importlib.import_module("dask").config.set(keys),
+        workers_apart(tmp_path, "tls://", distributed.Security(require_encryption=True)) as address,
+        served(Server(Store(library.parent / "server", 2**30), "127.0.0.1", 0, SECRET)) as url,
+    ):
+        assert address.startswith("tls://")
+        selected = ("acme:m:gate", "--target", "sim_icarus", "--cluster", address)
+        status, text = run(library, *selected, name="build", FUSESOC_FIRM_REMOTE=url, **token)
+        assert (status, results(text)) == (0, {"sim_icarus": "ok"}), text
+        assert "warning" not in text
+        assert os.access(library / "build" / "acme_m_gate_1.0" / "sim_icarus" / "acme_m_gate_1.0", os.X_OK)
+        for variable in names:
+            monkeypatch.delenv(variable)
+        status, text = run(library, *selected, name="build", FUSESOC_FIRM_REMOTE=url, **token)
+        assert (status, "requires distributed.comm.tls.ca-file" in text) == (1, True), text
+
+
+LOCKED = """\
+CAPI=2:
+name: acme:m:locked:1.0
+filesets: {base: {depend: ["robot:firm:generators", "acme:m:counter"]}}
+generate: {one: {generator: firm, parameters: {message: std_msgs/Header, ros: 2, width: 32}}}
+targets:
+  lint:
+    filesets: [base]
+    generate: [one]
+    toplevel: axis_to_std_msgs_header
+    flow: lint
+    flow_options: {tool: verilator, frontends: [ghdlsynth]}
+"""
+
+
+@pytest.mark.skipif(not can_sandbox(), reason="bwrap is not installed or not permitted")
+def test_two_machines_with_one_lock_give_the_same_bytes(library: Path, tmp_path: Path) -> None:
+    """The second machine has a copy of the project, lock file included, an empty store and its own temporary files."""
+    (library / "locked.core").write_text(LOCKED)
+    with (library / "fusesoc.conf").open("a") as conf:
+        conf.write(f"[library.firm]\nlocation = {library_root()}\n")
+    arguments = ("acme:m:locked", "--target", "lint", "--locked", "--build-only", "--cached")
+    status, text = run(library, "acme:m:locked", "--locked", name="lock")
+    assert (status, "locked.lock" in text) == (1, True), text
+    assert run(library, "acme:m:locked", name="lock")[0] == 0
+    second = tmp_path / "second"
+    shutil.copytree(library, second)
+    assert run(library, *arguments, name="build")[0] == 0
+    first = outputs(library)
+    assert any(path.suffix == ".v" for path in first)
+    shutil.rmtree(library / "build")
+    # At the same path, since GHDL's libraries contain it.
+    places = ("--ro-bind", "/", "/", "--dev", "/dev", "--proc", "/proc", "--tmpfs", "/tmp", "--bind")
+    done = subprocess.run(
+        ["bwrap", *places, str(second), str(library), "--unshare-net", *command(*arguments, name="build")],
+        cwd=library,
+        env=environment(library, FUSESOC_FIRM_CACHE=str(library / "store")),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, results(done.stdout)) == (0, {"lint": "ok"}), done.stdout + done.stderr
+    (second / "build").rename(library / "build")
+    assert outputs(library) == first
+    # Another file of a dependency is another build, which the lock does not accept.
+    (library / "counter" / "counter.vhd").write_text(FILES["counter/counter.vhd"] + "-- edited\n")
+    status, text = run(library, *arguments, name="build")
+    assert (status, "acme:m:counter" in text) == (1, True), text
 
 
 def simulations(library: Path) -> list[str]:

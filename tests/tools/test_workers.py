@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -20,6 +19,7 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools import workers
+from tests.certificates import needs_openssl, tls_files, write_certificates
 from tests.hdl.ghdl import REPOSITORY
 from tests.processes import IGNORING_INTERRUPTS
 
@@ -31,7 +31,6 @@ pytestmark = pytest.mark.xdist_group("dask")
 
 SMALL_BENCH = ("scheduler", "bench", "--requesters", "2,9", "--policies", "lru,lst", "--sets", "2", "--cycles", "500")
 
-needs_openssl = pytest.mark.skipif(not shutil.which("openssl"), reason="openssl is not installed")
 Captured = pytest.CaptureFixture[str]
 
 
@@ -130,49 +129,16 @@ def test_a_scheduler_that_ends() -> None:
 
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An authority, its certificate for all machines of a cluster, and another authority."""
     folder = tmp_path_factory.mktemp("certificates")
-    new_key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1"]
-    for name in ("ca", "other"):
-        command = [
-            "openssl",
-            "req",
-            "-x509",
-            *new_key,
-            "-keyout",
-            f"{name}.key",
-            "-out",
-            f"{name}.pem",
-            "-subj",
-            f"/CN={name}",
-        ]
-        subprocess.run(command, cwd=folder, check=True, capture_output=True)
-    for name, authority in (("node", "ca"), ("stranger", "other")):
-        request = ["openssl", "req", *new_key, "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj", f"/CN={name}"]
-        subprocess.run(request, cwd=folder, check=True, capture_output=True)
-        sign = [
-            "openssl",
-            "x509",
-            "-req",
-            "-in",
-            f"{name}.csr",
-            "-CA",
-            f"{authority}.pem",
-            "-CAkey",
-            f"{authority}.key",
-        ]
-        sign += ["-CAcreateserial", "-out", f"{name}.pem", "-days", "1"]
-        subprocess.run(sign, cwd=folder, check=True, capture_output=True)
+    write_certificates(folder)
     return folder
 
 
 def _configuration(folder: Path, name: str, authority: str) -> Any:
     """Dask's configuration, from one file that is the same on every machine of a cluster."""
-    tls = {"ca-file": str(folder / f"{authority}.pem")}
-    for role in ("client", "scheduler", "worker"):
-        tls |= {f"{role}.cert": str(folder / f"{name}.pem"), f"{role}.key": str(folder / f"{name}.key")}
     dask: Any = importlib.import_module("dask")
-    return dask.config.set({f"distributed.comm.tls.{key}": value for key, value in tls.items()})
+    files = tls_files(folder, name, authority)
+    return dask.config.set({f"distributed.comm.tls.{key}": value for key, value in files.items()})
 
 
 @pytest.fixture(scope="module")

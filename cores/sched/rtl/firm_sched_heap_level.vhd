@@ -188,7 +188,9 @@ begin
   first_rank   <= rank(first, not fill_r and id_r(SIDE));
   second_rank  <= rank(second, second_right);
   second_first <= is_before(second_rank, first_rank);
-  takes_second <= second(NODE_BITS-1) and (second_first or not first(NODE_BITS-1));
+  -- The comparison is the last to arrive. An INSERT has an item, so only a FILL may find the first one empty.
+  takes_second <= (second_first and second(NODE_BITS-1)) or
+                  (fill_r and right(NODE_BITS-1) and not left(NODE_BITS-1));
 
   hand_up : process (left, right, takes_second, id_r)
     variable smaller : node_t;

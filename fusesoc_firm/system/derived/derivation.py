@@ -18,6 +18,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.derived.bypass import with_bypass
 from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.connections import Wiring, places
 from fusesoc_firm.system.derived.cpp_function import check_kernel
@@ -188,9 +189,10 @@ class _Analysis:
             sources = [self.folder / source for source in accelerator.sources]
             width = accelerator.width or self.specification.project.width
             found = AcceleratorType(accelerator, inputs, outputs, width, declares_width(accelerator, sources))
+            found = with_bypass(found, self.faults)
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
-                check_kernel(found, self.faults)
+                check_kernel(found.own, self.faults)
             if accelerator.is_software and accelerator.sources:
                 check_function(found, sources[0], self.faults)
             check_pins(found, self.faults)

@@ -45,7 +45,9 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
         if accelerator.accelerator.type != "HLS" and identifier(name) != name:
             hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
             faults.error(
-                f"'{name}' is not a legal {'module' if accelerator.is_component else 'entity'} name", name.source, hint
+                f"'{name}' is not a legal {'module' if accelerator.own.is_component else 'entity'} name",
+                name.source,
+                hint,
             )
         for entity in _entities(accelerator):
             if owner := owners.get(entity.lower()):
@@ -64,5 +66,7 @@ def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
 
 def _entities(accelerator: AcceleratorType) -> Iterator[str]:
     yield accelerator.entity
+    if accelerator.inner:
+        yield accelerator.inner.entity
     if accelerator.accelerator.type == "HLS":
         yield kernel_entity(accelerator)

@@ -128,18 +128,29 @@ class MessageSide:
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with resolved messages and `width`-bit streams; with `has_width`, WIDTH sets the width."""
+    """An accelerator with resolved messages and `width`-bit streams; with `has_width`, WIDTH sets the width.
+
+    If only a part of its message is the user's, `inner` is the user's accelerator.
+    """
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
     outputs: tuple[MessageSide, ...]
     width: int
     has_width: bool = False
+    inner: AcceleratorType | None = None
+
+    @property
+    def own(self) -> AcceleratorType:
+        """The user's accelerator."""
+        return self.inner or self
 
     @property
     def entity(self) -> str:
-        """The unit that the top level instantiates: the user's entity or module, or the wrapper of a C++ function."""
+        """The unit that the top level instantiates: the user's entity or module, or a unit around it."""
         name = identifier(self.accelerator.name)
+        if self.inner:
+            return f"{name}_bypass"
         return f"{name}_wrapper" if self.accelerator.type == "HLS" else name
 
     @property
@@ -150,7 +161,7 @@ class AcceleratorType:
     @property
     def is_component(self) -> bool:
         """Whether the top level declares the unit as a component, since a Verilog module is not an entity."""
-        return self.accelerator.type == "Verilog"
+        return self.accelerator.type == "Verilog" and self.inner is None
 
 
 @dataclass(frozen=True)
@@ -380,7 +391,7 @@ class DerivedSystem:
     @property
     def kernels(self) -> tuple[AcceleratorType, ...]:
         """The C++ accelerators that an HLS tool turns into hardware."""
-        return tuple(type_ for type_ in self.accelerator_types if type_.accelerator.type == "HLS")
+        return tuple(type_.own for type_ in self.accelerator_types if type_.accelerator.type == "HLS")
 
     @property
     def accelerator_types(self) -> tuple[AcceleratorType, ...]:

@@ -78,6 +78,7 @@ class Project:
     """The answers that determine a new project; `width` is in bits.
 
     The topics are the names of the blocks if they are empty. Without `stimuli`, the project has examples of its own.
+    With `include`, the accelerator has only these fields of its message, and the others pass.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Project:
     input_topic: str = ""
     output_topic: str = ""
     stimuli: RecordedStimuli | None = None
+    include: tuple[str, ...] = ()
 
 
 def name_fault(name: str) -> str | None:
@@ -157,6 +159,8 @@ def create(project: Project, folder: Path, known: Libraries, library: Path, path
     """
     if fault := name_fault(project.name):
         fail(fault)
+    if project.include and (project.input != project.output or LANGUAGES[project.language].type == SOFTWARE):
+        fail("fields can only pass between equal messages, and not by software", hint="omit --out, or omit --include")
     with new_folder(folder) as inner:
         _write_all(project, inner, known, [os.path.relpath(path, folder) for path in paths])
         write_surroundings(inner, project.name, library)
@@ -238,13 +242,14 @@ def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame
         accelerators = [first | {"output": project.input, "length": [] if taken.is_fixed_size else ["given"]}]
         length: list[str] = []
     else:
-        length, buffer = _length(taken, given, longest)
+        length, buffer = ([], []) if project.include else _length(taken, given, longest)
     accelerators.append(own | {"output": project.output, "length": length, "next": _PUBLISHER, "buffer": []})
     return {
         "name": project.name,
         "input": project.input,
         "output": project.output,
         "middleware": ros.words[0],
+        "include": list(project.include),
         "width": [project.width] if project.width != Project.width else [],
         "accelerators": accelerators,
         "subscriber": _SUBSCRIBER,

@@ -71,7 +71,7 @@ def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
         paths = [folder / source for source in type_.accelerator.sources]
         # Software in another program has no sources.
         if paths and not any(path.exists() for path in paths):
-            texts[paths[0]] = skeleton(type_)
+            texts[paths[0]] = skeleton(type_.own)
     return texts
 
 
@@ -127,15 +127,19 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
     wires = wires_of(type_)
     gives = [_given(number, side, of_side[side.prefix], wires[number]) for number, side in enumerate(type_.outputs)]
     pairs = zip(type_.outputs, wires, strict=True)
+    takes = [side.prefix for side in type_.inputs]
     forwards = next((_forwards(type_, side, item) for side, item in pairs if item.carrier), None)
     return {
         **own,
         "entity": identifier(type_.accelerator.name),
         "sides": _declarations(type_, of_side, pins, language),
-        "takes": [side.prefix for side in type_.inputs],
+        "takes": takes,
         "output_count": max(1, len(type_.outputs)),
         "gives": gives,
         "forwards": forwards,
+        # A single output that is not forwarded needs no memory of what has been sent.
+        "single": {"ready": gives[0]["ready"], "takes": takes} if len(gives) == 1 and not forwards else None,
+        "has_several": len(gives) != 1 and not forwards,
         "counts": [count for given in gives for count in given["counts"]],
         "discards": _discards(type_.inputs, of_side, {name for item in wires for name in item.ready}),
         "pins": [{"port": str(pin.name), "bits": pin.bits} for pin in pins if pin.direction == "out"],

@@ -46,6 +46,7 @@ NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
 # What a subscriber's full queue does with a further frame.
 BLOCK, DROP_NEWEST, DROP_OLDEST = OVERFLOWS = ("block", "drop_newest", "drop_oldest")
+PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 # Whether the top level has a synchroniser after an input pin, or a FIFO after a publisher.
@@ -173,6 +174,9 @@ class OutputType(InterfaceType):
     """A message that an accelerator sends."""
 
     length: Text | None = key("source of the payload's length, if the size is variable", choices=LENGTHS)
+    others: Text | None = key(
+        "pass: the fields that are not selected are those of the input, which has the same message", choices=(PASS,)
+    )
 
 
 @dataclass(frozen=True)
