@@ -36,6 +36,8 @@ DOCS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # Programs other than Python that tests run.
+EMULATION_TOOLS := qemu-system-arm arm-none-eabi-gcc:gcc-arm-none-eabi \
+  /usr/lib/arm-none-eabi/include/string.h:libnewlib-arm-none-eabi
 TEST_TOOLS := bwrap:bubblewrap ccache iverilog strace verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET))) $(if $(SEED),--seed $(SEED)) \
@@ -65,7 +67,8 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 	@./.ci/install-tools $(subst icarus,iverilog,$(patsubst sim_%,%,$(filter sim_%,$(TARGET)))) >/dev/null
 	@$(BIN)/firm sim $(SYSTEM) $(SIM_FLAGS)
 
-test check: TOOLS = $(TEST_TOOLS)
+test: TOOLS = $(TEST_TOOLS)
+check: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS)
 test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 

@@ -8,21 +8,23 @@
 # * In the user's cache, it leaves a note of each program: what goes into the manifest, and the files that decide that.
 #   While these are unchanged, other builds take the note.
 #
-# What was built here, such as ./Vtop, is started from here, and so is everything if no Python has the package.
+# What was built here, such as ./Vtop, and mkdir, which is no tool of a build, are started from here, and so is
+# everything if no Python has the package.
 program=$1
 case $program in
-  */*) exec "$@" ;;
+  mkdir | */*) exec "$@" ;;
 esac
 
 noted=.firm_noted/$program
-if [ -s manifest.json ] && [ "$noted" -nt Makefile ] && read -r path <"$noted" &&
-  [ "$path" = "$(command -v "$program")" ] &&
+found=$(command -v "$program")
+if [ -s manifest.json ] && [ "$noted" -nt Makefile ] && read -r path <"$noted" && [ "$path" = "$found" ] &&
   [ "$(find -L "$path" ! -cnewer "$noted" 2>/dev/null)" = "$path" ]; then
   exec "$@"
 fi
 
-# Print what decides in which Python the package is found: variables, and how FuseSoC, above make, was started.
-environment_of_build() {
+# Set `environment` to what decides in which Python the package is found: variables, and how FuseSoC, above make, was
+# started.
+read_environment() {
   process=$PPID
   while read -r _ name _ above _ <"/proc/$process/stat"; do
     case $name in
@@ -30,13 +32,12 @@ environment_of_build() {
       *) break ;;
     esac
   done
-  words=$(tr '\0' '\n' <"/proc/$process/cmdline" | sed 2q) && [ -n "$words" ] || return
+  words=$(tr '\0\n' '\n ' <"/proc/$process/cmdline" | sed 'N; s/\n/ /; q') && [ -n "$words" ] || return
   case $words in
-    /*"
-/"*) ;;
+    /*' /'*) ;;
     *) words="$words $(readlink "/proc/$process/cwd")" || return ;;
   esac
-  echo "$PATH $PYTHONPATH $FUSESOC_FIRM_PYTHON" "$words" | tr '\n' ' '
+  environment="$PATH $PYTHONPATH $FUSESOC_FIRM_PYTHON $words"
 }
 
 # Add the entries of a note to the manifest, which is locked.
@@ -54,7 +55,7 @@ add_to_manifest() {
       for (i = 1; i <= count; i++) print text[names[i]] (i < count ? "," : "")
       print "  }\n}"
     }' "$manifest" "$note" >manifest.part || return
-  cmp -s manifest.part manifest.json && rm manifest.part || mv manifest.part manifest.json
+  if [ -s manifest.json ] && cmp -s manifest.part manifest.json; then rm manifest.part; else mv manifest.part manifest.json; fi
 }
 
 # Take the user's note of the program. Fail unless it holds here. Its lines: the environment, the package's folder,
@@ -66,18 +67,19 @@ take_note() {
     IFS= read -r known && IFS= read -r package
     while IFS= read -r line && [ -n "$line" ]; do set -- "$@" "$line"; done
   } <"$note"
-  [ "$known" = "$environment" ] && [ "$1" = "$(command -v "$program")" ] || return
+  [ "$known" = "$environment" ] && [ "$1" = "$found" ] || return
   newer=$(find "$@" -maxdepth 0 -cnewer "$note" 2>&1; find "$package" -name __pycache__ -prune -o -cnewer "$note" -print 2>&1)
-  [ -z "$newer" ] && mkdir -p .firm_noted && (flock 9 && add_to_manifest) 9<. && echo "$1" >"$noted"
+  [ -z "$newer" ] && { [ -d .firm_noted ] || mkdir .firm_noted; } && (flock 9 && add_to_manifest) 9<. && echo "$1" >"$noted"
 }
 
 # Outputs that must be removed after a failure, see the package's launcher.
 note=
+environment=
 case " $* " in
   *' --asc '* | *' --textcfg '* | *' --write '*) ;;
   *)
     cache=${FUSESOC_FIRM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/fusesoc_firm}
-    if environment=$(environment_of_build 2>/dev/null); then
+    if read_environment 2>/dev/null; then
       note=$cache/programs/$program
       take_note 2>/dev/null && exec "$@"
     fi

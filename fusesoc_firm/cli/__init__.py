@@ -14,6 +14,7 @@ from fusesoc_firm import __version__
 from fusesoc_firm.cli.build import add_build
 from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
+from fusesoc_firm.cli.emulate import add_emulate
 from fusesoc_firm.cli.init import add_init
 from fusesoc_firm.cli.live import add_live
 from fusesoc_firm.cli.message import add_message
@@ -37,7 +38,7 @@ from fusesoc_firm.tools.library_path import demos_root, docs_root, library_root
 # The commands of `firm --help`; commands that are not listed here follow as 'more'.
 GROUPS = {
     "start": ("init", "system"),
-    "run": ("sim", "live", "replay"),
+    "run": ("sim", "live", "replay", "emulate"),
     "look": ("message", "trace", "why", "graph"),
     "build": ("build", "test", "query", "affected", "lock", "cache", "path"),
 }
@@ -108,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     add_message(commands)
     add_system(commands)
     add_simulator(commands)
+    add_emulate(commands)
     add_live(commands)
     add_ros(commands)
     add_status(commands)

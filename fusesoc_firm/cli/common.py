@@ -93,6 +93,13 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
     return loaded
 
 
+def coloured(text: str, *, is_good: bool) -> str:
+    """Return a text in green or red for a terminal, and unchanged for a file or if `NO_COLOR` is set."""
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return text
+    return f"\033[{32 if is_good else 31}m{text}\033[0m"
+
+
 def print_warnings(warnings: Iterable[Diagnostic]) -> None:
     """Print warnings on standard error."""
     for warning in warnings:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import check_sources, command, core_folders, natural, print_warnings
+from fusesoc_firm.cli.common import check_sources, coloured, command, core_folders, natural, print_warnings
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.outputs import shown
 
@@ -79,7 +79,7 @@ def _sim(arguments: argparse.Namespace) -> None:
         print(f"log:   {shown(chosen.build.log)}")
         if chosen.waves:
             print(f"waves: {shown(chosen.waves)}")
-    print(report.verdict, flush=True)
+    print(coloured(report.verdict, is_good=report.is_good), flush=True)
     if not report.is_good or report.status:
         sys.exit(1)
 
@@ -189,7 +189,9 @@ def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | Non
 
     print(f"{chosen.build.core} in {SIMULATORS[chosen.simulator].title}, {report.title}")
     _print_messages(report)
-    for line in (*_with_fields(chosen, report.faults, loaded), *report.summary):
+    for line in _with_fields(chosen, report.faults, loaded):
+        print(coloured(line, is_good=False))
+    for line in report.summary:
         print(line)
 
 

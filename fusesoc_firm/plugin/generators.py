@@ -141,6 +141,13 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
             Parameter("product", "str", "the product to generate", "system", choices=("system", "simulation", "live")),
             Parameter("board", "str", "the name of a supported board, or a YAML file relative to the core"),
+            Parameter(
+                "interconnect",
+                "str",
+                "the connection to the host, instead of the specification's",
+                choices=("axi_stream", "uart", "spi"),
+            ),
+            Parameter("clock", "str", "the frequency of clk, such as 10 MHz, instead of the specification's"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
             Parameter("model", "str", "a Python file with a function that computes the system's responses"),
             Parameter(

@@ -74,12 +74,17 @@ class BuiltSimulator:
 
 
 def build_simulator(
-    spec: Path, tool: str | None = None, *, build_root: Path | None = None, sources: CoreSources | None = None
+    spec: Path,
+    tool: str | None = None,
+    *,
+    build_root: Path | None = None,
+    sources: CoreSources | None = None,
+    target: str = "",
 ) -> BuiltSimulator:
     """Build a simulator of a specification's system, or rebuild the changed parts. May raise `InputError`.
 
     All systems and tools share `build_root`, by default a folder in the user's cache. `sources` applies only if no core
-    beside the specification names the specification.
+    beside the specification names the specification. `target` is another target than that of live simulations.
     """
     tool = tool or default_simulator(is_live=True)
     _live(tool)
@@ -88,19 +93,20 @@ def build_simulator(
     if absent := missing(dict.fromkeys([*simulation_programs(tool), "make"])):
         fail(f"missing programs: {', '.join(absent)}", hint="; ".join(ways(program) for program in absent))
     spec = spec.resolve()
-    folder = _build_folder(spec, tool, build_root or Path(default_root()) / "simulators")
+    folder = _build_folder(spec, target or tool, build_root or Path(default_root()) / "simulators")
+    target = target or ("live" if tool == default_simulator(is_live=True) else f"live_{tool}")
     with locked(folder):
         core = core_of(spec) or _write_core(spec, folder / "core", sources or CoreSources())
         work = folder / "work"
         is_new = not work.exists()
         try:
-            _build(spec, core, tool, work)
+            _build(spec, core, (target, tool), work)
         except InputError:
             if is_new:
                 raise
             # FuseSoC's list of libraries may refer to deleted files.
             shutil.rmtree(work)
-            _build(spec, core, tool, work)
+            _build(spec, core, (target, tool), work)
         return BuiltSimulator(tool, work, tuple(_words(work, tool)))
 
 
@@ -121,10 +127,10 @@ def _write_core(spec: Path, folder: Path, sources: CoreSources) -> CoreFile:
     return read_core(core)
 
 
-def _build_folder(spec: Path, tool: str, root: Path) -> Path:
-    """Return a separate folder for each specification and tool, whose name includes the specification's name."""
+def _build_folder(spec: Path, purpose: str, root: Path) -> Path:
+    """Return a separate folder for each specification and purpose, whose name includes the specification's name."""
     digest = hashlib.sha256(str(spec).encode()).hexdigest()[:12]
-    folder = root.absolute() / f"{_short_name(spec)}-{digest}-{tool}"
+    folder = root.absolute() / f"{_short_name(spec)}-{digest}-{purpose}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -137,9 +143,9 @@ def _short_name(spec: Path) -> str:
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", spec.stem).lstrip("-")[:60]
 
 
-def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
+def _build(spec: Path, core: CoreFile, target_and_tool: tuple[str, str], work: Path) -> None:
     """Set up the target with FuseSoC, and run make."""
-    targets, target = core.section("targets"), "live" if tool == default_simulator(is_live=True) else f"live_{tool}"
+    targets, (target, tool) = core.section("targets"), target_and_tool
     if target not in targets:
         fail(f"{core.path} has no target '{target}'", hint=f"run 'firm system core {spec}' to add the target")
     made_with = targets[target].get("flow_options", {}).get("tool", tool)

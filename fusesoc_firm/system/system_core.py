@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property, partial
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
@@ -61,6 +62,7 @@ from fusesoc_firm.system.written.specification import Accelerator, Specification
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
+from fusesoc_firm.text.yaml_text import Text
 
 # FuseSoC's file types by suffix, and the suffixes of files that are not compiled separately.
 _FILE_TYPES = {
@@ -71,6 +73,8 @@ _FILE_TYPES = {
     ".sv": "systemVerilogSource",
     ".svh": "systemVerilogSource",
 }
+# Parameters of a call that replace keys of the project.
+_REPLACING = ("interconnect", "clock")
 _INCLUDE_SUFFIXES = (".vh", ".svh")
 # Hz. Without register slices, a system in which messages of variable size are passed through reaches 99 MHz on an ECP5.
 _SLICED_ABOVE = 100 * 10**6
@@ -111,29 +115,32 @@ class LoadedSystem:
         return list(dict.fromkeys(found))
 
 
+def _unchanged(specification: Specification) -> Specification:
+    return specification
+
+
 def load_system(
     path: Path,
     libraries: Mapping[Middleware, MessageLibrary],
     *,
     needs_sources: bool = True,
-    board: Board | None = None,
+    changed: Callable[[Specification], Specification] = _unchanged,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """Read a specification and derive its system, optionally for a board; raise `InputError` with all faults.
+    """Read a specification and derive its system; raise `InputError` with all faults.
 
-    Missing source files of accelerators are an error only if `needs_sources` is set. Messages in the `paths` of the
-    specification take precedence over messages in `libraries`.
+    The system is that of the `changed` specification, such as for a board. Missing source files of accelerators are an
+    error only if `needs_sources` is set. Messages in the `paths` of the specification take precedence over messages in
+    `libraries`.
     """
     faults = Diagnostics()
-    specification = read_specification(path, str(path), faults)
-    if board:
-        specification = on_board(specification, board)
+    specification = changed(read_specification(path, str(path), faults))
     own = {str(item): item.source for item in specification.paths}
     spoken = {MIDDLEWARES[word] for word in specification.middlewares if word in MIDDLEWARES} or {*libraries}
     needed = Libraries({ros: partial(libraries.__getitem__, ros) for ros in libraries if ros in spoken})
     libraries = with_paths(needed, own, path.parent, core_folders, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
-    return LoadedSystem(specification, path.parent, libraries, system, board, faults.warnings)
+    return LoadedSystem(specification, path.parent, libraries, system, None, faults.warnings)
 
 
 def with_paths(
@@ -167,12 +174,21 @@ def with_paths(
 
 def load_requested(request: Request) -> LoadedSystem:
     """Return the system of a generator call."""
-    return load_system(
+    board = _board(request)
+    given = {name: str(value) for name in _REPLACING if (value := request.parameters.get(name))}
+    loaded = load_system(
         specification_path(request),
         libraries(*library_sources(request)),
-        board=_board(request),
+        changed=lambda written: with_keys(on_board(written, board) if board else written, given),
         core_folders=request.message_folders.of,
     )
+    return replace(loaded, board=board)
+
+
+def with_keys(specification: Specification, values: Mapping[str, str]) -> Specification:
+    """Return the specification with other values of some of the project's keys."""
+    texts: dict[str, Any] = {name: Text(value) for name, value in values.items()}
+    return replace(specification, project=replace(specification.project, **texts))
 
 
 def specification_path(request: Request) -> Path:

@@ -47,7 +47,7 @@ def launch(program: str, arguments: Sequence[str], user_note: Path | None = None
     status = _run([str(path), *arguments])
     entries = note(program, Path())
     # A program beside the interpreter depends on this Python.
-    if user_note and shutil.which(program) and path.is_absolute():
+    if user_note and entries and shutil.which(program) and path.is_absolute():
         note_for_other_builds(user_note, environment, path, entries, started)
     if status:
         for option, value in pairwise(arguments):

@@ -1,6 +1,6 @@
 """Time of `firm test` and `firm build --cached` if nothing has changed, on one machine and on a second one.
 
-Also the cost of a sandbox for steps that run.
+Also the cost of a sandbox for steps that run, and times beside plain `fusesoc run`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.store.server import Server
 from fusesoc_firm.store.store import Store
 from fusesoc_firm.tools.library_path import demos_root, library_root
+from tests.bench import beside_fusesoc as beside
 from tests.bench.store import APPLICATIONS
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
@@ -87,7 +88,12 @@ JOBS = (
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
-    return {TITLE: [(job.name, state) for job in JOBS for state in job.states], SANDBOX_TITLE: [_SANDBOX_KEY]}
+    return {
+        TITLE: [(job.name, state) for job in JOBS for state in job.states],
+        SANDBOX_TITLE: [_SANDBOX_KEY],
+        beside.LAUNCHER_TITLE: [beside.LAUNCHER_KEY],
+        beside.FOREIGN_TITLE: [*beside.foreign_keys()],
+    }
 
 
 def measure(tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
@@ -109,7 +115,25 @@ def measure(tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
         with tempfile.TemporaryDirectory() as place:
             sandbox[_SANDBOX_KEY] = (*_SANDBOX_KEY, *_sandbox_cells(Path(place), tell))
     row = sandbox.get(_SANDBOX_KEY, (*_SANDBOX_KEY, *[""] * 4, NOT_MEASURED))
-    return [*tables, Table(SANDBOX_TITLE, _SANDBOX_COLUMNS, (row,), _SANDBOX_NOTE)]
+    tables.append(Table(SANDBOX_TITLE, _SANDBOX_COLUMNS, (row,), _SANDBOX_NOTE))
+    return [*tables, _launcher_table(tell, written, pattern), _foreign_table(tell, written, pattern)]
+
+
+def _launcher_table(tell: Tell, written: str, pattern: str) -> Table:
+    title, columns, key = beside.LAUNCHER_TITLE, beside.LAUNCHER_COLUMNS, beside.LAUNCHER_KEY
+    known = known_rows(written, title, columns)
+    if re.search(pattern, title):
+        known[key] = (*key, *beside.launcher_cells(tell))
+    return Table(title, columns, (known.get(key, (*key, *[""] * 4, NOT_MEASURED)),), beside.LAUNCHER_NOTE)
+
+
+def _foreign_table(tell: Tell, written: str, pattern: str) -> Table:
+    title, columns = beside.FOREIGN_TITLE, beside.FOREIGN_COLUMNS
+    known = known_rows(written, title, columns)
+    if re.search(pattern, title):
+        known |= beside.foreign_rows(tell)
+    rows = tuple(known.get(key, (*key, *[""] * 5, NOT_MEASURED)) for key in beside.foreign_keys())
+    return Table(title, columns, rows, beside.FOREIGN_NOTE)
 
 
 def _sandbox_cells(folder: Path, tell: Tell) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import pytest
 from fusesoc_firm.building.plan import Build
 from fusesoc_firm.building.simulation import Simulation
 from fusesoc_firm.cli import main
+from fusesoc_firm.cli.common import coloured
 from fusesoc_firm.cli.sim import _print_errors, _telling
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import artifacts
@@ -81,3 +82,14 @@ def test_a_violated_rule_of_a_stream_is_told(capsys: Captured) -> None:
     build.log.write_text(f"seed 1, stalls\n{rule}\nghdl:error: assertion failed\n", encoding="utf-8")
     _print_errors(Simulation(Path("img/img.core"), build, "ghdl", (), None), None, None)
     assert capsys.readouterr().err.splitlines()[0] == rule
+
+
+def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    assert coloured("PASS", is_good=True) == "PASS"
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert coloured("PASS", is_good=True) == "\033[32mPASS\033[0m"
+    assert coloured("FAIL", is_good=False) == "\033[31mFAIL\033[0m"
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert coloured("FAIL", is_good=False) == "FAIL"

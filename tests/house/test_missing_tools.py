@@ -29,6 +29,7 @@ SAID = {
     "sim_verilator": [GHDL, VERILATOR, f"g++: {APT} g++"],
     "live": [f"{APT} ghdl"],
     "live_verilator": [GHDL, VERILATOR, f"g++: {APT} g++"],
+    "emulate": [GHDL, VERILATOR, f"g++: {APT} g++"],
     "lint": [GHDL, VERILATOR],
     **{f"synth_{family}": SYNTHESIS for family in ("xilinx", "ecp5", "ice40", "gowin")},
     "icebreaker": [

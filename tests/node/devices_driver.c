@@ -232,7 +232,10 @@ void firm_cache_invalidate(const volatile void *memory, size_t size) {
     memcpy(cached.bytes + place, real.bytes + place, size);
 }
 
-uint32_t firm_bus_address(const volatile void *memory) { return BUS_BASE + (uint32_t)cached_place(memory, 0); }
+uint64_t firm_bus_address(const volatile void *memory) {
+    const uint64_t further = strcmp(fault, "high") == 0 ? (uint64_t)1 << 32 : strcmp(fault, "border") == 0 ? 0xEFFFFFC0u : 0;
+    return BUS_BASE + further + cached_place(memory, 0) + (strcmp(fault, "unaligned") == 0);
+}
 
 void firm_lock(firm_lock_t *lock) { (void)lock; }
 void firm_unlock(firm_lock_t *lock) { (void)lock; }
@@ -244,7 +247,7 @@ void firm_pause(void) { now += strcmp(fault, "frozen") != 0; }
 static uint8_t frame[LONGEST_STREAM], burst[LONGEST_STREAM];
 
 static int play_dma(char **words) {
-    static const char *const names[] = {"ok", "nothing", "burst", "too_long", "stuck", "no_sg", "error"};
+    static const char *const names[] = {"ok", "nothing", "burst", "too_long", "stuck", "no_sg", "error", "memory"};
     const int count = atoi(words[0]);
     const unsigned longest = (unsigned)atoi(words[1]);
     firm_dma_status_t status;

@@ -181,10 +181,25 @@ def test_frames_go_through_the_dma_and_back(devices: Driver, longest: int) -> No
         ("reset", "stuck 0 1 1"),
         # The same while nothing counts the ticks.
         ("frozen", "stuck 0 1 1"),
+        # Memory beyond 4 GiB, across this border, and at an odd address.
+        ("high", "memory 0 0 0"),
+        ("border", "memory 0 0 0"),
+        ("unaligned", "memory 0 0 0"),
     ],
 )
 def test_errors_of_the_dma_are_told(devices: Driver, fault: str, answer: str) -> None:
     assert devices.answers([], "dma", "100", "2000", "1", fault, "7") == [answer]
+
+
+@pytest.mark.parametrize("size", [2**26, 2**26 - 1, 0])
+def test_buffers_that_no_descriptor_can_have_are_not_compiled(size: int) -> None:
+    """A length has 26 bits; beyond them, it would change the marks of a frame's begin and end."""
+    folders = [f"-I{C_FOLDER / name}" for name in ("firm", "ports/bare_metal")]
+    command = ["gcc", "-std=c99", "-fsyntax-only", *folders, f"-DFIRM_DMA_BUFFER_BYTES={size}"]
+    command.append(str(C_FOLDER / "firm" / "firm_dma.c"))
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "firm_dma_buffers_" in done.stderr
 
 
 def test_frames_come_from_the_uart(devices: Driver) -> None:

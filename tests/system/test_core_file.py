@@ -17,7 +17,7 @@ from tests.system.systems import accelerator, converter, derived, instance, spec
 SPECS = Path(__file__).resolve().parents[2] / "specs"
 CORES = sorted(SPECS.glob("*/*.core"))
 SYNTHESIS = {*(f"synth_{family}" for family in ("xilinx", "ecp5", "ice40", "gowin")), *boards()}
-SIMULATION = {"sim", "sim_icarus", "sim_verilator", "live", "live_verilator"}
+SIMULATION = {"sim", "sim_icarus", "sim_verilator", "live", "live_verilator", "emulate"}
 
 
 def blocks() -> str:

@@ -189,9 +189,12 @@ def test_python_is_started_where_a_failure_has_to_be_cleaned_up_after(alone: Pat
         assert not (build / "system.asc").exists()
 
 
-def test_what_was_built_is_started_by_the_shell(build: Path) -> None:
+def test_what_was_built_and_mkdir_are_started_by_the_shell(alone: Path, build: Path) -> None:
     program(build, "Vtop", "exit 4")
+    program(alone, "mkdir", "exit 3")
     assert start(build, "./Vtop") == (4, "", 0)
+    assert start(build, "mkdir", "-p", "x") == (3, "", 0)
+    assert not (build / manifest.FILE).exists()
 
 
 def test_without_a_python_that_has_the_package_programs_are_started_all_the_same(alone: Path, build: Path) -> None:

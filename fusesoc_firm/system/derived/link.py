@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from fusesoc_firm.system.derived.model import Converter, Link, LinkKind, Scheduling
+from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Link, LinkKind, Scheduling
 from fusesoc_firm.system.written.specification import AXI_STREAM, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
@@ -45,6 +45,11 @@ def link_of(
             f"a link holds whole frames from the host; legal here: messages of at most {_MOST_BYTES} bytes",
         )
     return Link(kind, _clock_hz(project, clock, faults), longest)
+
+
+def may_be_linked(system: DerivedSystem) -> bool:
+    """Whether a system without a link could have one."""
+    return not system.scheduling.is_preemptive and _longest(system.subscribers) <= _MOST_BYTES
 
 
 def _longest(subscribers: Iterable[Converter]) -> int:

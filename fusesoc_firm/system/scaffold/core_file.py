@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.request.core_reader import read_core
 from fusesoc_firm.system.boards.board import QUARTUS, VIVADO, board_entity, boards, read_board
+from fusesoc_firm.system.derived.link import may_be_linked
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.verilog_bench import translated_unit
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -21,7 +22,7 @@ from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
 from fusesoc_firm.text.render import render
-from fusesoc_firm.tools.simulators import Simulator, default_simulator, fitting
+from fusesoc_firm.tools.simulators import SIMULATORS, Simulator, default_simulator, fitting
 
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
@@ -37,6 +38,10 @@ FAMILIES = [
 _SYSTEM, _SIMULATION = "system", "simulation"
 # The core with the generator `far`, and the core that had this generator before version 0.2.0.
 _SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
+# The simulator of an emulated board's hardware, and the keys of the project that the emulation replaces. A bit on the
+# line takes ten cycles of this clock, and the emulated processor does not know how fast the line is.
+EMULATING = "verilator"
+EMULATED = {"interconnect": "uart", "clock": "10 MHz"}
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
 # A target with the comment above it; blank lines separate targets.
 _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
@@ -134,6 +139,7 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
                 for is_live in ((False, True) if is_simulated else ())
                 for target in _simulations(system, unit, is_live=is_live)
             ],
+            "emulation": _emulation(system, unit) if is_simulated else None,
             # Only an HLS tool generates kernels, so there is no netlist of the whole system.
             "has_kernels": has_kernels,
             "families": [] if has_kernels else FAMILIES,
@@ -170,6 +176,21 @@ def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator
             "options": _options(item.options),
             "toplevel": f"{system.entity}_{suffix}",
         }
+
+
+def _emulation(system: DerivedSystem, unit: str) -> dict[str, object] | None:
+    """Return the target of `firm emulate`, or None for a system that cannot have a serial link there."""
+    simulator = SIMULATORS[EMULATING]
+    has_netlist = not (system.clocks or system.kernels) and system.id_bytes == 1
+    if not (has_netlist and may_be_linked(system)):
+        return None
+    return {
+        **EMULATED,
+        "simulator": EMULATING,
+        "unit": unit,
+        "options": _options(simulator.options),
+        "toplevel": f"{system.entity}_live",
+    }
 
 
 def _description(simulator: Simulator, *, is_first: bool, is_live: bool) -> str:

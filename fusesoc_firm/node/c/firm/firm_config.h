@@ -37,7 +37,10 @@
 #define FIRM_DMA_BUFFERS 4 /* in each direction */
 #endif
 #ifndef FIRM_DMA_BUFFER_BYTES
-#define FIRM_DMA_BUFFER_BYTES 2048 /* a multiple of 64; a longer frame takes several */
+#define FIRM_DMA_BUFFER_BYTES 2048 /* a multiple of 64, less than 64 MiB; a longer frame takes several */
+#endif
+#ifndef FIRM_DMA_ADDRESS_BITS
+#define FIRM_DMA_ADDRESS_BITS 32 /* of the engine, 32 to 64; generated block designs have 32 */
 #endif
 
 /* For an illegal size, the compiler stops at a line that names the rule. */
@@ -50,5 +53,8 @@ typedef char firm_dma_buffers_are_aligned[(FIRM_DMA_BUFFER_BYTES > 0 && FIRM_DMA
                                            FIRM_DMA_BUFFERS >= 2)
                                               ? 1
                                               : -1];
+/* A descriptor has 26 bits for a length. */
+typedef char firm_dma_buffers_fit_a_length[FIRM_DMA_BUFFER_BYTES < (1L << 26) ? 1 : -1];
+typedef char firm_dma_addresses_are_32_to_64_bits[(FIRM_DMA_ADDRESS_BITS >= 32 && FIRM_DMA_ADDRESS_BITS <= 64) ? 1 : -1];
 
 #endif

@@ -11,6 +11,8 @@
 #define STATUS 0x04u
 #define FIRST_DESCRIPTOR 0x08u
 #define LAST_DESCRIPTOR 0x10u
+/* From a register for an address to that for its upper half, which exists only in an engine with longer addresses. */
+#define UPPER 0x04u
 
 #define RUN (1u << 0)
 #define RESET (1u << 2)
@@ -35,18 +37,31 @@ static void make_ring(volatile firm_descriptor_t *ring, uint8_t buffers[][FIRM_D
     unsigned index;
     for (index = 0; index < FIRM_DMA_BUFFERS; ++index) {
         const firm_descriptor_t empty = {0, 0, 0, 0, {0, 0}, 0, 0, {0, 0, 0, 0, 0, 0, 0, 0}};
+        const uint64_t next = firm_bus_address(&ring[(index + 1) % FIRM_DMA_BUFFERS]);
+        const uint64_t buffer = firm_bus_address(buffers[index]);
         ring[index] = empty;
-        ring[index].next = firm_bus_address(&ring[(index + 1) % FIRM_DMA_BUFFERS]);
-        ring[index].buffer = firm_bus_address(buffers[index]);
+        ring[index].next = (uint32_t)next;
+        ring[index].next_high = (uint32_t)(next >> 32);
+        ring[index].buffer = (uint32_t)buffer;
+        ring[index].buffer_high = (uint32_t)(buffer >> 32);
     }
     firm_cache_flush(ring, FIRM_DMA_BUFFERS * sizeof *ring);
+}
+
+/* Write the address of a descriptor, the upper half last, as PG021 has it. */
+static void point_to(uintptr_t address, const volatile firm_descriptor_t *descriptor) {
+    const uint64_t place = firm_bus_address(descriptor);
+    firm_write(address, (uint32_t)place);
+#if FIRM_DMA_ADDRESS_BITS > 32
+    firm_write(address + UPPER, (uint32_t)(place >> 32));
+#endif
 }
 
 static void hand_over(uintptr_t channel, volatile firm_descriptor_t *descriptor, uint32_t control) {
     descriptor->control = control;
     descriptor->status = 0;
     firm_cache_flush(descriptor, sizeof *descriptor);
-    firm_write(channel + LAST_DESCRIPTOR, firm_bus_address(descriptor));
+    point_to(channel + LAST_DESCRIPTOR, descriptor);
 }
 
 static uint32_t status_of(volatile firm_descriptor_t *descriptor) {
@@ -67,7 +82,7 @@ static int is_cleared(uintptr_t address, uint32_t bits) {
 }
 
 static void start(uintptr_t channel, volatile firm_descriptor_t *ring, uint32_t interrupts) {
-    firm_write(channel + FIRST_DESCRIPTOR, firm_bus_address(ring));
+    point_to(channel + FIRST_DESCRIPTOR, ring);
     firm_write(channel + CONTROL, RUN | ONE_FRAME_AN_INTERRUPT | interrupts);
 }
 
@@ -77,11 +92,23 @@ static void give_back(firm_dma_t *dma, unsigned index) {
     hand_over(dma->base + S2MM, &dma->memory->from_system[index], FIRM_DMA_BUFFER_BYTES);
 }
 
+/* Return whether the engine can use the memory. */
+static int suits(const firm_dma_memory_t *memory) {
+    const uint64_t first = firm_bus_address(memory);
+    const uint64_t last = first + (sizeof *memory - 1);
+    const uint64_t highest = UINT64_MAX >> (64 - FIRM_DMA_ADDRESS_BITS);
+    return (uintptr_t)memory % FIRM_DMA_ALIGNMENT == 0 && first % FIRM_DMA_ALIGNMENT == 0 && first <= last &&
+           last <= highest;
+}
+
 firm_dma_status_t firm_dma_open(firm_dma_t *dma, uintptr_t base, firm_dma_memory_t *memory) {
     unsigned index;
     memset(dma, 0, sizeof *dma);
     dma->base = base;
     dma->memory = memory;
+    if (!suits(memory)) {
+        return FIRM_DMA_MEMORY;
+    }
     /* The reset of one channel resets both. */
     firm_write(base + MM2S + CONTROL, RESET);
     if (!is_cleared(base + MM2S + CONTROL, RESET)) {

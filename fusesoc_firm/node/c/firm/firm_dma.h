@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* AXI DMA between memory and the system's streams, for the block design of a board with a processor
- * (docs/how-to/build-for-a-board.md): scatter-gather, 26-bit lengths, 32-bit addresses, no realignment. PG021
+ * (docs/how-to/build-for-a-board.md): scatter-gather, 26-bit lengths, addresses of FIRM_DMA_ADDRESS_BITS, no realignment. PG021
  * describes registers and descriptors. This is firm/dma_transport.hpp in C, with static memory and cache maintenance.
  * */
 #ifndef FIRM_DMA_H
@@ -16,7 +16,8 @@ typedef struct {
     uint32_t next, next_high, buffer, buffer_high, reserved[2], control, status, unused[8];
 } firm_descriptor_t;
 
-/* Memory shared by processor and engine; it must begin at a multiple of FIRM_DMA_ALIGNMENT, below 4 GiB. */
+/* Memory shared by processor and engine; it must begin at a multiple of FIRM_DMA_ALIGNMENT, where the engine reaches
+ * it. */
 typedef struct {
     volatile firm_descriptor_t to_system[FIRM_DMA_BUFFERS];
     volatile firm_descriptor_t from_system[FIRM_DMA_BUFFERS];
@@ -31,7 +32,8 @@ typedef enum {
     FIRM_DMA_TOO_LONG,  /* a burst that did not fit its destination */
     FIRM_DMA_STUCK,     /* the engine does not respond */
     FIRM_DMA_NO_SG,     /* the engine lacks scatter and gather */
-    FIRM_DMA_ERROR      /* the engine has stopped: see firm_dma_fault */
+    FIRM_DMA_ERROR,     /* the engine has stopped: see firm_dma_fault */
+    FIRM_DMA_MEMORY     /* the memory is not aligned, or beyond the engine's addresses */
 } firm_dma_status_t;
 
 typedef struct {

@@ -19,7 +19,7 @@ void firm_cache_flush(const volatile void *memory, size_t size);
 void firm_cache_invalidate(const volatile void *memory, size_t size);
 
 /* Return the address of memory as a device sees it. */
-uint32_t firm_bus_address(const volatile void *memory);
+uint64_t firm_bus_address(const volatile void *memory);
 
 /* Delimit short sections that no other task or interrupt may enter. */
 void firm_lock(firm_lock_t *lock);

@@ -40,4 +40,4 @@ void firm_cache_invalidate(const volatile void *memory, size_t size) {
     barrier();
 }
 
-uint32_t firm_bus_address(const volatile void *memory) { return (uint32_t)(uintptr_t)memory; }
+uint64_t firm_bus_address(const volatile void *memory) { return (uint64_t)(uintptr_t)memory; }

@@ -1,0 +1,106 @@
+"""`firm emulate`: run a system's program for a processor on an emulated board, in front of the simulated hardware."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusesoc_firm.cli.common import add_sources, command, core_folders, positive, print_warnings
+from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.emulation.run import Emulation, Report
+
+_MOST_FAULTS = 30
+_PATIENCE_SECONDS = 60
+
+
+def add_emulate(commands: Any) -> None:
+    """Declare the command."""
+    emulate = command(
+        commands,
+        "emulate",
+        "run a system's program in C on an emulated Zynq, connected to the pins of the simulated hardware",
+        "firm emulate robot.yaml",
+        _emulate,
+    )
+    emulate.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    emulate.add_argument(
+        "--freertos", type=Path, metavar="DIR", help="run FreeRTOS, whose kernel is in DIR (default: bare metal)"
+    )
+    emulate.add_argument("--stimuli", type=Path, metavar="F", help="messages to send (default: those of the core)")
+    emulate.add_argument("--model", type=Path, metavar="F.py", help="the responses' model (default: that of the core)")
+    emulate.add_argument(
+        "--patience",
+        type=positive,
+        default=_PATIENCE_SECONDS,
+        metavar="S",
+        help="give up after S seconds in which nothing moves (default: %(default)s)",
+    )
+    emulate.add_argument(
+        "--build-root", type=Path, metavar="DIR", help="folder for the build (default: a folder in the user's cache)"
+    )
+    add_sources(emulate)
+
+
+def _emulate(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.emulation.messages import emulated_traffic, load_emulated
+    from fusesoc_firm.emulation.program import COMPILER, Kernel, compile_player
+    from fusesoc_firm.emulation.run import EMULATOR, Emulation
+    from fusesoc_firm.node.transport.simulator import Simulator
+    from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
+    from fusesoc_firm.system.message_sources import sources_of
+    from fusesoc_firm.system.scaffold.core_file import EMULATING
+    from fusesoc_firm.tools.programs import missing, ways
+
+    if absent := missing([COMPILER, EMULATOR]):
+        fail(f"missing programs: {', '.join(absent)}", hint="; ".join(map(ways, absent)))
+    kernel = Kernel(arguments.freertos)
+    kernel.check()
+    spec: Path = arguments.spec
+    loaded = load_emulated(spec, sources_of(spec, arguments.path, arguments.distro, core_folders), core_folders)
+    print_warnings(loaded.warnings)
+    traffic = emulated_traffic(spec, loaded, {"stimuli": arguments.stimuli, "model": arguments.model})
+    _tell("building the hardware")
+    sources = CoreSources(arguments.path, arguments.distro or "", core_folders=core_folders)
+    built = build_simulator(spec, EMULATING, build_root=arguments.build_root, sources=sources, target="emulate")
+    emulation = Emulation(
+        compile_player(loaded.system, kernel, built.folder),
+        lambda: Simulator([*built.command(), "+RAW=true"], built.folder),
+        traffic,
+        loaded.system,
+        arguments.patience,
+        lambda count: _tell(f"{count} of {len(traffic.responses)} messages received"),
+    )
+    begin = time.monotonic()
+    report = emulation.run()
+    _tell("")
+    title = f"{loaded.system.name} on {kernel.title}"
+    _print(report, emulation, f"{title}, in {time.monotonic() - begin:.1f} s")
+
+
+def _tell(step: str) -> None:
+    """Show the progress at a terminal."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{step}", end="", file=sys.stderr, flush=True)
+
+
+def _print(report: Report, emulation: Emulation, title: str) -> None:
+    """Print the result; raise `InputError` if it is not right."""
+    sent, expected = len(emulation.traffic.stimuli), len(emulation.traffic.responses)
+    print(f"{title}: {sent} messages sent, {len(report.frames)} of {expected} received")
+    if report.counts:
+        print(f"counts of the program: {', '.join(f'{name} {count}' for name, count in report.counts.items())}")
+    for line in report.other_lines:
+        print(f"the console printed: {line}")
+    found = emulation.faults(report)
+    for line in found[:_MOST_FAULTS]:
+        print(line)
+    if len(found) > _MOST_FAULTS:
+        print(f"and {len(found) - _MOST_FAULTS} more faults")
+    if report.fault or found:
+        fail(report.fault or "the messages differ from those of the model")
+    print(f"PASS {expected}/{expected}")
