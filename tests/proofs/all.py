@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from tests.proofs import manager, schedulers
+from tests.proofs import manager, parts, schedulers
 
-PROOFS = (*manager.PROOFS, *schedulers.PROOFS)
+PROOFS = (*manager.PROOFS, *parts.PROOFS, *schedulers.PROOFS)

@@ -7,14 +7,16 @@ from collections.abc import Iterator, Mapping
 
 from tests.hdl.ghdl import REPOSITORY
 from tests.proofs.all import PROOFS
-from tests.proofs.proof import Proof
+from tests.proofs.proof import Proof, Size
 
 DOCUMENT = REPOSITORY / "docs" / "figures" / "proofs.md"
 
 _TABLES = re.compile(r"(?<=<!-- by make proofs -->\n).*?(?=<!-- end -->)", re.DOTALL)
 _COLUMNS = ("harness", "of", "sizes", "method", "faults found", "seconds")
 # Generics of sizes, as a table says them.
-_SHORT = {"WIDTH": "W", "SUBSCRIBERS": "N", "REQUESTERS": "N"}
+_SHORT = {"WIDTH": "W", "SUBSCRIBERS": "N", "REQUESTERS": "N", "SOURCES": "N", "FRAMES": "F", "LIMIT": "L"}
+# Generics that a table says if they are true.
+_CHOICES = {"DROP_OLDEST": "drop_oldest", "DROP_NEWEST": "drop_newest"}
 
 
 def tables() -> str:
@@ -50,9 +52,17 @@ def write(seconds: Mapping[str, float]) -> None:
 
 
 def _sizes(proof: Proof) -> str:
-    return "; ".join(
-        " ".join(f"{_SHORT[name]}={value}" for name, value in size.items() if name in _SHORT) for size in proof.sizes
-    )
+    return "; ".join(" ".join(_words(size)) for size in proof.sizes)
+
+
+def _words(size: Size) -> Iterator[str]:
+    # A tree has no subscribers in its proof.
+    short = _SHORT if "SUBSCRIBERS" in size else {**_SHORT, "PUBLISHERS": "N"}
+    for name, value in size.items():
+        if name in short:
+            yield f"{short[name]}={value}"
+        elif value and name in _CHOICES:
+            yield _CHOICES[name]
 
 
 def _head(*names: str) -> list[str]:

@@ -2,13 +2,13 @@
 // A queue of frames: each frame that arrives leaves whole and in order, or is reported as dropped; no frame is lost
 // without a report, and no report is without a lost frame.
 //
-// Assumed: the first cycle is a reset, and no other is; the source keeps a beat until it is taken. A beat contains the
-// number of its frame and its own number within the frame: the queue does not look at data, so that what holds for these
-// holds for all. `chosen` is any frame, whose length and marks are remembered.
+// Assumed: the first cycle is a reset, and no other is; the source keeps a beat until it is taken. A beat of a frame of
+// up to two contains its number, that of its frame, and its own marks: the queue does not look at data, so that what
+// holds for these holds for all.
 module queue (input clk);
 
-localparam BEAT_BITS  = 2;
-localparam FRAME_BITS = 8 - BEAT_BITS;
+localparam BEAT_BITS  = 1;
+localparam FRAME_BITS = 4;
 
 (* anyseq *) wire         s_axis_tvalid;
 (* anyseq *) wire         s_axis_tlast;
@@ -23,7 +23,6 @@ wire                      m_axis_tlast;
 (* anyseq *) wire         m_axis_tready;
 wire                      frame_error;
 wire [3:0]                frame_error_code;
-(* anyconst *) wire [FRAME_BITS-1:0] chosen;
 
 reg is_first_cycle = 1;
 always @(posedge clk) is_first_cycle <= 0;
@@ -33,14 +32,12 @@ wire running = rst_n;
 // The source.
 reg [FRAME_BITS-1:0] frames;  // that have arrived
 reg [BEAT_BITS-1:0]  beat;    // the number of the next beat, up to the last that the queue keeps
-wire [7:0]           s_axis_tdata = {frames, beat};
 wire                 take = s_axis_tvalid && s_axis_tready;
-wire                 is_kept_end = s_axis_tlast || beat == `BEATS - 1;
+wire                 is_kept_end  = s_axis_tlast || beat == `BEATS - 1;
+wire [7:0]           s_axis_tdata = {is_kept_end, s_axis_tuser, s_axis_tkeep, frames, beat};
 reg                  is_cut;      // the queue has ended the frame
 reg                  s_stalled;
 reg [2:0]            s_before;
-reg [BEAT_BITS-1:0]  chosen_last;
-reg [1:0]            chosen_marks;
 always @(posedge clk) begin
     s_stalled <= s_axis_tvalid && !s_axis_tready;
     s_before  <= {s_axis_tlast, s_axis_tuser, s_axis_tkeep};
@@ -52,10 +49,6 @@ always @(posedge clk) begin
         frames <= frames + s_axis_tlast;
         beat   <= s_axis_tlast ? 0 : beat + (beat != `BEATS - 1);
         is_cut <= !s_axis_tlast && (is_cut || is_kept_end);
-        if (frames == chosen && is_kept_end && !is_cut) begin
-            chosen_last  <= beat;
-            chosen_marks <= {s_axis_tuser, s_axis_tkeep};
-        end
     end
 end
 always @* if (running && s_stalled) assume (s_axis_tvalid && s_before == {s_axis_tlast, s_axis_tuser, s_axis_tkeep});
@@ -81,7 +74,7 @@ firm_axis_queue dut (
     .frame_error_code(frame_error_code));
 
 // The receiver.
-wire [FRAME_BITS-1:0] m_frame = m_axis_tdata[7:BEAT_BITS];
+wire [FRAME_BITS-1:0] m_frame = m_axis_tdata[FRAME_BITS+BEAT_BITS-1:BEAT_BITS];
 wire [BEAT_BITS-1:0]  m_beat  = m_axis_tdata[BEAT_BITS-1:0];
 wire                  give    = m_axis_tvalid && m_axis_tready;
 reg                   inside;         // a frame has begun
@@ -128,9 +121,8 @@ always @* if (running) begin
         // A frame that has begun to leave is followed by nothing but its own beats.
         frames_are_whole: assert (m_beat == next_beat && (!inside || m_frame == next_frame));
         frames_in_order: assert (m_frame >= next_frame);
-        // Its end is where it was.
-        if (m_frame == chosen) ends_as_it_was: assert (
-            m_axis_tlast == (m_beat == chosen_last) && (!m_axis_tlast || {m_axis_tuser, m_axis_tkeep} == chosen_marks));
+        // Its end is where it was, and its marks are unchanged.
+        marks_unchanged: assert (m_axis_tdata[7:5] == {m_axis_tlast, m_axis_tuser, m_axis_tkeep});
     end
 
     // The frame that arrives may be reported before its end.

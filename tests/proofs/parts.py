@@ -1,0 +1,133 @@
+"""The proofs of the parts that keep a system from stalling: queue, watchdog, and the tree of Managers."""
+
+from __future__ import annotations
+
+from tests.proofs.proof import Mutation, Proof, Size
+
+_QUEUE = "firm_axis_queue.vhd"
+_WATCHDOG = "firm_axis_watchdog.vhd"
+_TREE = "firm_manager_tree.vhd"
+_INSERT = "firm_axis_id_insert.vhd"
+
+
+def _queue_size(frames: int, overflow: str) -> Size:
+    return {
+        "WIDTH": 8,
+        "FRAMES": frames,
+        "BEATS": 2,
+        "DROP_OLDEST": overflow == "drop_oldest",
+        "DROP_NEWEST": overflow == "drop_newest",
+    }
+
+
+_OLDEST, _NEWEST, _BLOCK = range(3)
+
+_QUEUED = Proof(
+    "queue",
+    "firm_axis_queue",
+    ("axis/package", "axis/axis"),
+    sizes=(
+        _queue_size(2, "drop_oldest"),
+        _queue_size(2, "drop_newest"),
+        _queue_size(2, "block"),
+        _queue_size(1, "drop_newest"),
+    ),
+    depth=11,
+    mutations=(
+        Mutation(_QUEUE, "read_beat or (valid_r and not m_axis_tready)", "read_beat", ("valid_stays",)),
+        Mutation(_QUEUE, "(not between and m_axis_tready)", "not between", ("payload_stays",)),
+        Mutation(
+            _QUEUE,
+            "(skipping_r or arrived or refuse) and",
+            "(skipping_r or arrived) and",
+            ("frames_are_whole",),
+            _NEWEST,
+        ),
+        Mutation(_QUEUE, "free(free_end_r) <= leaving_r;", "free(free_end_r) <= oldest;", ("frames_in_order",), _BLOCK),
+        Mutation(
+            _QUEUE, "memory(write) <= is_end & s_axis_tuser", 'memory(write) <= is_end & "0"', ("marks_unchanged",)
+        ),
+        Mutation(_QUEUE, "drop <= refuse or replace;", "drop <= refuse or arrived;", ("no_report_invented",)),
+        Mutation(_QUEUE, "drop <= refuse or replace;", "drop <= refuse;", ("nothing_lost",)),
+        Mutation(_QUEUE, "drop <= refuse or replace;", "drop <= arrived;", ("nothing_dropped",), _BLOCK),
+    ),
+    trace=12,
+    is_bounded=True,
+)
+
+_WATCHED = Proof(
+    "watchdog",
+    "firm_axis_watchdog",
+    ("axis/package", "axis/axis"),
+    sizes=({"WIDTH": 8, "SOURCES": 2, "LIMIT": 2}, {"WIDTH": 8, "SOURCES": 4, "LIMIT": 3}),
+    depth=16,
+    mutations=(
+        Mutation(_WATCHDOG, "cut_r    <= '1';", "cut_r    <= '0';", ("frees_the_channel",)),
+        Mutation(
+            _WATCHDOG,
+            "inside_r <= not s_axis_tlast;",
+            "inside_r <= not s_axis_tlast and not late;",
+            ("frees_the_grant",),
+        ),
+        Mutation(_WATCHDOG, "m_axis_tlast    <= '1';", "m_axis_tlast    <= '0';", ("abort_ends_one_frame",)),
+        Mutation(_WATCHDOG, "not clearing_r and not late and", "not clearing_r and", ("no_late_beat_leaves",)),
+        Mutation(_WATCHDOG, "inside_r = '1' and ready = '1'", "inside_r = '1'", ("no_hasty_abort",)),
+        Mutation(_WATCHDOG, "m_axis_tlast <= s_axis_tlast;", "m_axis_tlast <= '1';", ("beats_pass_unchanged",)),
+        Mutation(_WATCHDOG, "rst_n and ends and not late", "rst_n and ends", ("each_abort_is_reported",)),
+    ),
+    trace=16,
+    is_bounded=True,
+)
+
+_TREE_TO_HOST = Proof(
+    "manager_tree",
+    "small_tree",
+    (
+        "axis/package",
+        "axis/axis",
+        "sched/package",
+        *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
+        *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
+        "manager/tree",
+    ),
+    sizes=({"PUBLISHERS": 4}, {"PUBLISHERS": 2}),
+    depth=10,
+    mutations=(
+        Mutation(
+            "firm_axis_register_slice.vhd",
+            "move      <= m_axis_tready or not valid_r",
+            "move      <= '1'",
+            ("valid_stays", "payload_stays", "all_comes_out"),
+        ),
+        Mutation(
+            "firm_axis_mux.vhd", "<= decode(source, take, SOURCES)", "<= (others => take)", ("one_grant_in_a_group",)
+        ),
+        Mutation(
+            _INSERT,
+            "when extra_r = '1' else s_axis_tdata;",
+            "when extra_r = '1' else not s_axis_tdata;",
+            ("begins_with_its_id",),
+        ),
+        Mutation(_TREE, "high          => granted_high,", 'high          => x"00",', ("upper_byte_is_inserted",)),
+        Mutation(
+            _TREE, "sent_tuser(8 downto 1) <= granted_high;", 'sent_tuser(8 downto 1) <= x"00";', ("tid_is_the_id",)
+        ),
+        Mutation(
+            "firm_axis_register_slice.vhd",
+            "<= skid_r when skidded = '1' else arriving",
+            "<= arriving",
+            ("in_order_without_loss",),
+        ),
+        Mutation(
+            _TREE,
+            "m_axis_tuser            <= out_tuser(0 downto 0);",
+            "m_axis_tuser            <= not out_tuser(0 downto 0);",
+            ("abort_ends_a_frame",),
+        ),
+    ),
+    sources=("small_tree.vhd",),
+    trace=12,
+    is_bounded=True,
+)
+
+PROOFS = (_QUEUED, _WATCHED, _TREE_TO_HOST)
