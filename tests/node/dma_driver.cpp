@@ -186,7 +186,8 @@ class FakeDma : public firm::DmaDevice {
       piece.bytes.erase(piece.bytes.begin(), piece.bytes.begin() + static_cast<std::ptrdiff_t>(size));
     }
     words[7] = status;
-    channels_[1].status |= 1U << 12;
+    // The threshold of the interrupt counts frames.
+    if (is_last) channels_[1].status |= 1U << 12;
     changed_.notify_all();
   }
 

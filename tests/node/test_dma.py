@@ -210,6 +210,29 @@ def test_frames_there_and_back(root: Path, engine: Engine, size: int) -> None:
     assert (root / "sys/class/u-dma-buf/udmabuf0/sync_mode").read_text() == "2"
 
 
+class Patient(LinuxDmaDevice):
+    """An engine whose interrupt does not come; it is waited for, but not for longer than this many seconds."""
+
+    longest = 0.0
+
+    def wait(self, timeout: float | None) -> None:
+        assert timeout is not None
+        self.longest = max(self.longest, timeout)
+        super().wait(timeout)
+
+
+def test_a_frame_may_be_longer_than_all_buffers(root: Path, engine: Engine) -> None:
+    """Its interrupt comes at its end, which the engine reaches only if somebody looks before."""
+    patient = Patient("/dev/uio0", "udmabuf0", has_interrupt=False, root=root)
+    frame = pack_frame(1, random.Random(SEED).randbytes(3000))
+    with DmaTransport(patient, DmaBuffers(4, 2, 64)) as transport:
+        sender = threading.Thread(target=transport.send, args=(frame,))
+        sender.start()
+        assert transport.receive() == Burst(frame)
+        sender.join()
+    assert 0 < patient.longest < 1
+
+
 def test_a_record_aborts_a_frame(root: Path, engine: Engine) -> None:
     """The part of the frame that was sent, then the record of the hardware; the next frame is whole."""
     part, record, frame = b"\1\x64\0\0\0abc", b"\xff" * 5 + b"\1\x0a", pack_frame(1, b"de")

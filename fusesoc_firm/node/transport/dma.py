@@ -62,6 +62,8 @@ LENGTH, END_OF_FRAME, START_OF_FRAME, COMPLETE = (1 << 26) - 1, 1 << 26, 1 << 27
 # Each buffer begins at a multiple of the widest stream's beat.
 _ALIGNMENT = 64
 _RESET_SECONDS = 1.0
+# The interrupt comes at the end of a frame. For one that is longer than all buffers, they must be emptied before.
+_LOOK_SECONDS = 0.01
 _SHORTEST_PAUSE, _LONGEST_PAUSE = 5e-6, 500e-6
 
 
@@ -187,7 +189,7 @@ class DmaTransport:
                 # Acknowledge the interrupt before looking at the descriptors, so that no completion is missed.
                 self._device.write(FROM_SYSTEM + STATUS, Status.INTERRUPTS)
                 if self._from_system.done(self._next_received) is None:
-                    self._device.wait(rest)
+                    self._device.wait(_LOOK_SECONDS if rest is None else min(rest, _LOOK_SECONDS))
         return None
 
     def is_at_rest(self) -> None:

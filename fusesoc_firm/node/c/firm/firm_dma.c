@@ -29,7 +29,7 @@
 #define START_OF_FRAME (1u << 27)
 #define COMPLETE (1u << 31)
 
-#define PATIENCE_MS 100u
+#define PATIENCE_MS 1000u
 
 typedef char firm_descriptors_have_64_bytes[sizeof(firm_descriptor_t) == 64 ? 1 : -1];
 

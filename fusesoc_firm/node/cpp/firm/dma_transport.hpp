@@ -121,6 +121,9 @@ class DmaRing {
 };
 
 class DmaTransport : public Transport {
+  // The interrupt comes at the end of a frame. For one that is longer than all buffers, they must be emptied before.
+  static constexpr std::chrono::milliseconds kLook{10};
+
  public:
   // Reset the engine and thereby the system. Throws TransportError.
   explicit DmaTransport(std::unique_ptr<DmaDevice> device, TransportOptions options = {}, DmaOptions dma = {})
@@ -171,7 +174,7 @@ class DmaTransport : public Transport {
       if (is_closed_ || deadline.is_over()) break;
       // Acknowledge the interrupt before looking at the descriptors, so that no completion is missed.
       device_->write(dma::kS2mm + dma::kStatus, dma::kInterrupts);
-      if (!from_system_.done(receiving_)) device_->wait(deadline);
+      if (!from_system_.done(receiving_)) device_->wait(Deadline(kLook).or_earlier(deadline));
     }
     return std::nullopt;
   }
@@ -207,7 +210,7 @@ class DmaTransport : public Transport {
 
   // Return whether a bit of a register becomes 0 within a short time.
   bool is_cleared(std::size_t offset, std::uint32_t bit) {
-    const Deadline deadline(std::chrono::milliseconds(100));
+    const Deadline deadline(std::chrono::seconds(1));
     while ((device_->read(offset) & bit) != 0) {
       if (deadline.is_over()) return false;
     }
