@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ SUFFIXES = ("png", "svg")
 
 _PANEL_INCHES = (6.0, 4.0)
 _TIMELINE_INCHES = (9.0, 3.0)
+# An axis is logarithmic if the values differ by this factor.
+_WIDE = 20
 _MARKERS = "osv^DPX"
 # Without the date and the random names that matplotlib writes, equal values result in equal bytes.
 _SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
@@ -85,8 +89,16 @@ def _draw_lines(axis: Any, figure: Figure, panel: Panel) -> None:
     axis.set_xticks(places, [str(number) for number in figure.requesters])
     axis.set_xlabel("accelerators")
     axis.set_ylabel(figure.unit)
+    if _is_wide([*panel.series.values(), *panel.dissertation.values()]):
+        axis.set_yscale("log")
     axis.grid(visible=True, alpha=0.3)
     axis.legend()
+
+
+def _is_wide(series: Iterable[Sequence[float]]) -> bool:
+    """Return whether small values would look like zero beside the largest one."""
+    values = [value for row in series for value in row if not isnan(value)]
+    return bool(values) and 0 < min(values) * _WIDE < max(values)
 
 
 def _save(drawing: Any, path: Path) -> None:
