@@ -17,6 +17,7 @@ from fusesoc_firm.cli.build_options import (
     add_selection,
     is_sandboxed,
     limits_of,
+    outputs_of,
     run_options_of,
     selection_of,
 )
@@ -89,7 +90,7 @@ def _build_cached(arguments: argparse.Namespace) -> None:
     )
     chosen = ("build", *selection.words(), options.command_line(), names)
     make = partial(select_plan, selection, options, arguments.build_root)
-    report = Report(Words(is_cached=True), arguments.events, arguments.junit)
+    report = Report(Words(is_cached=True), outputs_of(arguments))
     run_cached(chosen, make, how, arguments.build_root, report)
 
 
@@ -117,7 +118,7 @@ def _build(arguments: argparse.Namespace) -> None:
         limits_of(arguments),
     )
     started = time.time()
-    report = Report(Words(), arguments.events, arguments.junit)
+    report = Report(Words(), outputs_of(arguments))
     report.plan(plan.builds)
     listener = Listener(report.tell, report.progress, report.begin)
     with closing(report), closing(build(plan, how, listener)) as outcomes:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from fusesoc_firm.building.pool import Limits
     from fusesoc_firm.building.run_options import RunOptions
     from fusesoc_firm.building.selection import Selection
+    from fusesoc_firm.cli.build_report import Outputs
 
 # Options of `fusesoc run` without attention of our own: with a value, and without.
 _VALUES = {"--filter": "apply a filter of FuseSoC; may be repeated", "--system-name": "another name for the system"}
@@ -152,9 +153,19 @@ def run_options_of(arguments: argparse.Namespace) -> RunOptions:
 
 
 def add_reports(parser: argparse.ArgumentParser) -> None:
-    """Add the reports, for `build_report.Report`."""
+    """Add the reports, for `outputs_of`."""
     parser.add_argument("--events", type=Path, metavar="FILE", help="write a line of JSON for each event")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results in the format of JUnit, for CI")
+    detail = parser.add_mutually_exclusive_group()
+    detail.add_argument("-v", "--verbose", action="store_true", help="print the log of each build when it ends")
+    detail.add_argument("-q", "--quiet", action="store_true", help="print only failures and the summary")
+
+
+def outputs_of(arguments: argparse.Namespace) -> Outputs:
+    """Return the reports in the arguments."""
+    from fusesoc_firm.cli.build_report import Outputs
+
+    return Outputs(arguments.events, arguments.junit, arguments.quiet, arguments.verbose)
 
 
 def _key(name: str) -> str:

@@ -57,22 +57,32 @@ class Row:
     steps: tuple[Step, ...] = ()
 
 
+@dataclass(frozen=True)
+class Outputs:
+    """The files of a report, and what is printed: `is_quiet` without progress and table, `is_verbose` with all logs."""
+
+    events: Path | None = None
+    junit: Path | None = None
+    is_quiet: bool = False
+    is_verbose: bool = False
+
+
 class Report:
     """The reports of one run, which is from the constructor to `close`."""
 
-    def __init__(self, words: Words, events: Path | None, junit: Path | None) -> None:
+    def __init__(self, words: Words, outputs: Outputs) -> None:
         """Begin the reports. Raise `InputError` if the file for the events cannot be written."""
         from tqdm import tqdm
 
         # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
         tqdm.monitor_interval = 0
         self._started = time.monotonic()
-        self._words, self._junit = words, junit
+        self._words, self._outputs = words, outputs
         self._builds: list[Build] = []
         self._rows: list[Row] = []
         self._running: list[Build] = []
-        self._events = _opened(events) if events else None
-        self._bar = tqdm(unit=words.unit, disable=None, file=sys.stderr)
+        self._events = _opened(outputs.events) if outputs.events else None
+        self._bar = tqdm(unit=words.unit, disable=outputs.is_quiet or None, file=sys.stderr)
 
     def plan(self, builds: Sequence[Build]) -> None:
         """Note all builds of the run, before the first one begins or ends."""
@@ -95,8 +105,10 @@ class Report:
         self._show()
 
     def end(self, outcome: Outcome) -> None:
-        """Note the end of a build."""
+        """Note the end of a build, and print its log if the report is verbose."""
         row = _row(outcome, self._words)
+        if self._outputs.is_verbose and not outcome.is_skipped:
+            self._bar.write(f"{outcome.build}: {row.result}\n{_text_of(outcome.build.log)}".rstrip(), file=sys.stdout)
         self._rows.append(row)
         self._running = [build for build in self._running if build != outcome.build]
         self._event("end", **_facts(row))
@@ -115,15 +127,16 @@ class Report:
         places = {build: place for place, build in enumerate(self._builds)}
         rows = sorted(self._rows, key=lambda row: places[row.outcome.build])
         seconds = time.monotonic() - self._started
-        if self._junit:
-            _write(self._junit, junit(rows, seconds, self._words))
+        if self._outputs.junit:
+            _write(self._outputs.junit, junit(rows, seconds, self._words))
         for outcome in (row.outcome for row in rows):
             if outcome.last_lines:
                 what = f"failed in try {outcome.tries - 1}" if outcome.is_good else "failed"
                 print(f"{outcome.build} {what}; the last lines of {shown(outcome.build.log)}")
                 print(*(f"    {line}" for line in outcome.last_lines), sep="\n")
-        _print_table(rows, self._words)
-        _print_faults(rows)
+        if not self._outputs.is_quiet:
+            _print_table(rows, self._words)
+            _print_faults(rows)
         print(self._summary(rows, seconds))
         if failed := self._counts()[_FAILED]:
             fail(f"{failed} of {len(rows)} {self._words.unit}s failed")
@@ -191,6 +204,14 @@ def _row(outcome: Outcome, words: Words) -> Row:
     is_cached = outcome.result == "ok" and bool(steps) and all(step.state == _CACHED for step in steps)
     good = _CACHED if is_cached else words.good
     return Row(outcome, good if outcome.result == "ok" else outcome.result, steps)
+
+
+def _text_of(log: Path) -> str:
+    """Return a log, or nothing if there is none."""
+    try:
+        return log.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
 
 
 def _print_table(rows: Sequence[Row], words: Words) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,9 @@ def add_emulate(commands: Any) -> None:
     emulate.add_argument(
         "--build-root", type=Path, metavar="DIR", help="folder for the build (default: a folder in the user's cache)"
     )
+    detail = emulate.add_mutually_exclusive_group()
+    detail.add_argument("-v", "--verbose", action="store_true", help="print all that the program writes to its console")
+    detail.add_argument("-q", "--quiet", action="store_true", help="print only the verdict and faults")
     add_sources(emulate)
 
 
@@ -64,7 +68,8 @@ def _emulate(arguments: argparse.Namespace) -> None:
     loaded = load_emulated(spec, sources_of(spec, arguments.path, arguments.distro, core_folders), core_folders)
     print_warnings(loaded.warnings)
     traffic = emulated_traffic(spec, loaded, {"stimuli": arguments.stimuli, "model": arguments.model})
-    _tell("building the hardware")
+    detail = Detail(is_quiet=arguments.quiet, is_verbose=arguments.verbose, expected=len(traffic.responses))
+    detail.tell("building the hardware")
     sources = CoreSources(arguments.path, arguments.distro or "", core_folders=core_folders)
     built = build_simulator(spec, EMULATING, build_root=arguments.build_root, sources=sources, target="emulate")
     emulation = Emulation(
@@ -73,29 +78,48 @@ def _emulate(arguments: argparse.Namespace) -> None:
         traffic,
         loaded.system,
         arguments.patience,
-        lambda count: _tell(f"{count} of {len(traffic.responses)} messages received"),
+        detail.receive,
     )
     begin = time.monotonic()
     report = emulation.run()
-    _tell("")
-    title = f"{loaded.system.name} on {kernel.title}"
-    _print(report, emulation, f"{title}, in {time.monotonic() - begin:.1f} s")
+    detail.tell("")
+    if not arguments.quiet:
+        _print_counts(report, emulation, f"{loaded.system.name} on {kernel.title}, in {time.monotonic() - begin:.1f} s")
+    _print_verdict(report, emulation)
 
 
-def _tell(step: str) -> None:
-    """Show the progress at a terminal."""
-    if sys.stderr.isatty():
-        print(f"\r\033[K{step}", end="", file=sys.stderr, flush=True)
+@dataclass(frozen=True)
+class Detail:
+    """How much is printed of a run from which `expected` messages return: the progress only at a terminal."""
+
+    is_quiet: bool
+    is_verbose: bool
+    expected: int
+
+    def tell(self, step: str) -> None:
+        """Show the progress."""
+        if sys.stderr.isatty() and not (self.is_quiet or self.is_verbose):
+            print(f"\r\033[K{step}", end="", file=sys.stderr, flush=True)
+
+    def receive(self, line: str, count: int) -> None:
+        """Print a line of the console, or show the number of received messages."""
+        if self.is_verbose:
+            print(line, flush=True)
+        self.tell(f"{count} of {self.expected} messages received")
 
 
-def _print(report: Report, emulation: Emulation, title: str) -> None:
-    """Print the result; raise `InputError` if it is not right."""
+def _print_counts(report: Report, emulation: Emulation, title: str) -> None:
     sent, expected = len(emulation.traffic.stimuli), len(emulation.traffic.responses)
     print(f"{title}: {sent} messages sent, {len(report.frames)} of {expected} received")
     if report.counts:
         print(f"counts of the program: {', '.join(f'{name} {count}' for name, count in report.counts.items())}")
     for line in report.other_lines:
         print(f"the console printed: {line}")
+
+
+def _print_verdict(report: Report, emulation: Emulation) -> None:
+    """Print the faults and the verdict; raise `InputError` if it is not good."""
+    expected = len(emulation.traffic.responses)
     found = emulation.faults(report)
     for line in found[:_MOST_FAULTS]:
         print(line)

@@ -15,6 +15,7 @@ from fusesoc_firm.cli.build_options import (
     add_selection,
     is_sandboxed,
     limits_of,
+    outputs_of,
     run_options_of,
     selection_of,
 )
@@ -73,7 +74,7 @@ def _test(arguments: argparse.Namespace) -> None:
         limits=limits_of(arguments),
         steps=steps,
     )
-    report = Report(Words("test", "passed", is_cached=True), arguments.events, arguments.junit)
+    report = Report(Words("test", "passed", is_cached=True), outputs_of(arguments))
     chosen = ("test", *selection.words(), options.command_line())
     run_cached(chosen, partial(_plan, selection, options, arguments.build_root), how, arguments.build_root, report)
 

@@ -65,7 +65,7 @@ class Emulation:
     """A program, a simulator, and the messages to and from the system's hardware.
 
     `start` starts the simulator. The run ends when nothing has moved for `patience` seconds in which the hardware
-    rests. `tell` is called with the number of received frames.
+    rests. `tell` is called with each line of the console and the number of frames so far.
     """
 
     program: Path
@@ -73,7 +73,7 @@ class Emulation:
     traffic: Traffic
     system: DerivedSystem
     patience: float = 60
-    tell: Callable[[int], None] = lambda _: None
+    tell: Callable[[str, int], None] = lambda _, __: None
 
     def run(self) -> Report:
         """Run the program until all responses have returned. May raise `InputError`."""
@@ -97,7 +97,7 @@ class Emulation:
         while not report.fault:
             if text := console.line(_WAIT_SECONDS):
                 report.add(text)
-                self.tell(len(report.frames))
+                self.tell(text, len(report.frames))
                 since = time.monotonic()
             if line.moved != moved or not line.is_at_rest:
                 moved, since = line.moved, time.monotonic()
