@@ -10,13 +10,14 @@ import heapq
 import os
 import signal
 import sys
+import threading
 import time
 from collections import deque
 from dataclasses import dataclass, field
 
 from fusesoc_firm.node.bursts import split_frame
 
-FAULTS = ("exit", "kill", "cut", "garbage", "hang", "unsent", "backwards", "long", "deaf", "error")
+FAULTS = ("exit", "kill", "cut", "garbage", "hang", "unsent", "backwards", "long", "deaf", "error", "later")
 
 
 @dataclass
@@ -89,6 +90,8 @@ class Simulator:
             sys.exit(4)
         if self.fault == "hang":
             time.sleep(1000)
+        if self.fault == "later":
+            threading.Timer(1, os._exit, [5]).start()
         return {
             "garbage": b"\xff" * 100,
             "unsent": (b"T" + bytes(16)) * 100,

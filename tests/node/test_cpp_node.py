@@ -139,6 +139,13 @@ def test_a_simulator_that_fails_ends_the_node(node_driver: Driver, fault: str, e
     assert 0 < len(published) <= 8 and published == [payload for _, payload in messages][: len(published)]
 
 
+def test_a_simulator_that_ends_while_nothing_moves_is_noticed(node_driver: Driver) -> None:
+    """Nothing is sent after its last answer."""
+    outcome = run(node_driver, [*puts([(0, b"abc")]), "await 2"], f"pipe:{SIMULATOR} --fault later --at 0")
+    assert outcome.published == {0: [b"abc"]}
+    assert outcome.said["error"] == "the simulator ended with status 5"
+
+
 def test_a_simulator_that_dies_is_started_again_on_request(node_driver: Driver, tmp_path: Path) -> None:
     mark = shlex.quote(str(tmp_path / "mark"))
     command = f"test -e {mark} || fault='--fault kill --at 20'; touch {mark}; {SIMULATOR} $fault"

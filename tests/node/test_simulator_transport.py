@@ -122,6 +122,18 @@ def transport(model: list[str]) -> Iterator[Transport]:
         yield opened
 
 
+def test_the_shell_runs_the_command(model: list[str]) -> None:
+    """As the node in C++ does: with variables, several commands, and processes that end with the transport."""
+    with open_transport(f"pipe:cd / && NONE= {shlex.join(model)}; exit 3") as opened:
+        opened.send(b"frame")
+        burst = opened.receive(60)
+    assert burst is not None and burst.data == b"frame"
+    with open_transport("pipe:echo 'never closed") as opened:
+        opened.send(b"frame")
+        with pytest.raises(TransportError, match="ended with status 2"):
+            opened.receive(60)
+
+
 def test_a_thread_runs_it_while_there_is_work(transport: Transport) -> None:
     frames = [bytes([number]) * (number + 1) for number in range(200)]
 

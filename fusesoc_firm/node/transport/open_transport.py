@@ -7,7 +7,6 @@ dma:UIO:BUFFER[:poll]             AXI DMA, such as dma:/dev/uio0:udmabuf0, witho
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 
 from fusesoc_firm.node.transport.dma import DmaTransport
@@ -22,11 +21,11 @@ LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts], dma:UIO:BUFFER[:poll]"
 def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Event], None] | None = None) -> Transport:
     """Open the transport at an address; `pace` and `observe` are for a simulator. May raise `TransportError`.
 
-    A simulator's command is split into words as in a shell, where only quotes are special characters.
+    The shell runs a simulator's command.
     """
     kind, _, rest = address.partition(":")
     if kind == "pipe" and rest.strip():
-        command = _words(address, rest)
+        command = ["/bin/sh", "-c", rest]
         return SimulatorTransport(lambda: Simulator(command), pace, observe)
     if kind == "uart":
         device, second, has_flow_control = _device(rest, ":rtscts")
@@ -37,13 +36,6 @@ def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Ev
         if uio and buffer:
             return DmaTransport(LinuxDmaDevice(uio, buffer, has_interrupt=not is_polled))
     raise TransportError(f"the transport is '{address}'; legal: {LEGAL}")
-
-
-def _words(address: str, command: str) -> list[str]:
-    try:
-        return shlex.split(command)
-    except ValueError as error:
-        raise TransportError(f"the transport is '{address}', whose command is invalid: {error}") from None
 
 
 def _device(text: str, option: str) -> tuple[str, str, bool]:

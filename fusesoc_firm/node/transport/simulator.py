@@ -15,12 +15,14 @@ The simulator is a separate process. If it ends unexpectedly, its output is show
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import tempfile
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -130,11 +132,14 @@ class Simulator:
         self.close()
 
     def kill(self) -> None:
-        """Kill the simulator immediately; any thread may call this method.
+        """Kill the simulator immediately, with all processes that it has started; any thread may call this method.
 
         The thread that uses the simulator gets a `TransportError`.
         """
-        self._process.kill()
+        if self._process.poll() is None:
+            # It leads a session, so this number is also that of its group. It may have ended meanwhile.
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
 
     def close(self) -> None:
         """Kill the simulator if it still runs. A second call does nothing."""

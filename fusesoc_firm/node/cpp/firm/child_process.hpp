@@ -6,6 +6,7 @@
 #pragma once
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -117,6 +118,12 @@ class ChildProcess {
       if (found >= 0) return static_cast<std::size_t>(found);
       if (errno != EINTR) fail_with_errno("reading from the child process");
     }
+  }
+
+  // Return whether the child has closed its output, as at its end.
+  bool has_closed() const {
+    pollfd output{from_child_.get(), 0, 0};
+    return ::poll(&output, 1, 0) > 0 && (output.revents & POLLHUP) != 0;
   }
 
   // The descriptor to wait on for the child's output.

@@ -95,6 +95,8 @@ class PipeTransport : public Transport {
   static constexpr int kReports = 4;
   static constexpr std::size_t kBufferBytes = 1 << 16;
   static constexpr unsigned kVersion = 2;  // of requests and reports
+  // How often a simulator at rest is looked at, which may have ended.
+  static constexpr std::chrono::nanoseconds kLook = std::chrono::milliseconds(250);
 
   void throw_if_over() const {
     if (is_closing_) throw TransportError("the transport is closed");
@@ -137,10 +139,9 @@ class PipeTransport : public Transport {
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait(lock, [this] { return is_closing_ || bytes_waiting_ < pipe_.bytes_waiting; });
     const auto has_work = [this] { return is_closing_ || !is_at_rest_; };
-    if (pipe_.idle_run) {
-      changed_.wait_for(lock, *pipe_.idle_run, has_work);
-    } else {
-      changed_.wait(lock, has_work);
+    const Deadline idle(pipe_.idle_run);
+    const auto look = std::min(kLook, pipe_.idle_run.value_or(kLook));
+    while (!changed_.wait_for(lock, look, has_work) && !idle.is_over() && !child_.has_closed()) {
     }
     return !is_closing_;
   }
