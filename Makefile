@@ -131,7 +131,7 @@ lint: setup $(VENV)/.extra-lint ## Check style and types of Python and VHDL, inc
 
 # All extras, since all of them are listed.
 licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
-licences: TOOLS = $(TEST_TOOLS)
+licences: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS)
 licences: tools ros ## List the project's dependencies and their licences in docs/reference/licences.md
 	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 

@@ -34,11 +34,14 @@ PROGRAMS: Mapping[str, str] = {
     "bubblewrap": "runs steps of builds in a sandbox",
     "ccache": "caches compiled files, in tests",
     "g++": "compiles simulated C++ kernels, Verilator's models, nodes in C++",
+    "gcc-arm-none-eabi": "compiles programs for emulated processors",
     "ghdl": "analyses, simulates and translates VHDL",
     "graphviz": "draws diagrams",
     "iverilog": "simulates Verilog",
+    "libnewlib-arm-none-eabi": "the C library of programs for emulated processors",
     "make": "runs the steps of a build",
     "python3": "runs everything",
+    "qemu-system-arm": "emulates processors",
     "strace": "observes the steps of builds, for cached results",
     "tcl": "reads generated block designs, in tests",
     "verilator": "simulates Verilog",
@@ -54,6 +57,8 @@ PROGRAMS: Mapping[str, str] = {
 # Their copyright files are prose, which no program can read.
 PROSE = {
     "g++": "GPL-3+ with GCC Runtime Library Exception",
+    "gcc-arm-none-eabi": "GPL-3+ with GCC Runtime Library Exception",
+    "libnewlib-arm-none-eabi": "BSD and MIT-like",
     "python3": "PSF-2.0",
     "strace": "LGPL-2.1+",
     "tcl": "TCL",

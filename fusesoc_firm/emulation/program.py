@@ -83,7 +83,9 @@ def compile_player(system: DerivedSystem, kernel: Kernel, folder: Path) -> Path:
     ]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
-        fail(f"{COMPILER} cannot compile the program for {kernel.title}:\n{done.stderr.rstrip()}")
+        is_without_library = "string.h: No such file" in done.stderr
+        hint = "apt-get install libnewlib-arm-none-eabi" if is_without_library else ""
+        fail(f"{COMPILER} cannot compile the program for {kernel.title}:\n{done.stderr.rstrip()}", hint=hint)
     return program
 
 

