@@ -60,6 +60,7 @@ PROSE = {
     "gcc-arm-none-eabi": "GPL-3+ with GCC Runtime Library Exception",
     "libnewlib-arm-none-eabi": "BSD and MIT-like",
     "python3": "PSF-2.0",
+    "qemu-system-arm": "GPL-2",
     "strace": "LGPL-2.1+",
     "tcl": "TCL",
 }
