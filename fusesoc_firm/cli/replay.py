@@ -64,7 +64,6 @@ def add_replay(commands: Any) -> None:
         help="add the hardware's latency to the recorded time stamps; requires the system's clock frequency",
     )
     replay.add_argument(
-        "-q",
         "--quiet",
         type=positive,
         default=_QUIET,
