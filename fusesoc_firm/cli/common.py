@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -98,6 +99,16 @@ def coloured(text: str, *, is_good: bool) -> str:
     if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return text
     return f"\033[{32 if is_good else 31}m{text}\033[0m"
+
+
+def terminal_width() -> int:
+    """Return the number of columns of the terminal, or a usual one."""
+    return shutil.get_terminal_size((100, 24)).columns
+
+
+def print_step(step: str) -> None:
+    """Show the current step of long work in the last line of a terminal; an empty step removes the line."""
+    print(f"\r\033[K{step[: terminal_width() - 1]}", end="", file=sys.stderr, flush=True)
 
 
 def print_warnings(warnings: Iterable[Diagnostic]) -> None:

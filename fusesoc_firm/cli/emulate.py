@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import add_sources, command, core_folders, positive, print_warnings
+from fusesoc_firm.cli.common import add_sources, command, core_folders, positive, print_step, print_warnings
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Detail:
     def tell(self, step: str) -> None:
         """Show the progress."""
         if sys.stderr.isatty() and not (self.is_quiet or self.is_verbose):
-            print(f"\r\033[K{step}", end="", file=sys.stderr, flush=True)
+            print_step(step)
 
     def receive(self, line: str, count: int) -> None:
         """Print a line of the console, or show the number of received messages."""

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import argparse
 import re
-import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import check_sources, coloured, command, core_folders, natural, print_warnings
+from fusesoc_firm.cli.common import (
+    check_sources,
+    coloured,
+    command,
+    core_folders,
+    natural,
+    print_step,
+    print_warnings,
+    terminal_width,
+)
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.outputs import shown
 
@@ -110,11 +118,11 @@ def _run(chosen: Simulation, *, is_verbose: bool, is_quiet: bool) -> Report:
             print(line, flush=True)
         elif is_progress:
             step = f"simulating: {len(report.messages)} messages" if report.title else f"building: {line}"
-            print(f"\r\033[K{step[: _width() - 1]}", end="", file=sys.stderr, flush=True)
+            print_step(step)
 
     report = chosen.run(tell)
     if is_progress:
-        print("\r\033[K", end="", file=sys.stderr, flush=True)
+        print_step("")
     return report
 
 
@@ -212,7 +220,7 @@ def _print_messages(report: Report) -> None:
     The host reports each response as the model expects it; a difference is one of the faults.
     """
     messages = report.messages
-    width = max((_width() - 26) // 2, _NARROWEST // 2)
+    width = max((terminal_width() - 26) // 2, _NARROWEST // 2)
     responses = "received" if report.is_good else "expected"
     print(f"{'message':>7}  {'cycles':>6}  {'latency':>7}  {'sent':{width}}  {responses}")
     for item in messages[:_MOST_MESSAGES]:
@@ -237,10 +245,6 @@ def _telling(messages: Sequence[str]) -> list[str]:
     copied = set(found[0]).intersection(*found[1:])
     kept = [[word for word in words if word not in copied and not word.endswith("...")] for words in found]
     return [" ".join(words) if len(words) > 1 else message for words, message in zip(kept, messages, strict=True)]
-
-
-def _width() -> int:
-    return shutil.get_terminal_size((100, 24)).columns
 
 
 def _cut(text: str, width: int) -> str:

@@ -26,7 +26,8 @@ _REST_SECONDS = 0.02
 class Line:
     """The line, which a thread of its own serves until it is closed.
 
-    `error` is what ended it unasked. `moved` counts the bytes in both directions.
+    `error` is what ended it unasked. `moved` counts the bytes in both directions. `is_at_rest` if nothing has moved at
+    the pins for a while, as before the emulator starts.
     """
 
     def __init__(self, simulator: Simulator, path: Path) -> None:
@@ -39,14 +40,9 @@ class Line:
         self._listener.listen(1)
         self._is_closed = False
         self._waiting = 0  # requests that the system has not taken
-        self._is_resting = True
+        self.is_at_rest = True
         self._thread = threading.Thread(target=self._serve, name="line", daemon=True)
         self._thread.start()
-
-    @property
-    def is_at_rest(self) -> bool:
-        """Whether nothing has moved at the pins for a while, as before the emulator starts."""
-        return self._is_resting
 
     def close(self) -> None:
         """End the simulation. A second call does nothing."""
@@ -77,12 +73,12 @@ class Line:
     def _carry(self, peer: socket.socket) -> None:
         self._simulator.run(1)
         while not self._is_closed:
-            self._is_resting = not self._waiting and self._simulator.quiet >= _REST_CYCLES
-            if not self._waiting and _is_readable(peer, _REST_SECONDS if self._is_resting else 0):
+            self.is_at_rest = not self._waiting and self._simulator.quiet >= _REST_CYCLES
+            if not self._waiting and _is_readable(peer, _REST_SECONDS if self.is_at_rest else 0):
                 data = peer.recv(_MOST_BYTES)
                 if not data:
                     return
-                self._is_resting = False
+                self.is_at_rest = False
                 self._simulator.request(data)
                 self._waiting += 1
                 self.moved += len(data)

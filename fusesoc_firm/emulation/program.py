@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import fusesoc_firm.node
-from fusesoc_firm.system.derived.model import Converter, DerivedSystem
+from fusesoc_firm.system.derived.link import longest_payload_of
+from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.text.diagnostics import fail
 
 COMPILER = "arm-none-eabi-gcc"
@@ -21,8 +22,6 @@ _MACHINE = ("-mcpu=cortex-a9", "-mfpu=vfpv3", "-mfloat-abi=hard", "-marm")
 _OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", *_MACHINE, "-nostartfiles", "-T", str(_BOARD / "zynq7000.ld"))
 _FREERTOS_SOURCES = ("tasks.c", "list.c", "queue.c", "portable/MemMang/heap_4.c")
 _FREERTOS_PORT = "portable/GCC/ARM_CA9"
-# ROS 2 may append so many bytes to a payload of fixed size.
-_TRAILING_BYTES = 3
 
 
 @dataclass(frozen=True)
@@ -65,8 +64,10 @@ class Kernel:
 
 
 def compile_player(system: DerivedSystem, kernel: Kernel, folder: Path) -> Path:
-    """Compile the program for a system into a folder, and return its ELF file. May raise `InputError`."""
-    kernel.check()
+    """Compile the program for a system into a folder, and return its ELF file. May raise `InputError`.
+
+    The kernel was checked before.
+    """
     program = folder / "player.elf"
     firm = [_C / "firm" / f"firm_{name}.c" for name in ("frame", "limit", "link", "queues", "uart")]
     board = [_BOARD / "start.S", _BOARD / "firm_board.c", _C / "ports" / "zynq.c"]
@@ -94,9 +95,5 @@ def sizes(system: DerivedSystem) -> dict[str, int]:
     return {
         "FIRM_SUBSCRIBERS": len(system.subscribers),
         "FIRM_PUBLISHERS": len(system.publishers),
-        "FIRM_LONGEST_PAYLOAD": max(map(_longest, (*system.subscribers, *system.publishers))),
+        "FIRM_LONGEST_PAYLOAD": max(map(longest_payload_of, (*system.subscribers, *system.publishers))),
     }
-
-
-def _longest(converter: Converter) -> int:
-    return converter.max_length or converter.buffer or converter.frame.payload_bytes + _TRAILING_BYTES

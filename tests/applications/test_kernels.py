@@ -95,7 +95,7 @@ def with_streams(folder: Path, name: str, width: int) -> Path:
 
 @pytest.mark.parametrize(("name", "width"), [("sobel", 8), ("sobel", 64), ("image_pipeline", 32)])
 def test_images_in_cpp(tmp_path: Path, name: str, width: int) -> None:
-    """Gray scale and the Sobel filter: images of all kinds, and messages that are no images."""
+    """Gray scale and the Sobel filter, with images of all kinds and messages that are not valid images."""
     print(f"seed {SEED + width}")
     source = random.Random(SEED + width)
     channels = 3 if name == "image_pipeline" else 1

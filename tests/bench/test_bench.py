@@ -322,8 +322,7 @@ def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
     assert len(system.subscribers) + len(system.publishers) + len(system.accelerators) == systems.BLOCKS
     assert len({connection.frame.message for connection in system.connections}) == systems.MESSAGES
     for job in systems.JOBS:
-        wall, processor = systems.run(job, tmp_path)
-        assert 0 < processor <= wall
+        assert min(systems.run(job, tmp_path)) > 0
     (tmp_path / "spec.yaml").write_text("project: {}\n", encoding="utf-8")
     with pytest.raises(subprocess.CalledProcessError, match=r"fusesoc_firm\.cli"):
         systems.run(systems.JOBS[0], tmp_path)

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Makes ids of two bytes from ids of one byte: inserts `high` after the first byte of each frame. The frame's other
 -- bytes move up by one lane, so a frame whose last beat is full gets one more beat. The paths from input to output are
--- combinational: put a register slice behind it. It adds no pause between the beats of a frame.
+-- combinational: put a register slice behind it. The insertion adds no pause between beats of a frame.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

@@ -54,7 +54,12 @@ def may_be_linked(system: DerivedSystem) -> bool:
 
 def _longest(subscribers: Iterable[Converter]) -> int:
     """Return the number of payload bytes in the longest frame from the host."""
-    return max(item.max_length or item.frame.payload_bytes + _TRAILING_BYTES for item in subscribers)
+    return max(map(longest_payload_of, subscribers))
+
+
+def longest_payload_of(converter: Converter) -> int:
+    """Return the number of bytes in a converter's longest payload."""
+    return converter.max_length or converter.buffer or converter.frame.payload_bytes + _TRAILING_BYTES
 
 
 def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:

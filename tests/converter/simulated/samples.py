@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
@@ -11,8 +12,8 @@ from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
-from tests.converter.simulated.subscribers import LENGTH_BYTES
+from fusesoc_firm.verify.stimuli import KINDS, TYPICAL, Stimuli
+from tests.converter.simulated.subscribers import LENGTH_BYTES, Subscriber
 from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD_VARIABLE
 
@@ -35,3 +36,24 @@ def typical(ros: Middleware, name: str, seed: int) -> bytes:
 def framed(payload: bytes, length: int | None = None) -> bytes:
     """A frame without the id; its header announces the payload's length, or another one."""
     return (len(payload) if length is None else length).to_bytes(LENGTH_BYTES, "little") + payload
+
+
+def serialise(ros: Middleware, name: str, value: Mapping[str, Any]) -> bytes:
+    """What rosbags makes of a value; it knows no wstring, for which our codec stands in, checked elsewhere."""
+    if name == "awkward_msgs/Unicode":
+        return encode(ORACLES[ros].frame(name), value)
+    return ORACLES[ros].serialise(name, value)
+
+
+def exchanged(
+    subscriber: Subscriber, ros: Middleware, name: str, seed: int, count: int
+) -> tuple[list[bytes], list[str]]:
+    """Frames of messages of all kinds, and the events that must come out of a subscriber."""
+    source = stimuli(ros, name, seed)
+    frames, expected = [], []
+    for number in range(count):
+        value = source.message(parse_name(name), KINDS[number % len(KINDS)])
+        payload = serialise(ros, name, value)
+        frames.append(framed(payload))
+        expected += subscriber.events(value, len(payload))
+    return frames, expected

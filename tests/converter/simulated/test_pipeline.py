@@ -16,10 +16,10 @@ from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import KINDS, TYPICAL
-from tests.converter.simulated.samples import ORACLES, case, framed, stimuli
+from fusesoc_firm.verify.stimuli import TYPICAL
+from tests.converter.simulated.samples import ORACLES, case, exchanged, framed, serialise, stimuli
 from tests.converter.simulated.subscribers import SubscriberBench
-from tests.converter.simulated.test_variable_converters import codes, outcomes, serialise, troubled, verdict
+from tests.converter.simulated.test_variable_converters import codes, outcomes, troubled, verdict
 
 SEED = 20261123
 CASES = [
@@ -47,13 +47,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReque
 def test_messages_come_through(bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
     print(f"seed {SEED}")
-    source = stimuli(ros, name, SEED)
-    frames, expected = [], []
-    for number in range(12):
-        value = source.message(parse_name(name), KINDS[number % len(KINDS)])
-        payload = serialise(ros, name, value)
-        frames.append(framed(payload))
-        expected += subscriber.events(value, len(payload))
+    frames, expected = exchanged(subscriber, ros, name, SEED, 12)
     for stall in 0, 40:
         assert subscriber.run(tmp_path, frames, SEED=SEED % 1000, STALL_PERCENT=stall) == expected
     assert subscriber.library.latches(subscriber.entity) == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.stimuli import KINDS, TYPICAL
-from tests.converter.simulated.samples import ORACLES, case, framed, stimuli
+from tests.converter.simulated.samples import ORACLES, case, exchanged, framed, serialise, stimuli
 from tests.converter.simulated.subscribers import LENGTH_BYTES, SubscriberBench
 from tests.frame.samples import AWKWARD_VARIABLE
 
@@ -70,13 +69,6 @@ NETLISTS = [
 ]
 
 
-def serialise(ros: Middleware, name: str, value: Mapping[str, Any]) -> bytes:
-    """What rosbags makes of a value; it knows no wstring, for which our codec stands in, checked elsewhere."""
-    if name == "awkward_msgs/Unicode":
-        return encode(ORACLES[ros].frame(name), value)
-    return ORACLES[ros].serialise(name, value)
-
-
 @pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("stall", [0, 40])
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
@@ -86,13 +78,7 @@ def test_messages_come_through_under_stalls(
     """Fields, lengths, streams and elements are those that rosbags serialised, in wire order."""
     subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)
     print(f"seed {SEED}")
-    source = stimuli(ros, name, SEED)
-    frames, expected = [], []
-    for number in range(9):
-        value = source.message(parse_name(name), KINDS[number % len(KINDS)])
-        payload = serialise(ros, name, value)
-        frames.append(framed(payload))
-        expected += subscriber.events(value, len(payload))
+    frames, expected = exchanged(subscriber, ros, name, SEED, 9)
     assert subscriber.run(tmp_path, frames, SEED=SEED % 1000, STALL_PERCENT=stall) == expected
 
 

@@ -3,7 +3,7 @@
 #ifndef FREERTOS_CONFIG_H
 #define FREERTOS_CONFIG_H
 
-#include <stdint.h>
+#include "firm_board.h"
 
 #define configUSE_PREEMPTION 1
 #define configUSE_PORT_OPTIMISED_TASK_SELECTION 0
@@ -30,12 +30,10 @@
 #define configUNIQUE_INTERRUPT_PRIORITIES 32
 #define configMAX_API_CALL_INTERRUPT_PRIORITY 18
 
-void firm_board_start_tick(void);
 #define configSETUP_TICK_INTERRUPT() firm_board_start_tick()
 /* The timer's status. */
 #define configCLEAR_TICK_INTERRUPT() (*(volatile uint32_t *)0xF8F0060Cu = 1u)
 
-void firm_board_say(const char *text);
 #define configASSERT(condition)                                   \
     do {                                                          \
         if (!(condition)) {                                       \

@@ -75,9 +75,6 @@ static void enable(unsigned interrupt, unsigned priority) {
 
 #ifdef FIRM_FREERTOS
 
-void firm_board_start_tick(void);
-void vApplicationIRQHandler(uint32_t acknowledged);
-
 static void tick(void) { FreeRTOS_Tick_Handler(); }
 
 /* FreeRTOS's port acknowledges and ends the interrupt. */

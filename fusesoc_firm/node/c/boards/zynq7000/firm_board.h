@@ -24,6 +24,9 @@ void firm_board_map_memory(void);
 /* Enable the interrupts and, without an operating system, the tick, which increments firm_ticks. */
 void firm_board_start(void);
 
+/* Start the tick, as FreeRTOS's scheduler does. */
+void firm_board_start_tick(void);
+
 /* Let an interrupt (32 to 95) call a function. */
 void firm_board_connect(unsigned interrupt, void (*handler)(void *context), void *context);
 
