@@ -71,8 +71,8 @@ _DEMOS = {
 }
 _LOOP_ENTITY = "manager_loop"
 _TREE_ENTITY = "manager_tree"
-# The sides of square trees of publishers, and the bar in MHz.
-_TREES = (4, 32)
+# Groups, publishers of each group, and the bar in MHz.
+_TREE_SIDE = 32
 _TREE_BAR = 100.0
 _TREE_CORES = (
     "axis/package",
@@ -296,17 +296,13 @@ def _loop(policy: str, channels: int) -> Callable[[Path], Design]:
 
 
 def _trees() -> Iterator[Row]:
-    for side in _TREES:
-        yield Row(_label("Manager of Managers, round_robin", side * side), None, _tree(side), _TREE_BAR)
+    yield Row(_label("Manager of Managers, round_robin", _TREE_SIDE**2), None, _tree, _TREE_BAR)
 
 
-def _tree(side: int) -> Callable[[Path], Design]:
-    def make(folder: Path) -> Design:
-        library = Library("firm", folder)
-        library.analyse([*core_files(*_TREE_CORES), Path(__file__).with_name(f"{_TREE_ENTITY}.vhd")])
-        return _synthesised(Subject(library, _TREE_ENTITY, {"WIDTH": MANAGER_WIDTH, "SIDE": side}))
-
-    return make
+def _tree(folder: Path) -> Design:
+    library = Library("firm", folder)
+    library.analyse([*core_files(*_TREE_CORES), Path(__file__).with_name(f"{_TREE_ENTITY}.vhd")])
+    return _synthesised(Subject(library, _TREE_ENTITY, {"WIDTH": MANAGER_WIDTH, "SIDE": _TREE_SIDE}))
 
 
 def _arithmetic() -> Iterator[Row]:

@@ -85,7 +85,7 @@ _WATCHED_SINK = Proof(
     "firm_axis_sink_watchdog",
     ("axis/package", "axis/axis"),
     sizes=({"WIDTH": 8, "LIMIT": 2}, {"WIDTH": 8, "LIMIT": 3}),
-    depth=14,
+    depth=11,
     mutations=(
         Mutation(_SINK_WATCHDOG, "free    <= m_axis_tready or not valid_r;", "free    <= '1';", ("valid_stays",)),
         Mutation(
@@ -96,8 +96,8 @@ _WATCHED_SINK = Proof(
         ),
         Mutation(
             _SINK_WATCHDOG,
-            "stuck_r <= expires or (stuck_r and not free);",
-            "stuck_r <= expires;",
+            "dropping_r <= '1';",
+            "dropping_r <= '0';",
             ("frees_the_channel",),
         ),
         Mutation(_SINK_WATCHDOG, "waited_r = LIMIT-1", "waited_r = 0", ("no_hasty_report",)),
@@ -117,7 +117,7 @@ _WATCHED_SINK = Proof(
             _SINK_WATCHDOG, "lost <= expires or (s_axis_tvalid and refuse);", "lost <= '0';", ("aborts_are_reported",)
         ),
     ),
-    trace=14,
+    trace=12,
     is_bounded=True,
 )
 

@@ -36,8 +36,8 @@ entity firm_axis_sink_watchdog is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    -- Errors of the sink, and of this entity: code 9 for each frame that did not leave as a whole. The sink's own report
-    -- of an aborted frame is left out.
+    -- Errors of the sink, and of this entity: code 9 for each frame that did not leave as a whole. The sink's own
+    -- report of an aborted frame is left out.
     s_frame_error      : in  std_logic                    := '0';
     s_frame_error_code : in  fault_t                      := NO_FAULT;
     frame_error        : out std_logic;
