@@ -24,6 +24,8 @@ from pathlib import Path
 
 import yaml
 
+from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
+from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
@@ -108,6 +110,23 @@ def write_projects() -> None:
             call_generator(folder / f"{project}.core", name, {})
 
 
+# Messages with converters of variable size: arrays of text, arrays of messages.
+VARIABLE = ("sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray")
+
+
+def write_converters() -> None:
+    """Write converters of variable size: subscribers with each number of register stages, publishers of each kind."""
+    library = MessageLibrary(ROS2)
+    frames = [frame_of(name, library.closure(name)) for name in map(parse_name, VARIABLE)]
+    for width in (8, 64):
+        made = {pipeline: subscriber_files(frames, width, pipeline=pipeline) for pipeline in PIPELINES}
+        for variant, files in {**made, "publishers": publisher_files(frames, width)}.items():
+            folder = SAMPLES / f"{variant}_{width}"
+            folder.mkdir(parents=True)
+            for name, file in files.items():
+                (folder / name).write_text(str(file.content), encoding="ascii")
+
+
 def write_loop() -> None:
     """Write the bench of `firm message verify`."""
     name = parse_name("sensor_msgs/LaserScan")
@@ -136,6 +155,7 @@ def samples() -> list[Path]:
         list(pool.map(generate, CALLS))
     write_skeletons()
     write_projects()
+    write_converters()
     write_loop()
     write_registers()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]

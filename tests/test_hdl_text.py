@@ -28,7 +28,7 @@ REASONS = {
         "bits": _OPERAND,
         "hexadecimal": _LITERAL,
         "bits_of_bool": _OPERAND,
-        "within": _CONDITION,
+        "between": _CONDITION,
         "any_of": _CONDITION,
     },
     "converter/configuration.py": {"_literal": _LITERAL},

@@ -118,7 +118,7 @@ def select_plan(selection: Selection, options: RunOptions, build_root: Path | No
 
 
 def plan_tests(selection: Selection, options: RunOptions, build_root: Path | None = None) -> Plan:
-    """Return a plan of the selected tests: targets named `sim*` and `test*` that simulate.
+    """Return a plan of the selected tests: targets that simulate and are named `sim*`, `test*` or as selected.
 
     Without names of cores, the plan contains the cores below the current folder; without targets, all tests. Raise
     `InputError` for unknown cores, and for named cores without these tests.
@@ -132,7 +132,7 @@ def plan_tests(selection: Selection, options: RunOptions, build_root: Path | Non
         for name in _names(fusesoc, core, (), faults) if core else _cores_here(fusesoc):
             if selection.affected is not None and name not in selection.affected:
                 continue
-            tests = _tests(fusesoc, name, options.use_flags())
+            tests = _tests(fusesoc, name, options.use_flags(), patterns)
             chosen = _matching_tests(name, tests, patterns, Diagnostics() if is_lenient else faults)
             builds |= dict.fromkeys(Build(name, test, _work_root(fusesoc, name, tests[test])) for test in chosen)
     faults.raise_if_any()
@@ -216,12 +216,12 @@ def _cores_here(fusesoc: Any) -> list[str]:
     return sorted(name for name in cores if Path(cores[name].core_file).resolve().is_relative_to(here))
 
 
-def _tests(fusesoc: Any, name: str, further: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the tests of a core with their flags."""
+def _tests(fusesoc: Any, name: str, further: Mapping[str, Any], selected: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Return the tests of a core with their flags; `selected` are names of targets that need not be called tests."""
     core = fusesoc.get_core(name)
     found: dict[str, dict[str, Any]] = {}
     for target in core.get_data({}).targets:
-        if target.startswith(TESTS):
+        if target.startswith(TESTS) or target in selected:
             flags = {**core.get_flags(target), "target": target, **further}
             flow = core.get_flow(flags)
             if flow == "sim" or (not flow and flags.get("tool") in _SIMULATORS):

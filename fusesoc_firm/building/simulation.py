@@ -18,10 +18,9 @@ from fusesoc_firm.request.core_reader import read_core
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import explanation, missing, simulation_programs
-from fusesoc_firm.tools.simulators import SIMULATORS
+from fusesoc_firm.tools.simulators import SIMULATORS, Simulator
 
 _LIBRARY_CORE = "robot:firm:firm_system"
-_WAVES = "waves.ghw"
 _MESSAGE = re.compile(r" *(\d+) > (\S+) \S+ ?(.*)")
 _RESPONSE = re.compile(r" +< (\S+) \S+ ?(.*)")
 _CYCLES = re.compile(r" +(\d+) cycles first beat in to last beat out, (-?\d+) last beat in to first beat out")
@@ -155,22 +154,23 @@ def simulation(core: str, folder: Path | None, wishes: Wishes) -> Simulation:
     tool = targets[target]
     if absent := missing(simulation_programs(tool)):
         fail(explanation(absent).removeprefix("error: "))
-    if wishes.has_waves and not SIMULATORS[tool].reads_vhdl:
-        fail(f"{SIMULATORS[tool].title} cannot write waves here", hint="add '--tool ghdl'")
     (build,) = plan.builds if target == "sim" else make_plan([core], [target]).builds
-    waves = build.work_root / _WAVES if wishes.has_waves else None
-    options = tuple(_options(wishes, reads_vhdl=SIMULATORS[tool].reads_vhdl))
+    waves = build.work_root / SIMULATORS[tool].waves if wishes.has_waves else None
+    options = tuple(_options(wishes, SIMULATORS[tool]))
     return Simulation(Path(found.core_file), build, tool, options, waves)
 
 
-def _options(wishes: Wishes, *, reads_vhdl: bool) -> Iterator[str]:
-    """Yield the options of `fusesoc run` after the core's name. A host in Verilog takes its seed from FuseSoC."""
-    if not reads_vhdl:
+def _options(wishes: Wishes, simulator: Simulator) -> Iterator[str]:
+    """Yield the options of `fusesoc run` after the core's name. A host in Verilog takes its options from FuseSoC."""
+    if not simulator.reads_vhdl:
         if wishes.seed is not None:
             yield f"--SEED={wishes.seed}"
+        if wishes.has_waves:
+            yield f"--WAVES={simulator.waves}"
+            yield from simulator.wave_options
         yield from shlex.split(wishes.options)
         return
-    flags = [f"-gSEED={wishes.seed}"] * (wishes.seed is not None) + [f"--wave={_WAVES}"] * wishes.has_waves
+    flags = [f"-gSEED={wishes.seed}"] * (wishes.seed is not None) + [f"--wave={simulator.waves}"] * wishes.has_waves
     if text := " ".join([*flags, wishes.options]).strip():
         # Option and value are joined by `=`, since the value begins with a dash. FuseSoC appends it to the core's.
         yield f"--sim_options={text}"

@@ -59,7 +59,7 @@ def add_sim(commands: Any) -> None:
     )
     sim.add_argument("--tool", choices=("ghdl", "icarus", "verilator"), help="the simulator (default: the core's)")
     sim.add_argument("--seed", type=natural, metavar="N", help="the seed of the random stalls (default: the core's)")
-    sim.add_argument("--waves", action="store_true", help="write a waveform file (GHDL only)")
+    sim.add_argument("--waves", action="store_true", help="write a waveform file")
     sim.add_argument(
         "--options", default="", metavar="TEXT", help="further options for the simulator, such as '-gSTALL_PERCENT=0'"
     )

@@ -38,7 +38,7 @@ from fusesoc_firm.converter.program import (
 )
 from fusesoc_firm.converter.slices import Slice, slices_of
 from fusesoc_firm.converter.steps import terminator_of
-from fusesoc_firm.converter.vhdl import LINE, any_of, binary, bits_of_bool, hexadecimal, within
+from fusesoc_firm.converter.vhdl import LINE, any_of, between, binary, bits_of_bool, hexadecimal, within
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, FrameField, Loop
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Context
@@ -462,7 +462,10 @@ def _any_place(places: Iterable[int]) -> str:
 
 
 def _any_area(areas: Iterable[Area]) -> str:
-    """A condition that holds at the places of these areas only."""
+    """A condition that holds at the places of these areas only, without parentheses around all of it."""
+    areas = list(areas)
+    if len(areas) == 1:
+        return between("place_r", areas[0].first, areas[0].last)
     return any_of(within("place_r", area.first, area.last) for area in areas)
 
 

@@ -38,9 +38,15 @@ def bits_of_bool(port: str) -> str:
     return f'"0000000" & {port}'
 
 
-def within(number: str, first: int, last: int) -> str:
+def between(number: str, first: int, last: int) -> str:
     """Return the condition that a number is in the range `first` to `last`."""
-    return f"{number} = {first}" if first == last else f"({number} >= {first} and {number} <= {last})"
+    return f"{number} = {first}" if first == last else f"{number} >= {first} and {number} <= {last}"
+
+
+def within(number: str, first: int, last: int) -> str:
+    """Return the condition that a number is in the range `first` to `last`, as an operand of other conditions."""
+    condition = between(number, first, last)
+    return condition if first == last else f"({condition})"
 
 
 def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:

@@ -29,7 +29,7 @@ class Simulator:
 
     A simulator that does not read VHDL reads a Verilog netlist from GHDL. `options` are the options of the simulator's
     flow in Edalize, and `system_verilog` are additional options for SystemVerilog. C++ functions require GHDL's native
-    interface (VHPIDIRECT).
+    interface (VHPIDIRECT). `waves` is the name of the waveform file, for which a build needs FuseSoC's `wave_options`.
     """
 
     title: str
@@ -40,6 +40,8 @@ class Simulator:
     options: Mapping[str, str] = field(default_factory=dict)
     system_verilog: Mapping[str, str] = field(default_factory=dict)
     live: Live | None = None
+    waves: str = "waves.vcd"
+    wave_options: tuple[str, ...] = ()
 
 
 SIMULATORS: dict[str, Simulator] = {
@@ -51,12 +53,15 @@ SIMULATORS: dict[str, Simulator] = {
         options={"sim_options": "[--ieee-asserts=disable-at-0]"},
         # FuseSoC does not build anything before the run. The makefile's line contains the options of the analysis.
         live=Live("-g", "analyze", "ghdl -r "),
+        waves="waves.ghw",
     ),
     "icarus": Simulator(
         "Icarus Verilog",
         ", of the netlist that GHDL makes of the VHDL",
         programs=("iverilog",),
         system_verilog={"iverilog_options": "[-g2012]"},
+        # Edalize starts it with `-fst`.
+        waves="waves.fst",
     ),
     "verilator": Simulator(
         "Verilator",
@@ -68,6 +73,7 @@ SIMULATORS: dict[str, Simulator] = {
             "make_options": "[OPT_FAST=-O2]",
         },
         live=Live("+"),
+        wave_options=("--verilator_options=--trace",),
     ),
 }
 """The simulators by Edalize's names; the first suitable simulator is the default."""

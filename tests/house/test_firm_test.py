@@ -43,6 +43,7 @@ targets:
   default: {filesets: [rtl]}
   sim: {filesets: [rtl, bench, data], toplevel: bench, flow: sim, flow_options: {tool: ghdl}}
   test_old: {filesets: [rtl, bench, data], toplevel: bench, default_tool: ghdl}
+  bench: {filesets: [rtl, bench, data], toplevel: bench, flow: sim, flow_options: {tool: ghdl}}
   simple: {filesets: [rtl], toplevel: counter, flow: lint, flow_options: {tool: verilator}}
 ---
 CAPI=2:
@@ -379,6 +380,12 @@ def test_what_is_not_cached_is_reported(library: Path) -> None:
         assert (status, results(text)) == (0, {"sim": "passed"})
         line = "'run' of acme:m:counter:1.0 sim is not cached: it reads {}, which is not an input of its core"
         assert line.format(library / "counter" / "limit.txt") in text.splitlines()
+
+
+def test_a_selected_target_may_have_any_name(library: Path) -> None:
+    for arguments in (["acme:m:counter@bench"], ["acme:m:counter", "--target", "bench"]):
+        status, text = run(library, *arguments)
+        assert (status, [*results(text)]) == (0, ["bench"])
 
 
 @pytest.mark.parametrize(

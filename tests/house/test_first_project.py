@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -42,6 +43,20 @@ def test_a_project_passes(project: Path) -> None:
     assert (project / waves).stat().st_size > 0
     (log,) = (line.removeprefix("log:").strip() for line in lines if line.startswith("log:"))
     assert "PASS 3/3" in (project / log).read_text()
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(("tool", "content"), [("icarus", b"Icarus Verilog"), ("verilator", b" in_x [63:0] $end")])
+def test_waves_of_all_simulators(project: Path, tool: str, content: bytes) -> None:
+    """Without the option, the file is not written again."""
+    done = firm(project, "sim", "--tool", tool, "--waves")
+    assert done.returncode == 0
+    (found,) = re.findall(r"^waves: (.*)", done.stdout, re.MULTILINE)
+    waves = project / found
+    assert content in waves.read_bytes()
+    waves.unlink()
+    assert firm(project, "sim", "--tool", tool).returncode == 0
+    assert not waves.exists()
 
 
 @pytest.mark.check

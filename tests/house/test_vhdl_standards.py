@@ -16,6 +16,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
+from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
@@ -100,7 +101,7 @@ def test_systems(firm: Library, core: Path, tmp_path: Path) -> None:
 
 
 def analyse_converters(work: Library, library: MessageLibrary, names: list[MessageName], count: int) -> None:
-    """Generate and analyse the converters of `count` messages."""
+    """Generate and analyse the converters of `count` messages, subscribers with each `pipeline`."""
     while count:
         name = names.pop()
         try:
@@ -109,10 +110,12 @@ def analyse_converters(work: Library, library: MessageLibrary, names: list[Messa
             print(error)
             continue
         for width in (8, 64):
-            made = subscriber_files([frame], width) | publisher_files([frame], width)
-            for file, content in made.items():
-                (work.directory / file).write_text(str(content.content), encoding="ascii")
-            work.analyse([work.directory / file for file in made], *STRICT)
+            # The pipelines' subscribers have the same name, so the last one analysed is kept.
+            subscribers = (subscriber_files([frame], width, pipeline=pipeline) for pipeline in PIPELINES)
+            for made in (*subscribers, publisher_files([frame], width)):
+                for file, content in made.items():
+                    (work.directory / file).write_text(str(content.content), encoding="ascii")
+                work.analyse([work.directory / file for file in made], *STRICT)
         count -= 1
 
 

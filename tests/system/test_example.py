@@ -33,6 +33,7 @@ def test_a_copy_is_a_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
     ("arguments", "said"),
     [
         (["--example", "quat2eule"], "did you mean 'quat2euler'"),
+        (["--example", "pid"], "        mobile_robot: Four wheels of a skid-steer robot"),
         (["--example", "sobel", "--in", "geometry_msgs/Point"], "an example has no --in"),
         (["--example", "sobel", "--width", "64"], "an example has no --width"),
         (["--example", "sobel", "--from-bag", "drive.bag"], "an example has no --from-bag"),

@@ -29,6 +29,8 @@ module firm_sim_host #(
   parameter WATCHDOG = 100000,
   // Cycles without a beat in which it listens for surplus frames after the last expected one.
   parameter QUIET = 1000,
+  // The file for all signals of the simulation; none if empty.
+  parameter WAVES = "",
   // The most frames of a file.
   parameter FRAMES = 65536
 ) (
@@ -75,7 +77,7 @@ module firm_sim_host #(
   // The value of an illegal byte, and of `..`, which matches any byte.
   localparam ILL_FORMED = -2, ANY = -3;
 
-  reg [NAME_BITS-1:0] stimulus_name, expected_name, received_name, name;
+  reg [NAME_BITS-1:0] stimulus_name, expected_name, received_name, waves_name, name;
   integer stimulus_file, expected_file, received_file, file;
   integer seed, stall_percent, shown, watchdog, quiet;
 
@@ -920,6 +922,7 @@ module firm_sim_host #(
       stimulus_name = STIMULUS_FILE;
       expected_name = EXPECTED_FILE;
       received_name = RECEIVED_FILE;
+      waves_name    = WAVES;
       // verilator lint_on WIDTH
       seed          = SEED;
       stall_percent = STALL_PERCENT;
@@ -932,6 +935,8 @@ module firm_sim_host #(
         expected_name = name;
       if ($value$plusargs("RECEIVED_FILE=%s", name))
         received_name = name;
+      if ($value$plusargs("WAVES=%s", name))
+        waves_name = name;
       if (!$value$plusargs("SEED=%d", seed))
         seed = SEED;
       if (!$value$plusargs("STALL_PERCENT=%d", stall_percent))
@@ -986,6 +991,10 @@ module firm_sim_host #(
       received_file = 0;
       if (received_name != 0)
         received_file = $fopen(received_name, "w");
+      if (waves_name != 0) begin
+        $dumpfile(waves_name);
+        $dumpvars;
+      end
     end
   endtask
 

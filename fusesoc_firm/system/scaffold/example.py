@@ -5,8 +5,9 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from fusesoc_firm.request.core_reader import read_core
 from fusesoc_firm.system.scaffold.project import files_of, new_folder, write_surroundings
-from fusesoc_firm.text.diagnostics import fail, nearest
+from fusesoc_firm.text.diagnostics import closest, fail
 from fusesoc_firm.text.naming import identifier
 
 # The pages beside the demo systems have links that only a checkout has.
@@ -24,8 +25,16 @@ def copy_example(example: str, folder: Path, demos: Path, library: Path) -> list
     `demos` is the folder of the demo systems, and `library` the folder of the generators. May raise `InputError`.
     """
     if example not in (known := examples(demos)):
-        fail(f"unknown example '{example}'", hint=nearest(example, known))
+        fail(f"unknown example '{example}'", hint=_hint(example, known, demos))
     with new_folder(folder) as inner:
         shutil.copytree(demos / example, inner, ignore=shutil.ignore_patterns(*_LEFT_OUT), dirs_exist_ok=True)
         write_surroundings(inner, identifier(folder.name), library)
     return files_of(folder)
+
+
+def _hint(example: str, known: list[str], demos: Path) -> str:
+    """Return the example that was probably meant, or all examples with what they do."""
+    if near := closest(example, known):
+        return f"did you mean '{near}'?"
+    does = {name: read_core(demos / name / f"{name}.core").data["description"] for name in known}
+    return "legal here:\n" + "\n".join(f"        {name}: {text}" for name, text in does.items())

@@ -170,6 +170,8 @@ class DmaTransport : public Transport {
         if (take(*status)) return without_record(std::exchange(burst_, {}));
         continue;
       }
+      // Who has nothing left to send would not notice that a frame on its way was lost.
+      check(dma::kMm2s, "MM2S");
       check(dma::kS2mm, "S2MM");
       if (is_closed_ || deadline.is_over()) break;
       // Acknowledge the interrupt before looking at the descriptors, so that no completion is missed.
