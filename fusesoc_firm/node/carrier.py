@@ -50,10 +50,21 @@ class Published:
     time_ns: int
 
 
+@dataclass(frozen=True)
+class Lost:
+    """Messages of the topic with this number that were published, but that the middleware did not deliver."""
+
+    topic: int
+    count: int
+
+
+Event = Taken | Published | Lost
+
+
 class Carrier(Protocol):
     """The topics of one middleware. Subscribers and publishers are numbered separately, as in the description."""
 
-    def receive(self) -> Iterator[Taken | Published]:
+    def receive(self) -> Iterator[Event]:
         """Yield events until the carrier is closed or the middleware ends. May raise `CarrierError`."""
 
     def publish(self, topic: int, payload: bytes) -> None:
@@ -76,14 +87,15 @@ class Carrier(Protocol):
 class RosOptions:
     """The options of a node's ROS process.
 
-    `arguments` are arguments to ROS, such as remappings. `depth` is the depth of ROS's queues, in messages. `python` is
-    the interpreter for which ROS is installed; if it is None, the carrier searches for an interpreter.
+    `arguments` are arguments to ROS, such as remappings. `depth`, in messages, and `is_reliable` are for all topics; if
+    they are None, each topic has its own. `python` is the interpreter for which ROS is installed; if it is None, the
+    carrier searches for an interpreter.
     """
 
     name: str
     arguments: tuple[str, ...] = ()
-    depth: int = 10
-    is_reliable: bool = True
+    depth: int | None = None
+    is_reliable: bool | None = None
     is_timed: bool = False
     python: str | None = None
 
@@ -121,11 +133,9 @@ class RosCarrier:
         configuration = {
             "ros": ros,
             "name": options.name,
-            "depth": options.depth,
-            "is_reliable": options.is_reliable,
             "is_timed": options.is_timed,
-            "subscribers": _numbered(ros, description.subscribers),
-            "publishers": _numbered(ros, description.publishers),
+            "subscribers": _numbered(ros, description.subscribers, options),
+            "publishers": _numbered(ros, description.publishers, options),
         }
         try:
             self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
@@ -145,7 +155,7 @@ class RosCarrier:
         )
         return subscribers, publishers
 
-    def receive(self) -> Iterator[Taken | Published]:
+    def receive(self) -> Iterator[Event]:
         """Yield events until the carrier is closed or ROS asks the node to end. May raise `CarrierError`."""
         try:
             while parcel := self._channel.receive():
@@ -154,6 +164,8 @@ class RosCarrier:
                         yield Taken(parcel.topic, parcel.data, parcel.time_ns)
                 elif parcel.kind == bridge.PUBLISHED:
                     yield Published(parcel.topic, parcel.time_ns)
+                elif parcel.kind == bridge.LOST:
+                    yield Lost(parcel.topic, int(parcel.data))
                 elif parcel.kind == bridge.DONE:
                     self._stopped.set()
                 elif parcel.kind == bridge.STOP:
@@ -204,8 +216,10 @@ class RosCarrier:
         return CarrierError(f"{self.title}: {parcel.data.decode(errors='replace')}")
 
 
-def _numbered(ros: int, topics: Sequence[NodeTopic]) -> list[dict[str, object]]:
-    return [{"number": number, **asdict(topic)} for number, topic in enumerate(topics) if topic.ros == ros]
+def _numbered(ros: int, topics: Sequence[NodeTopic], options: RosOptions) -> list[dict[str, object]]:
+    given = {"depth": options.depth, "is_reliable": options.is_reliable}
+    common = {name: value for name, value in given.items() if value is not None}
+    return [{"number": number, **asdict(topic), **common} for number, topic in enumerate(topics) if topic.ros == ros]
 
 
 def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:

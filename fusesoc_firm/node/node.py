@@ -21,8 +21,8 @@ from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
-from fusesoc_firm.node.carrier import Carrier, CarrierError, Published, Taken
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.carrier import Carrier, CarrierError, Lost, Published, Taken
+from fusesoc_firm.node.description import DEFAULT_DEPTH, Crossing, NodeDescription, NodeTopic
 from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.statistics import Statistics
@@ -60,12 +60,14 @@ OpenTransport = Callable[[HardwareListener], Transport]
 class NodeSettings:
     """The settings of a node: each queue holds `depth` messages, and `overflow` is the action of a full queue.
 
+    Without a `depth`, the queue of a topic has the topic's depth.
+
     After a stop request, the node processes received messages until the hardware has been silent for `settle` seconds
     and does not report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
     `report` receives messages to the user.
     """
 
-    depth: int = 10
+    depth: int | None = None
     overflow: Overflow = Overflow.DROP_OLDEST
     settle: float = 0.5
     drain: float = 10.0
@@ -116,7 +118,7 @@ class Node:
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
         self._queues: SubscriberQueues[_Message] = SubscriberQueues(
-            len(self._inputs), settings.depth, overflow=settings.overflow
+            len(self._inputs), [self._depth(item) for item in self._inputs], overflow=settings.overflow
         )
         self._carriers: Mapping[int, Carrier] = {}
         self._is_wanted_to_end = threading.Event()
@@ -128,6 +130,9 @@ class Node:
         self._failed_restarts = 0
         self._last_traffic = time.monotonic()
         self._hardware = _Hardware(open_transport(self), description)
+
+    def _depth(self, item: NodeTopic | Crossing) -> int:
+        return self._settings.depth or (item.depth if isinstance(item, NodeTopic) else DEFAULT_DEPTH)
 
     # --- the run ---------------------------------------------------------------------------------------------------
 
@@ -192,6 +197,8 @@ class Node:
             for event in carrier.receive():
                 if isinstance(event, Published):
                     self._note_published(event)
+                elif isinstance(event, Lost):
+                    self.statistics.inputs[self._inputs[event.topic].block].lost += event.count
                 else:
                     self._take_message(event)
         except CarrierError as error:

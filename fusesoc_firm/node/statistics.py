@@ -17,6 +17,8 @@ class Input:
     sent: int = 0
     refused: int = 0
     """messages that the hardware rejected because of broken frames"""
+    lost: int = 0
+    """messages that were published, but that ROS did not deliver to the node"""
 
 
 @dataclass
@@ -49,13 +51,13 @@ class Statistics:
 
     def text(self) -> str:
         """Return the counts as a table for the user."""
-        rows: list[tuple[str, ...]] = [("from", "received", "dropped", "sent", "refused")]
+        rows: list[tuple[str, ...]] = [("from", "received", "dropped", "sent", "refused", "lost")]
         rows += [
-            (name, *map(str, (item.received, item.dropped, item.sent, item.refused)))
+            (name, *map(str, (item.received, item.dropped, item.sent, item.refused, item.lost)))
             for name, item in self.inputs.items()
         ]
-        rows.append(("to", "frames", "published", "", ""))
-        rows += [(name, str(item.frames), str(item.published), "", "") for name, item in self.outputs.items()]
+        rows.append(("to", "frames", "published", "", "", ""))
+        rows += [(name, str(item.frames), str(item.published), "", "", "") for name, item in self.outputs.items()]
         notes = {
             "faults on the route from the hardware": self.faults,
             "faults in software": self.software_faults,
