@@ -128,7 +128,7 @@ _REFUSED = Proof(
     _SUBSCRIBER,
     ("axis/package", "axis/axis"),
     sizes=({"MAX_LENGTH": 6},),
-    depth=14,
+    depth=17,
     mutations=(
         Mutation(
             f"{_SUBSCRIBER}.vhd",
