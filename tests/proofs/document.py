@@ -22,6 +22,7 @@ _SHORT = {
     "FRAMES": "F",
     "LIMIT": "L",
     "MAX_LENGTH": "M",
+    "DEPTH": "D",
 }
 # Generics that a table says if they are true.
 _CHOICES = {"DROP_OLDEST": "drop_oldest", "DROP_NEWEST": "drop_newest"}
