@@ -220,6 +220,7 @@ class Engine:
         self._changed = threading.Condition()
         self._channels = {MM2S: _Channel(self._built), S2MM: _Channel(self._built)}
         self._reset_end: float | None = None
+        self._is_own_reset = True
         self._is_over = False
         self.resets = 0
         self.is_held = False
@@ -257,9 +258,11 @@ class Engine:
         with self._changed:
             place, channel = self._place(offset)
             if place == _CONTROL and value & _RESET:
-                self._reset()
+                self._reset(is_own=True)
             elif self._is_resetting():
-                self._break(f"register {offset:#x} is written during a reset")
+                # It has no effect. Of a reset by somebody else, the driver cannot know.
+                if self._is_own_reset:
+                    self._break(f"register {offset:#x} is written during a reset")
             elif place == _CONTROL:
                 channel.set_control(value)
             elif place == _STATUS:
@@ -299,9 +302,10 @@ class Engine:
     def _is_resetting(self) -> bool:
         return self._reset_end is not None and time.monotonic() < self._reset_end
 
-    def _reset(self) -> None:
-        """Reset both channels, whichever is told."""
+    def _reset(self, *, is_own: bool) -> None:
+        """Reset both channels, whichever is told; by the driver, or by somebody else."""
         self.resets += 1
+        self._is_own_reset = is_own
         self._reset_end = time.monotonic() + self._built.reset_seconds
         for channel in self._channels.values():
             channel.reset()
@@ -396,7 +400,7 @@ class Engine:
         if (fault := self._due(name)) is not None:
             self.faults.remove(fault)
             if fault.is_reset:
-                self._reset()
+                self._reset(is_own=False)
             else:
                 self._fail(channel, fault.bits)
             return None

@@ -6,6 +6,7 @@ from tests.proofs.proof import Mutation, Proof, Size
 
 _QUEUE = "firm_axis_queue.vhd"
 _WATCHDOG = "firm_axis_watchdog.vhd"
+_SINK_WATCHDOG = "firm_axis_sink_watchdog.vhd"
 _TREE = "firm_manager_tree.vhd"
 _INSERT = "firm_axis_id_insert.vhd"
 
@@ -79,6 +80,47 @@ _WATCHED = Proof(
     is_bounded=True,
 )
 
+_WATCHED_SINK = Proof(
+    "sink_watchdog",
+    "firm_axis_sink_watchdog",
+    ("axis/package", "axis/axis"),
+    sizes=({"WIDTH": 8, "LIMIT": 2}, {"WIDTH": 8, "LIMIT": 3}),
+    depth=11,
+    mutations=(
+        Mutation(_SINK_WATCHDOG, "free    <= m_axis_tready or not valid_r;", "free    <= '1';", ("valid_stays",)),
+        Mutation(
+            _SINK_WATCHDOG,
+            "      if free = '1' then\n        if stuck_r",
+            "      if ready = '1' then\n        if stuck_r",
+            ("payload_stays",),
+        ),
+        Mutation(
+            _SINK_WATCHDOG,
+            "dropping_r <= '1';",
+            "dropping_r <= '0';",
+            ("frees_the_channel",),
+        ),
+        Mutation(_SINK_WATCHDOG, "waited_r = LIMIT-1", "waited_r = 0", ("no_hasty_report",)),
+        Mutation(_SINK_WATCHDOG, "(stuck_r and is_open) or", "", ("frames_are_whole",)),
+        Mutation(_SINK_WATCHDOG, "tlast_r <= s_axis_tlast;", "tlast_r <= '0';", ("frames_in_order",)),
+        Mutation(_SINK_WATCHDOG, "(stuck_r and is_open) or", "stuck_r or", ("abort_ends_one_frame",)),
+        Mutation(
+            _SINK_WATCHDOG,
+            "lost <= expires or (s_axis_tvalid and refuse);",
+            "lost <= expires or drop;",
+            ("no_report_invented",),
+        ),
+        Mutation(
+            _SINK_WATCHDOG, "lost <= expires or (s_axis_tvalid and refuse);", "lost <= expires;", ("nothing_lost",)
+        ),
+        Mutation(
+            _SINK_WATCHDOG, "lost <= expires or (s_axis_tvalid and refuse);", "lost <= '0';", ("aborts_are_reported",)
+        ),
+    ),
+    trace=12,
+    is_bounded=True,
+)
+
 _TREE_TO_HOST = Proof(
     "manager_tree",
     "small_tree",
@@ -130,4 +172,4 @@ _TREE_TO_HOST = Proof(
     is_bounded=True,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _TREE_TO_HOST)
+PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _TREE_TO_HOST)

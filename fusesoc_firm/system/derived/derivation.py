@@ -105,7 +105,9 @@ def derive(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
     subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), project, parts.blocks, faults)
-    subscribers = tuple(replace(item, queue=queue_of(parts.blocks[item.block], item, faults)) for item in subscribers)
+    subscribers = tuple(
+        replace(item, queue=queue_of(parts.blocks[item.block], item, project, faults)) for item in subscribers
+    )
     publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)

@@ -73,11 +73,15 @@ class Overflow(Enum):
 
 @dataclass(frozen=True)
 class Queue:
-    """The queue of a subscriber: `frames` whole frames with payloads of at most `longest` bytes."""
+    """The queue of a subscriber: `frames` whole frames with payloads of at most `longest` bytes.
+
+    Without any frames, it is a watchdog: frames that the subscriber does not accept are dropped after `limit` cycles.
+    """
 
     frames: int
     longest: int
     overflow: Overflow = Overflow.BLOCK
+    limit: int = 0
 
 
 @dataclass(frozen=True)

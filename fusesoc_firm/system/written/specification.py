@@ -144,7 +144,8 @@ class Project(Section):
         is_asked=False,
     )
     watchdog: int = key(
-        "cycles of clk after which a publisher that stops in the middle of a frame is cut off; 0: never",
+        "cycles of clk after which a publisher that stops in the middle of a frame, or a subscriber without a queue"
+        " that drops frames, is cut off; 0: never",
         form="integer",
         default=1 << 20,
         is_asked=False,
@@ -301,7 +302,8 @@ class Block(Section):
         "number of frames that are stored before a subscriber (default: none)", form="integer", only_of=SUBSCRIBER
     )
     overflow: Text | None = key(
-        "what a subscriber's full queue does: block the host, or drop a frame (default: block)",
+        "what a subscriber's full queue does: block the host, or drop a frame (default: block); without a queue,"
+        " drop_newest drops frames after the watchdog's cycles",
         choices=OVERFLOWS,
         only_of=SUBSCRIBER,
     )

@@ -103,9 +103,9 @@ class LinuxDmaDevice : public DmaDevice {
   // TransportError.
   LinuxDmaDevice(const std::string& uio, const std::string& buffer, bool has_interrupt, const std::string& root = "",
                  std::unique_ptr<DmaRegisters> registers = nullptr)
-      : uio_(opened(root + uio)),
-        registers_(registers ? std::move(registers)
+      : registers_(registers ? std::move(registers)
                              : std::make_unique<MappedDmaRegisters>(root + uio, register_bytes(uio, root))),
+        uio_(opened(root + uio)),
         address_(checked_address(buffer, root)),
         memory_(root + "/dev/" + buffer, static_cast<std::size_t>(number_in(folder(buffer, root) + "/size"))),
         has_interrupt_(has_interrupt) {}
@@ -158,8 +158,8 @@ class LinuxDmaDevice : public DmaDevice {
     return static_cast<std::uint32_t>(address);
   }
 
-  Descriptor uio_;
   std::unique_ptr<DmaRegisters> registers_;
+  Descriptor uio_;
   std::uint32_t address_;
   Mapping memory_;
   bool has_interrupt_;

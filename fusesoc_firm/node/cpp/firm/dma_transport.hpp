@@ -148,6 +148,7 @@ class DmaTransport : public Transport {
   ~DmaTransport() override { close(); }
 
   void send(const std::uint8_t* frame, std::size_t size) override {
+    const std::lock_guard<std::mutex> lock(sending_mutex_);
     std::uint32_t start = dma::kStartOfFrame;
     while (size > 0) {
       wait_for_room();
@@ -164,6 +165,7 @@ class DmaTransport : public Transport {
   }
 
   std::optional<Burst> receive(Timeout timeout = std::nullopt) override {
+    const std::lock_guard<std::mutex> lock(receiving_mutex_);
     const Deadline deadline(timeout);
     while (!is_closed_) {
       if (const auto status = from_system_.done(receiving_)) {
@@ -181,10 +183,12 @@ class DmaTransport : public Transport {
     return std::nullopt;
   }
 
-  // Stop the engine, so that it does not write to memory that has been released.
+  // Stop the engine, so that it does not write to memory that has been released; nobody may hand over descriptors during
+  // its reset.
   void close() override {
     if (is_closed_.exchange(true)) return;
     device_->end();
+    const std::scoped_lock lock(sending_mutex_, receiving_mutex_);
     reset();
   }
 
@@ -294,6 +298,7 @@ class DmaTransport : public Transport {
   const std::unique_ptr<DmaDevice> device_;
   const DmaOptions count_;
   std::atomic<bool> is_closed_{false};
+  std::mutex sending_mutex_, receiving_mutex_;
 
   // Used by the sender only.
   DmaRing to_system_;

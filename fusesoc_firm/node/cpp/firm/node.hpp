@@ -285,9 +285,9 @@ class Node {
     } catch (const BurstError& error) {
       note(error);
     } catch (const TransportError& error) {
-      fail_receiver(error.what(), false);
+      fail_receiver(transport, error.what(), false);
     } catch (const std::exception& error) {
-      fail_receiver(std::string("a payload could not be published: ") + error.what(), true);
+      fail_receiver(transport, std::string("a payload could not be published: ") + error.what(), true);
     }
   }
 
@@ -308,10 +308,14 @@ class Node {
 
   // --- faults ---------------------------------------------------------------------------------------------------------
 
-  void fail_receiver(const std::string& reason, bool is_publishing) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    receiver_fault_ = reason;
-    has_publishing_failed_ = is_publishing;
+  // Close the transport as well, because hardware whose output nobody takes may never have room for the sender.
+  void fail_receiver(Transport& transport, const std::string& reason, bool is_publishing) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      receiver_fault_ = reason;
+      has_publishing_failed_ = is_publishing;
+    }
+    transport.close();
   }
 
   bool has_receiver_failed() const {
