@@ -1,4 +1,4 @@
-"""The proofs of the parts that keep a system from stalling: queue, watchdog, and the tree of Managers."""
+"""The proofs of parts: queue, watchdog, the tree of Managers, and the store of Ethernet frames."""
 
 from __future__ import annotations
 
@@ -172,4 +172,30 @@ _TREE_TO_HOST = Proof(
     is_bounded=True,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _TREE_TO_HOST)
+_STORE = "firm_mac_store.vhd"
+
+_STORED = Proof(
+    "frame_store",
+    "firm_mac_store",
+    ("axis/package", "axis/axis", "net/mac"),
+    sizes=({"DEPTH": 4},),
+    depth=11,
+    mutations=(
+        Mutation(_STORE, "fetch or (valid_r and not m_axis_tready)", "fetch", ("valid_stays",)),
+        Mutation(_STORE, "(m_axis_tready = '1' or valid_r = '0')", "true", ("payload_stays",)),
+        Mutation(
+            _STORE,
+            "commit   <= ends and has_room and not s_axis_tuser(0)",
+            "commit   <= ends and has_room",
+            ("no_byte_of_a_bad_frame",),
+        ),
+        Mutation(_STORE, "else not full_r;", "else '1';", ("in_order_once",)),
+        Mutation(_STORE, "<= s_axis_tlast & s_axis_tdata;", "<= '1' & s_axis_tdata;", ("whole_frames",)),
+        Mutation(_STORE, "is_lost <= ends and not has_room", "is_lost <= '0' and not has_room", ("lost_or_delivered",)),
+        Mutation(_STORE, "read_r /= start_r", "read_r /= write_r", ("no_pause",)),
+    ),
+    trace=12,
+    is_bounded=True,
+)
+
+PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _TREE_TO_HOST, _STORED)

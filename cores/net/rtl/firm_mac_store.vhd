@@ -55,8 +55,8 @@ architecture rtl of firm_mac_store is
 
 begin
 
-  assert DEPTH >= 16 and 2**clog2(DEPTH) = DEPTH
-    report "firm_mac_store: DEPTH is " & integer'image(DEPTH) & "; legal: powers of two, 16 or more"
+  assert DEPTH >= 4 and 2**clog2(DEPTH) = DEPTH
+    report "firm_mac_store: DEPTH is " & integer'image(DEPTH) & "; legal: powers of two, 4 or more"
     severity failure;
 
   has_room <= '0' when next_r = read_r else not full_r;
