@@ -37,7 +37,8 @@ DOCS ?=
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # Programs other than Python that tests run.
 EMULATION_TOOLS := qemu-system-arm arm-none-eabi-gcc:gcc-arm-none-eabi \
-  /usr/lib/arm-none-eabi/include/string.h:libnewlib-arm-none-eabi
+  /usr/lib/arm-none-eabi/include/string.h:libnewlib-arm-none-eabi \
+  qemu-arm:qemu-user $(foreach triple,arm-linux-gnueabihf aarch64-linux-gnu,$(triple)-g++:g++-$(triple))
 TEST_TOOLS := bwrap:bubblewrap ccache iverilog strace verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET))) $(if $(SEED),--seed $(SEED)) \

@@ -34,6 +34,8 @@ PROGRAMS: Mapping[str, str] = {
     "bubblewrap": "runs steps of builds in a sandbox",
     "ccache": "caches compiled files, in tests",
     "g++": "compiles simulated C++ kernels, Verilator's models, nodes in C++",
+    "g++-aarch64-linux-gnu": "compiles nodes in C++ for emulated processors, in tests",
+    "g++-arm-linux-gnueabihf": "compiles nodes in C++ for emulated processors, in tests",
     "gcc-arm-none-eabi": "compiles programs for emulated processors",
     "ghdl": "analyses, simulates and translates VHDL",
     "graphviz": "draws diagrams",
@@ -42,6 +44,7 @@ PROGRAMS: Mapping[str, str] = {
     "make": "runs the steps of a build",
     "python3": "runs everything",
     "qemu-system-arm": "emulates processors",
+    "qemu-user": "runs nodes in C++ for emulated processors, in tests",
     "strace": "observes the steps of builds, for cached results",
     "tcl": "reads generated block designs, in tests",
     "verilator": "simulates Verilog",
@@ -57,10 +60,13 @@ PROGRAMS: Mapping[str, str] = {
 # Their copyright files are prose, which no program can read.
 PROSE = {
     "g++": "GPL-3+ with GCC Runtime Library Exception",
+    "g++-aarch64-linux-gnu": "GPL-3+ with GCC Runtime Library Exception",
+    "g++-arm-linux-gnueabihf": "GPL-3+ with GCC Runtime Library Exception",
     "gcc-arm-none-eabi": "GPL-3+ with GCC Runtime Library Exception",
     "libnewlib-arm-none-eabi": "BSD and MIT-like",
     "python3": "PSF-2.0",
     "qemu-system-arm": "GPL-2",
+    "qemu-user": "GPL-2",
     "strace": "LGPL-2.1+",
     "tcl": "TCL",
 }

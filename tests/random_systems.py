@@ -2,7 +2,7 @@
 
 Data flows from subscribers through accelerators in VHDL to publishers. There are chains, messages that go to several
 blocks, publishers that get parts of a message from two blocks, accelerators of several inputs and outputs and of parts
-of messages, types with several blocks, buffers, and every width and scheduler that needs no times.
+of messages, types with several blocks, buffers, and every width, pipeline and scheduler that needs no times.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 
 import yaml
 
+from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
@@ -250,6 +251,7 @@ class _Maker:
             "name": "random",
             "width": self.chance.choice(WIDTHS[:5]),
             "scheduler": self.chance.choice(timeless),
+            "pipeline": self.chance.choice(PIPELINES),
         }
         outgoing: dict[str, list[dict[str, Any]]] = {}
         for output in self.outputs:

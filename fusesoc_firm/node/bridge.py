@@ -10,7 +10,9 @@ bridge.
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
+import logging
 import os
 import socket
 import struct
@@ -25,6 +27,10 @@ CONFIGURE, READY = b"C", b"R"
 # MESSAGE, in both directions: a message from a topic, or a message to publish. PUBLISHED, from the bridge, on request:
 # the message is published.
 MESSAGE, PUBLISHED = b"M", b"P"
+# LOST, from the bridge: the number of messages of a topic that ROS did not deliver, as text.
+LOST = b"L"
+# The number of the topic `/diagnostics`.
+DIAGNOSTICS = 0xFFFF
 # STOP, to the bridge: accept no more messages. From the bridge: ROS asks the node to end.
 STOP = b"S"
 # DONE, from the bridge: all messages accepted before STOP are handed over. FAULT, from the bridge: the error that ended
@@ -35,6 +41,8 @@ DONE, FAULT = b"D", b"E"
 _HEADER = struct.Struct("<cHqI")
 # The maximum time in s to wait until published messages have been sent.
 _FLUSH_SECONDS = 2.0
+# The interval in s at which the types of other nodes' topics are compared.
+_LOOK_SECONDS = 1.0
 
 
 class Parcel(NamedTuple):
@@ -103,6 +111,23 @@ class BridgeError(Exception):
     """ROS cannot do what the node requests."""
 
 
+class Gaps:
+    """The numbers of a topic's messages, of which each publisher counts its own."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, int] = {}
+
+    def missing(self, publisher: str, number: int) -> int:
+        """Return how many messages are missing before the message with this number; a restart is not a gap."""
+        last = self._last.get(publisher, number)
+        self._last[publisher] = number
+        return max(0, number - last - 1)
+
+    def forget(self) -> None:
+        """Begin with the next message."""
+        self._last.clear()
+
+
 class Ros(ABC):
     """The parts of a ROS node that both versions of ROS share."""
 
@@ -110,16 +135,32 @@ class Ros(ABC):
         self._config = config
         self._channel = channel
         self._is_taking = True
+        self._is_ready = threading.Event()
         self._ended = threading.Event()
+        self._reported: set[str] = set()
 
-    def take(self, topic: int, payload: bytes) -> None:
-        """Hand over a message; block until the engine accepts it."""
+    def ready(self) -> None:
+        """Hand over messages; rospy may have received some, such as latched ones, before the engine expects them."""
+        self._channel.send(READY, data=json.dumps(self.names()).encode())
+        self._is_ready.set()
+
+    def take(self, topic: int, payload: bytes, missing: int = 0) -> None:
+        """Hand over a message, before which `missing` ones were lost; block until the engine accepts it."""
+        self._is_ready.wait()
         if not self._is_taking:
             return
         try:
+            if missing:
+                self._channel.send(LOST, topic, str(missing).encode())
             self._channel.send(MESSAGE, topic, payload, time.monotonic_ns())
         except OSError:
             self._is_taking = False
+
+    def report(self, text: str) -> None:
+        """Tell the user, once."""
+        if text not in self._reported:
+            self._reported.add(text)
+            print(text, file=sys.stderr, flush=True)
 
     def end(self) -> None:
         """Make `spin` return; any thread may call it."""
@@ -158,14 +199,22 @@ class Ros1(Ros):
         self._rospy = rospy
         _warn_without_master()
         rospy.init_node(config["name"], disable_signals=True)
+        # rospy's reports of refused peers.
+        logging.getLogger("rosout").addFilter(_Once())
         rospy.on_shutdown(self._stopped_by_ros)
-        self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in config["publishers"]}
+        given = [*config["publishers"], config["diagnostics"]]
+        self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in given}
         self._publishers = {
             topic["number"]: rospy.Publisher(
-                topic["name"], self._classes[topic["number"]], queue_size=config["depth"], tcp_nodelay=True
+                topic["name"],
+                self._classes[topic["number"]],
+                queue_size=topic["depth"],
+                latch=topic["is_transient_local"],
+                tcp_nodelay=True,
             )
-            for topic in config["publishers"]
+            for topic in given
         }
+        self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"] if topic["is_numbered"]}
         self._subscribers = {
             topic["number"]: rospy.Subscriber(
                 topic["name"], _raw_class(rospy, topic), self._taken, topic["number"], tcp_nodelay=True
@@ -174,7 +223,12 @@ class Ros1(Ros):
         }
 
     def _taken(self, message: Any, topic: int) -> None:
-        self.take(topic, message._buff)  # noqa: SLF001 - rospy has no public name for it
+        payload = message._buff  # noqa: SLF001 - rospy has no public name for it
+        missing = 0
+        if topic in self._gaps:
+            publisher = message._connection_header["callerid"]  # noqa: SLF001
+            missing = self._gaps[topic].missing(publisher, int.from_bytes(payload[:4], "little"))
+        self.take(topic, payload, missing)
 
     def _stopped_by_ros(self) -> None:
         """Report a stop by ROS, such as `rosnode kill`.
@@ -188,7 +242,9 @@ class Ros1(Ros):
         """Return the names of the topics after remapping."""
         return {
             "subscribers": {number: topic.resolved_name for number, topic in self._subscribers.items()},
-            "publishers": {number: topic.resolved_name for number, topic in self._publishers.items()},
+            "publishers": {
+                number: topic.resolved_name for number, topic in self._publishers.items() if number != DIAGNOSTICS
+            },
         }
 
     def publish(self, topic: int, payload: bytes) -> None:
@@ -206,8 +262,19 @@ class Ros1(Ros):
         self._channel.send(DONE)
 
     def spin(self) -> None:
-        """Wait for `end`: rospy works in its own threads."""
-        self._ended.wait()
+        """Wait for `end`, and look at the types of the topics: rospy works in its own threads."""
+        while not self._ended.wait(_LOOK_SECONDS):
+            with contextlib.suppress(OSError, self._rospy.ROSException):  # the master does not answer
+                self._look_at_types(dict(self._rospy.get_published_topics()))
+
+    def _look_at_types(self, types: dict[str, str]) -> None:
+        names = self.names()
+        for kind in _KINDS:
+            for topic in self._config[kind]:
+                name = names[kind][topic["number"]]
+                found = types.get(name, "*")
+                if found not in ("*", topic["type"]):
+                    self.report(_type_report("another node", "uses", name, found, topic["type"]))
 
     def close(self) -> None:
         """Wait until published messages have been sent, then end the node."""
@@ -216,6 +283,22 @@ class Ros1(Ros):
             for connection in list(publisher.impl.connections):
                 _flush(connection, latest)
         self._rospy.signal_shutdown("the hardware is disconnected")
+
+
+class _Once(logging.Filter):
+    """Passes each report of a refused peer once, since a peer with another type of a topic tries again and again."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._known: set[str] = set()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether the record is new."""
+        text = record.getMessage()
+        is_known = text in self._known
+        if "inbound connection" in text:
+            self._known.add(text)
+        return not is_known
 
 
 def _warn_without_master() -> None:
@@ -258,7 +341,6 @@ class Ros2(Ros):
         super().__init__(config, channel)
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
-        from rclpy.qos import QoSProfile, ReliabilityPolicy
         from rclpy.signals import SignalHandlerOptions
 
         self._rclpy = rclpy
@@ -267,28 +349,76 @@ class Ros2(Ros):
         self._node = rclpy.create_node(config["name"])
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
-        self._taken = 0
+        # The number of callbacks so far.
+        self._handled = 0
         self._stops_at: float | None = None
-        reliability = ReliabilityPolicy.RELIABLE if config["is_reliable"] else ReliabilityPolicy.BEST_EFFORT
-        qos = QoSProfile(depth=config["depth"], reliability=reliability)
+        self._looks_at = 0.0
+        self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"]}
         self._publishers = {
-            topic["number"]: self._node.create_publisher(types[topic["type"]], topic["name"], qos)
+            topic["number"]: self._node.create_publisher(types[topic["type"]], topic["name"], _quality(topic))
             for topic in config["publishers"]
         }
+        self._add_diagnostics(config["diagnostics"])
         self._subscribers = {
-            topic["number"]: self._node.create_subscription(
-                types[topic["type"]], topic["name"], self._callback(topic["number"]), qos, raw=True
-            )
-            for topic in config["subscribers"]
+            topic["number"]: self._subscription(topic, types[topic["type"]]) for topic in config["subscribers"]
         }
         self._check_hashes()
 
-    def _callback(self, topic: int) -> Any:
-        def taken(payload: bytes) -> None:
-            self._taken += 1
-            self.take(topic, payload)
+    def _add_diagnostics(self, topic: dict[str, Any]) -> None:
+        try:
+            message = _message_class(topic["type"])
+        except BridgeError as error:
+            self.report(f"{topic['name']} is not published: {error}")
+            return
+        self._publishers[topic["number"]] = self._node.create_publisher(message, topic["name"], _quality(topic))
 
-        return taken
+    def _subscription(self, topic: dict[str, Any], message: Any) -> Any:
+        """Return a subscription that counts what ROS loses, by an event or by the numbers of a single publisher."""
+        from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
+
+        number = topic["number"]
+
+        def taken(payload: bytes, info: dict[str, int]) -> None:
+            self._handled += 1
+            self.take(number, payload, self._missing(number, info))
+
+        def lost(event: Any) -> None:
+            self._handled += 1
+            if not self._has_one_publisher(number):
+                self._channel.send(LOST, number, str(event.total_count_change).encode())
+
+        create = functools.partial(
+            self._node.create_subscription, message, topic["name"], taken, _quality(topic), raw=True
+        )
+        try:
+            return create(event_callbacks=SubscriptionEventCallbacks(message_lost=lost))
+        except UnsupportedEventTypeError:
+            return create()
+
+    def _missing(self, topic: int, info: dict[str, int]) -> int:
+        """Return how many messages are missing before one; rclpy does not tell which publisher has numbered it."""
+        if not self._has_one_publisher(topic):
+            self._gaps[topic].forget()
+            return 0
+        return self._gaps[topic].missing("", info["publication_sequence_number"])
+
+    def _has_one_publisher(self, topic: int) -> bool:
+        return bool(self._subscribers[topic].get_publisher_count() == 1)
+
+    def _look_at_peers(self) -> None:
+        """Report each node that uses a topic with another type."""
+        info = {
+            "subscribers": (self._node.get_publishers_info_by_topic, "publishes"),
+            "publishers": (self._node.get_subscriptions_info_by_topic, "subscribes to"),
+        }
+        names = self.names()
+        for kind in _KINDS:
+            ends_of, verb = info[kind]
+            for topic in self._config[kind]:
+                name = names[kind][topic["number"]]
+                for end in ends_of(name):
+                    if end.topic_type != topic["type"]:
+                        self.report(_type_report(end.node_name, verb, name, end.topic_type, topic["type"]))
 
     def _check_hashes(self) -> None:
         """Raise BridgeError if an installed type differs from the hardware's; older ROS 2 releases provide no hash."""
@@ -313,12 +443,15 @@ class Ros2(Ros):
         """Return the names of the topics after remapping."""
         return {
             "subscribers": {number: topic.topic_name for number, topic in self._subscribers.items()},
-            "publishers": {number: topic.topic_name for number, topic in self._publishers.items()},
+            "publishers": {
+                number: topic.topic_name for number, topic in self._publishers.items() if number != DIAGNOSTICS
+            },
         }
 
     def publish(self, topic: int, payload: bytes) -> None:
-        """Publish a message."""
-        self._publishers[topic].publish(payload)
+        """Publish a message; `/diagnostics` may have no publisher."""
+        if topic in self._publishers:
+            self._publishers[topic].publish(payload)
 
     def stop(self) -> None:
         """Make `spin` take the messages that have already arrived, and no further messages."""
@@ -328,9 +461,13 @@ class Ros2(Ros):
     def spin(self) -> None:
         """Call the callbacks."""
         while not self._ended.is_set():
-            taken = self._taken
+            handled = self._handled
             self._executor.spin_once(timeout_sec=0.5 if self._stops_at is None else 0)
-            if self._stops_at is not None and (taken == self._taken or time.monotonic() > self._stops_at):
+            if self._stops_at is None:
+                if time.monotonic() > self._looks_at:
+                    self._look_at_peers()
+                    self._looks_at = time.monotonic() + _LOOK_SECONDS
+            elif handled == self._handled or time.monotonic() > self._stops_at:
                 break
         self._is_taking = False
         if not self._ended.is_set():
@@ -346,11 +483,25 @@ class Ros2(Ros):
         """Wait until published messages have been sent, then end the node."""
         from rclpy.duration import Duration
 
-        if self._config["is_reliable"]:
-            for publisher in self._publishers.values():
-                publisher.wait_for_all_acked(Duration(seconds=_FLUSH_SECONDS))
+        for topic in self._config["publishers"]:
+            if topic["is_reliable"]:
+                self._publishers[topic["number"]].wait_for_all_acked(Duration(seconds=_FLUSH_SECONDS))
         self._node.destroy_node()
         self._rclpy.shutdown()
+
+
+def _quality(topic: dict[str, Any]) -> Any:
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+    return QoSProfile(
+        depth=topic["depth"],
+        reliability=ReliabilityPolicy.RELIABLE if topic["is_reliable"] else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if topic["is_transient_local"] else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _type_report(node: str, verb: str, topic: str, its: str, ours: str) -> str:
+    return f"{node} {verb} {topic} with the type {its}, which is {ours} here; no messages are exchanged"
 
 
 _KINDS = ("subscribers", "publishers")
@@ -379,7 +530,7 @@ def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
             break
         if parcel.kind == MESSAGE:
             ros.publish(parcel.topic, parcel.data)
-            if is_timed:
+            if is_timed and parcel.topic != DIAGNOSTICS:
                 channel.send(PUBLISHED, parcel.topic, time_ns=time.monotonic_ns())
         elif parcel.kind == STOP:
             ros.stop()
@@ -401,7 +552,7 @@ def main() -> int:
     except Exception as error:  # noqa: BLE001 - whatever ROS raises is reported
         channel.send(FAULT, data=str(error).encode())
         return 1
-    channel.send(READY, data=json.dumps(ros.names()).encode())
+    ros.ready()
     ready.set()
     server = threading.Thread(target=_serve, args=(ros, channel, config["is_timed"]), daemon=True)
     server.start()

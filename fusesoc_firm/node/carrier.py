@@ -16,6 +16,7 @@ from typing import Protocol
 
 from fusesoc_firm.node import bridge
 from fusesoc_firm.node.description import NodeDescription, NodeTopic
+from fusesoc_firm.node.diagnostics import Report, diagnostics_payload, diagnostics_topic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.ros_wheels import ros_python
 
@@ -50,14 +51,28 @@ class Published:
     time_ns: int
 
 
+@dataclass(frozen=True)
+class Lost:
+    """Messages of the topic with this number that were published, but that the middleware did not deliver."""
+
+    topic: int
+    count: int
+
+
+Event = Taken | Published | Lost
+
+
 class Carrier(Protocol):
     """The topics of one middleware. Subscribers and publishers are numbered separately, as in the description."""
 
-    def receive(self) -> Iterator[Taken | Published]:
+    def receive(self) -> Iterator[Event]:
         """Yield events until the carrier is closed or the middleware ends. May raise `CarrierError`."""
 
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message; any thread may call this method. After the middleware has ended, messages are dropped."""
+
+    def diagnose(self, report: Report) -> None:
+        """Publish a report on `/diagnostics`."""
 
     def stop(self) -> None:
         """Accept no more messages."""
@@ -76,14 +91,15 @@ class Carrier(Protocol):
 class RosOptions:
     """The options of a node's ROS process.
 
-    `arguments` are arguments to ROS, such as remappings. `depth` is the depth of ROS's queues, in messages. `python` is
-    the interpreter for which ROS is installed; if it is None, the carrier searches for an interpreter.
+    `arguments` are arguments to ROS, such as remappings. `depth`, in messages, and `is_reliable` are for all topics; if
+    they are None, each topic has its own. `python` is the interpreter for which ROS is installed; if it is None, the
+    carrier searches for an interpreter.
     """
 
     name: str
     arguments: tuple[str, ...] = ()
-    depth: int = 10
-    is_reliable: bool = True
+    depth: int | None = None
+    is_reliable: bool | None = None
     is_timed: bool = False
     python: str | None = None
 
@@ -97,6 +113,7 @@ class RosCarrier:
         May raise `CarrierError`.
         """
         self.title = f"ROS {ros}"
+        self._ros = ros
         self._python = options.python or _python_of(ros)
         mine, its = socket.socketpair()
         arguments = [*ros_arguments(ros, options.arguments)]
@@ -121,11 +138,10 @@ class RosCarrier:
         configuration = {
             "ros": ros,
             "name": options.name,
-            "depth": options.depth,
-            "is_reliable": options.is_reliable,
             "is_timed": options.is_timed,
-            "subscribers": _numbered(ros, description.subscribers),
-            "publishers": _numbered(ros, description.publishers),
+            "subscribers": _numbered(ros, description.subscribers, options),
+            "publishers": _numbered(ros, description.publishers, options),
+            "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
             self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
@@ -145,7 +161,7 @@ class RosCarrier:
         )
         return subscribers, publishers
 
-    def receive(self) -> Iterator[Taken | Published]:
+    def receive(self) -> Iterator[Event]:
         """Yield events until the carrier is closed or ROS asks the node to end. May raise `CarrierError`."""
         try:
             while parcel := self._channel.receive():
@@ -154,6 +170,8 @@ class RosCarrier:
                         yield Taken(parcel.topic, parcel.data, parcel.time_ns)
                 elif parcel.kind == bridge.PUBLISHED:
                     yield Published(parcel.topic, parcel.time_ns)
+                elif parcel.kind == bridge.LOST:
+                    yield Lost(parcel.topic, int(parcel.data))
                 elif parcel.kind == bridge.DONE:
                     self._stopped.set()
                 elif parcel.kind == bridge.STOP:
@@ -168,6 +186,10 @@ class RosCarrier:
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message."""
         self._send(bridge.MESSAGE, topic, payload)
+
+    def diagnose(self, report: Report) -> None:
+        """Publish a report on `/diagnostics`."""
+        self._send(bridge.MESSAGE, bridge.DIAGNOSTICS, diagnostics_payload(self._ros, report))
 
     def stop(self) -> None:
         """Accept no more messages."""
@@ -204,8 +226,10 @@ class RosCarrier:
         return CarrierError(f"{self.title}: {parcel.data.decode(errors='replace')}")
 
 
-def _numbered(ros: int, topics: Sequence[NodeTopic]) -> list[dict[str, object]]:
-    return [{"number": number, **asdict(topic)} for number, topic in enumerate(topics) if topic.ros == ros]
+def _numbered(ros: int, topics: Sequence[NodeTopic], options: RosOptions) -> list[dict[str, object]]:
+    given = {"depth": options.depth, "is_reliable": options.is_reliable}
+    common = {name: value for name, value in given.items() if value is not None}
+    return [{"number": number, **asdict(topic), **common} for number, topic in enumerate(topics) if topic.ros == ros]
 
 
 def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:

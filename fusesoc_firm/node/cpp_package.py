@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware, middleware_of
-from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.description import DEFAULT_DEPTH, NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.diagnostics import diagnostics_topic
 from fusesoc_firm.node.software_process import software_ports
 from fusesoc_firm.request.request import GeneratedFile
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -23,8 +24,6 @@ from fusesoc_firm.text.quoting import lines_of
 from fusesoc_firm.text.render import render
 
 HEADERS = Path(__file__).resolve().parent / "cpp"
-# The capacity, in messages, of each subscriber's queue and of ROS's queues.
-_QUEUE_DEPTH = 10
 _SOURCE_TEMPLATE = "node/node.cpp"
 _PACKAGE_TEMPLATE = "node/package.xml"
 
@@ -67,7 +66,9 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
     version = _only_version(description, ros)
     dialect = _DIALECTS[version]
     package = f"{description.name}_node"
-    packages = {topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)}
+    packages = {"diagnostic_msgs"} | {
+        topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)
+    }
     build = {
         "package": package,
         "name": description.name,
@@ -131,11 +132,12 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "width": description.width,
         "subscriber_count": len(loaded.system.subscribers),
         "publisher_count": len(loaded.system.publishers),
-        "queue_depth": _QUEUE_DEPTH,
+        "queue_depth": DEFAULT_DEPTH,
         "digest": description.digest,
         "definitions": [*_definitions(description)],
         "subscribers": [_row(topic) for topic in description.subscribers],
         "publishers": [_row(topic) for topic in description.publishers],
+        "diagnostics": _row(diagnostics_topic(description.versions[0])),
         "software": _software(loaded, description),
     }
 
@@ -162,7 +164,8 @@ def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) 
 
 def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
     """Yield the definition text of each message once; a ROS 2 message has no text."""
-    texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
+    topics = (*description.subscribers, *description.publishers, diagnostics_topic(description.versions[0]))
+    texts = {topic.type: topic.definition for topic in topics}
     for name, text in texts.items():
         if text:
             lines = lines_of(text)
@@ -188,5 +191,13 @@ def _row(topic: NodeTopic) -> dict[str, Any]:
         "topic": topic.name,
         "type": topic.type,
         "signature": topic.signature,
+        "is_reliable": _word(topic.is_reliable),
+        "is_transient_local": _word(topic.is_transient_local),
+        "depth": topic.depth,
+        "is_numbered": _word(topic.is_numbered),
         "definition": {"constant": _constant(topic.type)} if topic.definition else None,
     }
+
+
+def _word(value: bool) -> str:
+    return "true" if value else "false"

@@ -6,15 +6,21 @@ A payload is a message as serialised by the middleware, so the node needs only a
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import Definitions, MessageName, MessageType
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere, way_to
-from fusesoc_firm.system.derived.model import Converter, StatusAccess, Topic
+from fusesoc_firm.system.derived.model import Converter, Quality, StatusAccess, Topic
 from fusesoc_firm.system.system_core import LoadedSystem, identity
 from fusesoc_firm.text.diagnostics import fail
+
+_HEADER = MessageType(MessageName("std_msgs", "Header"))
+# The capacity, in messages, of a queue without a topic, and of a topic's queues without `qos`.
+DEFAULT_DEPTH = Quality().depth
 
 
 @dataclass(frozen=True)
@@ -23,7 +29,9 @@ class NodeTopic:
 
     `block` is the block in the specification, and `id` is the converter's id, if there is a converter.
 
-    A relative `name` is resolved in the node's namespace. `signature` is the definition's signature: the MD5 sum for
+    A relative `name` is resolved in the node's namespace. `depth` is the capacity of the topic's queues in messages.
+    With `is_numbered`, a message begins with its publisher's count, since its first field is a Header of ROS 1.
+    `signature` is the definition's signature: the MD5 sum for
     ROS 1, the RIHS01 hash for ROS 2. `definition` is the definition's text with the texts of all nested messages; only
     ROS 1 announces it.
     """
@@ -35,6 +43,10 @@ class NodeTopic:
     signature: str
     id: int | None = None
     definition: str = ""
+    is_reliable: bool = True
+    is_transient_local: bool = False
+    depth: int = DEFAULT_DEPTH
+    is_numbered: bool = False
 
 
 @dataclass(frozen=True)
@@ -142,15 +154,31 @@ def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
             f"'{topic.block}' uses {frame.ros.title}, which nodes do not support",
             hint="nodes support only ROS 1 and ROS 2",
         )
-    definitions = loaded.libraries[frame.ros].closure(frame.message)
-    is_first = frame.ros is ROS1
-    name = frame.message
-    return NodeTopic(
-        topic.block,
-        topic.ros_name,
-        str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
-        frame.ros.number,
-        signature(name, definitions),
-        topic.id if isinstance(topic, Converter) else None,
-        closure_text(name, definitions) if is_first else "",
+    return replace(
+        node_topic(topic.block, topic.ros_name, frame.message, loaded.libraries[frame.ros]),
+        id=topic.id if isinstance(topic, Converter) else None,
+        is_reliable=topic.quality.is_reliable,
+        is_transient_local=topic.quality.is_transient_local,
+        depth=topic.quality.depth,
     )
+
+
+def node_topic(block: str, topic: str, name: MessageName, library: MessageLibrary) -> NodeTopic:
+    """Return a topic with a message of the library, without a converter."""
+    definitions = library.closure(name)
+    is_first = library.ros is ROS1
+    return NodeTopic(
+        block,
+        topic,
+        str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
+        library.ros.number,
+        signature(name, definitions),
+        definition=closure_text(name, definitions) if is_first else "",
+        is_numbered=is_first and _begins_with_header(name, definitions),
+    )
+
+
+def _begins_with_header(name: MessageName, definitions: Definitions) -> bool:
+    """Return whether a message begins with the field `header`, in whose first bytes ROS 1 numbers messages."""
+    fields = definitions[name].fields
+    return bool(fields) and (fields[0].name, fields[0].type) == ("header", _HEADER)

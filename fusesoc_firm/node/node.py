@@ -21,8 +21,9 @@ from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
-from fusesoc_firm.node.carrier import Carrier, CarrierError, Published, Taken
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.carrier import Carrier, CarrierError, Lost, Published, Taken
+from fusesoc_firm.node.description import DEFAULT_DEPTH, Crossing, NodeDescription, NodeTopic
+from fusesoc_firm.node.diagnostics import INTERVAL_SECONDS, Report
 from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.statistics import Statistics
@@ -60,12 +61,14 @@ OpenTransport = Callable[[HardwareListener], Transport]
 class NodeSettings:
     """The settings of a node: each queue holds `depth` messages, and `overflow` is the action of a full queue.
 
+    Without a `depth`, the queue of a topic has the topic's depth.
+
     After a stop request, the node processes received messages until the hardware has been silent for `settle` seconds
     and does not report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
     `report` receives messages to the user.
     """
 
-    depth: int = 10
+    depth: int | None = None
     overflow: Overflow = Overflow.DROP_OLDEST
     settle: float = 0.5
     drain: float = 10.0
@@ -116,7 +119,7 @@ class Node:
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
         self._queues: SubscriberQueues[_Message] = SubscriberQueues(
-            len(self._inputs), settings.depth, overflow=settings.overflow
+            len(self._inputs), [self._depth(item) for item in self._inputs], overflow=settings.overflow
         )
         self._carriers: Mapping[int, Carrier] = {}
         self._is_wanted_to_end = threading.Event()
@@ -129,6 +132,9 @@ class Node:
         self._last_traffic = time.monotonic()
         self._hardware = _Hardware(open_transport(self), description)
 
+    def _depth(self, item: NodeTopic | Crossing) -> int:
+        return self._settings.depth or (item.depth if isinstance(item, NodeTopic) else DEFAULT_DEPTH)
+
     # --- the run ---------------------------------------------------------------------------------------------------
 
     def run(self, carriers: Mapping[int, Carrier]) -> bool:
@@ -140,6 +146,7 @@ class Node:
         self._carriers = carriers
         takers = [self._start(partial(self._take, carrier)) for carrier in carriers.values()]
         sender, receiver = self._start(self._send), self._start(self._receive)
+        self._start(self._diagnose)
         self._is_wanted_to_end.wait()
         latest = time.monotonic() + self._settings.drain
         for carrier in carriers.values():
@@ -179,6 +186,17 @@ class Node:
                 self._fault = self._fault or error
         self.stop()
 
+    def _diagnose(self) -> None:
+        """Report the counts at intervals."""
+        before = 0
+        while not self._is_wanted_to_end.wait(INTERVAL_SECONDS):
+            dropped = {item.block: self._queues.dropped(number) for number, item in enumerate(self._inputs)}
+            counts = self.statistics.counts(dropped)
+            now = self.statistics.troubles() + sum(dropped.values())
+            for carrier in self._carriers.values():
+                carrier.diagnose(Report(f"{self._description.name}: node", now > before, counts))
+            before = now
+
     def _count_rest(self) -> None:
         for number, item in enumerate(self._inputs):
             self.statistics.inputs[item.block].dropped += self._queues.dropped(number)
@@ -192,6 +210,8 @@ class Node:
             for event in carrier.receive():
                 if isinstance(event, Published):
                     self._note_published(event)
+                elif isinstance(event, Lost):
+                    self.statistics.inputs[self._inputs[event.topic].block].lost += event.count
                 else:
                     self._take_message(event)
         except CarrierError as error:

@@ -7,7 +7,9 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from fusesoc_firm.node.description import DEFAULT_DEPTH
 from fusesoc_firm.node.queues import Overflow
+from fusesoc_firm.system.written.specification import RELIABILITIES
 
 ROS_ARGUMENTS = "--ros-args"
 _REMAPPING = re.compile(r"[~/\w]+:=.*", re.DOTALL)
@@ -18,16 +20,14 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", metavar="NAME", help="the node's name (default: the system's name)")
     parser.add_argument(
         "--qos",
-        choices=("reliable", "best_effort"),
-        default="reliable",
-        help="reliability of all ROS 2 topics (default: reliable)",
+        choices=RELIABILITIES,
+        help="reliability of all ROS 2 topics (default: that of the specification's qos)",
     )
     parser.add_argument(
         "--queue",
         type=_positive,
-        default=10,
         metavar="N",
-        help="capacity of each queue, including ROS queues, in messages (default: %(default)s)",
+        help=f"capacity of each queue, including ROS queues, in messages (default: that of qos, {DEFAULT_DEPTH})",
     )
     parser.add_argument(
         "--overflow",

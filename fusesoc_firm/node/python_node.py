@@ -69,6 +69,10 @@ def _topic(topic: NodeTopic) -> dict[str, Any]:
         "ros": topic.ros,
         "signature": topic.signature,
         "id": repr(topic.id),
+        "is_reliable": repr(topic.is_reliable),
+        "is_transient_local": repr(topic.is_transient_local),
+        "depth": repr(topic.depth),
+        "is_numbered": repr(topic.is_numbered),
         "definition": {"constant": _constant(topic.type)} if topic.definition else None,
     }
 

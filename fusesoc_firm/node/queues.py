@@ -128,16 +128,20 @@ class SubscriberQueues(Generic[Item]):
     def __init__(
         self,
         subscribers: int,
-        capacity: int,
+        capacity: int | Sequence[int],
         policy: Policy | None = None,
         overflow: Overflow = Overflow.DROP_OLDEST,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Create queues of `capacity` frames each; the default `policy` is least recently used; `clock` returns ns."""
-        if subscribers < 1 or capacity < 1:
+        """Create queues; the default `policy` is least recently used; `clock` returns ns.
+
+        `capacity` is the number of frames in each queue, or the numbers of all queues.
+        """
+        capacities = [capacity] * subscribers if isinstance(capacity, int) else [*capacity]
+        if subscribers < 1 or len(capacities) != subscribers or min(capacities) < 1:
             raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 or more")
         self._policy = policy or LeastRecentlyUsed(subscribers)
-        self._capacity = capacity
+        self._capacities = capacities
         self._overflow = overflow
         self._clock = clock
         self._queues: list[deque[tuple[int, Item]]] = [deque() for _ in range(subscribers)]
@@ -154,13 +158,13 @@ class SubscriberQueues(Generic[Item]):
         """
         if not 0 <= subscriber < len(self._queues):
             raise IndexError(f"subscriber is {subscriber}; legal: 0 to {len(self._queues) - 1}")
-        queue = self._queues[subscriber]
+        queue, capacity = self._queues[subscriber], self._capacities[subscriber]
         with self._changed:
             if self._overflow is Overflow.BLOCK:
-                self._changed.wait_for(lambda: self._closed or len(queue) < self._capacity, timeout)
+                self._changed.wait_for(lambda: self._closed or len(queue) < capacity, timeout)
             if self._closed:
                 raise ClosedError("the queues are closed")
-            if len(queue) == self._capacity:
+            if len(queue) == capacity:
                 self._dropped[subscriber] += self._overflow is not Overflow.BLOCK
                 if self._overflow is not Overflow.DROP_OLDEST:
                     return False

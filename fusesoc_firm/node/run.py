@@ -21,6 +21,7 @@ from fusesoc_firm.node.status import checked
 from fusesoc_firm.node.trace import Trace
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.system.written.specification import RELIABLE
 from fusesoc_firm.text.diagnostics import fail
 
 
@@ -58,7 +59,7 @@ def run_options(
             arguments.name or description.name,
             tuple(passed),
             arguments.queue,
-            arguments.qos == "reliable",
+            None if arguments.qos is None else arguments.qos == RELIABLE,
             arguments.trace is not None,
             arguments.ros_python,
         ),

@@ -1,4 +1,7 @@
-"""Combinational loops: of every message that is passed through, and of random systems. None is allowed."""
+"""Combinational loops: of every message that is passed through, with each `pipeline`, and of random systems.
+
+None is allowed.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,10 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
+from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.netlist.model import NetlistError
@@ -30,7 +35,8 @@ BAR = 0
 
 _COLUMNS = ("design", "bits", "number", "loops", "bar", "result")
 _NOTE = """
-    Each message of a distribution has a subscriber that is connected to a publisher. Random systems have widths of
+    Each message of a distribution has a subscriber that is connected to a publisher, with each
+    [`pipeline`](../reference/variable-converters.md#register-stages). Random systems have widths and pipelines of
     their own, and first versions of accelerators, in which an input's ready depends on the outputs'.
     """
 # A random system has so many blocks at least and at most.
@@ -61,17 +67,22 @@ def rows(seed: int, random_systems: int = RANDOM_SYSTEMS) -> Iterator[Row]:
     """All rows; random systems are drawn by `seed`."""
     for distribution in DISTRIBUTIONS:
         systems = systems_of_all(distribution, 0, seed)
-        for width in WIDTHS:
-            parts = [_passed(distribution, system.names, width) for system in systems]
-            number = sum(len(system.names) for system in systems)
-            yield Row(f"messages of {distribution}", str(width), number, parts)
+        number = sum(len(system.names) for system in systems)
+        for pipeline, width in product(PIPELINES, WIDTHS):
+            parts = [_passed(distribution, system.names, width, pipeline) for system in systems]
+            yield Row(_label(distribution, pipeline), str(width), number, parts)
     yield Row("random systems", "", random_systems, [_random(seed + number) for number in range(random_systems)])
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
-    messages = [(f"messages of {distribution}", str(width)) for distribution in DISTRIBUTIONS for width in WIDTHS]
-    return {TITLE: [*messages, ("random systems", "")]}
+    messages = product(DISTRIBUTIONS, PIPELINES, WIDTHS)
+    rows_of_messages = [(_label(distribution, pipeline), str(width)) for distribution, pipeline, width in messages]
+    return {TITLE: [*rows_of_messages, ("random systems", "")]}
+
+
+def _label(distribution: str, pipeline: str) -> str:
+    return f"messages of {distribution}, pipeline {pipeline}"
 
 
 def measure(seed: int, tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
@@ -107,8 +118,9 @@ def _searched(part: Callable[[Path], list[str]]) -> list[str]:
         return part(Path(name))
 
 
-def _passed(distribution: str, names: Sequence[str], width: int) -> Callable[[Path], list[str]]:
-    return lambda folder: loops_of_messages(PassThrough(distribution, names, 0, 0, width), folder)
+def _passed(distribution: str, names: Sequence[str], width: int, pipeline: str) -> Callable[[Path], list[str]]:
+    system = PassThrough(distribution, names, count=0, seed=0, width=width, pipeline=pipeline)
+    return lambda folder: loops_of_messages(system, folder)
 
 
 def _random(seed: int) -> Callable[[Path], list[str]]:

@@ -70,6 +70,18 @@ _DEMOS = {
     **dict.fromkeys(("mobile_robot", "sobel", "image_pipeline", "robotic_arm"), (100.0, 125.0)),
 }
 _LOOP_ENTITY = "manager_loop"
+_TREE_ENTITY = "manager_tree"
+# Groups, publishers of each group, and the bar in MHz.
+_TREE_SIDE = 32
+_TREE_BAR = 100.0
+_TREE_CORES = (
+    "axis/package",
+    "axis/axis",
+    "sched/package",
+    *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
+    *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
+    "manager/tree",
+)
 # EXPONENT_BITS and MANTISSA_BITS by the bits of a number.
 _FLOATS = {64: (11, 52), 32: (8, 23)}
 _ARITHMETIC = (
@@ -124,7 +136,7 @@ def rows() -> dict[str, list[Row]]:
         _SYSTEMS_TITLE: [*_systems()],
         _SCHEDULERS_TITLE: [*_schedulers()],
         _MANAGER_TITLE: [*_managers()],
-        _LOOP_TITLE: [*_loops()],
+        _LOOP_TITLE: [*_loops(), *_trees()],
         _ARITHMETIC_TITLE: [*_arithmetic()],
     }
 
@@ -281,6 +293,16 @@ def _loop(policy: str, channels: int) -> Callable[[Path], Design]:
         return _synthesised(Subject(library, _LOOP_ENTITY, {"WIDTH": MANAGER_WIDTH, "CHANNELS": channels}))
 
     return make
+
+
+def _trees() -> Iterator[Row]:
+    yield Row(_label("Manager of Managers, round_robin", _TREE_SIDE**2), None, _tree, _TREE_BAR)
+
+
+def _tree(folder: Path) -> Design:
+    library = Library("firm", folder)
+    library.analyse([*core_files(*_TREE_CORES), Path(__file__).with_name(f"{_TREE_ENTITY}.vhd")])
+    return _synthesised(Subject(library, _TREE_ENTITY, {"WIDTH": MANAGER_WIDTH, "SIDE": _TREE_SIDE}))
 
 
 def _arithmetic() -> Iterator[Row]:

@@ -29,13 +29,14 @@ class Beat:
 
 @dataclass(frozen=True)
 class Cycle:
-    """A line of the trace."""
+    """A line of the trace; `is_aborted` is the mark of the leaving beat."""
 
     entering: Beat
     leaving: Beat
     subscriber_error: bool
     error: bool
     code: int
+    is_aborted: bool
 
 
 @dataclass
@@ -135,7 +136,11 @@ def read_trace(path: Path) -> list[Cycle]:
 def _cycles(path: Path) -> Iterator[Cycle]:
     for line in path.read_text(encoding="ascii").splitlines():
         numbers = [int(word) for word in line.split()]
-        yield Cycle(_beat(numbers[:5]), _beat(numbers[5:10]), bool(numbers[10]), bool(numbers[11]), numbers[12])
+        yield Cycle(_beat(numbers[:5]), _beat(numbers[5:10]), *_report(numbers[10:]))
+
+
+def _report(numbers: list[int]) -> tuple[bool, bool, int, bool]:
+    return bool(numbers[0]), bool(numbers[1]), numbers[2], bool(numbers[3])
 
 
 def _beat(numbers: list[int]) -> Beat:

@@ -311,7 +311,14 @@ STAND_IN = """\
 #include <string>
 #include <vector>
 namespace firm {
-struct Topic { std::optional<unsigned> id; std::string name, type, signature, definition{}; };
+struct Quality { bool is_reliable, is_transient_local; unsigned depth; };
+struct Topic {
+  std::optional<unsigned> id;
+  std::string name, type, signature;
+  Quality quality;
+  bool is_numbered;
+  std::string definition{};
+};
 struct Port { std::string topic; std::optional<unsigned> converter; };
 struct Software { std::vector<Port> inputs, outputs; };
 struct System {
@@ -320,6 +327,7 @@ struct System {
   std::size_t queue_depth;
   std::string digest;
   std::vector<Topic> subscribers, publishers;
+  Topic diagnostics;
   Software software{};
 };
 template <class T>

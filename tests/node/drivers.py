@@ -22,6 +22,8 @@ class Driver:
     """A compiled driver."""
 
     program: Path
+    emulator: tuple[str, ...] = ()
+    """What runs it, if it is for another processor."""
 
     def answers(self, lines: Sequence[str], *arguments: str) -> list[str]:
         """What it says to `lines`; fails if it, or a sanitizer, ends with a fault."""
@@ -32,7 +34,9 @@ class Driver:
         self._run(list(arguments), "")
 
     def _run(self, arguments: list[str], text: str) -> str:
-        done = subprocess.run([self.program, *arguments], input=text, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [*self.emulator, self.program, *arguments], input=text, capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0 and not done.stderr, done.stderr
         return done.stdout
 
@@ -45,6 +49,13 @@ def cpp_driver(name: str, sanitizers: str = "address,undefined") -> Driver:
         f"drivers/{name}_{sanitizers.replace(',', '_')}", lambda folder: subprocess.run(command, cwd=folder, check=True)
     )
     return Driver(folder / name)
+
+
+def cross_compiled_driver(name: str, processor: str, triple: str) -> Driver:
+    """`<name>_driver.cpp`, compiled for Linux on another processor, which QEMU emulates, once in a run."""
+    command = [f"{triple}-g++", *_OPTIONS, "-I", str(HEADERS), str(HERE / f"{name}_driver.cpp"), "-o", name]
+    folder = made_once(f"drivers/{name}_{processor}", lambda folder: subprocess.run(command, cwd=folder, check=True))
+    return Driver(folder / name, (f"qemu-{processor}", "-L", f"/usr/{triple}"))
 
 
 def compile_c_driver(

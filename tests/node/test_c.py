@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import random
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import BurstError, BurstJoiner
 from fusesoc_firm.node.queues import ClosedError, EmptyError, SubscriberQueues
 from tests.links import coded
+from tests.node.dma_engine import ERRORS, HALTED, MM2S, S2MM, Built, Engine, Fault, Loop, board
 from tests.node.drivers import C_FOLDER, HERE, Driver, compile_c_driver
 from tests.node.test_bursts import _interleaved
 
@@ -21,6 +23,7 @@ LONGEST = 60
 IDS = 3
 DEPTH = 2
 WIDTHS = (8, 32, 64)
+BUS_BASE = 0x1000_0000
 STAND_IN = HERE / "freertos_stand_in"
 # What Python says, and the name of it in C.
 WORDS = {
@@ -52,13 +55,15 @@ def drivers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     }
 
 
-@pytest.fixture(scope="module")
-def devices(tmp_path_factory: pytest.TempPathFactory) -> Driver:
+def _devices(folder: Path, sizes: Mapping[str, int]) -> Driver:
     sources = [f"firm/firm_{name}.c" for name in ("frame", "limit", "link", "dma", "uart")]
     port = C_FOLDER / "ports" / "bare_metal"
-    return compile_c_driver(
-        "devices", tmp_path_factory.mktemp("devices"), sources, [port], {"FIRM_DMA_BUFFER_BYTES": 128}
-    )
+    return compile_c_driver("devices", folder, sources, [port], {"FIRM_DMA_BUFFER_BYTES": 128, **sizes})
+
+
+@pytest.fixture(scope="module")
+def devices(tmp_path_factory: pytest.TempPathFactory) -> Driver:
+    return _devices(tmp_path_factory.mktemp("devices"), {})
 
 
 def test_frames_are_packed_alike(drivers: dict[int, Driver]) -> None:
@@ -164,31 +169,69 @@ def test_queues_serve_alike(drivers: dict[int, Driver]) -> None:
     assert sum(queues.dropped(subscriber) for subscriber in range(IDS)) > 20
 
 
+def _board(
+    root: Path, address: int = BUS_BASE, *, built: Built | None = None, faults: Sequence[Fault] = ()
+) -> AbstractContextManager[Engine]:
+    """A board whose system holds a whole frame, because the program receives only when it has sent one."""
+    return board(root, address=address, stream=Loop(room=200), built=built, faults=faults)
+
+
+def _through_the_dma(devices: Driver, root: Path, *words: object) -> str:
+    return devices.answers([], "dma", str(root), *map(str, words))[0]
+
+
 @pytest.mark.parametrize("longest", [100, 1000, 20000])
-def test_frames_go_through_the_dma_and_back(devices: Driver, longest: int) -> None:
-    """Also those that are longer than a buffer, and than all of them; caches are as the model has them."""
+def test_frames_go_through_the_dma_and_back(devices: Driver, tmp_path: Path, longest: int) -> None:
+    """Also those that are longer than a buffer, and than all of them; the processor has caches."""
     print(f"seed {SEED}")
-    assert devices.answers([], "dma", "200", str(longest), str(SEED), "none", "0") == ["ok 200 0 0"]
+    with _board(tmp_path):
+        answer = _through_the_dma(devices, tmp_path, 200 if longest < 20000 else 20, longest, SEED, "plain")
+    assert answer.split()[0] == "ok"
+
+
+def test_the_dma_reaches_more_than_4_gib(tmp_path: Path) -> None:
+    """The memory lies across the border."""
+    print(f"seed {SEED}")
+    address = 2**32 - 4096
+    devices = _devices(tmp_path, {"FIRM_DMA_ADDRESS_BITS": 40, "BUS_BASE": address})
+    with _board(tmp_path, address, built=Built(address_bits=40)):
+        assert _through_the_dma(devices, tmp_path, 100, 1000, SEED, "plain").split()[0] == "ok"
+
+
+@pytest.mark.parametrize("channel", [MM2S, S2MM])
+@pytest.mark.parametrize("bits", ERRORS)
+def test_errors_of_the_dma_are_told(devices: Driver, tmp_path: Path, channel: int, bits: int) -> None:
+    """A channel has halted and says why."""
+    with _board(tmp_path, faults=[Fault(7, channel, bits)]):
+        answer = _through_the_dma(devices, tmp_path, 100, 2000, 1, "plain")
+    found = f"{bits | HALTED:x}"
+    assert answer == ("error 7 " + (f"{found} 0" if channel == MM2S else f"0 {found}"))
+
+
+def test_a_reset_by_somebody_else_is_told(devices: Driver, tmp_path: Path) -> None:
+    with _board(tmp_path, faults=[Fault(7, S2MM, is_reset=True)]):
+        assert _through_the_dma(devices, tmp_path, 100, 2000, 1, "plain") == "error 7 1 1"
 
 
 @pytest.mark.parametrize(
-    ("fault", "answer"),
+    ("how", "built", "answer"),
     [
-        ("decode", "error 8 41 0"),
-        ("slave", "error 7 0 21"),
-        ("room", "too_long 0 0 0"),
-        ("simple", "no_sg 0 1 1"),
-        ("reset", "stuck 0 1 1"),
+        ("room", Built(), "too_long 0 0 0"),
+        ("plain", Built(has_scatter_gather=False), "no_sg 0 1 1"),
+        ("plain", Built(reset_seconds=1e9), "stuck 0 1 1"),
         # The same while nothing counts the ticks.
-        ("frozen", "stuck 0 1 1"),
+        ("frozen", Built(reset_seconds=1e9), "stuck 0 0 0"),
         # Memory beyond 4 GiB, across this border, and at an odd address.
-        ("high", "memory 0 0 0"),
-        ("border", "memory 0 0 0"),
-        ("unaligned", "memory 0 0 0"),
+        ("high", Built(), "memory 0 1 1"),
+        ("border", Built(), "memory 0 1 1"),
+        ("unaligned", Built(), "memory 0 1 1"),
     ],
 )
-def test_errors_of_the_dma_are_told(devices: Driver, fault: str, answer: str) -> None:
-    assert devices.answers([], "dma", "100", "2000", "1", fault, "7") == [answer]
+def test_a_dma_that_does_not_start_is_told(
+    devices: Driver, tmp_path: Path, how: str, built: Built, answer: str
+) -> None:
+    with _board(tmp_path, built=built):
+        assert _through_the_dma(devices, tmp_path, 100, 2000, 1, how) == answer
 
 
 @pytest.mark.parametrize("size", [2**26, 2**26 - 1, 0])

@@ -1,4 +1,4 @@
-"""AXI DMA in C++ before a model of the engine that watches the rules of descriptors, and its device made of files."""
+"""AXI DMA in C++ before the model of the engine, and its device made of files."""
 
 from __future__ import annotations
 
@@ -6,11 +6,24 @@ from pathlib import Path
 
 import pytest
 
+from tests.node.dma_engine import (
+    DMA_DECODE,
+    DMA_SLAVE,
+    MM2S,
+    REGISTER_BYTES,
+    S2MM,
+    SG_SLAVE,
+    Built,
+    Fault,
+    board,
+    board_files,
+)
 from tests.node.drivers import Driver, cpp_driver
 
 SEED = 20261123
 # Some frames are the record of an aborted frame.
 RECORD_BYTES = 7
+MEMORY_BYTES = 1 << 22
 
 
 @pytest.fixture(scope="module")
@@ -18,62 +31,70 @@ def driver() -> Driver:
     return cpp_driver("dma")
 
 
-def play(driver: Driver, count: int, longest: int, buffer: int, fault: str = "none", at: int = 0) -> str:
-    return driver.answers([], *map(str, [count, longest, buffer, SEED, fault, at]))[0]
+def play(driver: Driver, root: Path, count: int, longest: int, buffer: int, seconds: int = 60) -> str:
+    return driver.answers([], str(root), *map(str, [count, longest, buffer, SEED, seconds]))[0]
 
 
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("count", "longest", "buffer"), [(500, 300, 64), (500, 300, 1024), (20, 100_000, 4096), (50, 0, 0)]
 )
-def test_frames_go_there_and_back(driver: Driver, count: int, longest: int, buffer: int) -> None:
+def test_frames_go_there_and_back(driver: Driver, tmp_path: Path, count: int, longest: int, buffer: int) -> None:
     """Also those that are longer than a buffer, and than all of them."""
     print(f"seed {SEED}")
-    word, size, _ = play(driver, count, longest, buffer).split()
+    with board(tmp_path, MEMORY_BYTES):
+        word, size, _ = play(driver, tmp_path, count, longest, buffer).split()
     assert word == "ok" and count * 5 <= int(size) <= count * (longest + RECORD_BYTES)
 
 
 @pytest.mark.parametrize(
     ("fault", "error"),
     [
-        ("decode", "the DMA engine's MM2S: DMADecErr (address)"),
-        ("slave", "the DMA engine's S2MM: DMASlvErr (response from memory)"),
-        ("halt", "the DMA engine's S2MM: the channel has halted"),
-        ("stall", "the transport is closed"),
-        ("overrun", "the DMA engine wrote past the end of a buffer"),
-        ("simple", "the DMA engine does not support scatter-gather, so it is not from a generated block design"),
-        ("reset", "the DMA engine does not leave reset; check the engine's clock"),
-        ("start", "the DMA engine does not start"),
+        (Fault(10, MM2S, DMA_DECODE), "the DMA engine's MM2S: DMADecErr (address)"),
+        (Fault(10, S2MM, DMA_SLAVE), "the DMA engine's S2MM: DMASlvErr (response from memory)"),
+        (Fault(10, S2MM, is_silent=True), "the DMA engine's S2MM: the channel has halted"),
+        (Fault(10, MM2S, is_stalled=True), "the transport is closed"),
+        (Fault(10, S2MM, is_too_long=True), "the DMA engine wrote past the end of a buffer"),
+        # The last frame: nobody sends any more.
+        (Fault(100, MM2S, SG_SLAVE), "the DMA engine's MM2S: SGSlvErr (response from memory)"),
     ],
 )
-def test_errors_of_the_engine_are_named(driver: Driver, fault: str, error: str) -> None:
-    assert play(driver, 100, 100, 64, fault, 10) == f"error: {error}"
+def test_errors_of_the_engine_are_named(driver: Driver, tmp_path: Path, fault: Fault, error: str) -> None:
+    with board(tmp_path, MEMORY_BYTES, faults=[fault]):
+        assert play(driver, tmp_path, 100, 100, 64, 1 if fault.is_stalled else 60) == f"error: {error}"
+
+
+@pytest.mark.parametrize(
+    ("built", "error"),
+    [
+        (
+            Built(has_scatter_gather=False),
+            "the DMA engine does not support scatter-gather, so it is not from a generated block design",
+        ),
+        (Built(reset_seconds=1e9), "the DMA engine does not leave reset; check the engine's clock"),
+        (Built(starts=False), "the DMA engine does not start"),
+    ],
+)
+def test_an_engine_that_does_not_start_is_named(driver: Driver, tmp_path: Path, built: Built, error: str) -> None:
+    with board(tmp_path, MEMORY_BYTES, built=built):
+        assert play(driver, tmp_path, 1, 1, 64) == f"error: {error}"
 
 
 @pytest.mark.parametrize("size", [63, 100, 1 << 21])
-def test_illegal_buffers_are_named(driver: Driver, size: int) -> None:
-    assert play(driver, 1, 1, size) == (
-        f"error: the DMA has 4 buffers of {size} bytes; legal: 2 or more, a multiple of 64, and all within the"
-        " 4194304 bytes of memory"
-    )
+def test_illegal_buffers_are_named(driver: Driver, tmp_path: Path, size: int) -> None:
+    with board(tmp_path, MEMORY_BYTES):
+        assert play(driver, tmp_path, 1, 1, size) == (
+            f"error: the DMA has 4 buffers of {size} bytes; legal: 2 or more, a multiple of 64, and all within the"
+            " 4194304 bytes of memory"
+        )
 
 
-def _device(root: Path, address: str = "0x3f000000", kind: str = "u-dma-buf") -> Path:
+def _device(root: Path, address: int = 0x3F000000, kind: str = "u-dma-buf") -> Path:
     """The files of UIO and u-dma-buf."""
-    texts = {
-        "sys/class/uio/uio3/maps/map0/size": "0x10000\n",
-        f"sys/class/{kind}/udmabuf0/phys_addr": f"{address}\n",
-        f"sys/class/{kind}/udmabuf0/size": "8192\n",
-        f"sys/class/{kind}/udmabuf0/sync_mode": "1\n",
-    }
-    for name, text in texts.items():
-        (root / name).parent.mkdir(parents=True, exist_ok=True)
-        (root / name).write_text(text)
-    (root / "dev").mkdir()
-    registers = bytearray(65536)
+    board_files(root, 8192, address, kind)
+    registers = bytearray(REGISTER_BYTES)
     registers[0x34:0x38] = (77).to_bytes(4, "little")
-    (root / "dev/uio3").write_bytes(registers)
-    (root / "dev/udmabuf0").write_bytes(bytes(8192))
+    (root / "dev/uio0").write_bytes(registers)
     return root
 
 
@@ -81,14 +102,14 @@ def _device(root: Path, address: str = "0x3f000000", kind: str = "u-dma-buf") ->
 def test_a_device_of_files(driver: Driver, tmp_path: Path, kind: str) -> None:
     root = _device(tmp_path, kind=kind)
     assert driver.answers([], "files", str(root)) == [f"ok 77 8192 {0x3F000000}"]
-    assert (root / "dev/uio3").read_bytes()[0x30:0x34] == (0x1234567).to_bytes(4, "little")
+    assert (root / "dev/uio0").read_bytes()[0x30:0x34] == (0x1234567).to_bytes(4, "little")
     assert (root / "dev/udmabuf0").read_bytes()[5] == 0xAB
     # Not cached, and not a device's memory either.
     assert (root / f"sys/class/{kind}/udmabuf0/sync_mode").read_text() == "2"
 
 
 def test_a_device_that_does_not_serve_is_named(driver: Driver, tmp_path: Path) -> None:
-    root = _device(tmp_path, "0xfffff000")
+    root = _device(tmp_path, 0xFFFFF000)
     far = driver.answers([], "files", str(root))
     assert far == ["error: udmabuf0 ends beyond the 4 GiB that the DMA engine reaches"]
     size = root / "sys/class/u-dma-buf/udmabuf0/size"

@@ -29,14 +29,20 @@ from fusesoc_firm.simulation.simulator import BuiltSimulator, build_simulator
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity
 from tests.node.drivers import compile_c_driver, cpp_driver
+from tests.system.simulated.systems import DATA
 
 pytestmark = pytest.mark.check
 SEED = 20261123
-FRAMES = 120
+FRAMES = 200
 MOST_BYTES = 40
-POINT, TEXT = 0, 1
+QUEUED = 2
+POINT, TEXT, QUEUE, WATCHED, BUFFERED, NOBODY = 0, 1, 2, 3, 4, 7
 SPECIFICATION = f"""\
-project: {{name: robot, width: 32, status: frames}}
+project: {{name: robot, width: 32, status: frames, watchdog: 32}}
+accelerators:
+  - {{name: deaf, type: VHDL, sources: deaf.vhd, interface: {{
+     input: [{{middleware: ROS2, message: geometry_msgs/Vector3}}],
+     output: [{{middleware: ROS2, message: geometry_msgs/Vector3}}]}}}}
 blocks:
   - {{name: point_in, middleware: ROS2, mode: subscriber, message: geometry_msgs/Point,
      outgoing: [{{name: point_out}}]}}
@@ -44,6 +50,17 @@ blocks:
   - {{name: text_in, middleware: ROS2, mode: subscriber, message: std_msgs/String, maxLength: {MOST_BYTES},
      outgoing: [{{name: text_out}}]}}
   - {{name: text_out, middleware: ROS2, mode: publisher, message: std_msgs/String, maxLength: {MOST_BYTES}}}
+  - {{name: queue_in, middleware: ROS2, mode: subscriber, message: geometry_msgs/Vector3, queue: {QUEUED},
+     overflow: drop_newest, outgoing: [{{name: queue_deaf}}]}}
+  - {{name: queue_deaf, type: deaf, outgoing: [{{name: queue_out}}]}}
+  - {{name: queue_out, middleware: ROS2, mode: publisher, message: geometry_msgs/Vector3}}
+  - {{name: watched_in, middleware: ROS2, mode: subscriber, message: geometry_msgs/Vector3, overflow: drop_newest,
+     outgoing: [{{name: watched_deaf}}]}}
+  - {{name: watched_deaf, type: deaf, outgoing: [{{name: watched_out}}]}}
+  - {{name: watched_out, middleware: ROS2, mode: publisher, message: geometry_msgs/Vector3}}
+  - {{name: buffered_in, middleware: ROS2, mode: subscriber, message: std_msgs/String,
+     outgoing: [{{name: buffered_out}}]}}
+  - {{name: buffered_out, middleware: ROS2, mode: publisher, message: std_msgs/String, buffer: {MOST_BYTES}}}
 """
 ABORTED = f"faults[{Fault.SHORT_FRAME - 1}]"
 ENCODING = b"\x00\x01\x00\x00"
@@ -97,10 +114,10 @@ def _injected(seed: int) -> tuple[list[bytes], dict[str, int]]:
     source = random.Random(seed)
     frames, words = [], Counter[str]()
     for _ in range(FRAMES):
-        id_ = source.choice((POINT, TEXT, TEXT, 7))
-        if id_ == 7:
-            frames.append(pack_frame(id_, b"nobody"))
-            words["id_errors"] += 1
+        id_ = source.choice((POINT, TEXT, TEXT, QUEUE, WATCHED, BUFFERED, NOBODY))
+        if id_ not in (POINT, TEXT):
+            frames.append(_refused(id_, source))
+            words[f"subscriber[{id_}].frames" if id_ != NOBODY else "id_errors"] += 1
             continue
         payload = _point(source) if id_ == POINT else _text(source)
         fault = source.choice((None, *(POINT_FAULTS if id_ == POINT else TEXT_FAULTS)))
@@ -112,13 +129,28 @@ def _injected(seed: int) -> tuple[list[bytes], dict[str, int]]:
     frames.append(_broken(POINT, _point(source), last, source))
     for name in (f"subscriber[{POINT}].frames", f"subscriber[{POINT}].faults[{last - 1}]"):
         words[name] += 1
+    # One message is offered to the deaf accelerator; the publisher with a buffer reports what is too long for it.
+    words[f"subscriber[{QUEUE}].faults[{Fault.DROPPED - 1}]"] = words[f"subscriber[{QUEUE}].frames"] - QUEUED - 1
+    words[f"subscriber[{WATCHED}].faults[{Fault.WATCHDOG - 1}]"] = words[f"subscriber[{WATCHED}].frames"] - 1
+    words[f"publisher[{BUFFERED}].faults[{Fault.OVER_BUFFER - 1}]"] = words[f"subscriber[{BUFFERED}].frames"]
     return frames, {**words, "last_fault": POINT << 4 | last}
+
+
+def _refused(id_: int, source: random.Random) -> bytes:
+    """A good frame to an accelerator that never takes, to a publisher whose buffer is too small, or to nobody."""
+    if id_ == NOBODY:
+        return pack_frame(id_, b"nobody")
+    if id_ != BUFFERED:
+        return pack_frame(id_, _point(source))
+    text = b"a" * source.randint(MOST_BYTES, 2 * MOST_BYTES) + b"\0"
+    return pack_frame(id_, ENCODING + len(text).to_bytes(4, "little") + text)
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> BuiltSimulator:
     folder = tmp_path_factory.mktemp("robot")
     (folder / "robot.yaml").write_text(SPECIFICATION)
+    (folder / "deaf.vhd").write_text((DATA / "deaf.vhd").read_text())
     return build_simulator(folder / "robot.yaml", build_root=folder / "build")
 
 
@@ -211,7 +243,7 @@ READERS: dict[str, Callable[[BuiltSimulator, list[bytes], Path], tuple[Words, Wo
 def test_the_counters_are_what_was_injected(language: str, built: BuiltSimulator, tmp_path: Path) -> None:
     frames, expected = _injected(SEED + len(language))
     found, received = READERS[language](built, frames, tmp_path)
-    assert len(expected) == len(POINT_FAULTS) + len(TEXT_FAULTS) + 4 and received[f"publisher[{TEXT}].{ABORTED}"]
+    assert len(expected) == len(POINT_FAULTS) + len(TEXT_FAULTS) + 10 and received[f"publisher[{TEXT}].{ABORTED}"]
     counted = {name: word for name, word in found.items() if COUNTED.fullmatch(name) and word}
     assert counted == {**expected, **received, "digest": _digest(built)}
 
@@ -255,8 +287,9 @@ def test_the_command_prints_what_was_injected(
         with _line(transport) as device:
             assert main(["status", f"uart:{device}:1000000", "--system", str(_specification(built))]) == 0
     text = capsys.readouterr().out
-    names = {"subscriber[0]": "point_in", "subscriber[1]": "text_in", "publisher[0]": "point_out"}
-    names["publisher[1]"] = "text_out"
+    channels = ("point", "text", "queue", "watched", "buffered")
+    names = {f"subscriber[{place}]": f"{name}_in" for place, name in enumerate(channels)}
+    names |= {f"publisher[{place}]": f"{name}_out" for place, name in enumerate(channels)}
     found: dict[str, int] = {"id_errors": int(text.split("unknown ids ")[1].split(",")[0])}
     for channel, name in names.items():
         (row,) = [line.split(maxsplit=5) for line in text.splitlines() if line.startswith(f"{name} ")]
@@ -264,6 +297,6 @@ def test_the_command_prints_what_was_injected(
         for count, code in re.findall(r"(\d+) of code (\d+)", row[5]):
             found[f"{channel}.faults[{int(code) - 1}]"] = int(count)
     last = expected.pop("last_fault")
-    assert found == {**expected, **received}
+    assert {name: word for name, word in found.items() if word} == {**expected, **received}
     assert f"last fault: code {last & 15} of {names[f'subscriber[{last >> 4}]']}" in text
     assert f"digest {_digest(built)}" in text

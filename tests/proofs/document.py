@@ -14,7 +14,16 @@ DOCUMENT = REPOSITORY / "docs" / "figures" / "proofs.md"
 _TABLES = re.compile(r"(?<=<!-- by make proofs -->\n).*?(?=<!-- end -->)", re.DOTALL)
 _COLUMNS = ("harness", "of", "sizes", "method", "faults found", "seconds")
 # Generics of sizes, as a table says them.
-_SHORT = {"WIDTH": "W", "SUBSCRIBERS": "N", "REQUESTERS": "N", "SOURCES": "N", "FRAMES": "F", "LIMIT": "L"}
+_SHORT = {
+    "WIDTH": "W",
+    "SUBSCRIBERS": "N",
+    "REQUESTERS": "N",
+    "SOURCES": "N",
+    "FRAMES": "F",
+    "LIMIT": "L",
+    "MAX_LENGTH": "M",
+    "DEPTH": "D",
+}
 # Generics that a table says if they are true.
 _CHOICES = {"DROP_OLDEST": "drop_oldest", "DROP_NEWEST": "drop_newest"}
 

@@ -1,11 +1,14 @@
-"""The proofs of the parts that keep a system from stalling: queue, watchdog, and the tree of Managers."""
+"""The proofs of parts: queue, watchdog, the tree of Managers, and the store of Ethernet frames."""
 
 from __future__ import annotations
 
+from tests.bench.designs import SUBSCRIBER, Converter
 from tests.proofs.proof import Mutation, Proof, Size
 
 _QUEUE = "firm_axis_queue.vhd"
 _WATCHDOG = "firm_axis_watchdog.vhd"
+_SUBSCRIBER = "axis_to_std_msgs_string"
+_SINK_WATCHDOG = "firm_axis_sink_watchdog.vhd"
 _TREE = "firm_manager_tree.vhd"
 _INSERT = "firm_axis_id_insert.vhd"
 
@@ -79,6 +82,73 @@ _WATCHED = Proof(
     is_bounded=True,
 )
 
+_WATCHED_SINK = Proof(
+    "sink_watchdog",
+    "firm_axis_sink_watchdog",
+    ("axis/package", "axis/axis"),
+    sizes=({"WIDTH": 8, "LIMIT": 2}, {"WIDTH": 8, "LIMIT": 3}),
+    depth=11,
+    mutations=(
+        Mutation(_SINK_WATCHDOG, "free    <= m_axis_tready or not valid_r;", "free    <= '1';", ("valid_stays",)),
+        Mutation(
+            _SINK_WATCHDOG,
+            "      if free = '1' then\n        if stuck_r",
+            "      if ready = '1' then\n        if stuck_r",
+            ("payload_stays",),
+        ),
+        Mutation(
+            _SINK_WATCHDOG,
+            "dropping_r <= '1';",
+            "dropping_r <= '0';",
+            ("frees_the_channel",),
+        ),
+        Mutation(_SINK_WATCHDOG, "waited_r = LIMIT-1", "waited_r = 0", ("no_hasty_report",)),
+        Mutation(_SINK_WATCHDOG, "(stuck_r and is_open) or", "", ("frames_are_whole",)),
+        Mutation(_SINK_WATCHDOG, "tlast_r <= s_axis_tlast;", "tlast_r <= '0';", ("frames_in_order",)),
+        Mutation(_SINK_WATCHDOG, "(stuck_r and is_open) or", "stuck_r or", ("abort_ends_one_frame",)),
+        Mutation(
+            _SINK_WATCHDOG,
+            "lost <= expires or (s_axis_tvalid and refuse);",
+            "lost <= expires or drop;",
+            ("no_report_invented",),
+        ),
+        Mutation(
+            _SINK_WATCHDOG, "lost <= expires or (s_axis_tvalid and refuse);", "lost <= expires;", ("nothing_lost",)
+        ),
+        Mutation(
+            _SINK_WATCHDOG, "lost <= expires or (s_axis_tvalid and refuse);", "lost <= '0';", ("aborts_are_reported",)
+        ),
+    ),
+    trace=12,
+    is_bounded=True,
+)
+
+_REFUSED = Proof(
+    "refused_frames",
+    _SUBSCRIBER,
+    ("axis/package", "axis/axis"),
+    sizes=({"MAX_LENGTH": 6},),
+    depth=17,
+    mutations=(
+        Mutation(
+            f"{_SUBSCRIBER}.vhd",
+            "is_refused <= check_r and not",
+            "is_refused <= '0' and not",
+            ("no_refused_byte_leaves", "no_refused_message"),
+        ),
+        Mutation(
+            f"{_SUBSCRIBER}.vhd",
+            "length_t'range), MAX_LENGTH+1)",
+            "length_t'range), MAX_LENGTH)",
+            ("no_report_invented",),
+        ),
+        Mutation(f"{_SUBSCRIBER}.vhd", "frame_fault <= TOO_LONG;", "frame_fault <= BAD_LENGTH;", ("each_is_reported",)),
+    ),
+    trace=18,
+    is_bounded=True,
+    converter=Converter(1, "std_msgs/String", SUBSCRIBER, 8),
+)
+
 _TREE_TO_HOST = Proof(
     "manager_tree",
     "small_tree",
@@ -130,4 +200,30 @@ _TREE_TO_HOST = Proof(
     is_bounded=True,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _TREE_TO_HOST)
+_STORE = "firm_mac_store.vhd"
+
+_STORED = Proof(
+    "frame_store",
+    "firm_mac_store",
+    ("axis/package", "axis/axis", "net/mac"),
+    sizes=({"DEPTH": 4},),
+    depth=11,
+    mutations=(
+        Mutation(_STORE, "fetch or (valid_r and not m_axis_tready)", "fetch", ("valid_stays",)),
+        Mutation(_STORE, "(m_axis_tready = '1' or valid_r = '0')", "true", ("payload_stays",)),
+        Mutation(
+            _STORE,
+            "commit   <= ends and has_room and not s_axis_tuser(0)",
+            "commit   <= ends and has_room",
+            ("no_byte_of_a_bad_frame",),
+        ),
+        Mutation(_STORE, "else not full_r;", "else '1';", ("in_order_once",)),
+        Mutation(_STORE, "<= s_axis_tlast & s_axis_tdata;", "<= '1' & s_axis_tdata;", ("whole_frames",)),
+        Mutation(_STORE, "is_lost <= ends and not has_room", "is_lost <= '0' and not has_room", ("lost_or_delivered",)),
+        Mutation(_STORE, "read_r /= start_r", "read_r /= write_r", ("no_pause",)),
+    ),
+    trace=12,
+    is_bounded=True,
+)
+
+PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _STORED)

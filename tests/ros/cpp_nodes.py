@@ -252,6 +252,13 @@ class Peer:
         self._process.stdin.write(json.dumps(line) + "\n")
         self._process.stdin.flush()
 
+    def wait_until_published(self) -> None:
+        """Wait until it has published all; nothing may come meanwhile."""
+        assert self._process.stdin
+        self._process.stdin.write('{"sync": true}\n')
+        self._process.stdin.flush()
+        assert self._lines.get() == {"sync": True}
+
     def take(self) -> tuple[str, bytes]:
         """The next message: its topic and payload."""
         line = self._lines.get()

@@ -2,9 +2,11 @@
 
     python payload_peer.py 1|2 '{"topic": "package/Type", ...}' '{"topic": "package/Type", ...}'
 
-The first topics are subscribed to, the others published. A line `{"topic": ..., "payload": base64}` on its input is
+The first topics are subscribed to, the others published. Words may follow a type: `latched`, of a topic that need not
+find somebody, and `depth=3`. A line `{"topic": ..., "payload": base64}` on its input is
 parsed by the message's own class and published; one like it on its output is a message that came, as that class
-serialises it. The first line on its output says that every topic has found somebody. It needs nothing but ROS.
+serialises it. The first line on its output says that every topic has found somebody. A line `{"sync": ...}` comes back
+when all before it is published. It needs nothing but ROS.
 """
 
 from __future__ import annotations
@@ -35,7 +37,19 @@ def commands() -> Iterator[tuple[str, bytes]]:
     """The messages to publish, until the input ends."""
     for line in sys.stdin:
         command = json.loads(line)
-        yield command["topic"], base64.b64decode(command["payload"])
+        if "sync" in command:
+            say(command)
+        else:
+            yield command["topic"], base64.b64decode(command["payload"])
+
+
+class Wish:
+    """A topic's type, and what is wanted of it."""
+
+    def __init__(self, text: str) -> None:
+        self.type, *words = text.split()
+        self.is_latched = "latched" in words
+        self.depth = int(next((word[len("depth=") :] for word in words if word.startswith("depth=")), 1000))
 
 
 class Ros1Peer:
@@ -45,13 +59,17 @@ class Ros1Peer:
 
         rospy.init_node("peer", anonymous=True, disable_signals=True)
         self.publishers = {}
-        for topic, name in published.items():
-            message = get_message_class(name)
-            self.publishers[topic] = rospy.Publisher(topic, message, queue_size=1000, tcp_nodelay=True), message
-        self.subscribers = [
-            rospy.Subscriber(topic, get_message_class(name), self.take, topic, tcp_nodelay=True)
-            for topic, name in subscribed.items()
-        ]
+        self.sought = []
+        for topic, text in published.items():
+            wish = Wish(text)
+            message = get_message_class(wish.type)
+            end = rospy.Publisher(topic, message, queue_size=wish.depth, latch=wish.is_latched, tcp_nodelay=True)
+            self.publishers[topic] = end, message
+            self.sought += [] if wish.is_latched else [end]
+        for topic, text in subscribed.items():
+            wish = Wish(text)
+            subscriber = rospy.Subscriber(topic, get_message_class(wish.type), self.take, topic, tcp_nodelay=True)
+            self.sought += [] if wish.is_latched else [subscriber]
 
     def take(self, message: Any, topic: str) -> None:
         buffer = io.BytesIO()
@@ -59,8 +77,7 @@ class Ros1Peer:
         say_message(topic, buffer.getvalue())
 
     def is_connected(self) -> bool:
-        ends = [*self.subscribers, *(publisher for publisher, _ in self.publishers.values())]
-        return all(end.get_num_connections() for end in ends)
+        return all(end.get_num_connections() for end in self.sought)
 
     def run(self) -> None:
         while not self.is_connected():
@@ -84,11 +101,21 @@ class Ros2Peer:
         self.rclpy = rclpy
         rclpy.init()
         self.node = rclpy.create_node("peer")
-        self.types = {topic: message_class(name) for topic, name in (subscribed | published).items()}
+        self.wishes = {topic: Wish(text) for topic, text in {**subscribed, **published}.items()}
+        self.types = {topic: message_class(wish.type) for topic, wish in self.wishes.items()}
         self.subscribed = list(subscribed)
-        self.publishers = {topic: self.node.create_publisher(self.types[topic], topic, 1000) for topic in published}
+        self.publishers = {
+            topic: self.node.create_publisher(self.types[topic], topic, self.quality(topic)) for topic in published
+        }
         for topic in subscribed:
-            self.node.create_subscription(self.types[topic], topic, self.taker(topic), 1000)
+            self.node.create_subscription(self.types[topic], topic, self.taker(topic), self.quality(topic))
+
+    def quality(self, topic: str) -> Any:
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
+        wish = self.wishes[topic]
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if wish.is_latched else DurabilityPolicy.VOLATILE
+        return QoSProfile(depth=wish.depth, durability=durability)
 
     def taker(self, topic: str) -> Callable[[Any], None]:
         from rclpy.serialization import serialize_message
@@ -96,8 +123,12 @@ class Ros2Peer:
         return lambda message: say_message(topic, serialize_message(message))
 
     def is_connected(self) -> bool:
-        return all(publisher.get_subscription_count() for publisher in self.publishers.values()) and all(
-            self.node.count_publishers(topic) for topic in self.subscribed
+        sought = [topic for topic, wish in self.wishes.items() if not wish.is_latched]
+        return all(
+            self.node.count_publishers(topic)
+            if topic in self.subscribed
+            else self.publishers[topic].get_subscription_count()
+            for topic in sought
         )
 
     def publish_all(self) -> None:

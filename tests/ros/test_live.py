@@ -218,7 +218,7 @@ def test_quaternions_come_back_as_angles(place: Place) -> None:
             )
             assert struct.unpack_from("<3d", payload, len(prefix)) == pytest.approx(expected, abs=1e-9)
         assert node.stop() == 0
-        assert re.search(r"QuaternionToEuler_sub +20 +0 +20 +0\n", node.said())
+        assert re.search(r"QuaternionToEuler_sub +20 +0 +20 +0 +0\n", node.said())
     rows = [*csv.DictReader(table.open(encoding="utf-8"))]
     assert len(rows) == 20
     for row in rows:

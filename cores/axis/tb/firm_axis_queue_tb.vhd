@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The queue between a source of frames of random lengths and a sink that stops at random, also for long. Each cycle
--- becomes a line of the trace, which the model in tests/cores/queue_model.py replays.
+-- The queue, or with LIMIT the watchdog, between a source of frames of random lengths and a sink that stops at random,
+-- also for long. Each cycle becomes a line of the trace, which the models in tests/cores/queue_model.py and
+-- tests/cores/test_axis_sink_watchdog.py replay.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -15,6 +16,8 @@ entity firm_axis_queue_tb is
     BEATS       : integer := 8;
     DROP_NEWEST : boolean := false;
     DROP_OLDEST : boolean := false;
+    -- Cycles of the watchdog; 0: the queue.
+    LIMIT : integer := 0;
     -- Frames of the source, and beats of the longest.
     COUNT      : integer := 200;
     LONGEST    : integer := 10;
@@ -48,6 +51,7 @@ architecture simulation of firm_axis_queue_tb is
 
   signal out_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal out_tkeep  : std_logic_vector(LANES-1 downto 0);
+  signal out_tuser  : std_logic_vector(0 downto 0);
   signal out_tvalid : std_logic;
   signal out_tlast  : std_logic;
   signal out_tready : std_logic := '0';
@@ -88,32 +92,62 @@ begin
 
   clk <= not clk after 5 ns when not over else clk;
 
-  u_part : entity firm.firm_axis_queue
-    generic map (
-      WIDTH       => WIDTH,
-      FRAMES      => FRAMES,
-      BEATS       => BEATS,
-      DROP_NEWEST => DROP_NEWEST,
-      DROP_OLDEST => DROP_OLDEST
-    )
-    port map (
-      clk                => clk,
-      rst_n              => rst_n,
-      s_axis_tdata       => in_tdata,
-      s_axis_tkeep       => in_tkeep,
-      s_axis_tvalid      => in_tvalid,
-      s_axis_tlast       => in_tlast,
-      s_axis_tready      => in_tready,
-      m_axis_tdata       => out_tdata,
-      m_axis_tkeep       => out_tkeep,
-      m_axis_tvalid      => out_tvalid,
-      m_axis_tlast       => out_tlast,
-      m_axis_tready      => out_tready,
-      s_frame_error      => s_frame_error,
-      s_frame_error_code => "0010",
-      frame_error        => frame_error,
-      frame_error_code   => frame_error_code
-    );
+  queue : if LIMIT <= 0 generate
+    u_part : entity firm.firm_axis_queue
+      generic map (
+        WIDTH       => WIDTH,
+        FRAMES      => FRAMES,
+        BEATS       => BEATS,
+        DROP_NEWEST => DROP_NEWEST,
+        DROP_OLDEST => DROP_OLDEST
+      )
+      port map (
+        clk                => clk,
+        rst_n              => rst_n,
+        s_axis_tdata       => in_tdata,
+        s_axis_tkeep       => in_tkeep,
+        s_axis_tvalid      => in_tvalid,
+        s_axis_tlast       => in_tlast,
+        s_axis_tready      => in_tready,
+        m_axis_tdata       => out_tdata,
+        m_axis_tkeep       => out_tkeep,
+        m_axis_tuser       => out_tuser,
+        m_axis_tvalid      => out_tvalid,
+        m_axis_tlast       => out_tlast,
+        m_axis_tready      => out_tready,
+        s_frame_error      => s_frame_error,
+        s_frame_error_code => "0010",
+        frame_error        => frame_error,
+        frame_error_code   => frame_error_code
+      );
+  end generate queue;
+
+  watchdog : if LIMIT > 0 generate
+    u_part : entity firm.firm_axis_sink_watchdog
+      generic map (
+        WIDTH => WIDTH,
+        LIMIT => LIMIT
+      )
+      port map (
+        clk                => clk,
+        rst_n              => rst_n,
+        s_axis_tdata       => in_tdata,
+        s_axis_tkeep       => in_tkeep,
+        s_axis_tvalid      => in_tvalid,
+        s_axis_tlast       => in_tlast,
+        s_axis_tready      => in_tready,
+        m_axis_tdata       => out_tdata,
+        m_axis_tkeep       => out_tkeep,
+        m_axis_tuser       => out_tuser,
+        m_axis_tvalid      => out_tvalid,
+        m_axis_tlast       => out_tlast,
+        m_axis_tready      => out_tready,
+        s_frame_error      => s_frame_error,
+        s_frame_error_code => "0010",
+        frame_error        => frame_error,
+        frame_error_code   => frame_error_code
+      );
+  end generate watchdog;
 
   drive : process
     file trace          : text open write_mode is TRACE_FILE;
@@ -177,6 +211,11 @@ begin
       put(frame_error);
       if frame_error = '1' then
         put(to_integer(unsigned(frame_error_code)));
+      else
+        put(0);
+      end if;
+      if out_tvalid = '1' then
+        put(out_tuser(0));
       else
         put(0);
       end if;

@@ -48,6 +48,9 @@ module firm_sim_pipe #(
   localparam MOST_ERRORS  = 65534;
   localparam VERSION      = 2;           // of requests and reports
   localparam MOST_QUIET   = 2147483647;
+  // Bytes that are read at once, and written at once: a call for each byte takes more time than the simulation.
+  localparam PIECE_BYTES  = 4096;
+  localparam WORD_BYTES   = 64;
 
   integer requests, reports;             // files
   integer seed, stall_percent;
@@ -59,6 +62,7 @@ module firm_sim_pipe #(
   integer    request, cycles_left;
 
   // The stream to the system: the frames that wait to be offered.
+  reg [7:0]  piece [0:PIECE_BYTES-1];
   reg [7:0]  bytes [$];
   integer    sizes [$];
   reg        aborts [$];
@@ -133,15 +137,10 @@ module firm_sim_pipe #(
 
   // ------------------------------------------------------------------ requests and reports
 
-  task read_byte(output reg [7:0] value);
-    integer char;
-    begin
-      char = $fgetc(requests);
-      if (char < 0) begin
-        $display("firm_sim_pipe: the requests end within a request");
-        fail;
-      end
-      value = char[7:0];
+  task read_piece(input integer size);
+    if ($fread(piece, requests, 0, size) != size) begin
+      $display("firm_sim_pipe: the requests end within a request");
+      fail;
     end
   endtask
 
@@ -149,8 +148,9 @@ module firm_sim_pipe #(
     reg [31:0] sum;
     integer    place;
     begin
+      read_piece(4);
       for (place = 0; place < 4; place = place + 1)
-        read_byte(sum[8*place +: 8]);
+        sum[8*place +: 8] = piece[place];
       if (sum[31]) begin
         $display("firm_sim_pipe: a number in a request is greater than 2147483647");
         fail;
@@ -160,17 +160,18 @@ module firm_sim_pipe #(
   endtask
 
   task read_frame(input reg has_abort);
-    integer   size, place;
-    reg [7:0] value;
+    integer size, place, left, count;
     begin
       read_number(size);
       if (size == 0) begin
         $display("firm_sim_pipe: the requested frame has no bytes");
         fail;
       end
-      for (place = 0; place < size; place = place + 1) begin
-        read_byte(value);
-        bytes.push_back(value);
+      for (left = size; left > 0; left = left - count) begin
+        count = left < PIECE_BYTES ? left : PIECE_BYTES;
+        read_piece(count);
+        for (place = 0; place < count; place = place + 1)
+          bytes.push_back(piece[place]);
       end
       sizes.push_back(size);
       aborts.push_back(has_abort);
@@ -181,6 +182,20 @@ module firm_sim_pipe #(
     integer place;
     for (place = 0; place < size; place = place + 1)
       $fwrite(reports, "%c", number[8*place +: 8]);
+  endtask
+
+  task write_bytes;
+    reg [8*WORD_BYTES-1:0] word;
+    integer                place;
+    begin
+      while (burst.size() >= WORD_BYTES) begin
+        for (place = 0; place < WORD_BYTES; place = place + 1)
+          word[8*place +: 8] = burst.pop_front();
+        $fwrite(reports, "%u", word);
+      end
+      while (burst.size() != 0)
+        $fwrite(reports, "%c", burst.pop_front());
+    end
   endtask
 
   task report_version;
@@ -209,8 +224,7 @@ module firm_sim_pipe #(
       write_number(first_out, 8);
       write_number(cycle, 8);
       write_number({32'b0, burst.size()}, 4);
-      while (burst.size() != 0)
-        $fwrite(reports, "%c", burst.pop_front());
+      write_bytes;
     end
   endtask
 

@@ -182,6 +182,8 @@ class DmaTransport:
                         burst, self._burst = bytes(self._burst), bytearray()
                         return burst_of(burst)
                     continue
+                # Who has nothing left to send would not notice that a frame on its way was lost.
+                self._check(TO_SYSTEM)
                 self._check(FROM_SYSTEM)
                 rest = None if end is None else end - time.monotonic()
                 if rest is not None and rest <= 0:

@@ -21,8 +21,18 @@ _REACH = 2**32
 _WRITE_COMBINE = "2"
 
 
-class DmaDevice(Protocol):
-    """The driver's interface to the engine, which tests may also implement."""
+class Registers(Protocol):
+    """Access to the engine's registers, the only one that the driver has. A test gives it a model of the engine."""
+
+    def read(self, offset: int) -> int:
+        """Return the value of the register at `offset` (in bytes)."""
+
+    def write(self, offset: int, value: int) -> None:
+        """Set the register at `offset` (in bytes)."""
+
+
+class DmaDevice(Registers, Protocol):
+    """The driver's interface to the engine."""
 
     @property
     def memory(self) -> memoryview:
@@ -32,12 +42,6 @@ class DmaDevice(Protocol):
     def address(self) -> int:
         """The address of the memory's first byte, as the engine sees it."""
 
-    def read(self, offset: int) -> int:
-        """Return the value of the register at `offset` (in bytes)."""
-
-    def write(self, offset: int, value: int) -> None:
-        """Set the register at `offset` (in bytes)."""
-
     def wait(self, timeout: float | None) -> None:
         """Wait for an unacknowledged interrupt, the timeout (in seconds) or a call of `end`."""
 
@@ -45,14 +49,37 @@ class DmaDevice(Protocol):
         """Wake all threads that wait, now and later."""
 
 
+class _MappedRegisters:
+    """The registers in the first map of a UIO device."""
+
+    def __init__(self, file: int, size: int) -> None:
+        self._words = memoryview(mmap.mmap(file, size)).cast("I")
+
+    def read(self, offset: int) -> int:
+        """Return the value of the register at `offset` (in bytes)."""
+        return self._words[offset // _WORD_BYTES]
+
+    def write(self, offset: int, value: int) -> None:
+        """Set the register at `offset` (in bytes)."""
+        self._words[offset // _WORD_BYTES] = value
+
+
 class LinuxDmaDevice:
     """The engine of a board that runs Linux."""
 
-    def __init__(self, uio: str, buffer: str, *, has_interrupt: bool, root: Path = Path("/")) -> None:
+    def __init__(
+        self,
+        uio: str,
+        buffer: str,
+        *,
+        has_interrupt: bool,
+        root: Path = Path("/"),
+        registers: Registers | None = None,
+    ) -> None:
         """Open the engine; `uio` is a device such as /dev/uio0, `buffer` a name such as udmabuf0.
 
-        The first map of `uio` holds the registers. Without an interrupt, the registers are polled every 50 us. All
-        paths begin with `root`. May raise `TransportError`.
+        The first map of `uio` holds the registers, unless they are given. Without an interrupt, the registers are
+        polled every 50 us. All paths begin with `root`. May raise `TransportError`.
         """
         self._has_interrupt = has_interrupt
         about = root / "sys/class/u-dma-buf" / buffer
@@ -67,7 +94,7 @@ class LinuxDmaDevice:
         try:
             (about / "sync_mode").write_text(_WRITE_COMBINE, encoding="ascii")
             self._interrupt = os.open(device, os.O_RDWR | os.O_SYNC)
-            self._registers = memoryview(mmap.mmap(self._interrupt, _number(maps / "size"))).cast("I")
+            self._registers = registers or _MappedRegisters(self._interrupt, _number(maps / "size"))
             shared = os.open(root / "dev" / buffer, os.O_RDWR | os.O_SYNC)
             try:
                 self._memory = memoryview(mmap.mmap(shared, size))
@@ -89,11 +116,11 @@ class LinuxDmaDevice:
 
     def read(self, offset: int) -> int:
         """Return the value of the register at `offset` (in bytes)."""
-        return self._registers[offset // _WORD_BYTES]
+        return self._registers.read(offset)
 
     def write(self, offset: int, value: int) -> None:
         """Set the register at `offset` (in bytes)."""
-        self._registers[offset // _WORD_BYTES] = value
+        self._registers.write(offset, value)
 
     def wait(self, timeout: float | None) -> None:
         """Wait for an unacknowledged interrupt, the timeout (in seconds) or a call of `end`."""

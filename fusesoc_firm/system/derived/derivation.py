@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
@@ -42,6 +43,7 @@ from fusesoc_firm.system.derived.model import (
 from fusesoc_firm.system.derived.partition import Parting, Parts, message_names
 from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
+from fusesoc_firm.system.derived.quality import check_quality, quality_of
 from fusesoc_firm.system.derived.queue import queue_of
 from fusesoc_firm.system.derived.status import status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
@@ -103,7 +105,9 @@ def derive(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
     subscribers = with_longest_payloads(_converters(parts, SUBSCRIBER, connections), project, parts.blocks, faults)
-    subscribers = tuple(replace(item, queue=queue_of(parts.blocks[item.block], item, faults)) for item in subscribers)
+    subscribers = tuple(
+        replace(item, queue=queue_of(parts.blocks[item.block], item, project, faults)) for item in subscribers
+    )
     publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
@@ -284,6 +288,7 @@ class _Analysis:
         assert block.middleware is not None and block.message is not None
         if block.topic is not None:
             check_topic_name(block.topic, self.faults)
+        check_quality(block, self.faults)
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
@@ -367,7 +372,7 @@ def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> t
         frame = with_names_in_use(whole, names[name])
         # Converters with the same fields share the entity of the first one.
         suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(name).lower()}")
-        given_name = str(parts.blocks[name].topic or "")
-        software = parts.crossings.get(name)
-        found.append(Converter(str(name), frame, number, suffix, software=software, given_name=given_name))
+        block = parts.blocks[name]
+        topic: dict[str, Any] = {"given_name": str(block.topic or ""), "quality": quality_of(block)}
+        found.append(Converter(str(name), frame, number, suffix, software=parts.crossings.get(name), **topic))
     return tuple(found)

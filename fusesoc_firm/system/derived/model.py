@@ -25,12 +25,22 @@ def absolute_name(topic: str) -> str:
 
 
 @dataclass(frozen=True)
+class Quality:
+    """The quality of service of a topic: `depth` is the capacity of its queues in messages."""
+
+    is_reliable: bool = True
+    is_transient_local: bool = False
+    depth: int = 100
+
+
+@dataclass(frozen=True)
 class Topic:
     """A topic that connects the system to other programs; without a `given_name`, the topic has the block's name."""
 
     block: str
     frame: Frame
     given_name: str = field(default="", kw_only=True)
+    quality: Quality = field(default=Quality(), kw_only=True)
     # The longest payload that the hardware accepts, if it is limited.
     max_length: int | None = field(default=None, kw_only=True)
 
@@ -63,11 +73,15 @@ class Overflow(Enum):
 
 @dataclass(frozen=True)
 class Queue:
-    """The queue of a subscriber: `frames` whole frames with payloads of at most `longest` bytes."""
+    """The queue of a subscriber: `frames` whole frames with payloads of at most `longest` bytes.
+
+    Without any frames, it is a watchdog: frames that the subscriber does not accept are dropped after `limit` cycles.
+    """
 
     frames: int
     longest: int
     overflow: Overflow = Overflow.BLOCK
+    limit: int = 0
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import names_in_use, with_names_in_use
 from fusesoc_firm.system.derived.ids import check_count
 from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, End, MessageSide, Software, Topic
+from fusesoc_firm.system.derived.quality import quality_of
 from fusesoc_firm.system.written.specification import PUBLISHER, SUBSCRIBER, Block
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
@@ -123,7 +124,8 @@ class Parting:
 
     def _topic(self, name: str, frame: Frame) -> Topic:
         """Return the topic of the converter with this name in the specification."""
-        return Topic(name, frame, given_name=str(self.blocks[name].topic or ""))
+        block = self.blocks[name]
+        return Topic(name, frame, given_name=str(block.topic or ""), quality=quality_of(block))
 
     # --- where a message is ----------------------------------------------------------------------------------------
 

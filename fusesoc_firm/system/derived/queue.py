@@ -1,29 +1,23 @@
-"""The queue of frames before a subscriber: the specification's `queue` and `overflow`."""
+"""The queue of frames before a subscriber, or its watchdog: the specification's `queue` and `overflow`."""
 
 from __future__ import annotations
 
 from fusesoc_firm.system.derived.model import Converter, Overflow, Queue
-from fusesoc_firm.system.written.specification import BLOCK, Block
+from fusesoc_firm.system.written.specification import BLOCK, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 _MOST_FRAMES = 256
 _MOST_BYTES = 1 << 23
 
 
-def queue_of(block: Block, subscriber: Converter, faults: Diagnostics) -> Queue | None:
-    """Return the queue of a subscriber with its longest payload, or None without one; note faults.
+def queue_of(block: Block, subscriber: Converter, project: Project, faults: Diagnostics) -> Queue | None:
+    """Return the queue of a subscriber with its longest payload, or its watchdog, or None; note faults.
 
     If the longest payload is a default, there is a warning about the memory.
     """
     overflow = Overflow(str(block.overflow or BLOCK))
     if block.queue is None:
-        if overflow is not Overflow.BLOCK:
-            faults.error(
-                f"'{block.name}' drops frames, but has no 'queue'",
-                block.place("overflow"),
-                "add 'queue: <number of frames>'",
-            )
-        return None
+        return _watchdog_of(block, overflow, project, faults)
     least = 2 if overflow is Overflow.DROP_OLDEST else 1
     if not least <= block.queue <= _MOST_FRAMES:
         faults.error(
@@ -36,6 +30,19 @@ def queue_of(block: Block, subscriber: Converter, faults: Diagnostics) -> Queue 
     queue = Queue(block.queue, longest, overflow)
     _check_size(block, subscriber, queue, faults)
     return queue
+
+
+def _watchdog_of(block: Block, overflow: Overflow, project: Project, faults: Diagnostics) -> Queue | None:
+    """Return the watchdog of a subscriber that drops frames without a queue; there, no frame waits to be the oldest."""
+    if overflow is Overflow.DROP_NEWEST and project.watchdog:
+        return Queue(0, 0, overflow, project.watchdog)
+    if overflow is not Overflow.BLOCK:
+        faults.error(
+            f"'{block.name}' drops frames, but has no 'queue'" + " and no 'watchdog'" * (not project.watchdog),
+            block.place("overflow"),
+            "add 'queue: <number of frames>'",
+        )
+    return None
 
 
 def _check_size(block: Block, subscriber: Converter, queue: Queue, faults: Diagnostics) -> None:

@@ -1,4 +1,4 @@
-"""The watchdog of the Manager: the specification's `watchdog`."""
+"""The watchdog of the Manager: the specification's `watchdog`. Those before subscribers are in `queue`."""
 
 from __future__ import annotations
 

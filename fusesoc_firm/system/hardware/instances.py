@@ -13,11 +13,20 @@ from fusesoc_firm.system.derived.model import (
     Converter,
     DerivedSystem,
     Overflow,
+    Queue,
 )
 from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
 from fusesoc_firm.system.hardware.crossings import port_of
 from fusesoc_firm.system.hardware.maps import port_map
-from fusesoc_firm.system.hardware.names import ERROR_WORDS, FRAME_WORDS, LATE_WORDS, Names, reset_of, watched_publishers
+from fusesoc_firm.system.hardware.names import (
+    ERROR_WORDS,
+    FRAME_WORDS,
+    LATE_WORDS,
+    Names,
+    queue_word,
+    reset_of,
+    watched_publishers,
+)
 from fusesoc_firm.system.written.specification import Pin
 
 ERROR_CODE_BITS = 4
@@ -26,7 +35,7 @@ INNER = "inner_"
 
 
 def subscriber_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the instance of a subscriber, from the Manager to its message side, after its queue if it has one."""
+    """Return the instance of a subscriber, from the Manager to its message side, after its queue or its watchdog."""
     ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
     return {
         **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
@@ -40,22 +49,31 @@ def subscriber_instance(names: Names, converter: Converter, system: DerivedSyste
 
 
 def _queue(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the queue before a subscriber, with the signals between queue and subscriber."""
+    """Return the queue or the watchdog before a subscriber, with the signals between it and the subscriber."""
     assert converter.queue
     block, lanes, queue = converter.block, system.width // 8, converter.queue
-    beats = -(-(ID_BYTES + LENGTH_BYTES + queue.longest) // lanes)
-    # The Manager removes a beat with only the id. One beat more than the longest frame shows that a frame is longer.
     return {
         "block": block,
-        "label": names.label(block, "queue"),
+        "unit": queue_word(queue),
+        "label": names.label(block, queue_word(queue)),
         "width": system.width,
         "lanes": lanes,
-        "frames": queue.frames,
-        "beats": beats + (0 if lanes == ID_BYTES else 1),
-        "drop": None if queue.overflow is Overflow.BLOCK else {"generic": queue.overflow.value.upper()},
+        "watchdog": {"limit": queue.limit} if queue.limit else None,
+        "memory": None if queue.limit else _memory(queue, lanes),
         **{word: names.frame(block, word) for word in FRAME_WORDS},
         "id": converter.id,
         "out": error_of(converter, system),
+    }
+
+
+def _memory(queue: Queue, lanes: int) -> dict[str, Any]:
+    """Return the size of a queue; one beat more than the longest frame shows that a frame is longer."""
+    beats = -(-(ID_BYTES + LENGTH_BYTES + queue.longest) // lanes)
+    return {
+        "frames": queue.frames,
+        # The Manager removes a beat with only the id.
+        "beats": beats + (0 if lanes == ID_BYTES else 1),
+        "drop": None if queue.overflow is Overflow.BLOCK else {"generic": queue.overflow.value.upper()},
     }
 
 

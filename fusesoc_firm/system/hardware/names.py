@@ -14,6 +14,7 @@ from fusesoc_firm.system.derived.model import (
     DerivedSystem,
     End,
     LengthSource,
+    Queue,
 )
 from fusesoc_firm.system.derived.sides import (
     PAYLOAD_LENGTH,
@@ -60,7 +61,7 @@ AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
 OWN_RESET = "system_rst_n"
 # Low until all clock domains have been reset.
 RELEASED = "domains_rst_n"
-# Between a publisher and its buffer, and between a queue and its subscriber.
+# Between a publisher and its buffer, and between a subscriber and its queue or watchdog.
 FRAME_WORDS = (*AXIS, "tuser", "error", "error_code")
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in FRAME_WORDS)
 # Between a publisher that the watchdog may cut off and the system's errors.
@@ -85,7 +86,7 @@ class Names:
             if item.length and item.length.source is LengthSource.COMPUTED
         ]
         labels += [("u", block, "buffer") for block in buffered]
-        labels += [("u", block, "queue") for block in queued]
+        labels += [("u", item.block, queue_word(item.queue)) for item in system.subscribers if item.queue]
         late = [item.block for item in system.publishers if item.late_bytes]
         labels += [("u", block, "late") for block in late]
         synchronised = [(block.block, str(pin.name)) for block, pin in synchronised_pins(system)]
@@ -155,12 +156,17 @@ class Names:
         return self._labels["u", *_crossing_key(crossing, word)]
 
     def frame(self, block: str, signal: str) -> str:
-        """Return a signal between a publisher and its buffer, or between a queue and its subscriber."""
+        """Return a signal between a publisher and its buffer, or between a subscriber and its queue or watchdog."""
         return self._signals[block, "", f"frame_{signal}"]
 
     def late(self, block: str, signal: str) -> str:
         """Return a signal between a publisher and its FIFO for late frames."""
         return self._signals[block, "", f"late_{signal}"]
+
+
+def queue_word(queue: Queue) -> str:
+    """Return the word for what is before a subscriber, also in its label."""
+    return "watchdog" if queue.limit else "queue"
 
 
 def watched_publishers(system: DerivedSystem) -> list[Converter]:

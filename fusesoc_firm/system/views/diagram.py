@@ -221,7 +221,10 @@ def _converter(converter: Converter) -> list[str]:
 
 
 def _queue(converter: Converter) -> list[str]:
-    return [f"queue: {converter.queue.frames} frames"] if converter.queue else []
+    if not converter.queue:
+        return []
+    queue = converter.queue
+    return [f"watchdog: {queue.limit} cycles" if queue.limit else f"queue: {queue.frames} frames"]
 
 
 def _times(times: PublisherTimes, clock: Fraction | None) -> Iterator[str]:

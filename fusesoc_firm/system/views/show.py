@@ -195,9 +195,11 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
 
 
 def _queue(queue: Queue | None) -> dict[str, Any]:
-    """Return the queue of a subscriber, with the size of its memory in bytes of payload."""
+    """Return the queue of a subscriber, with the size of its memory in bytes of payload, or its watchdog."""
     if queue is None:
         return {}
+    if queue.limit:
+        return {"overflow": queue.overflow.value, "watchdog": queue.limit}
     size = queue.frames * queue.longest
     return {"queue": queue.frames, "overflow": queue.overflow.value, "queueBytes": size}
 

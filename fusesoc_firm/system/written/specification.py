@@ -46,6 +46,16 @@ NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
 # What a subscriber's full queue does with a further frame.
 BLOCK, DROP_NEWEST, DROP_OLDEST = OVERFLOWS = ("block", "drop_newest", "drop_oldest")
+RELIABLE, BEST_EFFORT = RELIABILITIES = ("reliable", "best_effort")
+VOLATILE, TRANSIENT_LOCAL = DURABILITIES = ("volatile", "transient_local")
+# The profiles of ROS 2 (rmw/qos_profiles.h) as reliability, durability and depth.
+PROFILES = {
+    "default": (RELIABLE, VOLATILE, 10),
+    "sensor_data": (BEST_EFFORT, VOLATILE, 5),
+    "parameters": (RELIABLE, VOLATILE, 1000),
+    "services_default": (RELIABLE, VOLATILE, 10),
+    "action_status_default": (RELIABLE, TRANSIENT_LOCAL, 1),
+}
 PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
@@ -134,7 +144,8 @@ class Project(Section):
         is_asked=False,
     )
     watchdog: int = key(
-        "cycles of clk after which a publisher that stops in the middle of a frame is cut off; 0: never",
+        "cycles of clk after which a publisher that stops in the middle of a frame, or a subscriber without a queue"
+        " that drops frames, is cut off; 0: never",
         form="integer",
         default=1 << 20,
         is_asked=False,
@@ -241,6 +252,22 @@ class Outgoing(Section):
 
 
 @dataclass(frozen=True)
+class Qos(Section):
+    """The quality of service of a topic; each key takes the place of the profile's value."""
+
+    profile: Text | None = key("a profile of ROS 2, for the keys that are not given", choices=tuple(PROFILES))
+    reliability: Text | None = key(
+        "whether lost messages are sent again (default: reliable; the only one in ROS 1)", choices=RELIABILITIES
+    )
+    durability: Text | None = key(
+        "transient_local: late subscribers receive the last messages; in ROS 1, a publisher then latches"
+        " (default: volatile)",
+        choices=DURABILITIES,
+    )
+    depth: int | None = key("capacity of the topic's queues, in messages (default: 100)", form="integer")
+
+
+@dataclass(frozen=True)
 class Block(Section):
     """An instance of an accelerator (with a type) or of a converter (with middleware, mode and message)."""
 
@@ -255,6 +282,9 @@ class Block(Section):
     topic: Text | None = key(
         "the topic of a converter's messages, such as /arm/left or left (default: the block's name)",
         only_of=CONVERTER,
+    )
+    qos: Qos | None = key(
+        "the quality of service of a converter's topic", form="section", section=Qos, only_of=CONVERTER, is_asked=False
     )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
@@ -272,7 +302,8 @@ class Block(Section):
         "number of frames that are stored before a subscriber (default: none)", form="integer", only_of=SUBSCRIBER
     )
     overflow: Text | None = key(
-        "what a subscriber's full queue does: block the host, or drop a frame (default: block)",
+        "what a subscriber's full queue does: block the host, or drop a frame (default: block); without a queue,"
+        " drop_newest drops frames after the watchdog's cycles",
         choices=OVERFLOWS,
         only_of=SUBSCRIBER,
     )

@@ -29,7 +29,10 @@ _MESSAGES_A_SYSTEM = 18
 
 @dataclass(frozen=True)
 class PassThrough:
-    """A system of some messages of a distribution, and `count` values of each, all drawn by `seed`."""
+    """A system of some messages of a distribution, and `count` values of each, all drawn by `seed`.
+
+    `pipeline` is that of all subscribers; without it, each has its default.
+    """
 
     distribution: str
     names: Sequence[str]
@@ -37,6 +40,7 @@ class PassThrough:
     seed: int
     width: int = 64
     megahertz: float | None = None
+    pipeline: str | None = None
 
     @cached_property
     def ros(self) -> Middleware:
@@ -46,7 +50,8 @@ class PassThrough:
     def specification(self, folder: Path) -> Path:
         """The system: each message has a subscriber that is called after it, and a publisher."""
         clock = f", clock: {self.megahertz:g} MHz" if self.megahertz else ""
-        lines = [f"project: {{name: pass_{self.distribution}, width: {self.width}{clock}}}", "blocks:"]
+        pipeline = f", pipeline: {self.pipeline}" if self.pipeline else ""
+        lines = [f"project: {{name: pass_{self.distribution}, width: {self.width}{clock}{pipeline}}}", "blocks:"]
         for name in self.names:
             kind = f"middleware: ROS{self.ros.number}, message: {name}"
             block = _block(name)

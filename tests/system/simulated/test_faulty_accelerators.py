@@ -21,6 +21,7 @@ PAYLOAD_BYTES = 24
 GOOD, BAD = 0, 1
 FRAMES = 3
 COUNT = 200
+LIMIT = 32
 
 
 def _system(folder: Path, width: int, accelerator: str, *, takes: bool = False, **keys: str | int) -> GeneratedSystem:
@@ -40,7 +41,8 @@ def _system(folder: Path, width: int, accelerator: str, *, takes: bool = False, 
     ]
     interface = {"input": sides, "output": sides}
     source = {"name": accelerator, "type": "VHDL", "sources": f"{accelerator}.vhd", "interface": interface}
-    content = {"project": {"name": "faulty", "width": width}, "accelerators": [source], "blocks": blocks}
+    project = {"name": "faulty", "width": width, "watchdog": LIMIT}
+    content = {"project": project, "accelerators": [source], "blocks": blocks}
     (folder / "faulty.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
     (folder / "stimuli.yaml").write_text("- good: {x: 1.0, y: 2.0, z: 3.0}\n")
     (folder / "model.py").write_text("def respond(subscriber, message):\n    return []\n")
@@ -82,7 +84,65 @@ def test_an_accelerator_that_never_takes(tmp_path: Path, width: int, overflow: s
     assert cycles <= _exchange(healthy, ids, 0)
 
 
-LIMIT = 32
+@pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
+def test_an_accelerator_that_never_takes_without_a_queue(tmp_path: Path, width: int) -> None:
+    """The watchdog costs the host its limit once; from then on, the subscriber's frames are dropped."""
+    print(f"frames from seed {SEED}")
+    source = random.Random(SEED)
+    ids = [source.choice([GOOD, BAD]) for _ in range(COUNT)]
+    ids[-1] = GOOD
+    deaf = _system(tmp_path / "deaf", width, "deaf", overflow="drop_newest")
+    healthy = _system(tmp_path / "healthy", width, "deaf", takes=True, overflow="drop_newest")
+    # One message is offered to the accelerator.
+    assert _exchange(deaf, ids, ids.count(BAD) - 1) <= _exchange(healthy, ids, 0) + LIMIT
+
+
+@pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
+def test_an_accelerator_that_takes_again(tmp_path: Path, width: int) -> None:
+    """The first text leaves as aborted, the next ones are dropped, and those after the pause are right."""
+    system = _dozing(tmp_path / "dozing", width)
+    print(f"frames from seed {SEED}")
+    source = random.Random(SEED)
+    early, late = 5, 5
+    # The accelerator takes again during the points.
+    frames = [_text(source) for _ in range(early)]
+    frames += [_point(source) for _ in range(100 if width == 8 else 800)]
+    frames += [_text(source) for _ in range(late)]
+    write_stimulus(system.folder / "stimulus.txt", frames)
+    answers = [f"< @0 answer\n  {BAD:02x}\n! aborted {BAD} 10\n"]
+    answers += [f"< @{place} answer\n  {frame.hex()}\n" for place, frame in enumerate(frames) if place >= early]
+    # Of the first text, the publisher reports its own frame as well.
+    (system.folder / "expected.txt").write_text(f"! frame_error {early + 1}\n{''.join(answers)}")
+    result = system.run(SEED=SEED, STALL_PERCENT=0)
+    assert result.exit_code == 0, result.output
+
+
+def _dozing(folder: Path, width: int) -> GeneratedSystem:
+    """A channel that returns Points, and one that returns texts but takes none at first."""
+    folder.mkdir()
+    (folder / "doze.vhd").write_text((DATA / "doze.vhd").read_text())
+    sides = [{"middleware": "ROS2", "message": "std_msgs/String"}]
+    source = {"name": "doze", "type": "VHDL", "sources": "doze.vhd", "interface": {"input": sides, "output": sides}}
+    blocks = [
+        _ros2("good", "subscriber", POINT, outgoing=[{"name": "good_back"}]),
+        _ros2("bad", "subscriber", "std_msgs/String", outgoing=[{"name": "acc"}], overflow="drop_newest"),
+        {"name": "acc", "type": "doze", "outgoing": [{"name": "bad_back"}]},
+        _ros2("good_back", "publisher", POINT),
+        _ros2("bad_back", "publisher", "std_msgs/String"),
+    ]
+    project = {"name": "faulty", "width": width, "watchdog": LIMIT}
+    content = {"project": project, "accelerators": [source], "blocks": blocks}
+    (folder / "faulty.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+    (folder / "stimuli.yaml").write_text("- good: {x: 1.0, y: 2.0, z: 3.0}\n")
+    (folder / "model.py").write_text("def respond(subscriber, message):\n    return []\n")
+    return build(call(folder / "faulty.yaml", folder / "stimuli.yaml", folder / "model.py"), folder / "work")
+
+
+def _text(source: random.Random) -> bytes:
+    letters = bytes(source.choices(b"abcdefghijklmnopqrstuvwxyz", k=source.randint(200, 300))) + b"\0"
+    return pack_frame(BAD, _CDR + len(letters).to_bytes(4, "little") + letters)
+
+
 HEALTHY = "none"
 # Each response to such a number is faulty.
 SICK = [number for number in range(20, 60) if number % 8 == 7]

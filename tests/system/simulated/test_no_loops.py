@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.converter.pipeline import PIPELINES
 from tests.bench.loops import loops_of_messages, loops_of_random_system
 from tests.converter.simulated.pass_through import PassThrough
 
@@ -18,8 +19,10 @@ SAMPLE = ("diagnostic_msgs/DiagnosticArray", "sensor_msgs/JointState", "sensor_m
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("distribution", ["noetic", "humble"])
 @pytest.mark.parametrize("width", [8, 64])
-def test_messages_that_are_passed_through(tmp_path: Path, distribution: str, width: int) -> None:
-    found = loops_of_messages(PassThrough(distribution, SAMPLE, count=0, seed=0, width=width), tmp_path)
+@pytest.mark.parametrize("pipeline", PIPELINES)
+def test_messages_that_are_passed_through(tmp_path: Path, distribution: str, width: int, pipeline: str) -> None:
+    system = PassThrough(distribution, SAMPLE, count=0, seed=0, width=width, pipeline=pipeline)
+    found = loops_of_messages(system, tmp_path)
     assert not found, "\n".join(found)
 
 

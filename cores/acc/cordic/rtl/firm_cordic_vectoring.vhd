@@ -158,15 +158,17 @@ begin
         busy_r    <= in_valid;
         folding_r <= in_valid;
         done_r    <= '0';
-        count_r   <= (others => '0');
       elsif folding_r = '1' then
         folding_r <= '0';
+      elsif busy_r = '1' and count_r = ITERATIONS-1 then
+        busy_r <= '0';
+        done_r <= '1';
+      end if;
+      -- Without `ready`, which arrives late: the table of angles comes after the count.
+      if folding_r = '1' then
+        count_r <= (others => '0');
       elsif busy_r = '1' then
         count_r <= count_r + 1;
-        if count_r = ITERATIONS-1 then
-          busy_r <= '0';
-          done_r <= '1';
-        end if;
       end if;
     end if;
   end process control;
@@ -174,8 +176,6 @@ begin
   rotate : process (clk)
     variable below    : boolean;
     variable scaled   : scaled_t;
-    variable sign     : unsigned(WIDTH downto 0);
-    variable distance : unsigned(WIDTH downto 0);
     variable step     : angle_t;
   begin
     if rising_edge(clk) then
@@ -183,7 +183,6 @@ begin
         x_negative_r <= in_x(WIDTH-1);
         y_negative_r <= in_y(WIDTH-1);
         exact_r      <= '0';
-        magnitude_r  <= absolute(in_x);
         scaled_r     <= resize(absolute(in_y), WIDTH+1);
         angle_r      <= (others => '0');
       elsif folding_r = '1' then
@@ -196,9 +195,8 @@ begin
           end if;
         elsif magnitude_r = 0 then
           -- On the y axis: turned onto the x axis at once, which is exact.
-          magnitude_r <= scaled_r(WIDTH-1 downto 0);
-          scaled_r    <= (others => '0');
-          aligned_r   <= (others => '0');
+          scaled_r  <= (others => '0');
+          aligned_r <= (others => '0');
           if y_negative_r = '1' then
             angle_r <= -half_pi;
           elsif scaled_r /= 0 then
@@ -214,12 +212,6 @@ begin
         scaled_r  <= scaled;
         aligned_r <= aligned(scaled, count_r + 1);
 
-        -- |y| * 2**i reaches x as |y| * 2**-i. The one's complement approximates |y|: it is at most one unit short, and
-        -- saves the carry.
-        sign        := (others => scaled_r(WIDTH));
-        distance    := shift_right(unsigned(aligned_r) xor sign, to_integer(count_r(FINE_WIDTH-1 downto 0) & '0'));
-        magnitude_r <= magnitude_r + signed(distance(WIDTH-1 downto 0));
-
         step := ANGLES(to_integer(count_r));
         if scaled_r = 0 then
           exact_r <= '1';
@@ -233,5 +225,27 @@ begin
       end if;
     end if;
   end process rotate;
+
+  -- The length. Its sum comes last, and only registers decide when it is taken: one multiplexer is left after it.
+  lengthen : process (clk)
+    variable sign     : unsigned(WIDTH downto 0);
+    variable distance : unsigned(WIDTH downto 0);
+  begin
+    if rising_edge(clk) then
+      if busy_r = '1' and folding_r = '0' then
+        -- |y| * 2**i reaches x as |y| * 2**-i. The one's complement approximates |y|: it is at most one unit short, and
+        -- saves the carry.
+        sign        := (others => scaled_r(WIDTH));
+        distance    := shift_right(unsigned(aligned_r) xor sign, to_integer(count_r(FINE_WIDTH-1 downto 0) & '0'));
+        magnitude_r <= magnitude_r + signed(distance(WIDTH-1 downto 0));
+      elsif busy_r = '1' then
+        if x_negative_r = '0' and magnitude_r = 0 then
+          magnitude_r <= scaled_r(WIDTH-1 downto 0);
+        end if;
+      elsif ready = '1' and in_valid = '1' then
+        magnitude_r <= absolute(in_x);
+      end if;
+    end if;
+  end process lengthen;
 
 end architecture rtl;

@@ -198,7 +198,8 @@ firm_dma_status_t firm_dma_receive(firm_dma_t *dma, uint8_t *burst, size_t room,
         }
         status = status_of(&dma->memory->from_system[dma->receiving]);
     }
-    return firm_dma_fault(dma, 0) != 0 ? FIRM_DMA_ERROR : FIRM_DMA_NOTHING;
+    /* Who has nothing left to send would not notice that a frame on its way was lost. */
+    return (firm_dma_fault(dma, 0) | firm_dma_fault(dma, 1)) != 0 ? FIRM_DMA_ERROR : FIRM_DMA_NOTHING;
 }
 
 void firm_dma_answer_interrupt(const firm_dma_t *dma) { firm_write(dma->base + S2MM + STATUS, INTERRUPTS); }

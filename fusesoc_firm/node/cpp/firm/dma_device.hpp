@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <thread>
 #include <utility>
@@ -20,12 +21,18 @@
 
 namespace firm {
 
-// The engine as its driver sees it; a test may provide its own.
-class DmaDevice {
+// The engine's registers at their offsets in bytes, the only access that the driver has. A test gives it a model of the
+// engine.
+class DmaRegisters {
  public:
-  virtual ~DmaDevice() = default;
+  virtual ~DmaRegisters() = default;
   virtual std::uint32_t read(std::size_t offset) = 0;
   virtual void write(std::size_t offset, std::uint32_t value) = 0;
+};
+
+// The engine as its driver sees it.
+class DmaDevice : public DmaRegisters {
+ public:
   // Uncached memory that processor and engine share, and the address of its first byte as the engine sees it.
   virtual std::uint8_t* memory() = 0;
   virtual std::size_t memory_bytes() const = 0;
@@ -35,26 +42,30 @@ class DmaDevice {
   virtual void end() = 0;
 };
 
+// A device file, opened. Throws TransportError.
+inline Descriptor opened(const std::string& path) {
+  Descriptor file(::open(path.c_str(), O_RDWR | O_SYNC | O_CLOEXEC));
+  if (file.get() < 0) fail_with_errno(path);
+  return file;
+}
+
 // A memory mapping of a device file.
 class Mapping {
  public:
   Mapping(const std::string& path, std::size_t size) : size_(size) {
-    file_ = Descriptor(::open(path.c_str(), O_RDWR | O_SYNC | O_CLOEXEC));
-    if (file_.get() < 0) fail_with_errno(path);
-    place_ = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, file_.get(), 0);
+    const Descriptor file = opened(path);
+    place_ = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, file.get(), 0);
     if (place_ == MAP_FAILED) fail_with_errno("mmap of " + path);
   }
   ~Mapping() { ::munmap(place_, size_); }
   Mapping(const Mapping&) = delete;
   Mapping& operator=(const Mapping&) = delete;
 
-  int file() const { return file_.get(); }
   void* place() const { return place_; }
   std::size_t size() const { return size_; }
 
  private:
   std::size_t size_;
-  Descriptor file_;
   void* place_ = nullptr;
 };
 
@@ -70,18 +81,37 @@ inline std::uint64_t number_in(const std::string& path) {
   }
 }
 
+// The registers in the first map of a UIO device.
+class MappedDmaRegisters : public DmaRegisters {
+ public:
+  MappedDmaRegisters(const std::string& path, std::size_t size) : mapping_(path, size) {}
+  std::uint32_t read(std::size_t offset) override { return at(offset); }
+  void write(std::size_t offset, std::uint32_t value) override { at(offset) = value; }
+
+ private:
+  volatile std::uint32_t& at(std::size_t offset) const {
+    return static_cast<volatile std::uint32_t*>(mapping_.place())[offset / sizeof(std::uint32_t)];
+  }
+
+  Mapping mapping_;
+};
+
 class LinuxDmaDevice : public DmaDevice {
  public:
-  // `uio` is a device such as /dev/uio0, whose first map holds the registers; `buffer` is a name such as udmabuf0.
-  // Without an interrupt, the registers are polled every 50 us. All paths begin with `root`. Throws TransportError.
-  LinuxDmaDevice(const std::string& uio, const std::string& buffer, bool has_interrupt, const std::string& root = "")
-      : registers_(root + uio, register_bytes(uio, root)),
+  // `uio` is a device such as /dev/uio0, whose first map holds the registers, unless they are given; `buffer` is a name
+  // such as udmabuf0. Without an interrupt, the registers are polled every 50 us. All paths begin with `root`. Throws
+  // TransportError.
+  LinuxDmaDevice(const std::string& uio, const std::string& buffer, bool has_interrupt, const std::string& root = "",
+                 std::unique_ptr<DmaRegisters> registers = nullptr)
+      : registers_(registers ? std::move(registers)
+                             : std::make_unique<MappedDmaRegisters>(root + uio, register_bytes(uio, root))),
+        uio_(opened(root + uio)),
         address_(checked_address(buffer, root)),
         memory_(root + "/dev/" + buffer, static_cast<std::size_t>(number_in(folder(buffer, root) + "/size"))),
         has_interrupt_(has_interrupt) {}
 
-  std::uint32_t read(std::size_t offset) override { return at(offset); }
-  void write(std::size_t offset, std::uint32_t value) override { at(offset) = value; }
+  std::uint32_t read(std::size_t offset) override { return registers_->read(offset); }
+  void write(std::size_t offset, std::uint32_t value) override { registers_->write(offset, value); }
   std::uint8_t* memory() override { return static_cast<std::uint8_t*>(memory_.place()); }
   std::size_t memory_bytes() const override { return memory_.size(); }
   std::uint32_t address() const override { return address_; }
@@ -93,10 +123,10 @@ class LinuxDmaDevice : public DmaDevice {
     }
     // The kernel disables the interrupt when it occurs.
     const std::uint32_t on = 1;
-    if (::write(registers_.file(), &on, sizeof on) != sizeof on) fail_with_errno("the interrupt");
+    if (::write(uio_.get(), &on, sizeof on) != sizeof on) fail_with_errno("the interrupt");
     std::uint32_t count;
-    if (waiter_.wait(registers_.file(), POLLIN, deadline) &&
-        ::read(registers_.file(), &count, sizeof count) != sizeof count) {
+    if (waiter_.wait(uio_.get(), POLLIN, deadline) &&
+        ::read(uio_.get(), &count, sizeof count) != sizeof count) {
       fail_with_errno("the interrupt");
     }
   }
@@ -128,11 +158,8 @@ class LinuxDmaDevice : public DmaDevice {
     return static_cast<std::uint32_t>(address);
   }
 
-  volatile std::uint32_t& at(std::size_t offset) const {
-    return static_cast<volatile std::uint32_t*>(registers_.place())[offset / sizeof(std::uint32_t)];
-  }
-
-  Mapping registers_;
+  std::unique_ptr<DmaRegisters> registers_;
+  Descriptor uio_;
   std::uint32_t address_;
   Mapping memory_;
   bool has_interrupt_;

@@ -148,6 +148,7 @@ class DmaTransport : public Transport {
   ~DmaTransport() override { close(); }
 
   void send(const std::uint8_t* frame, std::size_t size) override {
+    const std::lock_guard<std::mutex> lock(sending_mutex_);
     std::uint32_t start = dma::kStartOfFrame;
     while (size > 0) {
       wait_for_room();
@@ -164,12 +165,15 @@ class DmaTransport : public Transport {
   }
 
   std::optional<Burst> receive(Timeout timeout = std::nullopt) override {
+    const std::lock_guard<std::mutex> lock(receiving_mutex_);
     const Deadline deadline(timeout);
     while (!is_closed_) {
       if (const auto status = from_system_.done(receiving_)) {
         if (take(*status)) return without_record(std::exchange(burst_, {}));
         continue;
       }
+      // Who has nothing left to send would not notice that a frame on its way was lost.
+      check(dma::kMm2s, "MM2S");
       check(dma::kS2mm, "S2MM");
       if (is_closed_ || deadline.is_over()) break;
       // Acknowledge the interrupt before looking at the descriptors, so that no completion is missed.
@@ -179,10 +183,12 @@ class DmaTransport : public Transport {
     return std::nullopt;
   }
 
-  // Stop the engine, so that it does not write to memory that has been released.
+  // Stop the engine, so that it does not write to memory that has been released; nobody may hand over descriptors during
+  // its reset.
   void close() override {
     if (is_closed_.exchange(true)) return;
     device_->end();
+    const std::scoped_lock lock(sending_mutex_, receiving_mutex_);
     reset();
   }
 
@@ -292,6 +298,7 @@ class DmaTransport : public Transport {
   const std::unique_ptr<DmaDevice> device_;
   const DmaOptions count_;
   std::atomic<bool> is_closed_{false};
+  std::mutex sending_mutex_, receiving_mutex_;
 
   // Used by the sender only.
   DmaRing to_system_;

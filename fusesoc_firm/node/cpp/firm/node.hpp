@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -25,6 +26,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <firm/bursts.hpp>
 #include <firm/open_transport.hpp>
@@ -39,7 +41,8 @@ struct NodeConfiguration {
   unsigned subscribers = 1;
   unsigned publishers = 1;
   std::size_t longest_payload = 1 << 26;    // bytes, in either direction
-  std::size_t queue_depth = 10;             // frames, for each subscriber
+  std::size_t queue_depth = 100;            // frames, for each subscriber
+  std::map<unsigned, std::size_t> queue_depths{};  // frames, for subscribers whose queues differ
   Overflow overflow = Overflow::kDropOldest;
   std::function<std::unique_ptr<Policy>()> policy = nullptr;  // default: least recently used
   unsigned restarts = 0;                    // the number of times that a failed transport is reopened
@@ -70,7 +73,7 @@ class Node {
       : configuration_(checked(std::move(configuration))),
         open_(std::move(open)),
         publish_(std::move(publish)),
-        queues_(configuration_.subscribers, configuration_.queue_depth,
+        queues_(depths(configuration_),
                 configuration_.policy ? configuration_.policy() : nullptr, configuration_.overflow),
         trace_(configuration_.trace) {}
 
@@ -181,6 +184,13 @@ class Node {
     return configuration;
   }
 
+  // Return the capacities of all queues.
+  static std::vector<std::size_t> depths(const NodeConfiguration& configuration) {
+    std::vector<std::size_t> found(configuration.subscribers, configuration.queue_depth);
+    for (const auto& [subscriber, depth] : configuration.queue_depths) found.at(subscriber) = depth;
+    return found;
+  }
+
   // --- a session: one transport from start to end ---------------------------------------------------------------------
 
   // Run one transport; return its fault, or nothing if the node is done.
@@ -275,9 +285,9 @@ class Node {
     } catch (const BurstError& error) {
       note(error);
     } catch (const TransportError& error) {
-      fail_receiver(error.what(), false);
+      fail_receiver(transport, error.what(), false);
     } catch (const std::exception& error) {
-      fail_receiver(std::string("a payload could not be published: ") + error.what(), true);
+      fail_receiver(transport, std::string("a payload could not be published: ") + error.what(), true);
     }
   }
 
@@ -298,10 +308,14 @@ class Node {
 
   // --- faults ---------------------------------------------------------------------------------------------------------
 
-  void fail_receiver(const std::string& reason, bool is_publishing) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    receiver_fault_ = reason;
-    has_publishing_failed_ = is_publishing;
+  // Close the transport as well, because hardware whose output nobody takes may never have room for the sender.
+  void fail_receiver(Transport& transport, const std::string& reason, bool is_publishing) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      receiver_fault_ = reason;
+      has_publishing_failed_ = is_publishing;
+    }
+    transport.close();
   }
 
   bool has_receiver_failed() const {

@@ -10,6 +10,7 @@
 // dependencies.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -131,15 +132,22 @@ class SubscriberQueues {
   // Each queue holds `capacity` frames; without a policy, it is least recently used. Throws std::invalid_argument.
   SubscriberQueues(std::size_t subscribers, std::size_t capacity, std::unique_ptr<Policy> policy = nullptr,
                    Overflow overflow = Overflow::kDropOldest, Clock clock = steady_nanoseconds)
-      : policy_(policy ? std::move(policy) : std::make_unique<LeastRecentlyUsed>(subscribers)),
-        capacity_(capacity),
+      : SubscriberQueues(std::vector<std::size_t>(subscribers, capacity), std::move(policy), overflow,
+                         std::move(clock)) {}
+
+  // Queues with a capacity each.
+  explicit SubscriberQueues(std::vector<std::size_t> capacities, std::unique_ptr<Policy> policy = nullptr,
+                            Overflow overflow = Overflow::kDropOldest, Clock clock = steady_nanoseconds)
+      : policy_(policy ? std::move(policy) : std::make_unique<LeastRecentlyUsed>(capacities.size())),
+        capacities_(std::move(capacities)),
         overflow_(overflow),
         clock_(std::move(clock)),
-        queues_(subscribers),
-        dropped_(subscribers, 0) {
-    if (subscribers < 1 || capacity < 1) {
-      throw std::invalid_argument("subscribers is " + std::to_string(subscribers) + ", capacity is " +
-                                  std::to_string(capacity) + "; legal: 1 or more");
+        queues_(capacities_.size()),
+        dropped_(capacities_.size(), 0) {
+    const auto least = std::min_element(capacities_.begin(), capacities_.end());
+    if (least == capacities_.end() || *least < 1) {
+      throw std::invalid_argument("subscribers is " + std::to_string(capacities_.size()) + ", capacity is " +
+                                  (least == capacities_.end() ? "none" : std::to_string(*least)) + "; legal: 1 or more");
     }
   }
 
@@ -149,10 +157,10 @@ class SubscriberQueues {
     auto& queue = queues_.at(subscriber);
     std::unique_lock<std::mutex> lock(mutex_);
     if (overflow_ == Overflow::kBlock) {
-      wait_for(lock, timeout, [&] { return closed_ || queue.size() < capacity_; });
+      wait_for(lock, timeout, [&] { return closed_ || queue.size() < capacities_[subscriber]; });
     }
     if (closed_) throw ClosedError("the queues are closed");
-    if (queue.size() == capacity_) {
+    if (queue.size() == capacities_[subscriber]) {
       if (overflow_ != Overflow::kBlock) ++dropped_[subscriber];
       if (overflow_ != Overflow::kDropOldest) return false;
       queue.pop_front();
@@ -226,7 +234,7 @@ class SubscriberQueues {
   }
 
   std::unique_ptr<Policy> policy_;
-  std::size_t capacity_;
+  std::vector<std::size_t> capacities_;
   Overflow overflow_;
   Clock clock_;
   std::vector<std::deque<Waiting>> queues_;

@@ -3,8 +3,8 @@
 // and messages are never parsed.
 //
 //     firm::Ros1 ros(argc, argv, "quat2euler");                     // removes ROS's own arguments from argv
-//     ros.subscribe(topic, 10, [](const std::uint8_t* data, std::size_t size) { ... });
-//     firm::MessageHandler publish = ros.advertise(topic, 10);      // any thread may call it
+//     ros.subscribe(topic, topic.quality, [](const std::uint8_t* data, std::size_t size) { ... });
+//     firm::MessageHandler publish = ros.advertise(topic, topic.quality);  // any thread may call it
 //     while (running) ros.spin(std::chrono::milliseconds(50));
 //     ros.flush();
 //
@@ -19,7 +19,10 @@
 #include <chrono>
 #include <cstring>
 #include <functional>
+#include <iostream>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <typeinfo>
@@ -39,7 +42,11 @@ struct RawMessage {
 // The handler that roscpp calls for an incoming message. Instead of parsing the message, it keeps the bytes.
 class RawCallback : public ros::SubscriptionCallbackHelper {
  public:
-  explicit RawCallback(MessageHandler handler) : handler_(std::move(handler)) {}
+  // `count_missing` is called with the publisher and the bytes of each message.
+  using CountMissing = std::function<void(const std::string& publisher, const std::uint8_t* data, std::size_t size)>;
+
+  RawCallback(MessageHandler handler, CountMissing count_missing)
+      : handler_(std::move(handler)), count_missing_(std::move(count_missing)) {}
 
   // roscpp keeps the bytes only during this call; several subscriptions of a topic may share the result.
   ros::VoidConstPtr deserialize(const ros::SubscriptionCallbackHelperDeserializeParams& received) override {
@@ -48,6 +55,7 @@ class RawCallback : public ros::SubscriptionCallbackHelper {
 
   void call(ros::SubscriptionCallbackHelperCallParams& params) override {
     const auto& bytes = *static_cast<const Bytes*>(params.event.getMessage().get());
+    count_missing_(params.event.getPublisherName(), bytes.data(), bytes.size());
     handler_(bytes.data(), bytes.size());
   }
 
@@ -59,12 +67,17 @@ class RawCallback : public ros::SubscriptionCallbackHelper {
  private:
   using Bytes = std::vector<std::uint8_t>;
   MessageHandler handler_;
+  CountMissing count_missing_;
 };
 
 // A node of ROS 1.
 class Ros1 {
  public:
+  static constexpr unsigned kVersion = 1;
   static constexpr bool kHasQuality = false;
+  // Only messages with a Header have numbers.
+  static constexpr bool kCountsDrops = false;
+  static constexpr std::size_t kUnlimited = 0;
   static constexpr const char* kArguments = "ROS arguments: NAME:=VALUE remaps a topic, __name:=, __ns:=, __log:=";
 
   // Remove ROS's own arguments from `argv`. The node is called `name` unless `__name:=` is given.
@@ -93,18 +106,25 @@ class Ros1 {
   }
 
   // Pass every message of a topic to `handler`, in the thread that calls spin().
-  void subscribe(const Topic& topic, std::size_t depth, MessageHandler handler) {
-    ros::SubscribeOptions options(topic.name, static_cast<std::uint32_t>(depth), topic.signature, topic.type);
-    options.helper = boost::make_shared<RawCallback>(std::move(handler));
+  void subscribe(const Topic& topic, const Quality& quality, MessageHandler handler) {
+    ros::SubscribeOptions options(topic.name, static_cast<std::uint32_t>(quality.depth), topic.signature, topic.type);
+    const auto count_missing = [this, gaps = Gaps(), is_numbered = topic.is_numbered](
+                                   const std::string& publisher, const std::uint8_t* data, std::size_t size) mutable {
+      if (is_numbered && size >= 4) lost_ += gaps.missing(publisher, number_at(data));
+    };
+    options.helper = boost::make_shared<RawCallback>(std::move(handler), count_missing);
     // Send small messages at once, without waiting for the next one.
     options.transport_hints.tcpNoDelay();
+    types_[node_->resolveName(topic.name)] = topic.type;
     subscribers_.push_back(node_->subscribe(options));
   }
 
   // Return a function that publishes messages of a topic.
-  MessageHandler advertise(const Topic& topic, std::size_t depth) {
-    ros::AdvertiseOptions options(topic.name, static_cast<std::uint32_t>(depth), topic.signature, topic.type,
+  MessageHandler advertise(const Topic& topic, const Quality& quality) {
+    ros::AdvertiseOptions options(topic.name, static_cast<std::uint32_t>(quality.depth), topic.signature, topic.type,
                                   topic.definition);
+    options.latch = quality.is_transient_local;
+    types_[node_->resolveName(topic.name)] = topic.type;
     return [publisher = node_->advertise(options)](const std::uint8_t* data, std::size_t size) {
       publisher.publish(RawMessage{data, size});
     };
@@ -112,9 +132,13 @@ class Ros1 {
 
   // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end.
   bool spin(std::chrono::milliseconds duration) {
+    look_at_types();
     callbacks_.callAvailable(ros::WallDuration(std::chrono::duration<double>(duration).count()));
     return ros::ok();
   }
+
+  // Return how many messages are missing between those that arrived, by the numbers in their headers.
+  std::uint64_t lost() const { return lost_; }
 
   // Take no more messages.
   void unsubscribe() { subscribers_.clear(); }
@@ -123,6 +147,35 @@ class Ros1 {
   void flush() { std::this_thread::sleep_for(std::chrono::milliseconds(300)); }
 
  private:
+  // The `seq` of a Header, which is little-endian on the wire.
+  static std::uint64_t number_at(const std::uint8_t* data) {
+    return data[0] | data[1] << 8 | data[2] << 16 | static_cast<std::uint64_t>(data[3]) << 24;
+  }
+
+  // Report each topic that another node uses with another type, at intervals.
+  void look_at_types() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < looks_at_) return;
+    looks_at_ = now + std::chrono::seconds(1);
+    XmlRpc::XmlRpcValue request, response, topics;
+    request[0] = ros::this_node::getName();
+    request[1] = "";
+    // `false`: do not wait for a master that has ended.
+    if (!ros::master::execute("getPublishedTopics", request, response, topics, false)) return;
+    for (int index = 0; index < topics.size(); ++index) {
+      const std::string name = topics[index][0], found = topics[index][1];
+      const auto known = types_.find(name);
+      if (known == types_.end() || found == "*" || found == known->second) continue;
+      const std::string report = "another node uses " + name + " with the type " + found + ", which is " +
+                                 known->second + " here; no messages are exchanged";
+      if (reported_.insert(report).second) std::cerr << report << std::endl;
+    }
+  }
+
+  std::uint64_t lost_ = 0;
+  std::map<std::string, std::string> types_;
+  std::set<std::string> reported_;
+  std::chrono::steady_clock::time_point looks_at_{};
   ros::CallbackQueue callbacks_;
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Subscriber> subscribers_;

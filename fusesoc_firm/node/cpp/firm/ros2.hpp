@@ -3,8 +3,8 @@
 // time, so it needs no message packages to compile, and messages are never parsed.
 //
 //     firm::Ros2 ros(argc, argv, "quat2euler");                     // removes ROS's own arguments from argv
-//     ros.subscribe(topic, 10, [](const std::uint8_t* data, std::size_t size) { ... });
-//     firm::MessageHandler publish = ros.advertise(topic, 10);      // any thread may call it
+//     ros.subscribe(topic, topic.quality, [](const std::uint8_t* data, std::size_t size) { ... });
+//     firm::MessageHandler publish = ros.advertise(topic, topic.quality);  // any thread may call it
 //     while (running) ros.spin(std::chrono::milliseconds(50));
 //     ros.flush();
 //
@@ -14,6 +14,7 @@
 #include <dlfcn.h>
 #include <rcl/arguments.h>
 #include <rcl/error_handling.h>
+#include <rcl/graph.h>
 #include <rcl/init.h>
 #include <rcl/init_options.h>
 #include <rcl/logging.h>
@@ -30,7 +31,9 @@
 #include <chrono>
 #include <cstring>
 #include <functional>
+#include <iostream>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -88,7 +91,11 @@ inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
 // A node of ROS 2.
 class Ros2 {
  public:
+  static constexpr unsigned kVersion = 2;
   static constexpr bool kHasQuality = true;
+  // All messages have numbers.
+  static constexpr bool kCountsDrops = true;
+  static constexpr std::size_t kUnlimited = 0;
   static constexpr const char* kArguments =
       "ROS arguments, after --ros-args: -r NAME:=VALUE remaps a topic, -r __node:=, -r __ns:=, --log-level";
 
@@ -130,10 +137,10 @@ class Ros2 {
   }
 
   // Pass every message of a topic to `handler`, in the thread that calls spin(). Throws MiddlewareError.
-  void subscribe(const Topic& topic, std::size_t depth, MessageHandler handler) {
-    auto made = std::make_unique<Subscription>(depth, std::move(handler));
+  void subscribe(const Topic& topic, const Quality& quality, MessageHandler handler) {
+    auto made = std::make_unique<Subscription>(quality.depth, topic.type, std::move(handler));
     rcl_subscription_options_t options = rcl_subscription_get_default_options();
-    options.qos = quality(depth);
+    options.qos = profile(quality);
     check_rcl(rcl_subscription_init(&made->rcl, &node_, type_support(topic), topic.name.c_str(), &options),
               "subscribe to " + topic.name);
     subscriptions_.push_back(std::move(made));
@@ -141,10 +148,11 @@ class Ros2 {
   }
 
   // Return a function that publishes messages of a topic. Both this call and the function throw MiddlewareError.
-  MessageHandler advertise(const Topic& topic, std::size_t depth) {
+  MessageHandler advertise(const Topic& topic, const Quality& quality) {
     auto made = std::make_unique<Publisher>();
+    made->type = topic.type;
     rcl_publisher_options_t options = rcl_publisher_get_default_options();
-    options.qos = quality(depth);
+    options.qos = profile(quality);
     check_rcl(rcl_publisher_init(&made->rcl, &node_, type_support(topic), topic.name.c_str(), &options),
               "advertise " + topic.name);
     publishers_.push_back(std::move(made));
@@ -159,6 +167,7 @@ class Ros2 {
 
   // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end. Throws MiddlewareError.
   bool spin(std::chrono::milliseconds duration) {
+    look_at_peers();
     if (subscriptions_.empty()) {
       // rcl does not wait on an empty set.
       std::this_thread::sleep_for(duration);
@@ -180,8 +189,16 @@ class Ros2 {
     return rcl_context_is_valid(&context_);
   }
 
+  // Return how many messages are missing between those that arrived, by the numbers of each publisher.
+  std::uint64_t lost() const {
+    std::uint64_t sum = lost_;
+    for (const auto& subscription : subscriptions_) sum += subscription->lost;
+    return sum;
+  }
+
   // Take no more messages.
   void unsubscribe() {
+    for (const auto& subscription : subscriptions_) lost_ += subscription->lost;
     for (auto& subscription : subscriptions_) ignore(rcl_subscription_fini(&subscription->rcl, &node_));
     subscriptions_.clear();
   }
@@ -192,17 +209,18 @@ class Ros2 {
     for (auto& publisher : publishers_) ignore(rcl_publisher_wait_for_all_acked(&publisher->rcl, second));
   }
 
-  // Also take messages from peers that do not promise delivery (sensors), and make no such promise.
-  void be_best_effort() { reliability_ = RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT; }
-
  private:
+  static constexpr std::chrono::seconds kLookInterval{1};
+
   struct Publisher {
+    std::string type;
     rcl_publisher_t rcl = rcl_get_zero_initialized_publisher();
   };
 
   // A subscription with a buffer that grows to the largest message.
   struct Subscription {
-    Subscription(std::size_t most, MessageHandler handle_message) : depth(most), handler(std::move(handle_message)) {
+    Subscription(std::size_t most, std::string message_type, MessageHandler handle_message)
+        : depth(most), type(std::move(message_type)), handler(std::move(handle_message)) {
       const rcl_allocator_t allocator = rcl_get_default_allocator();
       check_rcl(rmw_serialized_message_init(&message, 0, &allocator), "allocate a message");
     }
@@ -213,24 +231,68 @@ class Ros2 {
     // Take no more than its queue holds, so that a peer that never stops does not starve others.
     void take_all() {
       for (std::size_t number = 0; number < depth; ++number) {
-        const rcl_ret_t result = rcl_take_serialized_message(&rcl, &message, nullptr, nullptr);
+        rmw_message_info_t info = rmw_get_zero_initialized_message_info();
+        const rcl_ret_t result = rcl_take_serialized_message(&rcl, &message, &info, nullptr);
         if (result == RCL_RET_SUBSCRIPTION_TAKE_FAILED) return rcl_reset_error();
         check_rcl(result, "take a message");
+        count_missing(info);
         handler(message.buffer, message.buffer_length);
       }
     }
 
+    void count_missing(const rmw_message_info_t& info) {
+      if (info.publication_sequence_number == RMW_MESSAGE_INFO_SEQUENCE_NUMBER_UNSUPPORTED) return;
+      const auto* bytes = reinterpret_cast<const char*>(info.publisher_gid.data);
+      lost += gaps.missing(std::string(bytes, sizeof info.publisher_gid.data), info.publication_sequence_number);
+    }
+
     const std::size_t depth;
+    const std::string type;
     const MessageHandler handler;
+    Gaps gaps;
+    std::uint64_t lost = 0;
     rcl_subscription_t rcl = rcl_get_zero_initialized_subscription();
     rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
   };
 
-  rmw_qos_profile_t quality(std::size_t depth) const {
-    rmw_qos_profile_t profile = rmw_qos_profile_default;
-    profile.depth = depth;
-    profile.reliability = reliability_;
-    return profile;
+  static rmw_qos_profile_t profile(const Quality& quality) {
+    rmw_qos_profile_t made = rmw_qos_profile_default;
+    made.depth = quality.depth;
+    made.reliability =
+        quality.is_reliable ? RMW_QOS_POLICY_RELIABILITY_RELIABLE : RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT;
+    made.durability =
+        quality.is_transient_local ? RMW_QOS_POLICY_DURABILITY_TRANSIENT_LOCAL : RMW_QOS_POLICY_DURABILITY_VOLATILE;
+    return made;
+  }
+
+  // Report each node that uses a topic with another type, at intervals.
+  void look_at_peers() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < looks_at_) return;
+    looks_at_ = now + kLookInterval;
+    for (const auto& subscription : subscriptions_) {
+      const char* name = rcl_subscription_get_topic_name(&subscription->rcl);
+      report_types(rcl_get_publishers_info_by_topic, "publishes", name, subscription->type);
+    }
+    for (const auto& publisher : publishers_) {
+      const char* name = rcl_publisher_get_topic_name(&publisher->rcl);
+      report_types(rcl_get_subscriptions_info_by_topic, "subscribes to", name, publisher->type);
+    }
+  }
+
+  template <typename EndsOf>
+  void report_types(EndsOf ends_of, const std::string& verb, const std::string& topic, const std::string& type) {
+    rcl_allocator_t allocator = rcl_get_default_allocator();
+    rmw_topic_endpoint_info_array_t ends = rmw_get_zero_initialized_topic_endpoint_info_array();
+    if (ends_of(&node_, &allocator, topic.c_str(), false, &ends) != RCL_RET_OK) return rcl_reset_error();
+    for (std::size_t index = 0; index < ends.size; ++index) {
+      const auto& end = ends.info_array[index];
+      if (end.topic_type == type) continue;
+      const std::string report = std::string(end.node_name) + " " + verb + " " + topic + " with the type " +
+                                 end.topic_type + ", which is " + type + " here; no messages are exchanged";
+      if (reported_.insert(report).second) std::cerr << report << std::endl;
+    }
+    ignore(rmw_topic_endpoint_info_array_fini(&ends, &allocator));
   }
 
   void remove_ros_arguments(int& argc, char** argv) {
@@ -246,7 +308,9 @@ class Ros2 {
 
   std::string name_;
   bool is_started_ = false;
-  rmw_qos_reliability_policy_t reliability_ = RMW_QOS_POLICY_RELIABILITY_RELIABLE;
+  std::uint64_t lost_ = 0;
+  std::chrono::steady_clock::time_point looks_at_{};
+  std::set<std::string> reported_;
   rcl_context_t context_ = rcl_get_zero_initialized_context();
   rcl_node_t node_ = rcl_get_zero_initialized_node();
   rcl_wait_set_t waiting_ = rcl_get_zero_initialized_wait_set();

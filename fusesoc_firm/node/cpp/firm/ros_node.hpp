@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include <firm/diagnostics.hpp>
 #include <firm/node.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/status.hpp>
@@ -55,6 +56,7 @@ struct System {
   std::string digest;  // empty if the status is not read by frames
   std::vector<Topic> subscribers;
   std::vector<Topic> publishers;
+  Topic diagnostics;
   Software software{};
 
   bool has_software() const { return !software.inputs.empty(); }
@@ -69,13 +71,21 @@ class UsageError : public std::runtime_error {
 struct NodeArguments {
   std::string transport;
   std::string software;
-  std::size_t depth;
+  std::optional<std::size_t> depth;    // of all topics; nothing: each topic's own
+  std::optional<bool> is_reliable;     // all topics; nothing: each topic's own
   Overflow overflow = Overflow::kDropOldest;
   std::chrono::seconds drain{10};
   bool restarts = false;
-  bool is_best_effort = false;
   std::string trace;
   bool wants_help = false;
+
+  // Return the quality of service of a topic.
+  Quality quality_of(const Topic& topic) const {
+    Quality quality = topic.quality;
+    quality.depth = depth.value_or(quality.depth);
+    quality.is_reliable = is_reliable.value_or(quality.is_reliable);
+    return quality;
+  }
 };
 
 // Parse a positive whole number. Throws UsageError.
@@ -101,7 +111,6 @@ Value word_of(const std::string& option, const std::string& text, const std::map
 // Throws UsageError.
 inline NodeArguments parse_arguments(const System& system, bool has_quality, int argc, char** argv) {
   NodeArguments arguments;
-  arguments.depth = system.queue_depth;
   for (int index = 1; index < argc; ++index) {
     const std::string option = argv[index];
     const auto value = [&] {
@@ -130,7 +139,7 @@ inline NodeArguments parse_arguments(const System& system, bool has_quality, int
     } else if (option == "--trace") {
       arguments.trace = value();
     } else if (option == "--qos" && has_quality) {
-      arguments.is_best_effort = word_of<bool>(option, value(), {{"best_effort", true}, {"reliable", false}});
+      arguments.is_reliable = word_of<bool>(option, value(), {{"best_effort", false}, {"reliable", true}});
     } else {
       throw UsageError("unknown option '" + option + "'");
     }
@@ -149,13 +158,13 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
     out << "  --software COMMAND   the command that runs the blocks in software, such as\n"
         << "                       'python3 -m fusesoc_firm.node.software_process SPECIFICATION'\n";
   }
-  out << "  --depth N            capacity of each queue, including ROS queues, in messages (" << system.queue_depth << ")\n"
+  out << "  --depth N            capacity of each queue, including ROS queues, in messages (default: each topic's)\n"
       << "  --overflow WORD      action if a queue is full: drop_oldest (the default), drop_newest, or\n"
       << "                       block, which stops all topics\n"
       << "  --drain SECONDS      time limit for pending messages when the node ends (10)\n"
       << "  --restart            reopen the transport each time it fails\n"
       << "  --trace FILE         write each step of each message to FILE, as CSV\n";
-  if (has_quality) out << "  --qos WORD           reliability of all topics: reliable (the default) or best_effort\n";
+  if (has_quality) out << "  --qos WORD           reliability of all topics: reliable or best_effort (default: each topic's)\n";
   out << "  --help               print this help\n\n" << ros_arguments << "\n\ntopics to the hardware:\n";
   for (const auto& topic : system.subscribers) out << "  " << topic.name << "  " << topic.type << "\n";
   out << "topics from the hardware:\n";
@@ -217,7 +226,10 @@ class Engines {
     configuration.width = system.width;
     configuration.subscribers = system.subscriber_count;
     configuration.publishers = system.publisher_count;
-    configuration.queue_depth = arguments.depth;
+    configuration.queue_depth = arguments.depth.value_or(system.queue_depth);
+    for (const auto& topic : system.subscribers) {
+      if (topic.id) configuration.queue_depths[*topic.id] = arguments.quality_of(topic).depth;
+    }
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
     configuration.log = &std::cerr;
@@ -233,6 +245,7 @@ class Engines {
     configuration.subscribers = static_cast<unsigned>(inputs.size());
     configuration.publishers = static_cast<unsigned>(outputs.size());
     configuration.trace = nullptr;
+    configuration.queue_depths.clear();
     software_ = std::make_unique<Node>(configuration, "software:" + arguments.software, by_id(from_software_));
     for (unsigned id = 0; id < inputs.size(); ++id) {
       if (inputs[id].converter) from_hardware_.at(*inputs[id].converter) = into(*software_, id);
@@ -305,11 +318,12 @@ class Engines {
 };
 
 // Print an engine's counts.
-inline void print_statistics(const std::string& name, const Node& node) {
+// `lost` messages were published, but ROS did not deliver them.
+inline void print_statistics(const std::string& name, const Node& node, std::uint64_t lost = 0) {
   const NodeStatistics counted = node.statistics();
   std::cerr << name << ": " << counted.received << " received, " << counted.dropped << " dropped, " << counted.sent
             << " sent, " << counted.published << " published, " << counted.errors << " errors, " << counted.restarts
-            << " restarts" << std::endl;
+            << " restarts, " << lost << " lost by ROS" << std::endl;
 }
 
 // Run the node until a signal, ROS, or the hardware ends it. Return the exit status.
@@ -322,15 +336,28 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   }
   if (!ros.start([] { return is_interrupted != 0; })) return 0;
   std::map<std::string, MessageHandler> publish;
-  for (const auto& topic : system.publishers) publish[topic.name] = ros.advertise(topic, arguments.depth);
+  for (const auto& topic : system.publishers) {
+    publish[topic.name] = ros.advertise(topic, arguments.quality_of(topic));
+  }
   Engines engines(system, arguments, std::move(publish), arguments.trace.empty() ? nullptr : &trace);
-  for (const auto& topic : system.subscribers) ros.subscribe(topic, arguments.depth, engines.taker(topic));
+  for (const auto& topic : system.subscribers) {
+    Quality quality = arguments.quality_of(topic);
+    // Only the node's queue then drops messages, which it counts. If it blocks, the one of ROS must have a limit.
+    if (!Ros::kCountsDrops && arguments.overflow != Overflow::kBlock) quality.depth = Ros::kUnlimited;
+    ros.subscribe(topic, quality, engines.taker(topic));
+  }
 
   RunningNode hardware(engines.hardware(), arguments.drain);
   std::optional<RunningNode> software;
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
+  Diagnosis diagnosis(ros, system.diagnostics);
   while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
+    diagnosis.tell([&] {
+      std::vector<Report> reports{report_of(system.name + ": node", engines.hardware(), ros.lost())};
+      if (engines.software()) reports.push_back(report_of(system.name + ": software", *engines.software()));
+      return reports;
+    });
   }
   // Handle messages that ROS has already received.
   ros.spin(std::chrono::milliseconds(0));
@@ -339,7 +366,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   int status = software ? software->stop() : 0;
   status = std::max(status, hardware.stop());
   ros.flush();
-  print_statistics(system.name + "_node", engines.hardware());
+  print_statistics(system.name + "_node", engines.hardware(), ros.lost());
   if (software) print_statistics("its software", *engines.software());
   return status;
 }
@@ -353,9 +380,6 @@ int run(const System& system, int argc, char** argv) {
     if (arguments.wants_help) {
       print_help(std::cout, system, Ros::kArguments, Ros::kHasQuality);
       return 0;
-    }
-    if constexpr (Ros::kHasQuality) {
-      if (arguments.is_best_effort) ros.be_best_effort();
     }
     return serve(ros, system, arguments);
   } catch (const UsageError& fault) {

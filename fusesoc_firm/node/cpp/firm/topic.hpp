@@ -5,21 +5,48 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
 namespace firm {
 
+// The quality of service of a topic: `depth` is the capacity of its queues in messages. In ROS 1, topics are always
+// reliable, and a publisher that is transient local latches.
+struct Quality {
+  bool is_reliable = true;
+  bool is_transient_local = false;
+  std::size_t depth = 100;
+};
+
 // A topic and the id of its converter in the hardware; no id if only software uses the topic. `signature` is the
-// definition's signature: the MD5 sum for ROS 1, the RIHS01 hash for ROS 2. `definition` is the definition's text with
-// the texts of all nested messages, as ROS 1 announces it.
+// definition's signature: the MD5 sum for ROS 1, the RIHS01 hash for ROS 2. If `is_numbered`, a message begins with its
+// publisher's count, since its first field is a Header of ROS 1. `definition` is the definition's text with the texts of
+// all nested messages, as ROS 1 announces it.
 struct Topic {
   std::optional<unsigned> id;
   std::string name;
   std::string type;
   std::string signature;
+  Quality quality{};
+  bool is_numbered = false;
   std::string definition{};
+};
+
+// The numbers of a topic's messages, of which each publisher counts its own.
+class Gaps {
+ public:
+  // Return how many messages are missing before the message with this number; a restart is not a gap.
+  std::uint64_t missing(const std::string& publisher, std::uint64_t number) {
+    const auto [last, is_first] = last_.try_emplace(publisher, number);
+    const std::uint64_t gap = !is_first && number > last->second ? number - last->second - 1 : 0;
+    last->second = number;
+    return gap;
+  }
+
+ private:
+  std::map<std::string, std::uint64_t> last_;
 };
 
 // A function that handles a serialised message, from the middleware or to publish. The caller owns the bytes.

@@ -1,0 +1,360 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Answers ARP requests for its address (RFC 826) and ICMP echo requests (RFC 792). Most bytes of a reply are those of
+-- its request in the same place, so it is made as the request arrives: a delay line gives the bytes that move, and
+-- constants replace the others. The reply waits in a store until the request is known to be whole and meant for this
+-- host; everything else is forgotten there.
+--
+-- An echo request has an IPv4 header of 20 bytes with a right checksum, is not a fragment, and comes in a frame that is
+-- long enough for it. Its checksum is not verified: the reply's is right if the request's is.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+
+entity firm_net_responder is
+  generic (
+    DEPTH : integer := 2048  -- bytes of waiting replies, a power of two
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- This host, the first byte on the line highest. A frame under way at a change may be dropped.
+    mac     : in std_logic_vector(47 downto 0);
+    address : in std_logic_vector(31 downto 0);
+
+    -- All frames of firm_mac_receiver; after a last beat, six cycles are without a beat.
+    s_axis_tdata  : in std_logic_vector(7 downto 0);
+    s_axis_tuser  : in std_logic_vector(0 downto 0);
+    s_axis_tvalid : in std_logic;
+    s_axis_tlast  : in std_logic;
+
+    -- Replies; within a frame there is a beat in each cycle.
+    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic;
+
+    is_lost : out std_logic  -- a pulse for each reply that found no room
+  );
+end entity firm_net_responder;
+
+architecture rtl of firm_net_responder is
+
+  subtype byte_t is std_logic_vector(7 downto 0);
+  type bytes_t is array (natural range <>) of byte_t;
+
+  -- Places in a frame, of the first byte of a field.
+  constant LENGTH_PLACE      : natural := 16;  -- of IPv4
+  constant FRAGMENT_PLACE    : natural := 20;
+  constant PROTOCOL_PLACE    : natural := 23;
+  constant SOURCE_PLACE      : natural := 26;
+  constant DESTINATION_PLACE : natural := 30;
+  constant ICMP_PLACE        : natural := 34;
+  constant CHECKSUM_PLACE    : natural := 36;  -- of ICMP
+  constant OPCODE_PLACE      : natural := 20;  -- of ARP
+  constant SENDER_PLACE      : natural := 22;
+  constant TARGET_PLACE      : natural := 32;
+  constant MAC_BYTES         : natural := 6;
+  constant ADDRESS_BYTES     : natural := 4;
+  constant ETHERNET_BYTES    : natural := 14;
+  constant IPV4_BYTES        : natural := 20;
+  constant SHORTEST          : natural := IPV4_BYTES + 8;  -- IPv4 packet with an echo request
+  -- The place from which nothing more is decided; counts of places stop there.
+  constant END_PLACE         : natural := 63;
+
+  -- Of ARP: Ethernet for IPv4, a request.
+  constant ARP_REQUEST  : bytes_t(12 to 21) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04", x"00", x"01");
+  -- Of IPv4 without options.
+  constant IPV4         : bytes_t(12 to 14) := (x"08", x"00", x"45");
+  constant ICMP         : byte_t            := x"01";
+  constant ECHO_REQUEST : bytes_t(34 to 35) := (x"08", x"00");
+  constant ECHO_REPLY   : byte_t            := x"00";
+  constant ARP_REPLY    : byte_t            := x"02";
+  -- The flag for more fragments, and the offset.
+  constant FRAGMENT     : byte_t            := x"3f";
+  -- The reply's checksum is higher by the difference of the types, in its upper byte.
+  constant TYPE_DIFFERENCE : unsigned(7 downto 0) := x"08";
+  constant OVERFLOWING     : unsigned(7 downto 0) := x"f8";
+
+  -- The newest byte first. A reply's byte of the same place is AHEAD bytes behind it: its first bytes are those of the
+  -- request's source.
+  constant AHEAD     : natural := MAC_BYTES;
+  constant ARP_MOVE  : natural := TARGET_PLACE - SENDER_PLACE;
+  constant IPV4_MOVE : natural := DESTINATION_PLACE - SOURCE_PLACE;
+  signal delay_r     : bytes_t(0 to AHEAD+ARP_MOVE);
+
+  signal place_r   : natural range 0 to END_PLACE;      -- of the request's byte
+  signal count_r   : unsigned(15 downto 0) := (others => '0');  -- bytes of the request so far
+  signal shift     : std_logic;
+  signal left_r    : natural range 0 to AHEAD;          -- shifts after the request's last byte
+  signal early_r   : natural range 0 to AHEAD;          -- shifts before the reply's first byte
+
+  -- Of the request so far.
+  signal direct_r    : std_logic;                       -- it is sent to this host only
+  signal broadcast_r : std_logic;
+  signal arp_r       : std_logic;                       -- it is an ARP request for this host
+  signal echo_r      : std_logic;                       -- it is an echo request for this host
+  signal sum_r       : unsigned(19 downto 0) := (others => '0');  -- of the IPv4 header's words
+  signal length_r    : unsigned(15 downto 0) := (others => '0');  -- of the IPv4 packet
+  signal summed_r    : std_logic;                       -- the IPv4 header's checksum is right
+  signal holds_r     : std_logic;                       -- the frame holds the IPv4 packet
+  signal aborted_r   : std_logic;
+
+  signal reply_place_r : natural range 0 to END_PLACE;
+  signal reply_tdata   : byte_t;
+  signal reply_tuser   : std_logic_vector(0 downto 0);
+  signal reply_tvalid  : std_logic;
+  signal reply_tlast   : std_logic;
+
+  -- Byte `index` of a word, counted as on the line.
+  function byte_of(word : std_logic_vector; index : natural) return byte_t is
+    constant BITS : std_logic_vector(word'length-1 downto 0) := word;
+  begin
+    return BITS(BITS'high-8*index downto BITS'high-8*index-7);
+  end function byte_of;
+
+  -- Whether a byte at `place` is not that of `wanted`.
+  function differs(place : natural; byte : byte_t; wanted : bytes_t) return std_logic is
+  begin
+    for index in wanted'range loop
+      if place = index and byte /= wanted(index) then
+        return '1';
+      end if;
+    end loop;
+    return '0';
+  end function differs;
+
+  -- The byte, or that of `by` which has this place.
+  function replaced(place : natural; byte : byte_t; by : bytes_t) return byte_t is
+  begin
+    for index in by'range loop
+      if place = index then
+        return by(index);
+      end if;
+    end loop;
+    return byte;
+  end function replaced;
+
+  -- Whether the upper byte of a request's checksum overflows in the reply.
+  function carries(byte : byte_t) return std_logic is
+  begin
+    if unsigned(byte) >= OVERFLOWING then
+      return '1';
+    end if;
+    return '0';
+  end function carries;
+
+  -- The bytes of a word as they are in a frame from `place` on.
+  function placed(word : std_logic_vector; place : natural) return bytes_t is
+    variable bytes : bytes_t(place to place+word'length/8-1);
+  begin
+    for index in bytes'range loop
+      bytes(index) := byte_of(word, index - place);
+    end loop;
+    return bytes;
+  end function placed;
+
+begin
+
+  shift <= '1' when s_axis_tvalid = '1' or left_r /= 0 else '0';
+
+  delay : process (clk)
+  begin
+    if rising_edge(clk) and shift = '1' then
+      delay_r(0)                 <= s_axis_tdata;
+      delay_r(1 to delay_r'high) <= delay_r(0 to delay_r'high-1);
+    end if;
+  end process delay;
+
+  -- ------------------------------------------------------------------ the request
+
+  follow : process (clk)
+  begin
+    if rising_edge(clk) then
+      if s_axis_tvalid = '1' then
+        count_r <= count_r + 1;
+        if place_r /= END_PLACE then
+          place_r <= place_r + 1;
+        end if;
+        if s_axis_tlast = '1' then
+          place_r <= 0;
+          count_r <= (others => '0');
+          left_r  <= AHEAD;
+        end if;
+      elsif left_r /= 0 then
+        left_r <= left_r - 1;
+      end if;
+      if rst_n = '0' then
+        place_r <= 0;
+        count_r <= (others => '0');
+        left_r  <= 0;
+      end if;
+    end if;
+  end process follow;
+
+  match : process (clk)
+    variable arp_differs  : std_logic;
+    variable echo_differs : std_logic;
+  begin
+    if rising_edge(clk) and s_axis_tvalid = '1' then
+      if place_r = 0 then
+        direct_r    <= '1';
+        broadcast_r <= '1';
+        arp_r       <= '1';
+        echo_r      <= '1';
+      end if;
+      if place_r < MAC_BYTES then
+        if differs(place_r, s_axis_tdata, placed(mac, 0)) = '1' then
+          direct_r <= '0';
+        end if;
+        if s_axis_tdata /= x"ff" then
+          broadcast_r <= '0';
+        end if;
+      end if;
+
+      arp_differs  := differs(place_r, s_axis_tdata, ARP_REQUEST)
+                      or differs(place_r, s_axis_tdata, placed(address, TARGET_PLACE+MAC_BYTES));
+      echo_differs := differs(place_r, s_axis_tdata, IPV4)
+                      or differs(place_r, s_axis_tdata, ECHO_REQUEST)
+                      or differs(place_r, s_axis_tdata, placed(address, DESTINATION_PLACE));
+      if place_r = MAC_BYTES then
+        -- A group of hosts is not a source.
+        arp_differs  := s_axis_tdata(0) or not (direct_r or broadcast_r);
+        echo_differs := s_axis_tdata(0) or not direct_r;
+      elsif place_r = FRAGMENT_PLACE and (s_axis_tdata and FRAGMENT) /= x"00" then
+        echo_differs := '1';
+      elsif place_r = FRAGMENT_PLACE+1 and s_axis_tdata /= x"00" then
+        echo_differs := '1';
+      elsif place_r = PROTOCOL_PLACE and s_axis_tdata /= ICMP then
+        echo_differs := '1';
+      end if;
+      if arp_differs = '1' then
+        arp_r <= '0';
+      end if;
+      if echo_differs = '1' then
+        echo_r <= '0';
+      end if;
+      aborted_r <= s_axis_tuser(0);
+    end if;
+  end process match;
+
+  check_header : process (clk)
+  begin
+    if rising_edge(clk) and s_axis_tvalid = '1' then
+      if place_r = 0 then
+        sum_r <= (others => '0');
+      elsif place_r >= ETHERNET_BYTES and place_r < ETHERNET_BYTES+IPV4_BYTES and place_r mod 2 = 1 then
+        sum_r <= sum_r + (unsigned(delay_r(0)) & unsigned(s_axis_tdata));
+      end if;
+      if place_r = LENGTH_PLACE or place_r = LENGTH_PLACE+1 then
+        length_r <= length_r(7 downto 0) & unsigned(s_axis_tdata);
+      end if;
+      if s_axis_tlast = '1' then
+        holds_r <= '0';
+        if length_r >= SHORTEST and ('0' & count_r) + 1 >= ('0' & length_r) + ETHERNET_BYTES then
+          holds_r <= '1';
+        end if;
+      end if;
+    end if;
+  end process check_header;
+
+  -- The words and the carries add up to all ones. A register of its own: there is time until the end of the frame.
+  compare_sum : process (clk)
+  begin
+    if rising_edge(clk) then
+      summed_r <= '0';
+      if ("0000" & sum_r(15 downto 0)) + sum_r(19 downto 16) = x"0ffff" then
+        summed_r <= '1';
+      end if;
+    end if;
+  end process compare_sum;
+
+  -- ------------------------------------------------------------------ the reply
+
+  follow_reply : process (clk)
+  begin
+    if rising_edge(clk) then
+      reply_tvalid <= '0';
+      reply_tlast  <= '0';
+      if shift = '1' then
+        if early_r /= 0 then
+          early_r <= early_r - 1;
+        else
+          reply_tvalid <= '1';
+        end if;
+        if left_r = 1 then
+          early_r     <= AHEAD;
+          reply_tlast <= '1';
+        end if;
+      end if;
+      if reply_tvalid = '1' then
+        if reply_tlast = '1' then
+          reply_place_r <= 0;
+        elsif reply_place_r /= END_PLACE then
+          reply_place_r <= reply_place_r + 1;
+        end if;
+      end if;
+      if rst_n = '0' then
+        reply_tvalid  <= '0';
+        reply_place_r <= 0;
+        early_r       <= AHEAD;
+      end if;
+    end if;
+  end process follow_reply;
+
+  choose : process (delay_r, reply_place_r, arp_r, mac, address)
+    variable byte : byte_t;
+  begin
+    byte := delay_r(AHEAD);
+    if reply_place_r < MAC_BYTES then
+      byte := delay_r(0);
+    end if;
+    byte := replaced(reply_place_r, byte, placed(mac, MAC_BYTES));
+    if arp_r = '1' then
+      byte := replaced(reply_place_r, byte, placed(mac & address, SENDER_PLACE));
+      if reply_place_r = OPCODE_PLACE+1 then
+        byte := ARP_REPLY;
+      elsif reply_place_r >= TARGET_PLACE and reply_place_r < TARGET_PLACE+ARP_MOVE then
+        byte := delay_r(AHEAD+ARP_MOVE);
+      end if;
+    else
+      byte := replaced(reply_place_r, byte, placed(address, SOURCE_PLACE));
+      if reply_place_r >= DESTINATION_PLACE and reply_place_r < DESTINATION_PLACE+IPV4_MOVE then
+        byte := delay_r(AHEAD+IPV4_MOVE);
+      elsif reply_place_r = ICMP_PLACE then
+        byte := ECHO_REPLY;
+      elsif reply_place_r = CHECKSUM_PLACE then
+        -- In ones' complement, a carry out of this byte enters the next one, and may come back from there.
+        byte := std_logic_vector(unsigned(byte) + TYPE_DIFFERENCE);
+        if carries(delay_r(AHEAD)) = '1' and delay_r(AHEAD-1) = x"ff" then
+          byte := std_logic_vector(unsigned(byte) + 1);
+        end if;
+      elsif reply_place_r = CHECKSUM_PLACE+1 and carries(delay_r(AHEAD+1)) = '1' then
+        byte := std_logic_vector(unsigned(byte) + 1);
+      end if;
+    end if;
+    reply_tdata <= byte;
+  end process choose;
+
+  reply_tuser(0) <= aborted_r or not (arp_r or (echo_r and summed_r and holds_r));
+
+  u_store : entity firm.firm_mac_store
+    generic map (
+      DEPTH => DEPTH
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => reply_tdata,
+      s_axis_tuser  => reply_tuser,
+      s_axis_tvalid => reply_tvalid,
+      s_axis_tlast  => reply_tlast,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready,
+      is_lost       => is_lost
+    );
+
+end architecture rtl;

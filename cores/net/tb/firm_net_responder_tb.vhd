@@ -1,0 +1,172 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Sends frames to the responder of the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles
+-- before it, whether it is aborted (0 or 1), the number of bytes, and the bytes. The replies go to a file, a row each:
+-- the number of bytes, and the bytes; or `lost`.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use ieee.math_real.all;
+use std.textio.all;
+library firm;
+use firm.firm_sim_pkg.all;
+
+entity firm_net_responder_tb is
+  generic (
+    DEPTH         : integer := 2048;
+    FRAME_FILE    : string  := "frames.txt";
+    RESULT_FILE   : string  := "replies.txt";
+    EXPECTED_FILE : string  := "";
+    SEED          : integer := 1;
+    -- The chances, each cycle, that no byte comes, and that the reader takes nothing.
+    SLOW_PERCENT  : integer := 0;
+    STALL_PERCENT : integer := 0
+  );
+end entity firm_net_responder_tb;
+
+architecture simulation of firm_net_responder_tb is
+
+  -- Between two frames of the receiver, at least.
+  constant GAP_CYCLES  : positive := 6;
+  -- After the last frame, for the reader.
+  constant LAST_CYCLES : positive := 4 * DEPTH;
+
+  signal clk   : std_logic := '0';
+  signal rst_n : std_logic := '0';
+  signal over  : boolean   := false;
+
+  signal s_tdata  : std_logic_vector(7 downto 0) := (others => '0');
+  signal s_tuser  : std_logic_vector(0 downto 0) := "0";
+  signal s_tvalid : std_logic                    := '0';
+  signal s_tlast  : std_logic                    := '0';
+
+  signal m_tdata  : std_logic_vector(7 downto 0);
+  signal m_tvalid : std_logic;
+  signal m_tlast  : std_logic;
+  signal m_tready : std_logic := '0';
+  signal is_lost  : std_logic;
+
+begin
+
+  clk <= not clk after 4 ns when not over else '0';
+
+  u_responder : entity firm.firm_net_responder
+    generic map (
+      DEPTH => DEPTH
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      mac           => x"020000000002",
+      address       => x"c0000202",
+      s_axis_tdata  => s_tdata,
+      s_axis_tuser  => s_tuser,
+      s_axis_tvalid => s_tvalid,
+      s_axis_tlast  => s_tlast,
+      m_axis_tdata  => m_tdata,
+      m_axis_tvalid => m_tvalid,
+      m_axis_tlast  => m_tlast,
+      m_axis_tready => m_tready,
+      is_lost       => is_lost
+    );
+
+  send : process
+    file frames       : text open read_mode is FRAME_FILE;
+    variable row      : line;
+    variable before   : integer;
+    variable abort    : integer;
+    variable size     : integer;
+    variable byte     : integer;
+    variable random_1 : positive := SEED;
+    variable random_2 : positive := 3;
+    variable draw     : real;
+
+    procedure wait_for(cycles : in natural) is
+    begin
+      for cycle in 1 to cycles loop
+        wait until rising_edge(clk);
+      end loop;
+    end procedure wait_for;
+
+  begin
+    wait_for(4);
+    rst_n <= '1';
+    while not endfile(frames) loop
+      readline(frames, row);
+      read(row, before);
+      read(row, abort);
+      read(row, size);
+      wait_for(before + GAP_CYCLES);
+      for place in 0 to size-1 loop
+        read(row, byte);
+        loop
+          uniform(random_1, random_2, draw);
+          exit when 100.0 * draw >= real(SLOW_PERCENT);
+          wait until rising_edge(clk);
+        end loop;
+        s_tvalid <= '1';
+        s_tdata  <= std_logic_vector(to_unsigned(byte, 8));
+        s_tlast  <= '0';
+        s_tuser  <= "0";
+        if place = size-1 then
+          s_tlast <= '1';
+          if abort = 1 then
+            s_tuser <= "1";
+          end if;
+        end if;
+        wait until rising_edge(clk);
+        s_tvalid <= '0';
+        s_tdata  <= (others => 'X');
+      end loop;
+    end loop;
+    wait_for(LAST_CYCLES);
+    over <= true;
+    wait;
+  end process send;
+
+  take : process (clk)
+    variable random_1 : positive := SEED;
+    variable random_2 : positive := 5;
+    variable draw     : real;
+  begin
+    if rising_edge(clk) then
+      uniform(random_1, random_2, draw);
+      m_tready <= '1';
+      if 100.0 * draw < real(STALL_PERCENT) then
+        m_tready <= '0';
+      end if;
+    end if;
+  end process take;
+
+  record_replies : process
+    file replies     : text open write_mode is RESULT_FILE;
+    file expected    : text open read_mode is existing(EXPECTED_FILE);
+    variable row     : line;
+    variable content : line;
+    variable size    : natural := 0;
+  begin
+    while not over loop
+      wait until rising_edge(clk) or over;
+      next when over or rst_n = '0';
+      if is_lost = '1' then
+        write(row, string'("lost"));
+        write_result(replies, expected, EXPECTED_FILE, row);
+      end if;
+      next when m_tvalid = '0' or m_tready = '0';
+      size := size + 1;
+      write(content, ' ' & integer'image(to_integer(unsigned(m_tdata))));
+      if m_tlast = '1' then
+        write(row, integer'image(size) & content.all);
+        write_result(replies, expected, EXPECTED_FILE, row);
+        deallocate(content);
+        size := 0;
+      end if;
+    end loop;
+    assert size = 0
+      report "a reply without an end" severity failure;
+    assert endfile(expected)
+      report EXPECTED_FILE & " has more lines than there are replies" severity failure;
+    print("PASS");
+    wait;
+  end process record_replies;
+
+end architecture simulation;
