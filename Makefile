@@ -104,8 +104,8 @@ else
 	done; exit $$status
 endif
 
-bench: TOOLS = iverilog verilator
-bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures; BENCH='area cycles' for parts, BENCH=--help lists them
+bench: TOOLS = iverilog verilator $(STUDIO_TOOLS)
+bench: setup ros studio $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean

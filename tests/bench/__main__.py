@@ -29,6 +29,7 @@ from tests.bench import (
     replay,
     simulators,
     store,
+    studio,
     systems,
     timing,
     use,
@@ -96,6 +97,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "replay": lambda: replay.measure(seed, _tell),
         "live": lambda: live.measure(_tell),
         "store": lambda: store.measure(_tell),
+        "studio": lambda: studio.measure(seed, _tell),
     }
     return measures[part]()
 

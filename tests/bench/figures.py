@@ -69,6 +69,7 @@ PAGES = (
         ("systems", "builds", "actions", "simulators", "store"),
     ),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live")),
+    Page("studio", "Figures of firm studio", "how fast the page is", ("studio",)),
 )
 _HEADINGS = {
     "area": "Area",
@@ -88,6 +89,7 @@ _HEADINGS = {
     "store": "Store",
     "replay": "Replay",
     "live": "Live nodes",
+    "studio": "The page",
 }
 _METHODS = {
     "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT counts
@@ -123,6 +125,7 @@ _METHODS = {
     "store": "The tables list the number of cores that a second run of FuseSoC generates, and the time of this run.",
     "replay": "`firm replay` replays bags that rosbags has written. rosbags also reads the recorded bags.",
     "live": "[`firm live`](../how-to/run-live.md) runs as a node of a running ROS.",
+    "studio": "A browser opens [the page](../how-to/studio.md) and edits a system.",
 }
 _INTRODUCTION = """# {title}
 
