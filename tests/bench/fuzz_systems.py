@@ -194,10 +194,7 @@ class Program:
     def run(self, seed: str, size: int) -> Tally:
         """Send so many frames and judge what happens."""
         source = random.Random(seed)
-        return self.send([_frame(self.system, source) for _ in range(size)], source, seed)
-
-    def send(self, sent: list[Sent], source: random.Random, seed: str) -> Tally:
-        """Send these frames and judge what happens; `source` draws stalls, and faults name `seed`."""
+        sent = [_frame(self.system, source) for _ in range(size)]
         folder = self.path.parent
         frames = b"".join(len(item.record).to_bytes(4, "little") + item.record for item in sent)
         (folder / "frames").write_bytes(frames)

@@ -21,7 +21,6 @@ _SHORT = {
     "SOURCES": "N",
     "FRAMES": "F",
     "LIMIT": "L",
-    "MAX_LENGTH": "M",
     "DEPTH": "D",
 }
 # Generics that a table says if they are true.
