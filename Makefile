@@ -39,6 +39,7 @@ PYTEST_OPTIONS ?= -n auto --dist loadgroup
 EMULATION_TOOLS := qemu-system-arm arm-none-eabi-gcc:gcc-arm-none-eabi \
   /usr/lib/arm-none-eabi/include/string.h:libnewlib-arm-none-eabi \
   qemu-arm:qemu-user $(foreach triple,arm-linux-gnueabihf aarch64-linux-gnu,$(triple)-g++:g++-$(triple))
+STUDIO_TOOLS := chromium
 TEST_TOOLS := bwrap:bubblewrap ccache iverilog strace verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET))) $(if $(SEED),--seed $(SEED)) \
@@ -57,7 +58,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); see the message above." >&2; exit 1; }
 
-.PHONY: help sim test check docs ros bitstream bench matrix proofs policies corpus fuzz-netlist lint licences setup tools clean distclean
+.PHONY: help sim test check docs studio ros bitstream bench matrix proofs policies corpus fuzz-netlist lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -69,11 +70,11 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 	@$(BIN)/firm sim $(SYSTEM) $(SIM_FLAGS)
 
 test: TOOLS = $(TEST_TOOLS)
-check: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS)
+check: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS)
 test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
-check: setup ros lint ## Run the longer tests: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'
+check: setup ros lint studio ## Run the longer tests: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest -m "check and not thorough" $(PYTEST_OPTIONS)
 
 docs: TOOLS = dot:graphviz
@@ -81,6 +82,10 @@ docs: tools $(VENV)/.extra-docs ## Run the commands in the documentation, build 
 	@$(BIN)/python -m tests.pages $(DOCS)
 	@$(BIN)/zensical build --clean --strict
 	@echo "The site: build/docs/index.html"
+
+studio: $(VENV)/.extra-page ## Build the page of firm studio
+	@cd fusesoc_firm/studio/page && export PATH="$(CURDIR)/$(BIN):$$PATH" && \
+	  npm ci --silent --no-audit --no-fund && npm run --silent build
 
 # Some tests need both, and are skipped without them.
 ros: $(VENV)/.ros2
@@ -132,7 +137,7 @@ lint: setup $(VENV)/.extra-lint ## Check style and types of Python and VHDL, inc
 
 # All extras, since all of them are listed.
 licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
-licences: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS)
+licences: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS)
 licences: tools ros ## List the project's dependencies and their licences in docs/reference/licences.md
 	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 

@@ -36,9 +36,10 @@ ALLOWED: dict[str, str] = {
     "plugin": "building converter message node request simulation store system text tools",
     "emulation": "frame message node request simulation system text",
     "replay": "bags frame message node simulation system text",
+    "studio": "system text",
     "cli": (
-        "accelerator action building converter emulation message node plugin replay scheduling simulation store system"
-        " text tools verify"
+        "accelerator action building converter emulation message node plugin replay scheduling simulation store studio"
+        " system text tools verify"
     ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.

@@ -26,6 +26,7 @@ from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.sim import add_sim
 from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.status import add_status
+from fusesoc_firm.cli.studio import add_studio
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.test import add_test
 from fusesoc_firm.cli.tool import add_tool
@@ -37,7 +38,7 @@ from fusesoc_firm.tools.library_path import demos_root, docs_root, library_root
 
 # The commands of `firm --help`; commands that are not listed here follow as 'more'.
 GROUPS = {
-    "start": ("init", "system"),
+    "start": ("init", "system", "studio"),
     "run": ("sim", "live", "replay", "emulate"),
     "look": ("message", "trace", "why", "graph"),
     "build": ("build", "test", "query", "affected", "lock", "cache", "path"),
@@ -108,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_message(commands)
     add_system(commands)
+    add_studio(commands)
     add_simulator(commands)
     add_emulate(commands)
     add_live(commands)

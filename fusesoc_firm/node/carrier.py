@@ -16,7 +16,6 @@ from typing import Protocol
 
 from fusesoc_firm.node import bridge
 from fusesoc_firm.node.description import NodeDescription, NodeTopic
-from fusesoc_firm.node.diagnostics import Report, diagnostics_payload, diagnostics_topic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.ros_wheels import ros_python
 
@@ -71,9 +70,6 @@ class Carrier(Protocol):
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message; any thread may call this method. After the middleware has ended, messages are dropped."""
 
-    def diagnose(self, report: Report) -> None:
-        """Publish a report on `/diagnostics`."""
-
     def stop(self) -> None:
         """Accept no more messages."""
 
@@ -113,7 +109,6 @@ class RosCarrier:
         May raise `CarrierError`.
         """
         self.title = f"ROS {ros}"
-        self._ros = ros
         self._python = options.python or _python_of(ros)
         mine, its = socket.socketpair()
         arguments = [*ros_arguments(ros, options.arguments)]
@@ -141,7 +136,6 @@ class RosCarrier:
             "is_timed": options.is_timed,
             "subscribers": _numbered(ros, description.subscribers, options),
             "publishers": _numbered(ros, description.publishers, options),
-            "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
             self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
@@ -186,10 +180,6 @@ class RosCarrier:
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message."""
         self._send(bridge.MESSAGE, topic, payload)
-
-    def diagnose(self, report: Report) -> None:
-        """Publish a report on `/diagnostics`."""
-        self._send(bridge.MESSAGE, bridge.DIAGNOSTICS, diagnostics_payload(self._ros, report))
 
     def stop(self) -> None:
         """Accept no more messages."""

@@ -16,6 +16,7 @@ from fusesoc_firm.message.library import libraries
 from fusesoc_firm.request.core_reader import CoreFile, read_core
 from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
+from fusesoc_firm.system.written.specification import Draft
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 # The generator instance that generates the system.
@@ -67,7 +68,7 @@ def sources_of(
 
 
 def load_beside(
-    spec: Path,
+    spec: Path | Draft,
     paths: Sequence[Path] = (),
     distro: str | None = None,
     *,
@@ -75,7 +76,8 @@ def load_beside(
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
     """Return the system of a specification; `paths` and `distro` are a command's arguments. May raise `InputError`."""
-    sources = sources_of(spec, paths, distro, core_folders)
+    path = spec.path if isinstance(spec, Draft) else spec
+    sources = sources_of(path, paths, distro, core_folders)
     known = libraries(sources.paths, os.environ, sources.distro)
     return load_system(spec, known, needs_sources=needs_sources, core_folders=core_folders)
 

@@ -58,7 +58,7 @@ from fusesoc_firm.system.hardware.status import (
     status_description,
     status_entity,
 )
-from fusesoc_firm.system.written.specification import Accelerator, Specification, is_core, read_specification
+from fusesoc_firm.system.written.specification import Accelerator, Draft, Specification, is_core, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
@@ -120,7 +120,7 @@ def _unchanged(specification: Specification) -> Specification:
 
 
 def load_system(
-    path: Path,
+    source: Path | Draft,
     libraries: Mapping[Middleware, MessageLibrary],
     *,
     needs_sources: bool = True,
@@ -134,7 +134,8 @@ def load_system(
     `libraries`.
     """
     faults = Diagnostics()
-    specification = changed(read_specification(path, str(path), faults))
+    path = source.path if isinstance(source, Draft) else source
+    specification = changed(read_specification(source, str(path), faults))
     own = {str(item): item.source for item in specification.paths}
     spoken = {MIDDLEWARES[word] for word in specification.middlewares if word in MIDDLEWARES} or {*libraries}
     needed = Libraries({ros: partial(libraries.__getitem__, ros) for ros in libraries if ros in spoken})

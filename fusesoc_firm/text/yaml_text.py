@@ -31,7 +31,7 @@ _INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", 
 # A block begins with the dash of a list's item, or with the first word of a line that is not a comment.
 _BLOCK_BEGIN = re.compile(r" *(-(?= )|[^\s#:-][^\s:]*)")
 # The line ends that PyYAML counts.
-_LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
+LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def read_yaml(
 
 def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL) -> YamlText:
     """Parse a YAML text; if it becomes invalid, report the place and return the part above."""
-    lines = tuple(_LINE_END.split(text.rstrip()))
+    lines = tuple(LINE_END.split(text.rstrip()))
     _note_control_characters(text, file, faults)
     text = _CONTROL_CHARACTERS.sub(_REPLACEMENT, text)
     try:
@@ -160,7 +160,7 @@ def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL
 
 
 def _note_control_characters(text: str, file: str, faults: Diagnostics) -> None:
-    for number, line in enumerate(_LINE_END.split(text)):
+    for number, line in enumerate(LINE_END.split(text)):
         for found in _CONTROL_CHARACTERS.finditer(line):
             shown = _CONTROL_CHARACTERS.sub("?", line)
             message = f"invalid YAML: it contains the control character 0x{ord(found.group()):02x}"

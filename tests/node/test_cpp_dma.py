@@ -112,6 +112,10 @@ def test_a_device_that_does_not_serve_is_named(driver: Driver, tmp_path: Path) -
     root = _device(tmp_path, 0xFFFFF000)
     far = driver.answers([], "files", str(root))
     assert far == ["error: udmabuf0 ends beyond the 4 GiB that the DMA engine reaches"]
+    address = root / "sys/class/u-dma-buf/udmabuf0/phys_addr"
+    address.write_text("0x1020\n")
+    askew = driver.answers([], "files", str(root))
+    assert askew == ["error: udmabuf0 begins at 4128, which is not a multiple of 64"]
     size = root / "sys/class/u-dma-buf/udmabuf0/size"
     size.write_text("many\n")
     assert driver.answers([], "files", str(root)) == [f"error: {size} contains 'many', which is not a number"]

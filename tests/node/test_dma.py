@@ -196,6 +196,7 @@ def test_buffers_that_cannot_be(root: Path, buffers: DmaBuffers) -> None:
         ("sys/class/uio/uio0/maps/map0/size", None, "cannot read .*map0/size; check whether the driver is loaded"),
         ("sys/class/u-dma-buf/udmabuf0/phys_addr", "soon", "phys_addr contains 'soon', which is not a number"),
         ("sys/class/u-dma-buf/udmabuf0/phys_addr", "0xffff8000", "udmabuf0 ends beyond the 4 GiB"),
+        ("sys/class/u-dma-buf/udmabuf0/phys_addr", "0x1020", "begins at 0x1020, which is not a multiple of 64"),
         ("dev/uio0", None, "cannot use .*No such file"),
     ],
 )

@@ -19,7 +19,7 @@ from enum import IntFlag
 from types import TracebackType
 
 from fusesoc_firm.node.transport.abort_record import burst_of
-from fusesoc_firm.node.transport.dma_device import DmaDevice
+from fusesoc_firm.node.transport.dma_device import DMA_ALIGNMENT, DmaDevice
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 
 # The addresses of the first registers of the channels to and from the system; other registers are at offsets from them.
@@ -59,8 +59,6 @@ _FAULTS = {
 DESCRIPTOR_BYTES = 64
 NEXT, BUFFER, DESCRIPTOR_CONTROL, DESCRIPTOR_STATUS = 0, 2, 6, 7
 LENGTH, END_OF_FRAME, START_OF_FRAME, COMPLETE = (1 << 26) - 1, 1 << 26, 1 << 27, 1 << 31
-# Each buffer begins at a multiple of the widest stream's beat.
-_ALIGNMENT = 64
 _RESET_SECONDS = 1.0
 # The interrupt comes at the end of a frame. For one that is longer than all buffers, they must be emptied before.
 _LOOK_SECONDS = 0.01
@@ -221,12 +219,12 @@ class DmaTransport:
         """
         count, size = self._buffers.send + self._buffers.receive, self._buffers.size
         room = len(self._device.memory) - count * DESCRIPTOR_BYTES
-        most = min(max(0, room) // max(1, count), LENGTH) // _ALIGNMENT * _ALIGNMENT
+        most = min(max(0, room) // max(1, count), LENGTH) // DMA_ALIGNMENT * DMA_ALIGNMENT
         size = size or most
-        if min(self._buffers.send, self._buffers.receive) < 2 or size % _ALIGNMENT or not 0 < size <= most:
+        if min(self._buffers.send, self._buffers.receive) < 2 or size % DMA_ALIGNMENT or not 0 < size <= most:
             raise TransportError(
                 f"the DMA has {self._buffers.send} and {self._buffers.receive} buffers of {size} bytes; legal: 2 or"
-                f" more, a multiple of {_ALIGNMENT}, and all within the {len(self._device.memory)} bytes of memory"
+                f" more, a multiple of {DMA_ALIGNMENT}, and all within the {len(self._device.memory)} bytes of memory"
             )
         return size
 

@@ -14,6 +14,8 @@ from typing import Protocol
 
 from fusesoc_firm.node.transport.transport import TransportError
 
+# Descriptors and buffers begin at multiples of the widest stream's beat.
+DMA_ALIGNMENT = 64
 _WORD_BYTES = 4
 _POLL_SECONDS = 50e-6
 _REACH = 2**32
@@ -89,6 +91,8 @@ class LinuxDmaDevice:
         self._address, size = _number(about / "phys_addr"), _number(about / "size")
         if self._address + size > _REACH:
             raise TransportError(f"{buffer} ends beyond the 4 GiB that the DMA engine reaches")
+        if self._address % DMA_ALIGNMENT:
+            raise TransportError(f"{buffer} begins at {self._address:#x}, which is not a multiple of {DMA_ALIGNMENT}")
         maps = root / "sys/class/uio" / Path(uio).name / "maps/map0"
         device = root / uio.lstrip("/")
         try:

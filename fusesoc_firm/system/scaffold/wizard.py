@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-import yaml as pyyaml
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
@@ -31,8 +30,9 @@ from fusesoc_firm.system.written.specification import (
 )
 from fusesoc_firm.text.outputs import check_output, write
 from fusesoc_firm.text.prompts import Asker, Question
+from fusesoc_firm.text.yaml_edit import is_number, word
 from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
-from fusesoc_firm.text.yaml_text import LONGEST_NUMBER, read_yaml
+from fusesoc_firm.text.yaml_text import read_yaml
 
 # All messages that the specification's `paths` provide.
 MessageNames = Callable[[Sequence[str]], Sequence[str]]
@@ -71,14 +71,10 @@ def _style(text: str) -> YAML:
 
 def _word(answer: str) -> Any:
     """Return an answer as a scalar, in quotes if YAML would otherwise misread it, alone or in a list."""
-    if answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer:
-        # A number is also accepted as a word, and is easier to read without quotes.
-        return int(answer)
-    try:
-        is_plain = pyyaml.safe_load(f"[{answer}]") == [answer]
-    except (pyyaml.YAMLError, ValueError):
-        is_plain = False
-    return answer if is_plain else DoubleQuotedScalarString(answer)
+    written = word(answer)
+    if written != answer:
+        return DoubleQuotedScalarString(answer)
+    return int(answer) if is_number(answer) else answer
 
 
 def _words(answers: Sequence[str]) -> Any:

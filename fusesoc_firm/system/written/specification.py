@@ -19,7 +19,7 @@ from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.text.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
-from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
+from fusesoc_firm.text.yaml_text import Text, is_null, parse_yaml, read_yaml
 
 # The type of an accelerator that is a function in software.
 SOFTWARE = "ROS-SW"
@@ -354,12 +354,20 @@ def is_core(path: str) -> bool:
     return _CORE.fullmatch(path) is not None
 
 
-def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
+@dataclass(frozen=True)
+class Draft:
+    """The text of a specification that is not yet in its file."""
+
+    path: Path
+    text: str
+
+
+def read_specification(source: Path | Draft, file: str, faults: Diagnostics) -> Specification:
     """Read the specification in a file, which messages call `file`, and note all faults.
 
     Raise `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
-    text = read_yaml(path, file, faults)
+    text = parse_yaml(source.text, file, faults) if isinstance(source, Draft) else read_yaml(source, file, faults)
     if text.root is None or is_null(text.root):
         faults.raise_if_any()
         fail(f"{file} is empty; a specification needs the keys 'project' and 'blocks'")

@@ -134,6 +134,9 @@ class LinuxDmaDevice : public DmaDevice {
   void end() override { waiter_.end(); }
 
  private:
+  // Of descriptors and buffers: the widest stream's beat.
+  static constexpr std::size_t kAlignment = 64;
+
   static std::size_t register_bytes(const std::string& uio, const std::string& root) {
     const std::string name = uio.substr(uio.rfind('/') + 1);
     return static_cast<std::size_t>(number_in(root + "/sys/class/uio/" + name + "/maps/map0/size"));
@@ -150,6 +153,9 @@ class LinuxDmaDevice : public DmaDevice {
     const std::uint64_t address = number_in(about + "/phys_addr"), size = number_in(about + "/size");
     if (address + size > std::uint64_t{1} << 32) {
       throw TransportError(buffer + " ends beyond the 4 GiB that the DMA engine reaches");
+    }
+    if (address % kAlignment != 0) {
+      throw TransportError(buffer + " begins at " + std::to_string(address) + ", which is not a multiple of 64");
     }
     // Neither cached nor mapped as device memory, which allows only aligned accesses.
     if (!(std::ofstream(about + "/sync_mode") << 2 << std::flush)) {

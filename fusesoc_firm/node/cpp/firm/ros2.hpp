@@ -91,7 +91,6 @@ inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
 // A node of ROS 2.
 class Ros2 {
  public:
-  static constexpr unsigned kVersion = 2;
   static constexpr bool kHasQuality = true;
   // All messages have numbers.
   static constexpr bool kCountsDrops = true;
@@ -190,11 +189,7 @@ class Ros2 {
   }
 
   // Return how many messages are missing between those that arrived, by the numbers of each publisher.
-  std::uint64_t lost() const {
-    std::uint64_t sum = lost_;
-    for (const auto& subscription : subscriptions_) sum += subscription->lost;
-    return sum;
-  }
+  std::uint64_t lost() const { return lost_; }
 
   // Take no more messages.
   void unsubscribe() {

@@ -1,0 +1,121 @@
+"""A specification that is open in the page: its text, which follows the file, and the way back from each edit."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.studio.edits import edited
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.files import read_regular, write_whole
+from fusesoc_firm.text.yaml_edit import EditError
+from fusesoc_firm.text.yaml_text import SMALL
+
+_BYTE_ORDER_MARK = "\ufeff"
+# The number of edits that can be undone.
+_MOST_STEPS = 1000
+
+
+class Document:
+    """A file and the texts that it had; the file stays the truth, so a change by another program ends the way back."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file; raise `InputError` if that is not possible."""
+        self.path = path
+        self.text = ""
+        self._mark = ""
+        self._time = -1
+        self._undone: list[str] = []
+        self._done: list[str] = []
+        self.follow()
+
+    @property
+    def version(self) -> str:
+        """The name of the text, which changes with it."""
+        return hashlib.sha256(self.text.encode()).hexdigest()[:16]
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an edit to undo."""
+        return bool(self._done)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is an undone edit."""
+        return bool(self._undone)
+
+    def follow(self) -> bool:
+        """Read the file if it has changed, and return whether its text has. May raise `InputError`."""
+        try:
+            time = self.path.stat().st_mtime_ns
+            if time == self._time:
+                return False
+            text = read_regular(self.path, SMALL.bytes).decode()
+        except OSError as error:
+            fail(f"cannot read {self.path}: {error.strerror}")
+        except UnicodeDecodeError:
+            fail(f"cannot read {self.path}: it is not UTF-8")
+        self._time = time
+        self._mark = _BYTE_ORDER_MARK if text.startswith(_BYTE_ORDER_MARK) else ""
+        text = text.removeprefix(_BYTE_ORDER_MARK)
+        if text == self.text:
+            return False
+        self.text = text
+        self._done, self._undone = [], []
+        return True
+
+    def edit(self, version: str, edit: Mapping[str, Any]) -> None:
+        """Make an edit of the text with this version; raise `EditError` if it cannot be made."""
+        self._check(version)
+        self._replace(edited(self.text, edit))
+
+    def write(self, version: str, text: str) -> None:
+        """Replace the whole text, as an editor does; raise `EditError` if the file has another version by now."""
+        self._check(version)
+        self._replace(text)
+
+    def undo(self, version: str) -> None:
+        """Take the last edit back."""
+        self._check(version)
+        self._step(self._done, self._undone, "undo")
+
+    def redo(self, version: str) -> None:
+        """Make the edit again that was taken back last."""
+        self._check(version)
+        self._step(self._undone, self._done, "redo")
+
+    def _step(self, source: list[str], sink: list[str], what: str) -> None:
+        if not source:
+            raise EditError(f"there is nothing to {what}")
+        before = self.text
+        self._save(source[-1])
+        source.pop()
+        sink.append(before)
+
+    def _replace(self, text: str) -> None:
+        before = self.text
+        if text == before:
+            return
+        self._save(text)
+        self._done = [*self._done[-_MOST_STEPS + 1 :], before]
+        self._undone = []
+
+    def _check(self, version: str) -> None:
+        self.follow()
+        if version != self.version:
+            raise EditError("the file has changed meanwhile")
+
+    def _save(self, text: str) -> None:
+        data = (self._mark + text).encode()
+        if len(data) > SMALL.bytes:
+            raise EditError(f"a specification has at most {SMALL.bytes} bytes")
+        try:
+            # Through a link, the file that it names is replaced.
+            write_whole(os.path.realpath(self.path), data)
+            self._time = self.path.stat().st_mtime_ns
+        except OSError as error:
+            raise EditError(f"cannot write {self.path}: {error.strerror}") from error
+        self.text = text

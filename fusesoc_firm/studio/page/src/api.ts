@@ -1,0 +1,84 @@
+// Requests to the server, whose address is that of the page.
+
+export type Path = (string | number)[];
+
+export interface Fault {
+  severity: "error" | "warning";
+  message: string;
+  hint?: string;
+  file?: string;
+  line?: number;
+  column?: number;
+  path?: Path | null;
+}
+
+export type Section = Record<string, any>;
+
+/** What the server says of a specification; see fusesoc_firm/studio/scene.py. */
+export interface Scene {
+  file: string;
+  text: string;
+  version: string;
+  canUndo: boolean;
+  canRedo: boolean;
+  specification: Section | null;
+  faults: Fault[];
+  derived: Section | null;
+}
+
+/** A key of the grammar. */
+export interface Key {
+  name: string;
+  meaning: string;
+  default: string;
+  form: "text" | "integer" | "texts" | "section" | "sections";
+  choices: (string | number)[];
+  isRequired: boolean;
+  onlyOf: string;
+  section: string | null;
+}
+
+export type Grammar = Record<string, Key[]>;
+
+async function answer<T>(response: Response): Promise<T> {
+  if (response.ok) return response.json();
+  const isJson = response.headers.get("Content-Type")?.startsWith("application/json");
+  throw new Error(isJson ? (await response.json()).reason : await response.text());
+}
+
+async function get<T>(name: string, query: Record<string, string> = {}): Promise<T> {
+  return answer(await fetch(`api/${name}?${new URLSearchParams(query)}`));
+}
+
+async function post<T>(name: string, body: object): Promise<T> {
+  const headers = { "Content-Type": "application/json" };
+  return answer(await fetch(`api/${name}`, { method: "POST", headers, body: JSON.stringify(body) }));
+}
+
+export const files = () => get<{ files: string[] }>("files");
+export const grammar = () => get<Grammar>("grammar");
+export const scene = (file: string) => get<Scene>("scene", { file });
+export const sources = (file: string) => get<{ faults: Fault[] }>("sources", { file });
+export const messages = (file: string, query: string) =>
+  get<{ messages: string[]; count: number }>("messages", { file, query });
+export const edit = (file: string, version: string, change: object) =>
+  post<Scene>("edit", { file, version, change });
+export const write = (file: string, version: string, text: string) => post<Scene>("write", { file, version, text });
+export const step = (what: "undo" | "redo", file: string, version: string) => post<Scene>(what, { file, version });
+export const check = (file: string, text: string) => post<Scene>("check", { file, text });
+
+/** Call a function whenever another program has changed a file; reconnects if the server was restarted. */
+export function follow(changed: (file: string) => void): () => void {
+  let socket: WebSocket | undefined;
+  let isOver = false;
+  const open = () => {
+    socket = new WebSocket(new URL("api/changes", location.href.replace(/^http/, "ws")));
+    socket.onmessage = (event) => changed(JSON.parse(event.data).changed);
+    socket.onclose = () => isOver || setTimeout(open, 2000);
+  };
+  open();
+  return () => {
+    isOver = true;
+    socket?.close();
+  };
+}

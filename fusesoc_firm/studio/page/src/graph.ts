@@ -1,0 +1,128 @@
+// From a specification to nodes and edges in their places.
+
+import type { Edge, Node } from "@xyflow/svelte";
+import ELK from "elkjs/lib/elk.bundled.js";
+import type { Fault, Path, Scene, Section } from "./api";
+
+export type Kind = "subscriber" | "publisher" | "accelerator" | "software" | "manager";
+
+export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path };
+export type BlockData = BlockWords & { errors: number; warnings: number };
+
+export type BlockNode = Node<BlockData, "block">;
+
+const LINE = 17;
+const elk = new ELK();
+
+const list = (value: unknown): any[] => (Array.isArray(value) ? value : []);
+const isAt = (path: Path | null | undefined, place: Path) =>
+  !!path && place.every((part, index) => path[index] === part);
+
+export const faultsAt = (faults: Fault[], place: Path) => faults.filter((fault) => isAt(fault.path, place));
+
+/** The accelerator of a block, and its index among the accelerators. */
+export function typeOf(specification: Section, block: Section): [Section, number] | null {
+  const index = list(specification.accelerators).findIndex((item) => item?.name === block.type);
+  return index < 0 ? null : [specification.accelerators[index], index];
+}
+
+export function kindOf(specification: Section, block: Section): Kind {
+  if (block.mode === "subscriber" || block.mode === "publisher") return block.mode;
+  return typeOf(specification, block)?.[0].type === "ROS-SW" ? "software" : "accelerator";
+}
+
+function linesOf(block: Section, scene: Scene): string[] {
+  const found: string[] = [];
+  if (block.mode) {
+    found.push(String(block.message ?? ""), `topic ${block.topic ?? block.name}`);
+    if (block.period) found.push(`period ${block.period}`);
+    if (block.queue) found.push(`queue of ${block.queue}`);
+    const converters = Object.values(scene.derived?.Converters ?? {}).flat() as Section[];
+    const own = converters.find((item) => item.block === block.name);
+    if (own) found.push(`id ${own.id}, payload ${own.payloadBytes} bytes`);
+  } else {
+    const type = typeOf(scene.specification!, block)?.[0];
+    found.push(type ? `${block.type} (${type.type})` : String(block.type ?? "no type"));
+    if (block.clock) found.push(`clock ${block.clock}`);
+    const pins = list(type?.pins).map((pin) => pin?.name);
+    if (pins.length) found.push(`pins ${pins.join(", ")}`);
+  }
+  return found;
+}
+
+function nodeOf(id: string, data: BlockWords, faults: Fault[]): BlockNode {
+  const errors = faults.filter((fault) => fault.severity === "error").length;
+  const words = [data.name, ...data.lines];
+  const width = Math.min(320, Math.max(120, ...words.map((line) => 7.2 * line.length + 28)));
+  const height = 30 + LINE * data.lines.length;
+  const label = `${data.kind} ${data.name}${faults.length ? `, ${faults.length} faults` : ""}`;
+  return {
+    id,
+    type: "block",
+    position: { x: 0, y: 0 },
+    width,
+    height,
+    ariaLabel: label,
+    deletable: data.kind !== "manager",
+    data: { ...data, errors, warnings: faults.length - errors },
+  };
+}
+
+/** The blocks and the two sides of the Manager as nodes, and the connections as edges. */
+export function graphOf(scene: Scene): { nodes: BlockNode[]; edges: Edge[] } {
+  const specification = scene.specification ?? {};
+  const project = specification.project ?? {};
+  const blocks = list(specification.blocks);
+  const nodes = blocks.map((block, index) => {
+    const path = ["blocks", index];
+    const data = { kind: kindOf(specification, block ?? {}), name: String(block?.name ?? `block ${index + 1}`) };
+    return nodeOf(`block:${index}`, { ...data, lines: linesOf(block ?? {}, scene), path }, faultsAt(scene.faults, path));
+  });
+  const manager = (id: string, name: string, lines: string[], faults: Fault[]) =>
+    nodeOf(id, { kind: "manager", name, lines, path: ["project"] }, faults);
+  const faults = faultsAt(scene.faults, ["project"]);
+  const link = `${project.interconnect ?? "axi_stream"}, ${project.width ?? 8} bits`;
+  nodes.unshift(manager("manager:in", "from the host", [link], []));
+  nodes.push(manager("manager:out", "to the host", [`scheduler ${project.scheduler ?? "fixed_priority"}`], faults));
+  const edges: Edge[] = [];
+  blocks.forEach((block, index) => {
+    if (block?.mode === "subscriber") edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`));
+    if (block?.mode === "publisher") edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out"));
+    list(block?.outgoing).forEach((way, number) => {
+      const sink = blocks.findIndex((other) => other?.name === way?.name);
+      if (sink < 0) return;
+      const fields = [...list(way.include), ...list(way.exclude).map((field) => `without ${field}`)];
+      edges.push({
+        id: `way:${index}:${number}`,
+        source: `block:${index}`,
+        target: `block:${sink}`,
+        label: fields.join(", "),
+        ariaLabel: `connection from ${block.name} to ${way.name}`,
+        data: { path: ["blocks", index, "outgoing", number] },
+      });
+    });
+  });
+  return { nodes, edges };
+}
+
+function fixed(id: string, source: string, target: string): Edge {
+  return { id, source, target, selectable: false, deletable: false, focusable: false, class: "stream" };
+}
+
+/** Place the nodes, from left to right along the data. */
+export async function placed(nodes: BlockNode[], edges: Edge[]): Promise<BlockNode[]> {
+  const graph = await elk.layout({
+    id: "root",
+    layoutOptions: {
+      "elk.algorithm": "layered",
+      "elk.direction": "RIGHT",
+      "elk.spacing.nodeNode": "24",
+      "elk.layered.spacing.nodeNodeBetweenLayers": "70",
+      "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
+    },
+    children: nodes.map(({ id, width, height }) => ({ id, width, height })),
+    edges: edges.map(({ id, source, target }) => ({ id, sources: [source], targets: [target] })),
+  });
+  const places = new Map(graph.children!.map((item) => [item.id, { x: item.x!, y: item.y! }]));
+  return nodes.map((node) => ({ ...node, position: places.get(node.id)! }));
+}

@@ -1,0 +1,95 @@
+"""What the page shows of a specification: its sections as written, its faults, and what is derived from it.
+
+The picture needs only a text that is YAML; the rest of the specification may be faulty or unfinished.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.system.views.show import derived_description
+from fusesoc_firm.system.written.specification import Specification
+from fusesoc_firm.text.diagnostics import Diagnostic, InputError
+from fusesoc_firm.text.yaml_edit import path_at
+from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
+from fusesoc_firm.text.yaml_text import yaml_data
+
+Load = Callable[[str], LoadedSystem]
+"""Derives the system of a text in the specification's place. May raise `InputError`."""
+
+
+def scene(text: str, file: str, load: Load) -> dict[str, Any]:
+    """Return a specification as plain data; diagnostics call it `file`.
+
+    `specification` is the file's content (None if it is not a mapping in YAML), `faults` are its faults and warnings,
+    each with the `path` of what it concerns, and `derived` is what `firm system show` prints (None if there are
+    faults).
+    """
+    derived = None
+    diagnostics: Iterable[Diagnostic]
+    try:
+        loaded = load(text)
+        diagnostics = loaded.warnings
+        derived = derived_description(loaded.system)
+    except InputError as error:
+        diagnostics = error.diagnostics
+    return {
+        "specification": _content(text),
+        "faults": [_fault(text, file, item) for item in diagnostics],
+        "derived": derived,
+    }
+
+
+def grammar() -> dict[str, Any]:
+    """Return the keys of each kind of section: name, meaning, form, default, legal values, and the kind of sections."""
+    found: dict[str, Any] = {}
+    _describe(Specification, found)
+    return found
+
+
+def _content(text: str) -> dict[str, Any] | None:
+    try:
+        content = yaml_data(text)
+    except yaml.YAMLError:
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def _fault(text: str, file: str, fault: Diagnostic) -> dict[str, Any]:
+    """Return a fault with the path of the value at its place, if that is in the specification."""
+    source = fault.source
+    is_here = source is not None and source.file == file
+    return fault.data() | {"path": path_at(text, source.line, source.column) if source and is_here else None}
+
+
+def _describe(section: type[Section], found: dict[str, Any]) -> None:
+    if section.__name__ in found:
+        return
+    defaults = {field.name: field.default for field in fields(section)}
+    found[section.__name__] = [
+        _entry(name, entry) | _default(defaults[field]) for name, (field, entry) in keys_of(section).items()
+    ]
+    for _, entry in keys_of(section).values():
+        if entry.section:
+            _describe(entry.section, found)
+
+
+def _default(value: object) -> dict[str, str]:
+    return {"default": str(value) if isinstance(value, str | int) else ""}
+
+
+def _entry(name: str, entry: Key) -> dict[str, Any]:
+    return {
+        "name": name,
+        "meaning": entry.meaning,
+        "form": entry.form,
+        "choices": [*entry.choices],
+        "isRequired": entry.is_required,
+        "onlyOf": entry.only_of,
+        "section": entry.section.__name__ if entry.section else None,
+    }

@@ -1,0 +1,293 @@
+"""The server of the page: on loopback alone, under an address with a secret, for the files of one folder.
+
+Another page in the same browser knows neither the secret nor may it send requests here: hosts and origins other than
+our own are refused, which also ends attacks by names that lead to loopback (DNS rebinding).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import secrets
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+from aiohttp import WSMsgType, web
+
+from fusesoc_firm.studio.document import Document
+from fusesoc_firm.studio.scene import grammar, scene
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import Diagnostic, InputError
+from fusesoc_firm.text.files import is_file
+from fusesoc_firm.text.yaml_edit import EditError
+from fusesoc_firm.text.yaml_text import SMALL, yaml_data
+
+HOST = "127.0.0.1"
+_PAGE = Path(__file__).parent / "static"
+# The seconds between two looks at the opened files.
+_LOOK = 0.3
+# The largest number of messages in an answer to a search, and of specifications in a list.
+_MOST_NAMES, _MOST_FILES = 50, 1000
+# Everything comes from this server; nothing that a file contains can run.
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self';"
+    " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_HEADERS = {
+    "Content-Security-Policy": _POLICY,
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+
+Load = Callable[[Path, str], LoadedSystem]
+"""Derives the system of a text in the place of a specification. May raise `InputError`."""
+Check = Callable[[LoadedSystem, Path], Sequence[Diagnostic]]
+"""Compares a system's accelerators with their sources and returns the warnings. May raise `InputError`."""
+Names = Callable[[Path, Sequence[str]], Sequence[str]]
+"""Returns the names of all messages for a specification with these `paths`. May raise `InputError`."""
+
+
+class Studio:
+    """The page's server for a folder of specifications, or for one specification."""
+
+    def __init__(self, place: Path, load: Load, check: Check, names: Names) -> None:
+        """Serve a file or folder; `load`, `check` and `names` are what the command line uses."""
+        self._place = place.resolve()
+        self._folder = self._place if self._place.is_dir() else self._place.parent
+        self._load, self._check, self._names = load, check, names
+        self._documents: dict[str, Document] = {}
+        self._listeners: set[web.WebSocketResponse] = set()
+        # Derivations share caches, so one runs at a time.
+        self._turn = asyncio.Lock()
+        self._own_hosts: set[str] = set()
+        self.secret = secrets.token_urlsafe(24)
+
+    async def start(self, port: int = 0) -> web.AppRunner:
+        """Start the server on a port of loopback (0: any free one); `address` is known afterwards."""
+        app = web.Application(middlewares=[self._guard], client_max_size=2 * SMALL.bytes)
+        under = f"/{self.secret}"
+        app.add_routes(
+            [
+                web.get(f"{under}/", self._page),
+                web.get(f"{under}/api/files", self._files),
+                web.get(f"{under}/api/grammar", self._grammar),
+                web.get(f"{under}/api/scene", self._scene),
+                web.get(f"{under}/api/messages", self._messages),
+                web.get(f"{under}/api/sources", self._sources),
+                web.get(f"{under}/api/changes", self._changes),
+                web.post(f"{under}/api/check", self._check_text),
+                *(web.post(f"{under}/api/{step}", self._step) for step in ("edit", "write", "undo", "redo")),
+            ]
+        )
+        if (_PAGE / "assets").is_dir():
+            app.router.add_static(f"{under}/assets", _PAGE / "assets")
+        app.cleanup_ctx.append(self._following)
+        runner = web.AppRunner(app, access_log=None)
+        await runner.setup()
+        site = web.TCPSite(runner, HOST, port)
+        await site.start()
+        number = runner.addresses[0][1]
+        self._own_hosts = {f"{name}:{number}" for name in (HOST, "localhost")}
+        self.address = f"http://{HOST}:{number}{under}/"
+        return runner
+
+    # --- requests --------------------------------------------------------------------------------------------------
+
+    @web.middleware
+    async def _guard(
+        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
+        """Refuse requests that our own page would not send, and turn faults into answers."""
+        origin = request.headers.get("Origin")
+        is_own = request.headers.get("Host", "") in self._own_hosts
+        is_own = is_own and (origin is None or origin.removeprefix("http://") in self._own_hosts)
+        secret = request.path.split("/")[1] if "/" in request.path else ""
+        if not is_own or not hmac.compare_digest(secret.encode(), self.secret.encode()):
+            return web.Response(status=403, text="open the address that firm studio printed\n", headers=_HEADERS)
+        if request.method == "POST" and request.content_type != "application/json":
+            return web.Response(status=415, text="requests are in JSON\n", headers=_HEADERS)
+        try:
+            answer = await handler(request)
+        except (EditError, InputError) as error:
+            answer = _json({"reason": str(error)}, status=409)
+        except web.HTTPException as error:
+            answer = web.Response(status=error.status, text=f"{error.reason}\n")
+        if not answer.prepared:
+            answer.headers.update(_HEADERS)
+        return answer
+
+    async def _page(self, _: web.Request) -> web.Response:
+        try:
+            text = (_PAGE / "index.html").read_text(encoding="utf-8")
+        except OSError:
+            text = "The page is not built; 'make studio' builds it.\n"
+        return web.Response(text=text, content_type="text/html")
+
+    async def _files(self, _: web.Request) -> web.Response:
+        return _json({"files": await asyncio.to_thread(lambda: [*self._specifications()])})
+
+    async def _grammar(self, _: web.Request) -> web.Response:
+        return _json(grammar())
+
+    async def _scene(self, request: web.Request) -> web.Response:
+        document = self._document(request.query.get("file", ""))
+        document.follow()
+        return await self._answer(document)
+
+    async def _messages(self, request: web.Request) -> web.Response:
+        """Search all messages for the words of a query."""
+        document = self._document(request.query.get("file", ""))
+        words = request.query.get("query", "").lower().split()
+        found = _content(document.text).get("paths") or []
+        paths = [str(item) for item in found] if isinstance(found, list) else [str(found)]
+        async with self._turn:
+            names = await asyncio.to_thread(self._names, document.path, paths)
+        found = [name for name in names if all(word in name.lower() for word in words)]
+        return _json({"messages": found[:_MOST_NAMES], "count": len(found)})
+
+    async def _sources(self, request: web.Request) -> web.Response:
+        """Compare the accelerators' sources with their interfaces."""
+        document = self._document(request.query.get("file", ""))
+        async with self._turn:
+            return _json({"faults": await asyncio.to_thread(self._source_faults, document)})
+
+    async def _check_text(self, request: web.Request) -> web.Response:
+        """Return the scene of a text that is not in the file yet."""
+        body = await _body(request)
+        document = self._document(body.get("file"))
+        return await self._answer(document, str(body.get("text", "")))
+
+    async def _step(self, request: web.Request) -> web.Response:
+        """Edit the file, and return its new scene."""
+        body = await _body(request)
+        document, version = self._document(body.get("file")), str(body.get("version"))
+        match request.path.rsplit("/", 1)[-1]:
+            case "edit":
+                edit = body.get("change")
+                document.edit(version, edit if isinstance(edit, dict) else {})
+            case "write":
+                document.write(version, str(body.get("text", "")))
+            case "undo":
+                document.undo(version)
+            case _:
+                document.redo(version)
+        return await self._answer(document)
+
+    async def _answer(self, document: Document, unsaved: str | None = None) -> web.Response:
+        text, file = document.text if unsaved is None else unsaved, str(document.path)
+        async with self._turn:
+            found = await asyncio.to_thread(scene, text, file, lambda text: self._load(document.path, text))
+        state = {"version": document.version, "canUndo": document.can_undo, "canRedo": document.can_redo}
+        return _json({"file": self._name(document.path), "text": text, **state, **found})
+
+    def _source_faults(self, document: Document) -> list[dict[str, Any]]:
+        try:
+            diagnostics = self._check(self._load(document.path, document.text), document.path)
+        except InputError as error:
+            diagnostics = error.diagnostics
+        return [item.data() for item in diagnostics]
+
+    # --- files -----------------------------------------------------------------------------------------------------
+
+    def _specifications(self) -> Iterator[str]:
+        """Yield the names of all specifications, relative to the folder."""
+        if not self._place.is_dir():
+            yield self._name(self._place)
+            return
+        count = 0
+        for path in sorted(self._folder.rglob("*.yaml")):
+            parts = path.relative_to(self._folder).parts
+            if any(part.startswith(".") or part == "build" for part in parts) or not self._is_inside(path):
+                continue
+            if count < _MOST_FILES and {"project", "blocks"} <= _content(_text(path)).keys():
+                count += 1
+                yield self._name(path)
+
+    def _document(self, name: object) -> Document:
+        """Return the open document with a name; raise 404 for files outside the folder and for other files."""
+        path = self._folder / str(name)
+        if not name or "\0" in str(name) or path.suffix != ".yaml" or not self._is_inside(path) or not is_file(path):
+            raise web.HTTPNotFound(reason="there is no such specification")
+        if not self._place.is_dir() and path.resolve() != self._place:
+            raise web.HTTPNotFound(reason="only one specification is open")
+        path = path.resolve()
+        return self._documents.setdefault(str(path), Document(path))
+
+    def _is_inside(self, path: Path) -> bool:
+        return path.resolve().is_relative_to(self._folder)
+
+    def _name(self, path: Path) -> str:
+        return path.relative_to(self._folder).as_posix()
+
+    # --- changes by others -----------------------------------------------------------------------------------------
+
+    async def _changes(self, request: web.Request) -> web.WebSocketResponse:
+        """Tell the page which open file another program has changed."""
+        socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024)
+        await socket.prepare(request)
+        self._listeners.add(socket)
+        try:
+            async for message in socket:
+                if message.type == WSMsgType.ERROR:
+                    break
+        finally:
+            self._listeners.discard(socket)
+        return socket
+
+    async def _following(self, _: web.Application) -> Any:
+        task = asyncio.create_task(self._follow())
+        yield
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+        for socket in [*self._listeners]:
+            await socket.close()
+
+    async def _follow(self) -> None:
+        while True:
+            await asyncio.sleep(_LOOK)
+            for document in [*self._documents.values()]:
+                with suppress(InputError):
+                    if document.follow():
+                        await self._tell({"changed": self._name(document.path)})
+
+    async def _tell(self, event: dict[str, Any]) -> None:
+        for socket in [*self._listeners]:
+            with suppress(ConnectionError):
+                await socket.send_json(event)
+
+
+async def _body(request: web.Request) -> dict[str, Any]:
+    try:
+        body = await request.json()
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError):
+        body = None
+    if not isinstance(body, dict):
+        raise web.HTTPBadRequest(reason="the request is not a mapping in JSON")
+    return body
+
+
+def _json(data: object, status: int = 200) -> web.Response:
+    # YAML has values, such as dates, that JSON has not.
+    return web.json_response(data, status=status, dumps=lambda value: json.dumps(value, default=str))
+
+
+def _text(path: Path) -> str:
+    with suppress(OSError, UnicodeDecodeError):
+        if path.stat().st_size <= SMALL.bytes:
+            return path.read_text(encoding="utf-8")
+    return ""
+
+
+def _content(text: str) -> dict[str, Any]:
+    with suppress(yaml.YAMLError, InputError):
+        content = yaml_data(text)
+        if isinstance(content, dict):
+            return content
+    return {}

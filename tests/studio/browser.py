@@ -1,0 +1,153 @@
+"""A headless Chromium, driven by its own protocol (Chrome DevTools Protocol) over a WebSocket."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import shutil
+import subprocess
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+
+PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+# The limit for everything that the page should do; a busy machine needs a part of it.
+_SECONDS = 20
+_KEYS = {"Enter": 13, "Tab": 9, "Escape": 27, "Delete": 46, "Backspace": 8, "ArrowDown": 40, "End": 35}
+_CONTROL, _SHIFT = 2, 8
+
+
+class Page:
+    """A page of the browser; `trouble` collects its errors and what its policy has refused."""
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+        self._socket = socket
+        self._count = 0
+        self._answers: dict[int, asyncio.Future[Any]] = {}
+        self._reader = asyncio.create_task(self._read())
+        self.trouble: list[str] = []
+
+    async def call(self, method: str, **parameters: Any) -> Any:
+        """Call a method of the protocol."""
+        self._count += 1
+        answer = self._answers[self._count] = asyncio.get_running_loop().create_future()
+        await self._socket.send_json({"id": self._count, "method": method, "params": parameters})
+        return await asyncio.wait_for(answer, _SECONDS)
+
+    async def open(self, address: str) -> None:
+        """Open an address in a window of 1,400 by 1,000 pixels."""
+        for domain in "Page", "Runtime", "Log":
+            await self.call(f"{domain}.enable")
+        window = {"width": 1400, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+        await self.call("Emulation.setDeviceMetricsOverride", **window)
+        await self.call("Page.navigate", url=address)
+
+    async def evaluate(self, script: str) -> Any:
+        """Return the value of an expression in the page."""
+        found = await self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, (script, found["exceptionDetails"])
+        return found["result"].get("value")
+
+    async def until(self, script: str) -> None:
+        """Wait until an expression is true."""
+        end = time.monotonic() + _SECONDS
+        while time.monotonic() < end:
+            if await self.evaluate(f"Boolean({script})"):
+                return
+            await asyncio.sleep(0.05)
+        text = await self.evaluate("document.body.innerText")
+        raise AssertionError(f"it did not become true: {script}; {self.trouble}; {text}")
+
+    async def place(self, selector: str) -> tuple[float, float]:
+        """Return the middle of an element, once it is there and at rest."""
+        find = f"document.querySelector({json.dumps(selector)})"
+        await self.until(f"{find} !== null")
+        before: Any = None
+        while True:
+            await self.evaluate(f"{find}.scrollIntoView({{block: 'nearest'}})")
+            box = await self.evaluate(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({find}.getBoundingClientRect())")
+            if box == before:
+                return box[0], box[1]
+            before = box
+            await asyncio.sleep(0.1)
+
+    async def click(self, selector: str) -> None:
+        """Click on the middle of an element."""
+        await self.drag(selector, None)
+
+    async def drag(self, start: str, end: str | None) -> None:
+        """Press the mouse at one element and release it at another."""
+        x, y = await self.place(start)
+        mouse = {"button": "left", "clickCount": 1}
+        await self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        await self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, **mouse)
+        if end:
+            to_x, to_y = await self.place(end)
+            for part in range(1, 11):
+                way = part / 10
+                moved = {"x": x + (to_x - x) * way, "y": y + (to_y - y) * way}
+                await self.call("Input.dispatchMouseEvent", type="mouseMoved", buttons=1, **moved)
+            x, y = to_x, to_y
+        await self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, **mouse)
+
+    async def press(self, *keys: str, control: bool = False, shift: bool = False) -> None:
+        """Press and release keys, one after the other."""
+        for key in keys:
+            code = _KEYS.get(key) or ord(key.upper())
+            common = {"key": key, "windowsVirtualKeyCode": code, "modifiers": _CONTROL * control | _SHIFT * shift}
+            text = {"Enter": "\r"}.get(key, "" if key in _KEYS or control else key)
+            await self.call("Input.dispatchKeyEvent", type="keyDown", text=text, **common)
+            await self.call("Input.dispatchKeyEvent", type="keyUp", **common)
+
+    async def write(self, text: str) -> None:
+        """Type a text where the focus is."""
+        await self.call("Input.insertText", text=text)
+
+    async def picture(self, path: Path) -> None:
+        """Write a picture of the window."""
+        path.write_bytes(base64.b64decode((await self.call("Page.captureScreenshot"))["data"]))
+
+    async def _read(self) -> None:
+        async for message in self._socket:
+            content = message.json()
+            method, parameters = content.get("method", ""), content.get("params", {})
+            if "id" in content:
+                answer = self._answers.pop(content["id"])
+                if "error" in content:
+                    answer.set_exception(AssertionError(content["error"]))
+                else:
+                    answer.set_result(content["result"])
+            elif method == "Runtime.exceptionThrown" or parameters.get("entry", {}).get("level") == "error":
+                self.trouble.append(json.dumps(parameters))
+
+
+@asynccontextmanager
+async def opened(address: str, folder: Path, *options: str) -> AsyncIterator[Page]:
+    """A page in a browser of its own, whose profile is in a folder."""
+    assert PROGRAM
+    command = [PROGRAM, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+    command += ["--remote-debugging-port=0", f"--user-data-dir={folder}", *options, "about:blank"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        port = folder / "DevToolsActivePort"
+        end = time.monotonic() + _SECONDS
+        while not (port.exists() and port.read_text().count("\n")):
+            assert process.poll() is None, "the browser ended"
+            assert time.monotonic() < end, "the browser did not start"
+            await asyncio.sleep(0.1)
+        base = f"http://127.0.0.1:{port.read_text().split()[0]}"
+        async with aiohttp.ClientSession() as session:
+            async with session.get(f"{base}/json") as answer:
+                target = next(item for item in await answer.json() if item["type"] == "page")
+            async with session.ws_connect(target["webSocketDebuggerUrl"], max_msg_size=0) as socket:
+                page = Page(socket)
+                await page.open(address)
+                yield page
+    finally:
+        process.kill()
+        process.wait()

@@ -1,0 +1,45 @@
+"""A studio for a folder, which runs in a thread of the test."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from fusesoc_firm.request.request import no_core_folders
+from fusesoc_firm.studio.server import Studio
+from fusesoc_firm.system.message_sources import MessageSources, known_names, load_beside
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.system.written.specification import Draft
+from fusesoc_firm.text.diagnostics import Diagnostic
+
+
+def load(spec: Path, text: str) -> LoadedSystem:
+    return load_beside(Draft(spec, text), needs_sources=False)
+
+
+def no_check(_: LoadedSystem, __: Path) -> Sequence[Diagnostic]:
+    return ()
+
+
+def names(spec: Path, own: Sequence[str]) -> Sequence[str]:
+    return known_names(spec, own, MessageSources(), no_core_folders)
+
+
+@contextmanager
+def served(place: Path) -> Iterator[Studio]:
+    """The studio, with its address."""
+    studio = Studio(place, load, no_check, names)
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever, name="studio")
+    thread.start()
+    try:
+        runner = asyncio.run_coroutine_threadsafe(studio.start(), loop).result(60)
+        yield studio
+        asyncio.run_coroutine_threadsafe(runner.cleanup(), loop).result(60)
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()
