@@ -13,10 +13,12 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 from fusesoc_firm.action.action import Action, after, execute, log_of, look_up
 from fusesoc_firm.action.contents import Contents
@@ -205,6 +207,7 @@ class StepsRun:
         """Run a step; return whether it succeeded."""
         action = self._action(name, tree_of(self.build.work_root, self.contents))
         why = [_RERUN] if is_rerun else reasons(action, self.results, self.contents) or [_NOT_STORED]
+        action = replace(action, declared=_files_of_parameters(self.build.work_root / action.arguments[-1]))
         done = execute(action, self.results, self.contents, self.build.log)
         record = self.results.record(action.key())
         remember(action, record.facts if record else (), self.results)
@@ -231,6 +234,15 @@ class StepsRun:
     def _show(self, record: Record) -> None:
         text = log_of(record, self.results, self.build.work_root) or b""
         print(text.decode(errors="backslashreplace"), end="", flush=True)
+
+
+def _files_of_parameters(edam: Path) -> tuple[str, ...]:
+    """Return the files that are values of a core's parameters of the type `file`, such as a processor's firmware."""
+    text = edam.read_text(encoding="utf-8")
+    if "datatype: file" not in text:
+        return ()
+    parameters = yaml.safe_load(text)["parameters"].values()
+    return tuple(str(item["default"]) for item in parameters if item["datatype"] == "file" and item.get("default"))
 
 
 def backend_of(fusesoc: Any, build: Build, further: Mapping[str, Any]) -> tuple[str, str]:

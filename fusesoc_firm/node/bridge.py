@@ -29,6 +29,8 @@ CONFIGURE, READY = b"C", b"R"
 MESSAGE, PUBLISHED = b"M", b"P"
 # LOST, from the bridge: the number of messages of a topic that ROS did not deliver, as text.
 LOST = b"L"
+# The number of the topic `/diagnostics`.
+DIAGNOSTICS = 0xFFFF
 # STOP, to the bridge: accept no more messages. From the bridge: ROS asks the node to end.
 STOP = b"S"
 # DONE, from the bridge: all messages accepted before STOP are handed over. FAULT, from the bridge: the error that ended
@@ -200,7 +202,8 @@ class Ros1(Ros):
         # rospy's reports of refused peers.
         logging.getLogger("rosout").addFilter(_Once())
         rospy.on_shutdown(self._stopped_by_ros)
-        self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in config["publishers"]}
+        given = [*config["publishers"], config["diagnostics"]]
+        self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in given}
         self._publishers = {
             topic["number"]: rospy.Publisher(
                 topic["name"],
@@ -209,7 +212,7 @@ class Ros1(Ros):
                 latch=topic["is_transient_local"],
                 tcp_nodelay=True,
             )
-            for topic in config["publishers"]
+            for topic in given
         }
         self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"] if topic["is_numbered"]}
         self._subscribers = {
@@ -239,7 +242,9 @@ class Ros1(Ros):
         """Return the names of the topics after remapping."""
         return {
             "subscribers": {number: topic.resolved_name for number, topic in self._subscribers.items()},
-            "publishers": {number: topic.resolved_name for number, topic in self._publishers.items()},
+            "publishers": {
+                number: topic.resolved_name for number, topic in self._publishers.items() if number != DIAGNOSTICS
+            },
         }
 
     def publish(self, topic: int, payload: bytes) -> None:
@@ -353,10 +358,19 @@ class Ros2(Ros):
             topic["number"]: self._node.create_publisher(types[topic["type"]], topic["name"], _quality(topic))
             for topic in config["publishers"]
         }
+        self._add_diagnostics(config["diagnostics"])
         self._subscribers = {
             topic["number"]: self._subscription(topic, types[topic["type"]]) for topic in config["subscribers"]
         }
         self._check_hashes()
+
+    def _add_diagnostics(self, topic: dict[str, Any]) -> None:
+        try:
+            message = _message_class(topic["type"])
+        except BridgeError as error:
+            self.report(f"{topic['name']} is not published: {error}")
+            return
+        self._publishers[topic["number"]] = self._node.create_publisher(message, topic["name"], _quality(topic))
 
     def _subscription(self, topic: dict[str, Any], message: Any) -> Any:
         """Return a subscription that counts what ROS loses, by an event or by the numbers of a single publisher."""
@@ -429,12 +443,15 @@ class Ros2(Ros):
         """Return the names of the topics after remapping."""
         return {
             "subscribers": {number: topic.topic_name for number, topic in self._subscribers.items()},
-            "publishers": {number: topic.topic_name for number, topic in self._publishers.items()},
+            "publishers": {
+                number: topic.topic_name for number, topic in self._publishers.items() if number != DIAGNOSTICS
+            },
         }
 
     def publish(self, topic: int, payload: bytes) -> None:
-        """Publish a message."""
-        self._publishers[topic].publish(payload)
+        """Publish a message; `/diagnostics` may have no publisher."""
+        if topic in self._publishers:
+            self._publishers[topic].publish(payload)
 
     def stop(self) -> None:
         """Make `spin` take the messages that have already arrived, and no further messages."""
@@ -513,7 +530,7 @@ def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
             break
         if parcel.kind == MESSAGE:
             ros.publish(parcel.topic, parcel.data)
-            if is_timed:
+            if is_timed and parcel.topic != DIAGNOSTICS:
                 channel.send(PUBLISHED, parcel.topic, time_ns=time.monotonic_ns())
         elif parcel.kind == STOP:
             ros.stop()

@@ -16,6 +16,7 @@ from typing import Protocol
 
 from fusesoc_firm.node import bridge
 from fusesoc_firm.node.description import NodeDescription, NodeTopic
+from fusesoc_firm.node.diagnostics import Report, diagnostics_payload, diagnostics_topic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.ros_wheels import ros_python
 
@@ -70,6 +71,9 @@ class Carrier(Protocol):
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message; any thread may call this method. After the middleware has ended, messages are dropped."""
 
+    def diagnose(self, report: Report) -> None:
+        """Publish a report on `/diagnostics`."""
+
     def stop(self) -> None:
         """Accept no more messages."""
 
@@ -109,6 +113,7 @@ class RosCarrier:
         May raise `CarrierError`.
         """
         self.title = f"ROS {ros}"
+        self._ros = ros
         self._python = options.python or _python_of(ros)
         mine, its = socket.socketpair()
         arguments = [*ros_arguments(ros, options.arguments)]
@@ -136,6 +141,7 @@ class RosCarrier:
             "is_timed": options.is_timed,
             "subscribers": _numbered(ros, description.subscribers, options),
             "publishers": _numbered(ros, description.publishers, options),
+            "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
             self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
@@ -180,6 +186,10 @@ class RosCarrier:
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message."""
         self._send(bridge.MESSAGE, topic, payload)
+
+    def diagnose(self, report: Report) -> None:
+        """Publish a report on `/diagnostics`."""
+        self._send(bridge.MESSAGE, bridge.DIAGNOSTICS, diagnostics_payload(self._ros, report))
 
     def stop(self) -> None:
         """Accept no more messages."""

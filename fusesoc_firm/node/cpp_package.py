@@ -14,6 +14,7 @@ from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware, middleware_of
 from fusesoc_firm.node.description import DEFAULT_DEPTH, NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.diagnostics import diagnostics_topic
 from fusesoc_firm.node.software_process import software_ports
 from fusesoc_firm.request.request import GeneratedFile
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -65,7 +66,9 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
     version = _only_version(description, ros)
     dialect = _DIALECTS[version]
     package = f"{description.name}_node"
-    packages = {topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)}
+    packages = {"diagnostic_msgs"} | {
+        topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)
+    }
     build = {
         "package": package,
         "name": description.name,
@@ -134,6 +137,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "definitions": [*_definitions(description)],
         "subscribers": [_row(topic) for topic in description.subscribers],
         "publishers": [_row(topic) for topic in description.publishers],
+        "diagnostics": _row(diagnostics_topic(description.versions[0])),
         "software": _software(loaded, description),
     }
 
@@ -160,7 +164,8 @@ def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) 
 
 def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
     """Yield the definition text of each message once; a ROS 2 message has no text."""
-    texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
+    topics = (*description.subscribers, *description.publishers, diagnostics_topic(description.versions[0]))
+    texts = {topic.type: topic.definition for topic in topics}
     for name, text in texts.items():
         if text:
             lines = lines_of(text)

@@ -6,9 +6,10 @@ A payload is a message as serialised by the middleware, so the node needs only a
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import Definitions, MessageName, MessageType
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
@@ -153,21 +154,27 @@ def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
             f"'{topic.block}' uses {frame.ros.title}, which nodes do not support",
             hint="nodes support only ROS 1 and ROS 2",
         )
-    definitions = loaded.libraries[frame.ros].closure(frame.message)
-    is_first = frame.ros is ROS1
-    name = frame.message
+    return replace(
+        node_topic(topic.block, topic.ros_name, frame.message, loaded.libraries[frame.ros]),
+        id=topic.id if isinstance(topic, Converter) else None,
+        is_reliable=topic.quality.is_reliable,
+        is_transient_local=topic.quality.is_transient_local,
+        depth=topic.quality.depth,
+    )
+
+
+def node_topic(block: str, topic: str, name: MessageName, library: MessageLibrary) -> NodeTopic:
+    """Return a topic with a message of the library, without a converter."""
+    definitions = library.closure(name)
+    is_first = library.ros is ROS1
     return NodeTopic(
-        topic.block,
-        topic.ros_name,
+        block,
+        topic,
         str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
-        frame.ros.number,
+        library.ros.number,
         signature(name, definitions),
-        topic.id if isinstance(topic, Converter) else None,
-        closure_text(name, definitions) if is_first else "",
-        topic.quality.is_reliable,
-        topic.quality.is_transient_local,
-        topic.quality.depth,
-        is_first and _begins_with_header(name, definitions),
+        definition=closure_text(name, definitions) if is_first else "",
+        is_numbered=is_first and _begins_with_header(name, definitions),
     )
 
 

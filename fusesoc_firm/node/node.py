@@ -23,6 +23,7 @@ from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.carrier import Carrier, CarrierError, Lost, Published, Taken
 from fusesoc_firm.node.description import DEFAULT_DEPTH, Crossing, NodeDescription, NodeTopic
+from fusesoc_firm.node.diagnostics import INTERVAL_SECONDS, Report
 from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.statistics import Statistics
@@ -145,6 +146,7 @@ class Node:
         self._carriers = carriers
         takers = [self._start(partial(self._take, carrier)) for carrier in carriers.values()]
         sender, receiver = self._start(self._send), self._start(self._receive)
+        self._start(self._diagnose)
         self._is_wanted_to_end.wait()
         latest = time.monotonic() + self._settings.drain
         for carrier in carriers.values():
@@ -183,6 +185,17 @@ class Node:
             if not self._is_over.is_set():
                 self._fault = self._fault or error
         self.stop()
+
+    def _diagnose(self) -> None:
+        """Report the counts at intervals."""
+        before = 0
+        while not self._is_wanted_to_end.wait(INTERVAL_SECONDS):
+            dropped = {item.block: self._queues.dropped(number) for number, item in enumerate(self._inputs)}
+            counts = self.statistics.counts(dropped)
+            now = self.statistics.troubles() + sum(dropped.values())
+            for carrier in self._carriers.values():
+                carrier.diagnose(Report(f"{self._description.name}: node", now > before, counts))
+            before = now
 
     def _count_rest(self) -> None:
         for number, item in enumerate(self._inputs):

@@ -15,6 +15,7 @@ from fusesoc_firm.text.diagnostics import fail
 WHEELS = {
     "ros-jazzy-rclpy": "7.1.6",
     "ros-jazzy-rmw-fastrtps-cpp": "8.4.3",
+    "ros-jazzy-diagnostic-msgs": "5.3.6",
     "ros-jazzy-geometry-msgs": "5.3.6",
     "ros-jazzy-sensor-msgs": "5.3.6",
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from fusesoc_firm.node.description import NodeDescription
@@ -48,6 +48,21 @@ class Statistics:
             {item.block: Input() for item in description.inputs},
             {item.block: Output() for item in description.outputs},
         )
+
+    def counts(self, dropped: Mapping[str, int]) -> dict[str, int]:
+        """Return all counts by their names, with the messages that the queues of inputs have `dropped` so far."""
+        found: dict[str, int] = {}
+        for name, item in self.inputs.items():
+            found |= {f"{name} received": item.received, f"{name} dropped": item.dropped + dropped.get(name, 0)}
+            found |= {f"{name} sent": item.sent, f"{name} refused": item.refused, f"{name} lost": item.lost}
+        for name, output in self.outputs.items():
+            found |= {f"{name} frames": output.frames, f"{name} published": output.published}
+        return found | {"faults": self.faults, "faults in software": self.software_faults, "restarts": self.restarts}
+
+    def troubles(self) -> int:
+        """Return the number of messages that were dropped, lost or refused, and of faults and restarts."""
+        inputs = sum(item.dropped + item.refused + item.lost for item in self.inputs.values())
+        return inputs + self.faults + self.software_faults + self.restarts
 
     def text(self) -> str:
         """Return the counts as a table for the user."""

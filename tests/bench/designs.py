@@ -95,20 +95,24 @@ def generate(directory: Path, *converters: Converter) -> list[Design]:
 
 
 def _generate(directory: Path, converter: Converter) -> Design:
-    frame = converter.frame()
-    is_subscriber = converter.direction == SUBSCRIBER
-    make, name = (subscriber_files, subscriber_entity) if is_subscriber else (publisher_files, publisher_entity)
+    work = Library("work", directory)
+    work.analyse(write_converter(converter, directory))
+    name = subscriber_entity if converter.direction == SUBSCRIBER else publisher_entity
+    entity = name(converter.frame())
+    text = (directory / f"{entity}.vhd").read_text(encoding="ascii")
+    return Design(work, entity, ports_of(text), text.count("\n"))
+
+
+def write_converter(converter: Converter, directory: Path) -> list[Path]:
+    """Write the files of a converter, in the order of their analysis; raises `NotConvertedError`."""
+    make = subscriber_files if converter.direction == SUBSCRIBER else publisher_files
     try:
-        files = make([frame], converter.width)
+        files = make([converter.frame()], converter.width)
     except InputError as error:
         raise NotConvertedError(str(error)) from error
     for file, generated in files.items():
         (directory / file).write_text(str(generated.content), encoding="ascii")
-    work = Library("work", directory)
-    work.analyse(directory / file for file in files)
-    entity = name(frame)
-    text = (directory / f"{entity}.vhd").read_text(encoding="ascii")
-    return Design(work, entity, ports_of(text), text.count("\n"))
+    return [directory / file for file in files]
 
 
 def ports_of(vhdl: str) -> tuple[Port, ...]:

@@ -194,7 +194,10 @@ class Program:
     def run(self, seed: str, size: int) -> Tally:
         """Send so many frames and judge what happens."""
         source = random.Random(seed)
-        sent = [_frame(self.system, source) for _ in range(size)]
+        return self.send([_frame(self.system, source) for _ in range(size)], source, seed)
+
+    def send(self, sent: list[Sent], source: random.Random, seed: str) -> Tally:
+        """Send these frames and judge what happens; `source` draws stalls, and faults name `seed`."""
         folder = self.path.parent
         frames = b"".join(len(item.record).to_bytes(4, "little") + item.record for item in sent)
         (folder / "frames").write_bytes(frames)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import random
 import shutil
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -109,6 +113,62 @@ def test_records_are_read() -> None:
         for item in records
     )
     assert [*read_records(data)] == records
+
+
+# Sizes of all kinds, of which some break on their way out.
+_TYPES = (
+    "geometry_msgs/Quaternion",
+    "geometry_msgs/Pose",
+    "geometry_msgs/Transform",
+    "std_msgs/String",
+    "std_msgs/Header",
+    "std_msgs/Float64MultiArray",
+    "sensor_msgs/JointState",
+    "sensor_msgs/LaserScan",
+    "sensor_msgs/CompressedImage",
+    "geometry_msgs/PoseArray",
+)
+
+
+def _with_broken_beats(good: Sent, lanes: int) -> Iterator[Sent]:
+    """The frame with a null, a holed and a short beat at every place, each followed by the good frame."""
+    beats = -(-(1 + len(good.body)) // lanes)
+    for place in range(beats):
+        for what in Trouble.NULL_BEAT, Trouble.GAP, Trouble.SHORT:
+            # A short last beat only ends the frame early.
+            if what is not Trouble.SHORT or place < beats - 1:
+                yield replace(good, trouble=what, beat=place, shown=None)
+                yield good
+
+
+@needs_verilator
+@pytest.mark.parametrize(
+    "width",
+    [
+        pytest.param(width, marks=pytest.mark.check if width == 16 else pytest.mark.thorough)
+        for width in (16, 32, 64, 128, 256, 512)
+    ],
+)
+def test_a_broken_beat_at_every_place_costs_its_frame_alone(tmp_path: Path, width: int) -> None:
+    print(f"seed {SEED}")
+    source = random.Random(f"{SEED} {width}")
+    program = fuzz_systems.build(System(width, 2, _TYPES, "block"), tmp_path)
+    sent: list[Sent] = []
+    for id_, name in enumerate(_TYPES):
+        payloads = Payloads(ROS2, name)
+        payload = sorted((payloads.draw(source) for _ in range(9)), key=len)[4]
+        body = len(payload).to_bytes(4, "little") + payload
+        sent += _with_broken_beats(Sent(id_, body, Trouble.NONE, 0, payloads.shown(payload)), width // 8)
+    for _ in fuzz_systems.STALLS:
+        tally = program.send(sent, source, f"{SEED}")
+        assert not tally.fault, tally.fault
+        assert tally.broken == tally.good == len(sent) // 2
+        records = read_records((program.path.parent / "records").read_bytes())
+        codes = Counter(record.data[0] for record in records if record.kind == "E" and record.channel < len(_TYPES))
+        # With a hole in the last beat, the next byte may be one after the payload.
+        assert codes[Fault.BROKEN_BEAT.value] >= tally.broken - len(_TYPES)
+        assert {*codes} <= {Fault.BROKEN_BEAT.value, Fault.LONG_FRAME.value}
+        print(f"{width} bits: {tally.broken} broken frames in {tally.cycles} cycles")
 
 
 # A program of a wide system takes minutes to compile.

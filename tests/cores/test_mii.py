@@ -1,4 +1,4 @@
-"""Ethernet frames at the pins of an MII: both directions, with clocks that are unrelated."""
+"""Ethernet frames at the pins of an MII or a GMII: both directions, with clocks that are unrelated."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 
 from tests.cores.crossing_paths import Domains, unsynchronised
-from tests.cores.ethernet import GAP_BYTES, Burst, on_line, random_bursts, verdict
+from tests.cores.ethernet import GAP_BYTES, LONGEST, Burst, on_line, random_bursts, verdict
 from tests.hdl.ghdl import Generic, Library, core_files
 
 SEED = 20261126
+# The sides with a clock of their own.
+ENTITIES = {"firm_mii": ("mii_rx", "mii_tx"), "firm_gmii": ("gmii_rx",)}
 CORES = (
     "axis/package",
     "axis/axis",
@@ -71,6 +73,21 @@ def test_good_frames_come_back_and_no_others(library: Library, tmp_path: Path, p
     assert min(idle for idle, _, _ in back[1:]) >= 2 * GAP_BYTES
 
 
+@pytest.mark.parametrize("period", [7990, 8000, 8010])
+def test_good_frames_come_back_at_a_gmii(library: Library, tmp_path: Path, period: int) -> None:
+    """The clocks differ by some 0.2 %, more than any two of 125 MHz; the longest frames do not overrun the FIFO."""
+    seed = SEED + period
+    print(f"seed {seed}")
+    bursts = [Burst(burst.data, GAP_BYTES, burst.fault) for burst in random_bursts(60, 250, seed)]
+    bursts += [Burst(on_line(random.Random(seed).randbytes(LONGEST)))] * 3
+    rows = [burst.row() for burst in bursts]
+    back = _back(library, tmp_path, rows, PERIOD_PS=period, PHY_PERIOD_PS=8000, SEED=seed, IS_GMII=True)
+    verdicts = map(verdict, bursts)
+    assert [bytes(data) for _, _, data in back] == [on_line(item.frame) for item in verdicts if item.pulse == "good"]
+    assert {fault for _, fault, _ in back} == {-1}
+    assert min(idle for idle, _, _ in back[1:]) >= GAP_BYTES
+
+
 def test_a_preamble_may_have_any_number_of_nibbles(library: Library, tmp_path: Path) -> None:
     frames = [random.Random(number).randbytes(60 + number) for number in range(15)]
     rows = [_row(Burst(on_line(frame)), cut=cut) for cut, frame in enumerate(frames)]
@@ -91,13 +108,16 @@ def _hardware(folder: Path) -> Library:
     return library
 
 
-def test_it_has_no_latch(tmp_path: Path) -> None:
-    assert _hardware(tmp_path).latches("firm_mii") == []
+@pytest.mark.parametrize("entity", ENTITIES)
+def test_it_has_no_latch(tmp_path: Path, entity: str) -> None:
+    assert _hardware(tmp_path).latches(entity) == []
 
 
 @pytest.mark.check
-def test_every_path_between_the_clocks_is_synchronised(tmp_path: Path) -> None:
-    verilog = _hardware(tmp_path).synthesise("firm_mii", {}, "verilog")
-    clocks = {"clk": "system", "mii_rx_clk": "mii_rx", "mii_tx_clk": "mii_tx"}
-    domains = Domains(clocks, lambda port: port[:6] if port.startswith("mii") else "system")
-    assert unsynchronised(verilog, "firm_mii", tmp_path, domains) == []
+@pytest.mark.parametrize("entity", ENTITIES)
+def test_every_path_between_the_clocks_is_synchronised(tmp_path: Path, entity: str) -> None:
+    verilog = _hardware(tmp_path).synthesise(entity, {}, "verilog")
+    sides = ENTITIES[entity]
+    clocks = {"clk": "system"} | {f"{side}_clk": side for side in sides}
+    domains = Domains(clocks, lambda port: next(filter(port.startswith, sides), "system"))
+    assert unsynchronised(verilog, entity, tmp_path, domains) == []

@@ -110,6 +110,18 @@ module gate;
 endmodule
 """,
 }
+READER = """\
+module gate;
+  reg [8191:0] name;
+  reg [7:0] code [0:0];
+  initial begin
+    if ($value$plusargs("code=%s", name))
+      $readmemh(name, code);
+    $display("code %h", code[0]);
+    $finish;
+  end
+endmodule
+"""
 TOOLS = {"make", "ghdl", "ghdl-mcode", "iverilog", "vvp", "verilator", "verilator_bin", "g++", "vgate", "sh"}
 
 
@@ -369,6 +381,31 @@ def test_why_a_step_ran(library: Path) -> None:
     notes = [path.read_text(errors="replace") for path in (library.parent / "store").glob("*/notes/*/*")]
     assert any("SECRET" in note for note in notes)
     assert not any("a-value" in note for note in notes)
+
+
+def test_a_file_in_a_parameter_is_an_input(library: Path) -> None:
+    """A file outside the core, such as a processor's firmware, that the user names."""
+    core, firmware = library / "gate" / "gate.core", library.parent / "firmware.hex"
+    core.write_text(
+        core.read_text().replace(
+            "toplevel: gate, flow: sim, flow", "toplevel: gate, parameters: [code], flow: sim, flow"
+        )
+        + "parameters: {code: {datatype: file, paramtype: plusarg}}\n"
+    )
+    (library / "gate" / "gate.v").write_text(READER)
+    firmware.write_text("2a\n")
+
+    def result() -> str:
+        status, text = run(library, "acme:m:gate@sim_icarus", f"--backend=--code={firmware}")
+        assert status == 0 and "is not cached" not in text
+        return results(text)["sim_icarus"]
+
+    log = library / "build" / "acme_m_gate_1.0" / "sim_icarus.log"
+    assert [result(), result()] == ["passed", "cached"]
+    assert "code 2a" in log.read_text()
+    firmware.write_text("2b\n")
+    assert result() == "passed"
+    assert "code 2b" in log.read_text()
 
 
 def test_what_is_not_cached_is_reported(library: Path) -> None:

@@ -327,6 +327,7 @@ struct System {
   std::size_t queue_depth;
   std::string digest;
   std::vector<Topic> subscribers, publishers;
+  Topic diagnostics;
   Software software{};
 };
 template <class T>

@@ -27,6 +27,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from fusesoc_firm.node.transport.simulator import SimulatorTransport
+
 MM2S, S2MM = 0x00, 0x30
 _CONTROL, _STATUS, _CURRENT, _CURRENT_HIGH, _TAIL, _TAIL_HIGH = range(0x00, 0x18, 4)
 _RUN, _RESET, _RESERVED_ONE = 1 << 0, 1 << 2, 1 << 1
@@ -125,6 +127,37 @@ class Loop:
         with self._changed:
             self._pieces.clear()
             self._changed.notify_all()
+
+
+class Simulated:
+    """A simulated system, whose frames the engine exchanges through `transport`; a reset does not reach it."""
+
+    def __init__(self, transport: SimulatorTransport) -> None:
+        self._transport = transport
+        self._frame = b""
+        self._bursts: deque[bytes] = deque()
+
+    def put(self, piece: bytes, *, is_last: bool, is_over: Callable[[], bool]) -> None:
+        """Take a piece."""
+        del is_over
+        self._frame += piece
+        if is_last:
+            self._transport.send(self._frame)
+            self._frame = b""
+
+    def wait(self, seconds: float) -> None:
+        """Wait for a burst."""
+        if not self._bursts and (burst := self._transport.receive(seconds)) is not None:
+            self._bursts.append(burst.data)
+
+    def get(self) -> tuple[bytes, bool] | None:
+        """Return the next burst."""
+        return (self._bursts.popleft(), True) if self._bursts else None
+
+    def clear(self) -> None:
+        """Forget what was not sent and what was received."""
+        self._frame = b""
+        self._bursts.clear()
 
 
 class _Channel:

@@ -10,8 +10,9 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.carrier import CarrierError, Published, Taken
+from fusesoc_firm.node.carrier import CarrierError, Event, Lost, Published, Taken
 from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.diagnostics import Report
 from fusesoc_firm.node.node import HardwareListener, Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.trace import Trace
@@ -28,17 +29,21 @@ class FakeCarrier:
 
     def __init__(self) -> None:
         self.published: list[tuple[int, bytes]] = []
-        self._events: SimpleQueue[Taken | Published | CarrierError | None] = SimpleQueue()
+        self.reports: list[Report] = []
+        self._events: SimpleQueue[Event | CarrierError | None] = SimpleQueue()
         self._stopped = threading.Event()
 
     def give(self, topic: int, *payloads: bytes) -> None:
         for payload in payloads:
             self._events.put(Taken(topic, payload, time.monotonic_ns()))
 
+    def lose(self, topic: int, count: int) -> None:
+        self._events.put(Lost(topic, count))
+
     def end(self, error: CarrierError | None = None) -> None:
         self._events.put(error)
 
-    def receive(self) -> Iterator[Taken | Published]:
+    def receive(self) -> Iterator[Event]:
         while True:
             event = self._events.get()
             if event is None:
@@ -52,6 +57,9 @@ class FakeCarrier:
     def publish(self, topic: int, payload: bytes) -> None:
         self.published.append((topic, payload))
         self._events.put(Published(topic, time.monotonic_ns()))
+
+    def diagnose(self, report: Report) -> None:
+        self.reports.append(report)
 
     def stop(self) -> None:
         self._events.put(None)

@@ -559,3 +559,33 @@ def test_a_relative_topic_moves_with_the_namespace(tmp_path: Path, topic: str) -
     found = describe(loaded(tmp_path, specification(blocks + converter("out", "publisher", "Point"))))
     assert [topic.name for topic in (*found.subscribers, *found.publishers)] == [topic, "out"]
     assert replace(found.publishers[0], block="a", name=topic) == found.subscribers[0]
+
+
+def test_a_topic_has_the_quality_of_its_block(tmp_path: Path) -> None:
+    """A profile, its keys overridden, and the defaults."""
+    blocks = (
+        "  - {name: a, middleware: ROS2, mode: subscriber, message: geometry_msgs/Point, outgoing: [{name: z}],"
+        " qos: {profile: sensor_data, durability: transient_local}}\n"
+        "  - {name: z, middleware: ROS2, mode: publisher, message: geometry_msgs/Point, qos: {depth: 7}}\n"
+        "  - {name: b, middleware: ROS, mode: subscriber, message: std_msgs/Header, outgoing: [{name: y}]}\n"
+        "  - {name: y, middleware: ROS, mode: publisher, message: std_msgs/Header}\n"
+    )
+    description = describe(loaded(tmp_path, f"project: {{name: robot}}\nblocks:\n{blocks}"))
+    found = [
+        (topic.is_reliable, topic.is_transient_local, topic.depth)
+        for topic in (*description.subscribers, *description.publishers)
+    ]
+    assert found == [(False, True, 5), (True, False, 100), (True, False, 7), (True, False, 100)]
+
+
+def test_messages_that_the_carrier_has_lost_are_counted_and_reported(tmp_path: Path) -> None:
+    bench = Bench()
+    run = Run(describe(pairs(tmp_path)), bench.open)
+    run.carrier.lose(1, 3)
+    run.carrier.give(1, POINTS[0])
+    until(lambda: any(report.is_warning for report in run.carrier.reports))
+    until(lambda: not run.carrier.reports[-1].is_warning)
+    counts = run.carrier.reports[-1].counts
+    assert [counts[f"a1 {name}"] for name in ("received", "dropped", "sent", "lost")] == [1, 0, 1, 3]
+    run.stop()
+    assert run.node.statistics.inputs["a1"].lost == 3

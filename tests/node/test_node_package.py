@@ -36,7 +36,9 @@ def written(folder: Path, text: str, *paths: Path) -> LoadedSystem:
 
 def rows(source: str) -> list[tuple[str, ...]]:
     """Id, name, type and signature of each topic in a table."""
-    return re.findall(r'^ +(\d+|\{\}), "(.*)", "(.*)",\n +"(.*)",', source, re.MULTILINE)
+    *found, diagnostics = re.findall(r'^ +(\d+|\{\}), "(.*)", "(.*)",\n +"(.*)",', source, re.MULTILINE)
+    assert diagnostics[:2] == ("{}", "/diagnostics")
+    return found
 
 
 def definition(source: str, constant: str) -> str:

@@ -6,11 +6,14 @@ The node has no ROS here: its engine, the driver and Linux's devices are the cod
 from __future__ import annotations
 
 import shutil
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from tests.node.dma_engine import ERRORS, MM2S, S2MM, Fault, board
+from fusesoc_firm.node.transport.simulator import SimulatorTransport
+from tests.cores.pipes import pipe_bench
+from tests.node.dma_engine import ERRORS, MM2S, S2MM, Fault, Simulated, board
 from tests.node.drivers import Driver, cpp_driver, cross_compiled_driver
 
 SEED = 20261125
@@ -61,3 +64,15 @@ def test_every_fault_is_told(driver: Driver, tmp_path: Path) -> None:
     assert sum("the channel has halted" in line for line in told) == 3
     assert counts["published"] + counts["lost"] == 1000
     assert counts["lost"] > 0 and counts["silently"] == 0
+
+
+def test_messages_pass_simulated_hardware(driver: Driver, tmp_path: Path) -> None:
+    """GHDL simulates the system, which is a wire."""
+    bench = pipe_bench("ghdl", tmp_path)
+    with (
+        closing(SimulatorTransport(lambda: bench.start(64, SEED=1, STALL_PERCENT=30))) as transport,
+        board(tmp_path, MEMORY_BYTES, stream=Simulated(transport)),
+    ):
+        told, counts = _play(driver, tmp_path, 100, 4096, 0)
+    assert not told
+    assert counts == {"sent": 100, "published": 100, "lost": 0, "silently": 0}

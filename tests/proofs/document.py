@@ -21,6 +21,7 @@ _SHORT = {
     "SOURCES": "N",
     "FRAMES": "F",
     "LIMIT": "L",
+    "MAX_LENGTH": "M",
     "DEPTH": "D",
 }
 # Generics that a table says if they are true.

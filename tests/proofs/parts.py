@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from tests.bench.designs import SUBSCRIBER, Converter
 from tests.proofs.proof import Mutation, Proof, Size
 
 _QUEUE = "firm_axis_queue.vhd"
 _WATCHDOG = "firm_axis_watchdog.vhd"
+_SUBSCRIBER = "axis_to_std_msgs_string"
 _SINK_WATCHDOG = "firm_axis_sink_watchdog.vhd"
 _TREE = "firm_manager_tree.vhd"
 _INSERT = "firm_axis_id_insert.vhd"
@@ -121,6 +123,32 @@ _WATCHED_SINK = Proof(
     is_bounded=True,
 )
 
+_REFUSED = Proof(
+    "refused_frames",
+    _SUBSCRIBER,
+    ("axis/package", "axis/axis"),
+    sizes=({"MAX_LENGTH": 6},),
+    depth=17,
+    mutations=(
+        Mutation(
+            f"{_SUBSCRIBER}.vhd",
+            "is_refused <= check_r and not",
+            "is_refused <= '0' and not",
+            ("no_refused_byte_leaves", "no_refused_message"),
+        ),
+        Mutation(
+            f"{_SUBSCRIBER}.vhd",
+            "length_t'range), MAX_LENGTH+1)",
+            "length_t'range), MAX_LENGTH)",
+            ("no_report_invented",),
+        ),
+        Mutation(f"{_SUBSCRIBER}.vhd", "frame_fault <= TOO_LONG;", "frame_fault <= BAD_LENGTH;", ("each_is_reported",)),
+    ),
+    trace=18,
+    is_bounded=True,
+    converter=Converter(1, "std_msgs/String", SUBSCRIBER, 8),
+)
+
 _TREE_TO_HOST = Proof(
     "manager_tree",
     "small_tree",
@@ -198,4 +226,4 @@ _STORED = Proof(
     is_bounded=True,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _TREE_TO_HOST, _STORED)
+PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _STORED)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.bench.designs import Converter, write_converter
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.proofs.symbiyosys import Outcome, Task
 
@@ -48,7 +49,8 @@ class Proof:
     It is done by induction over `depth` cycles or, `is_bounded`, for all traces of so many cycles from reset; `trace`
     is the length of those that are searched for what a mutation violates. The harness gets the generics and `defines`
     as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `sources` are VHDL files beside the harness, such
-    as a wrapper; `helpers` is the entity's own part of a harness that is for several.
+    as a wrapper; `helpers` is the entity's own part of a harness that is for several. With a `converter`, the entity is
+    a generated one.
     """
 
     harness: str
@@ -63,6 +65,7 @@ class Proof:
     variant: str = ""
     trace: int = 12
     is_bounded: bool = False
+    converter: Converter | None = None
 
     @property
     def name(self) -> str:
@@ -82,16 +85,17 @@ class Proof:
 
     def prove(self, size: Size, folder: Path) -> Outcome:
         """Prove all assertions at a size; `folder` is empty."""
-        task = self._task(self._sources(), size, folder)
+        task = self._task(self._sources(folder), size, folder)
         return task.check(folder, self.depth) if self.is_bounded else task.prove(folder, self.depth)
 
     def search(self, mutation: Mutation, label: str, folder: Path) -> Outcome:
         """Look for a trace in which a broken copy violates an assertion; `folder` is empty."""
-        files = _mutated(self._sources(), mutation, folder)
+        files = _mutated(self._sources(folder), mutation, folder)
         return self._task(files, self.sizes[mutation.size], folder).search(folder, self.trace, label)
 
-    def _sources(self) -> list[Path]:
-        return [*core_files(*self.cores), *(HARNESSES / name for name in self.sources)]
+    def _sources(self, folder: Path) -> list[Path]:
+        generated = write_converter(self.converter, folder) if self.converter else []
+        return [*core_files(*self.cores), *(HARNESSES / name for name in self.sources), *generated]
 
     def _task(self, files: Sequence[Path], size: Size, folder: Path) -> Task:
         library = Library("firm", folder)

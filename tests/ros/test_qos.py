@@ -1,24 +1,30 @@
-"""Quality of service against real ROS: latched topics, what ROS drops, other types; `firm live` and nodes in C++."""
+"""Quality of service and diagnostics against real ROS, of `firm live` and nodes in C++.
+
+`pytest -m thorough tests/ros/test_qos.py -s` runs 1,000 messages a second for half a minute and prints the account.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import re
 import signal
 import struct
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.simulation.simulator import build_simulator
 from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros, missing_ros, running_ros
-from tests.ros.live_nodes import LiveNode, model_address
+from tests.ros.live_nodes import LiveNode, model_address, paced, specification
 
-pytestmark = pytest.mark.check
+RATE, SECONDS = 1000, 30
 # The node's own queue is short, and what it publishes is kept.
 ECHO = """\
 project: {name: qos_echo, width: 64}
@@ -37,11 +43,11 @@ MESSAGES = 400
 
 @dataclass
 class Place:
-    """A version of ROS that runs, and the node in C++, compiled once."""
+    """A version of ROS that runs, and the nodes in C++, each compiled once."""
 
     ros: Ros
     folder: Path
-    program: Path | None = None
+    programs: dict[Path, Path] = field(default_factory=dict)
 
     def specification(self) -> Path:
         path = self.folder / "qos_echo.yaml"
@@ -55,12 +61,26 @@ class Place:
         if kind == "live":
             command = ["live", str(self.specification()), "--transport", address]
             return LiveNode(self.ros, self.folder / "node.log", command)
-        if self.program is None:
-            package, program = self.folder / "package", self.folder / "qos_echo"
-            assert main(["system", "node", str(self.specification()), "--language", "cpp", "-o", str(package)]) == 0
-            self.ros.compile(package, program)
-            self.program = program
-        return Node(self.ros, self.program, address)
+        return Node(self.ros, self.compiled(self.specification()), address)
+
+    def compiled(self, spec: Path) -> Path:
+        """The node of a system in C++."""
+        if spec not in self.programs:
+            package = self.folder / f"{spec.stem}_package"
+            assert main(["system", "node", str(spec), "--language", "cpp", "-o", str(package)]) == 0
+            self.programs[spec] = self.folder / spec.stem
+            self.ros.compile(package, self.programs[spec])
+        return self.programs[spec]
+
+    def angles(self, kind: str, *arguments: str) -> NodeProcess:
+        """A node of quat2euler, simulated by Verilator."""
+        spec = specification("quat2euler", self.ros.version, self.folder)
+        built = build_simulator(spec, "verilator", build_root=self.folder / "simulators")
+        address = f"pipe:exec {built.script()}"
+        if kind == "cpp":
+            return Node(self.ros, self.compiled(spec), address, *arguments)
+        options = ["--transport", address, *(word.replace("--depth", "--queue") for word in arguments)]
+        return LiveNode(self.ros, self.folder / "node.log", ["live", str(spec), *options])
 
     def type(self, name: str) -> str:
         """A message's name in this version."""
@@ -99,6 +119,7 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         yield Place(ros, folder)
 
 
+check = pytest.mark.check
 both_kinds = pytest.mark.parametrize("kind", ["live", "cpp"])
 
 
@@ -115,10 +136,10 @@ def stopped(node: NodeProcess) -> Iterator[None]:
         os.kill(number, signal.SIGCONT)
 
 
-def counts(node: NodeProcess) -> tuple[int, int, int, int]:
-    """What an ended node tells of images: received, dropped, sent, lost by ROS."""
+def counts(node: NodeProcess, block: str) -> tuple[int, int, int, int]:
+    """What an ended node tells of a block: received, dropped, sent, lost by ROS."""
     patterns = (
-        r"image_in +(\d+) +(\d+) +(\d+) +0 +(\d+)\n",
+        rf"{block} +(\d+) +(\d+) +(\d+) +0 +(\d+)\n",
         r"(\d+) received, (\d+) dropped, (\d+) sent, .* (\d+) lost by ROS",
     )
     found = next(filter(None, (re.search(pattern, node.said()) for pattern in patterns)))
@@ -126,6 +147,7 @@ def counts(node: NodeProcess) -> tuple[int, int, int, int]:
     return received, dropped, sent, lost
 
 
+@check
 @both_kinds
 def test_what_is_published_before_the_node_or_its_peer_arrives(place: Place, kind: str) -> None:
     """A publisher keeps its last message for the node, and the node its own for a peer that comes later."""
@@ -143,6 +165,7 @@ def test_what_is_published_before_the_node_or_its_peer_arrives(place: Place, kin
             assert node.stop() == 0
 
 
+@check
 @both_kinds
 def test_all_that_is_lost_is_counted(place: Place, kind: str) -> None:
     """The process of ROS stands still while a peer with a short queue sends; each message arrives or is counted."""
@@ -161,13 +184,14 @@ def test_all_that_is_lost_is_counted(place: Place, kind: str) -> None:
         while came[-1] != MESSAGES:
             came.append(place.number(peer.take()[1]))
         assert node.stop() == 0
-    received, dropped, sent, lost = counts(node)
+    received, dropped, sent, lost = counts(node, "image_in")
     assert received + lost == MESSAGES + 1
     assert received == dropped + sent
     assert len(came) == sent and came == sorted(came)
     assert lost > 0
 
 
+@check
 @both_kinds
 def test_a_peer_with_another_type_is_reported_once(place: Place, kind: str) -> None:
     told = "no messages are exchanged"
@@ -182,3 +206,57 @@ def test_a_peer_with_another_type_is_reported_once(place: Place, kind: str) -> N
         assert ["/image_in" in line for line in said] == [True, False]
         assert ["/text_in" in line for line in said] == [False, True]
         assert node.stop() == 0
+
+
+@check
+@both_kinds
+def test_counts_are_published_as_diagnostics(place: Place, kind: str) -> None:
+    """Two strings are in the counts of some later second; what was lost is a warning there, and only then."""
+    image = place.type("sensor_msgs/Image")
+    script = str(Path(__file__).with_name("diagnostics_peer.py"))
+    command = [place.ros.python, script, str(place.ros.version)]
+    with (
+        place.node(kind) as node,
+        Peer(place.ros, {"/image_out": image}, {"/image_in": f"{image} depth=3"}) as peer,
+        subprocess.Popen(command, env=dict(place.ros.environment), stdout=subprocess.PIPE, text=True) as watcher,
+    ):
+        try:
+            assert watcher.stdout
+            statuses = (json.loads(line) for line in watcher.stdout)
+            peer.wait_until_connected()
+            first = next(statuses)
+            assert (first["name"], first["level"]) == ("qos_echo: node", 0)
+            for number in range(2):
+                peer.publish("/image_in", place.image(number))
+                peer.take()
+            with stopped(node):
+                for number in range(2, MESSAGES):
+                    peer.publish("/image_in", place.image(number))
+                peer.wait_until_published()
+            warning = next(status for status in statuses if status["level"])
+            calm = next(status for status in statuses if not status["level"])
+        finally:
+            watcher.kill()
+        assert node.stop() == 0
+    prefix = "image_in " if kind == "live" else ""
+    assert warning["level"] == 1
+    assert int(first["values"][prefix + "received"]) == 0
+    received, dropped, sent, lost = counts(node, "image_in")
+    expected = {"received": received, "dropped": dropped, "sent": sent, "lost": lost}
+    assert {name: int(calm["values"][prefix + name]) for name in expected} == expected
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("depth", [100, 1000])
+@both_kinds
+def test_a_thousand_messages_a_second(place: Place, kind: str, depth: int) -> None:
+    """Each message comes back or is counted; how many do depends on the machine, and is printed."""
+    with place.angles(kind, "--depth", str(depth)) as node:
+        (found,) = paced(place.ros, RATE, SECONDS, [("/QuaternionToEuler_sub", "/QuaternionToEuler_pub")])
+        assert node.stop() == 0
+    received, dropped, sent, lost = counts(node, "QuaternionToEuler_sub")
+    came = len(found["z"])
+    print(f"ROS {place.ros.version}, {kind}, {depth}: sent {found['sent']}, came {came}, {dropped=}, {lost=}")
+    assert found["sent"] == RATE * SECONDS == received + lost
+    assert received == dropped + sent
+    assert came == sent

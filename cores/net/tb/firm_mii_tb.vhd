@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A board with the pins of an MII that sends back each good frame. A row of the file is a burst of nibbles on the line
--- to the board: the idle nibbles before it, the nibble at which the PHY reports an error or -1, the number of nibbles,
--- and the nibbles. What the board sends goes to a file in the same form. The clocks are unrelated.
+-- A board with the pins of an MII or a GMII that sends back each good frame. A row of the file is a burst on the line
+-- to the board, in units of nibbles or bytes: the idle ones before it, the one at which the PHY reports an error or -1,
+-- the number, and the values. What the board sends goes to a file in the same form. The clocks are unrelated.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -11,6 +11,7 @@ use firm.firm_sim_pkg.all;
 
 entity firm_mii_tb is
   generic (
+    IS_GMII       : boolean := false;
     LINE_FILE     : string  := "nibbles.txt";
     RESULT_FILE   : string  := "sent.txt";
     EXPECTED_FILE : string  := "";
@@ -24,7 +25,7 @@ end entity firm_mii_tb;
 architecture simulation of firm_mii_tb is
 
   -- Of the line, at the end: the longest frame and some more.
-  constant LAST_NIBBLES : positive := 4000;
+  constant LAST_UNITS : positive := 4000;
 
   signal clk      : std_logic := '0';
   signal rx_clk   : std_logic;
@@ -32,12 +33,13 @@ architecture simulation of firm_mii_tb is
   signal rst_n    : std_logic := '0';
   signal over     : boolean   := false;
 
-  signal mii_rx_dv : std_logic                    := '0';
-  signal mii_rx_er : std_logic                    := '0';
-  signal mii_rxd   : std_logic_vector(3 downto 0) := x"0";
-  signal mii_tx_en : std_logic;
-  signal mii_tx_er : std_logic;
-  signal mii_txd   : std_logic_vector(3 downto 0);
+  -- The pins; an MII has the lower four of data.
+  signal pin_rx_dv : std_logic                    := '0';
+  signal pin_rx_er : std_logic                    := '0';
+  signal pin_rxd   : std_logic_vector(7 downto 0) := x"00";
+  signal pin_tx_en : std_logic;
+  signal pin_tx_er : std_logic;
+  signal pin_txd   : std_logic_vector(7 downto 0);
 
   signal rx_step : std_logic;
   signal rx_dv   : std_logic;
@@ -72,37 +74,70 @@ begin
       clk       => rx_clk
     );
 
-  u_tx_clock : entity firm.firm_sim_clock
-    generic map (
-      PERIOD_PS => PHY_PERIOD_PS,
-      SEED      => SEED + 1
-    )
-    port map (
-      reference => clk,
-      clk       => tx_clk
-    );
+  if_mii : if not IS_GMII generate
 
-  u_mii : entity firm.firm_mii
-    port map (
-      clk        => clk,
-      rst_n      => rst_n,
-      mii_rx_clk => rx_clk,
-      mii_rx_dv  => mii_rx_dv,
-      mii_rx_er  => mii_rx_er,
-      mii_rxd    => mii_rxd,
-      mii_tx_clk => tx_clk,
-      mii_tx_en  => mii_tx_en,
-      mii_tx_er  => mii_tx_er,
-      mii_txd    => mii_txd,
-      rx_step    => rx_step,
-      rx_dv      => rx_dv,
-      rx_er      => rx_er,
-      rxd        => rxd,
-      tx_step    => tx_step,
-      tx_en      => tx_en,
-      tx_er      => tx_er,
-      txd        => txd
-    );
+    u_tx_clock : entity firm.firm_sim_clock
+      generic map (
+        PERIOD_PS => PHY_PERIOD_PS,
+        SEED      => SEED + 1
+      )
+      port map (
+        reference => clk,
+        clk       => tx_clk
+      );
+
+    u_mii : entity firm.firm_mii
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        mii_rx_clk => rx_clk,
+        mii_rx_dv  => pin_rx_dv,
+        mii_rx_er  => pin_rx_er,
+        mii_rxd    => pin_rxd(3 downto 0),
+        mii_tx_clk => tx_clk,
+        mii_tx_en  => pin_tx_en,
+        mii_tx_er  => pin_tx_er,
+        mii_txd    => pin_txd(3 downto 0),
+        rx_step    => rx_step,
+        rx_dv      => rx_dv,
+        rx_er      => rx_er,
+        rxd        => rxd,
+        tx_step    => tx_step,
+        tx_en      => tx_en,
+        tx_er      => tx_er,
+        txd        => txd
+      );
+
+    pin_txd(7 downto 4) <= x"0";
+
+  end generate if_mii;
+
+  if_gmii : if IS_GMII generate
+
+    tx_clk <= clk;
+
+    u_gmii : entity firm.firm_gmii
+      port map (
+        clk         => clk,
+        rst_n       => rst_n,
+        gmii_rx_clk => rx_clk,
+        gmii_rx_dv  => pin_rx_dv,
+        gmii_rx_er  => pin_rx_er,
+        gmii_rxd    => pin_rxd,
+        gmii_tx_en  => pin_tx_en,
+        gmii_tx_er  => pin_tx_er,
+        gmii_txd    => pin_txd,
+        rx_step     => rx_step,
+        rx_dv       => rx_dv,
+        rx_er       => rx_er,
+        rxd         => rxd,
+        tx_step     => tx_step,
+        tx_en       => tx_en,
+        tx_er       => tx_er,
+        txd         => txd
+      );
+
+  end generate if_gmii;
 
   u_receiver : entity firm.firm_mac_receiver
     port map (
@@ -165,15 +200,15 @@ begin
     variable idle   : integer;
     variable fault  : integer;
     variable size   : integer;
-    variable nibble : integer;
+    variable value  : integer;
 
     procedure show(dv : in std_logic; er : in std_logic; value : in natural) is
     begin
       -- As a PHY: off the rising edge.
       wait until falling_edge(rx_clk);
-      mii_rx_dv <= dv;
-      mii_rx_er <= er;
-      mii_rxd   <= std_logic_vector(to_unsigned(value, 4));
+      pin_rx_dv <= dv;
+      pin_rx_er <= er;
+      pin_rxd   <= std_logic_vector(to_unsigned(value, 8));
     end procedure show;
 
   begin
@@ -194,15 +229,15 @@ begin
         show('0', '0', 0);
       end loop;
       for place in 0 to size-1 loop
-        read(row, nibble);
+        read(row, value);
         if place = fault then
-          show('1', '1', nibble);
+          show('1', '1', value);
         else
-          show('1', '0', nibble);
+          show('1', '0', value);
         end if;
       end loop;
     end loop;
-    for place in 1 to LAST_NIBBLES loop
+    for place in 1 to LAST_UNITS loop
       show('0', '0', 0);
     end loop;
     over <= true;
@@ -221,9 +256,9 @@ begin
     while not over loop
       wait until rising_edge(tx_clk) or over;
       next when over or rst_n = '0';
-      if mii_tx_en = '1' then
-        write(content, ' ' & integer'image(to_integer(unsigned(mii_txd))));
-        if mii_tx_er = '1' and fault = -1 then
+      if pin_tx_en = '1' then
+        write(content, ' ' & integer'image(to_integer(unsigned(pin_txd))));
+        if pin_tx_er = '1' and fault = -1 then
           fault := size;
         end if;
         size := size + 1;

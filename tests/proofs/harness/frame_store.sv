@@ -2,9 +2,9 @@
 // The store of frames from a line that cannot wait: each good frame leaves whole, once and in order, or is reported as
 // lost; no byte of an aborted frame leaves; a frame that leaves does not pause.
 //
-// Assumed: the first cycle is a reset, and no other is. A byte contains whether its frame will be aborted, the number of
-// the good frames before it, and its own number, of which only the lowest bits are kept: the store does not look at
-// data, so that what holds for these holds for all.
+// Assumed: the first cycle is a reset, and no other is; a frame has up to four bytes, which is more than fit into the
+// smallest store. A byte contains whether its frame will be aborted, the number of the good frames before it, and its
+// own number: the store does not look at data, so that what holds for these holds for all.
 module frame_store (input clk);
 
 localparam BYTE_BITS  = 2;
@@ -41,7 +41,6 @@ always @(posedge clk) begin
         is_bad_r <= is_bad;
     end
 end
-// A longer frame would begin its numbers anew.
 always @* if (running && s_axis_tvalid && place == 3) assume (s_axis_tlast);
 
 firm_mac_store dut (

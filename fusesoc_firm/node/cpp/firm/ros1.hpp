@@ -73,6 +73,7 @@ class RawCallback : public ros::SubscriptionCallbackHelper {
 // A node of ROS 1.
 class Ros1 {
  public:
+  static constexpr unsigned kVersion = 1;
   static constexpr bool kHasQuality = false;
   // Only messages with a Header have numbers.
   static constexpr bool kCountsDrops = false;

@@ -91,6 +91,7 @@ inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
 // A node of ROS 2.
 class Ros2 {
  public:
+  static constexpr unsigned kVersion = 2;
   static constexpr bool kHasQuality = true;
   // All messages have numbers.
   static constexpr bool kCountsDrops = true;
@@ -189,7 +190,11 @@ class Ros2 {
   }
 
   // Return how many messages are missing between those that arrived, by the numbers of each publisher.
-  std::uint64_t lost() const { return lost_; }
+  std::uint64_t lost() const {
+    std::uint64_t sum = lost_;
+    for (const auto& subscription : subscriptions_) sum += subscription->lost;
+    return sum;
+  }
 
   // Take no more messages.
   void unsubscribe() {

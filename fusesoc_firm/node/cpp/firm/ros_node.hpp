@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include <firm/diagnostics.hpp>
 #include <firm/node.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/status.hpp>
@@ -55,6 +56,7 @@ struct System {
   std::string digest;  // empty if the status is not read by frames
   std::vector<Topic> subscribers;
   std::vector<Topic> publishers;
+  Topic diagnostics;
   Software software{};
 
   bool has_software() const { return !software.inputs.empty(); }
@@ -349,7 +351,13 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   std::optional<RunningNode> software;
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
+  Diagnosis diagnosis(ros, system.diagnostics);
   while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
+    diagnosis.tell([&] {
+      std::vector<Report> reports{report_of(system.name + ": node", engines.hardware(), ros.lost())};
+      if (engines.software()) reports.push_back(report_of(system.name + ": software", *engines.software()));
+      return reports;
+    });
   }
   // Handle messages that ROS has already received.
   ros.spin(std::chrono::milliseconds(0));
