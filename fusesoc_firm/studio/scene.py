@@ -6,6 +6,7 @@ The picture needs only a text that is YAML; the rest of the specification may be
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import fields
 from typing import Any
 
@@ -63,8 +64,12 @@ def _content(text: str) -> dict[str, Any] | None:
 def _fault(text: str, file: str, fault: Diagnostic) -> dict[str, Any]:
     """Return a fault with the path of the value at its place, if that is in the specification."""
     source = fault.source
-    is_here = source is not None and source.file == file
-    return fault.data() | {"path": path_at(text, source.line, source.column) if source and is_here else None}
+    path = None
+    if source and source.file == file:
+        # A text that exceeds the limits has no nodes.
+        with suppress(InputError):
+            path = path_at(text, source.line, source.column)
+    return fault.data() | {"path": path}
 
 
 def _describe(section: type[Section], found: dict[str, Any]) -> None:

@@ -1,0 +1,61 @@
+"""Every fault of the samples in tests/errors leads to what it concerns: by lines that another YAML library counts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML, YAMLError
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.studio.scene import scene
+from fusesoc_firm.system.system_core import LoadedSystem, load_system
+from fusesoc_firm.system.written.specification import Draft
+
+SAMPLES = Path(__file__).parents[1] / "errors" / "spec"
+
+
+def block_of(text: str, line: int) -> int | None:
+    """The index of the block whose lines contain a line (from 1), or None; the last item may end anywhere."""
+    content: Any = YAML().load(text)
+    blocks = content.get("blocks") if isinstance(content, CommentedMap) else None
+    if not isinstance(blocks, CommentedSeq) or blocks.fa.flow_style():
+        return None
+    first_key = min(
+        (content.lc.key(key)[0] for key in content if content.lc.key(key)[0] > blocks.lc.line), default=10**9
+    )
+    starts = [blocks.lc.item(index)[0] for index in range(len(blocks))]
+    if line - 1 >= first_key:
+        return None
+    return max((index for index, start in enumerate(starts) if start <= line - 1), default=None)
+
+
+def test_faults_lead_to_their_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(SAMPLES)
+    libraries = {ros: MessageLibrary(ros, [Path("messages")]) for ros in (ROS1, ROS2)}
+    seen = 0
+    for path in filter(Path.is_file, sorted(SAMPLES.glob("*.yaml"))):
+        text = path.read_bytes().decode("utf-8-sig", errors="replace")
+
+        def load(text: str, name: str = path.name) -> LoadedSystem:
+            return load_system(Draft(Path(name), text), libraries)
+
+        found = scene(text, path.name, load)
+        assert any(fault["severity"] == "error" for fault in found["faults"]), path
+        if found["specification"] is None:
+            continue
+        for fault in found["faults"]:
+            if fault["path"] is None:
+                assert fault.get("file") != path.name, (path, fault)
+                continue
+            try:
+                block = block_of(text, fault["line"])
+            except YAMLError:
+                continue
+            if block is not None:
+                assert fault["path"][:2] == ["blocks", block], (path, fault)
+                seen += 1
+    assert seen > 100
