@@ -78,7 +78,9 @@ def add_init(commands: Any) -> None:
         help="take at most N messages from the bag (default: 10, or fewer if they are longer than 100,000 bytes)",
     )
     init.add_argument(
-        "--example", metavar="DEMO", help="copy a demo system, such as quat2euler (NAME is then only the folder)"
+        "--example",
+        metavar="DEMO",
+        help="copy a demo system by its name or a word, such as quat2euler or pid (NAME is then only the folder)",
     )
     add_sources(init)
 
@@ -86,21 +88,22 @@ def add_init(commands: Any) -> None:
 def _init(arguments: argparse.Namespace) -> None:
     if arguments.limit and not arguments.from_bag:
         fail("--limit needs --from-bag")
-    if arguments.example:
+    if arguments.example is not None:
         _copy_example(arguments)
     else:
         _start(arguments)
 
 
 def _copy_example(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.scaffold.example import copy_example
+    from fusesoc_firm.system.scaffold.example import copy_example, example_named
     from fusesoc_firm.tools.library_path import demos_root, library_root
 
     if given := [name for name in _DESCRIBING if getattr(arguments, name)]:
         fail(f"an example has no {_OPTIONS.get(given[0], f'--{given[0]}')}", hint="only NAME can be chosen")
-    folder = Path(arguments.name or arguments.example)
-    _print_files(folder, copy_example(arguments.example, folder, demos_root(), library_root()))
-    print(f"next: cd {folder} && firm sim {arguments.example}.yaml")
+    example = example_named(arguments.example, demos_root())
+    folder = Path(arguments.name or example)
+    _print_files(folder, copy_example(example, folder, demos_root(), library_root()))
+    print(f"next: cd {folder} && firm sim {example}.yaml")
 
 
 def _start(arguments: argparse.Namespace) -> None:

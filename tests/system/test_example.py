@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.system.scaffold.example import examples
+from fusesoc_firm.system.scaffold.example import example_named, examples
 from fusesoc_firm.tools.library_path import demos_root
 
 Captured = pytest.CaptureFixture[str]
@@ -30,10 +30,22 @@ def test_a_copy_is_a_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
 
 
 @pytest.mark.parametrize(
+    ("words", "example"),
+    [("pid", "mobile_robot"), ("image", "image_pipeline"), ("Roll", "quat2euler"), ("q", "quat2euler")],
+)
+def test_a_word_may_name_an_example(words: str, example: str) -> None:
+    assert example_named(words, demos_root()) == example
+
+
+@pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--example", "quat2eule"], "did you mean 'quat2euler'"),
-        (["--example", "pid"], "        mobile_robot: Four wheels of a skid-steer robot"),
+        (["--example", "quat2eular"], "did you mean 'quat2euler'"),
+        (["--example", "radar"], "        mobile_robot: Four wheels of a skid-steer robot"),
+        (["--example", "in"], "        sobel: "),
+        (["--example", "m"], "unknown example 'm'"),
+        (["--example", "."], "unknown example '.'"),
+        (["--example", ""], "        sobel: "),
         (["--example", "sobel", "--in", "geometry_msgs/Point"], "an example has no --in"),
         (["--example", "sobel", "--width", "64"], "an example has no --width"),
         (["--example", "sobel", "--from-bag", "drive.bag"], "an example has no --from-bag"),

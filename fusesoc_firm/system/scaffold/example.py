@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 
 from fusesoc_firm.request.core_reader import read_core
@@ -19,22 +21,35 @@ def examples(demos: Path) -> list[str]:
     return sorted(path.name for path in demos.iterdir() if (path / f"{path.name}.core").is_file())
 
 
+def example_named(words: str, demos: Path) -> str:
+    """Return the only demo system whose name begins with the words, or else the only one whose description has them.
+
+    Raise `InputError` if there is none or several.
+    """
+    known = {name: str(read_core(demos / name / f"{name}.core").data["description"]) for name in examples(demos)}
+    named = [name for name in known if name.startswith(words)]
+    described = [name for name, text in known.items() if re.search(rf"\b{re.escape(words)}\b", text, re.IGNORECASE)]
+    if words in known:
+        return words
+    found = named or described
+    if not words or len(found) != 1:
+        fail(f"unknown example '{words}'", hint=_hint(words, known))
+    return found[0]
+
+
 def copy_example(example: str, folder: Path, demos: Path, library: Path) -> list[Path]:
     """Copy a demo system to a new folder as a project, and return its files, relative to `folder`.
 
     `demos` is the folder of the demo systems, and `library` the folder of the generators. May raise `InputError`.
     """
-    if example not in (known := examples(demos)):
-        fail(f"unknown example '{example}'", hint=_hint(example, known, demos))
     with new_folder(folder) as inner:
         shutil.copytree(demos / example, inner, ignore=shutil.ignore_patterns(*_LEFT_OUT), dirs_exist_ok=True)
         write_surroundings(inner, identifier(folder.name), library)
     return files_of(folder)
 
 
-def _hint(example: str, known: list[str], demos: Path) -> str:
+def _hint(words: str, known: Mapping[str, str]) -> str:
     """Return the example that was probably meant, or all examples with what they do."""
-    if near := closest(example, known):
+    if near := closest(words, known):
         return f"did you mean '{near}'?"
-    does = {name: read_core(demos / name / f"{name}.core").data["description"] for name in known}
-    return "legal here:\n" + "\n".join(f"        {name}: {text}" for name, text in does.items())
+    return "legal here:\n" + "\n".join(f"        {name}: {text}" for name, text in known.items())
