@@ -61,7 +61,10 @@ def add_sim(commands: Any) -> None:
     sim.add_argument("--seed", type=natural, metavar="N", help="the seed of the random stalls (default: the core's)")
     sim.add_argument("--waves", action="store_true", help="write a waveform file")
     sim.add_argument(
-        "--options", default="", metavar="TEXT", help="further options for the simulator, such as '-gSTALL_PERCENT=0'"
+        "--options",
+        default="",
+        metavar="TEXT",
+        help="further options for the simulator, with an equals sign: --options=-gSTALL_PERCENT=60",
     )
     detail = sim.add_mutually_exclusive_group()
     detail.add_argument("-v", "--verbose", action="store_true", help="print the tools' output as it appears")
