@@ -69,7 +69,7 @@ class VhdlReader:
         # What is declared in a missing unit is unknown, too, so further messages say nothing.
         if not absent or (self._known.is_complete and not any(name in self._known.generated for name in absent)):
             for text, source in messages:
-                faults.error(text, source, _core_hint(text))
+                faults.error(text, source, _hint(text))
         tree = self._all_entities or self._tree(paths) or self._tree(paths[-1:])
         return [unit for path in paths for unit in tree.units(path, generics)] if tree else []
 
@@ -243,8 +243,10 @@ class _Tree:
         return place(path, int(item.get("line", "1")), int(item.get("col", "1")), len(name), self._lines[path])
 
 
-def _core_hint(text: str) -> str:
-    """Return which core of this package has the unit that GHDL misses, or an empty text."""
+def _hint(text: str) -> str:
+    """Return how the file gets the library `firm` or a unit of it that GHDL misses, or an empty text."""
+    if text.startswith('no declaration for "firm"'):
+        return "write 'library firm;' at the top of the file"
     found = _MISSING_UNIT.match(text)
     if not found or not found[1]:
         return ""

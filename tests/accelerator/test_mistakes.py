@@ -204,6 +204,12 @@ def test_the_core_of_a_missing_unit_is_named() -> None:
     assert fault.hint == "it is in robot:acc:firm_float, on which the accelerator's core must depend"
 
 
+def test_the_library_of_the_arithmetic_is_named() -> None:
+    (fault, *_) = diagnostics("vhdl", "begin\n", "begin\n  u_add : entity firm.firm_float_add port map (clk => clk);\n")
+    assert fault.message.endswith('no declaration for "firm"')
+    assert fault.hint == "write 'library firm;' at the top of the file"
+
+
 def test_without_the_program_the_check_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fusesoc_firm.accelerator.check.find", lambda _: None)
     (warning,) = diagnostics("vhdl", "img", "img")
