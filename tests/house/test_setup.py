@@ -112,6 +112,7 @@ def test_make_without_a_target_lists_them() -> None:
         "test",
         "check",
         "docs",
+        "studio",
         "corpus",
         "bench",
         "bitstream",

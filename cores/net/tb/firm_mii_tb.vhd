@@ -202,13 +202,13 @@ begin
     variable size   : integer;
     variable value  : integer;
 
-    procedure show(dv : in std_logic; er : in std_logic; value : in natural) is
+    procedure show(dv : in std_logic; er : in std_logic; data : in natural) is
     begin
       -- As a PHY: off the rising edge.
       wait until falling_edge(rx_clk);
       pin_rx_dv <= dv;
       pin_rx_er <= er;
-      pin_rxd   <= std_logic_vector(to_unsigned(value, 8));
+      pin_rxd   <= std_logic_vector(to_unsigned(data, 8));
     end procedure show;
 
   begin
