@@ -38,9 +38,9 @@ from fusesoc_firm.tools.library_path import demos_root, docs_root, library_root
 
 # The commands of `firm --help`; commands that are not listed here follow as 'more'.
 GROUPS = {
-    "start": ("init", "system", "studio"),
+    "start": ("init", "system"),
     "run": ("sim", "live", "replay", "emulate"),
-    "look": ("message", "trace", "why", "graph"),
+    "look": ("studio", "message", "trace", "why", "graph"),
     "build": ("build", "test", "query", "affected", "lock", "cache", "path"),
 }
 
