@@ -9,9 +9,11 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
+import os
 import secrets
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,9 @@ from fusesoc_firm.text.yaml_text import SMALL, yaml_data
 
 HOST = "127.0.0.1"
 _PAGE = Path(__file__).parent / "static"
+# The names that a specification may end with, and folders in which nobody writes one.
+_SUFFIXES = (".yaml", ".yml")
+_NO_SOURCES = ("build", "node_modules")
 # The seconds between two looks at the opened files.
 _LOOK = 0.3
 # The largest number of messages in an answer to a search, and of specifications in a list.
@@ -130,7 +135,7 @@ class Studio:
         return web.Response(text=text, content_type="text/html")
 
     async def _files(self, _: web.Request) -> web.Response:
-        return _json({"files": await asyncio.to_thread(lambda: [*self._specifications()])})
+        return _json({"files": await asyncio.to_thread(lambda: [*islice(self._specifications(), _MOST_FILES)])})
 
     async def _grammar(self, _: web.Request) -> web.Response:
         return _json(grammar())
@@ -200,19 +205,22 @@ class Studio:
         if not self._place.is_dir():
             yield self._name(self._place)
             return
-        count = 0
-        for path in sorted(self._folder.rglob("*.yaml")):
-            parts = path.relative_to(self._folder).parts
-            if any(part.startswith(".") or part == "build" for part in parts) or not self._is_inside(path):
-                continue
-            if count < _MOST_FILES and {"project", "blocks"} <= _content(_text(path)).keys():
-                count += 1
-                yield self._name(path)
+        for place, folders, names in os.walk(self._folder):
+            folders[:] = sorted(name for name in folders if name not in _NO_SOURCES and not name.startswith("."))
+            for path in (Path(place, name) for name in sorted(names)):
+                if path.suffix in _SUFFIXES and self._is_inside(path) and _is_specification(path):
+                    yield self._name(path)
 
     def _document(self, name: object) -> Document:
         """Return the open document with a name; raise 404 for files outside the folder and for other files."""
         path = self._folder / str(name)
-        if not name or "\0" in str(name) or path.suffix != ".yaml" or not self._is_inside(path) or not is_file(path):
+        if (
+            not name
+            or "\0" in str(name)
+            or path.suffix not in _SUFFIXES
+            or not self._is_inside(path)
+            or not is_file(path)
+        ):
             raise web.HTTPNotFound(reason="there is no such specification")
         if not self._place.is_dir() and path.resolve() != self._place:
             raise web.HTTPNotFound(reason="only one specification is open")
@@ -283,6 +291,10 @@ def _text(path: Path) -> str:
         if path.stat().st_size <= SMALL.bytes:
             return path.read_text(encoding="utf-8")
     return ""
+
+
+def _is_specification(path: Path) -> bool:
+    return {"project", "blocks"} <= _content(_text(path)).keys()
 
 
 def _content(text: str) -> dict[str, Any]:

@@ -32,6 +32,9 @@ def folder(tmp_path: Path) -> Path:
     (inside / "stimuli.yaml").write_text("- a: {x: 1}\n", encoding="utf-8")
     (tmp_path / "secret.yaml").write_text(TEXT.replace("robot", "hidden"), encoding="utf-8")
     (inside / "link.yaml").symlink_to(tmp_path / "secret.yaml")
+    for name in "build", ".venv", "node_modules":
+        (inside / "arm" / name).mkdir()
+        (inside / "arm" / name / "copy.yaml").write_text(TEXT, encoding="utf-8")
     return inside
 
 
