@@ -1,7 +1,6 @@
 // From a specification to nodes and edges in their places.
 
 import type { Edge, Node } from "@xyflow/svelte";
-import ELK from "elkjs/lib/elk.bundled.js";
 import type { Fault, Path, Scene, Section } from "./api";
 
 export type Kind = "subscriber" | "publisher" | "accelerator" | "software" | "manager";
@@ -12,7 +11,8 @@ export type BlockData = BlockWords & { errors: number; warnings: number };
 export type BlockNode = Node<BlockData, "block">;
 
 const LINE = 17;
-const elk = new ELK();
+// The layout engine is most of the page, so it loads while the server derives the system.
+const engine = import("elkjs/lib/elk.bundled.js").then((module) => new module.default());
 
 const list = (value: unknown): any[] => (Array.isArray(value) ? value : []);
 const isAt = (path: Path | null | undefined, place: Path) =>
@@ -31,17 +31,17 @@ export function kindOf(specification: Section, block: Section): Kind {
   return typeOf(specification, block)?.[0].type === "ROS-SW" ? "software" : "accelerator";
 }
 
-function linesOf(block: Section, scene: Scene): string[] {
+function linesOf(block: Section, specification: Section, derived: Section | null): string[] {
   const found: string[] = [];
   if (block.mode) {
     found.push(String(block.message ?? ""), `topic ${block.topic ?? block.name}`);
     if (block.period) found.push(`period ${block.period}`);
     if (block.queue) found.push(`queue of ${block.queue}`);
-    const converters = Object.values(scene.derived?.Converters ?? {}).flat() as Section[];
+    const converters = Object.values(derived?.Converters ?? {}).flat() as Section[];
     const own = converters.find((item) => item.block === block.name);
     if (own) found.push(`id ${own.id}, payload ${own.payloadBytes} bytes`);
   } else {
-    const type = typeOf(scene.specification!, block)?.[0];
+    const type = typeOf(specification, block)?.[0];
     found.push(type ? `${block.type} (${type.type})` : String(block.type ?? "no type"));
     if (block.clock) found.push(`clock ${block.clock}`);
     const pins = list(type?.pins).map((pin) => pin?.name);
@@ -68,15 +68,19 @@ function nodeOf(id: string, data: BlockWords, faults: Fault[]): BlockNode {
   };
 }
 
-/** The blocks and the two sides of the Manager as nodes, and the connections as edges. */
-export function graphOf(scene: Scene): { nodes: BlockNode[]; edges: Edge[] } {
+/**
+ * The blocks and the two sides of the Manager as nodes, and the connections as edges.
+ *
+ * `derived` are the facts of the last text without faults, so that a fault does not rearrange the picture.
+ */
+export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNode[]; edges: Edge[] } {
   const specification = scene.specification ?? {};
   const project = specification.project ?? {};
   const blocks = list(specification.blocks);
   const nodes = blocks.map((block, index) => {
     const path = ["blocks", index];
     const data = { kind: kindOf(specification, block ?? {}), name: String(block?.name ?? `block ${index + 1}`) };
-    return nodeOf(`block:${index}`, { ...data, lines: linesOf(block ?? {}, scene), path }, faultsAt(scene.faults, path));
+    return nodeOf(`block:${index}`, { ...data, lines: linesOf(block ?? {}, specification, derived), path }, faultsAt(scene.faults, path));
   });
   const manager = (id: string, name: string, lines: string[], faults: Fault[]) =>
     nodeOf(id, { kind: "manager", name, lines, path: ["project"] }, faults);
@@ -111,7 +115,7 @@ function fixed(id: string, source: string, target: string): Edge {
 
 /** Place the nodes, from left to right along the data. */
 export async function placed(nodes: BlockNode[], edges: Edge[]): Promise<BlockNode[]> {
-  const graph = await elk.layout({
+  const graph = await (await engine).layout({
     id: "root",
     layoutOptions: {
       "elk.algorithm": "layered",
