@@ -12,11 +12,9 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.system.written.specification import Specification
-from fusesoc_firm.text.yaml_edit import EditError, insert, put, remove
+from fusesoc_firm.text.yaml_edit import EditError, Path, insert, put, remove, value_at
 from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 from fusesoc_firm.text.yaml_text import yaml_data
-
-Place = Sequence[str | int]
 
 
 def edited(text: str, edit: Mapping[str, Any]) -> str:
@@ -38,7 +36,7 @@ def edited(text: str, edit: Mapping[str, Any]) -> str:
         raise EditError(f"invalid YAML: {error}") from error
 
 
-def section_at(path: Place) -> type[Section]:
+def section_at(path: Path) -> type[Section]:
     """Return the grammar of the section at a path. Raise `EditError` if no section can be there."""
     section: type[Section] = Specification
     steps = iter(path)
@@ -66,7 +64,7 @@ def _set(text: str, edit: Mapping[str, Any]) -> str:
     path, name, value = _path(edit["path"]), edit["key"], edit.get("value")
     section = section_at(path)
     entry = _key(section, name)
-    there = _at(yaml_data(text), path)
+    there = value_at(yaml_data(text), path)
     # The author may use another spelling of the key.
     name = next((spelling for spelling in entry.aliases if spelling in there), name)
     if value is None or value in ("", []):
@@ -99,7 +97,7 @@ def _add(text: str, edit: Mapping[str, Any]) -> str:
     assert entry.section
     for name in value:
         _key(entry.section, name)
-    items = _at(yaml_data(text), path[:-1]).get(path[-1])
+    items = value_at(yaml_data(text), path[:-1]).get(path[-1])
     if not items:
         return put(text, path, [value], [*keys_of(section)])
     index = edit.get("index", len(items))
@@ -113,7 +111,7 @@ def _remove(text: str, edit: Mapping[str, Any]) -> str:
     if not path or not isinstance(path[-1], int):
         raise EditError("'remove' needs the path of a list's item")
     section_at(path)
-    name = _at(yaml_data(text), path).get("name")
+    name = value_at(yaml_data(text), path).get("name")
     text = _without(text, path)
     if len(path) == 2 and path[0] == "blocks":
         # From the end, so that the other places stay.
@@ -122,9 +120,9 @@ def _remove(text: str, edit: Mapping[str, Any]) -> str:
     return text
 
 
-def _without(text: str, path: Place) -> str:
+def _without(text: str, path: Path) -> str:
     """Return the text without an item, and without its list's key if the list may be missing."""
-    siblings = _at(yaml_data(text), path[:-1])
+    siblings = value_at(yaml_data(text), path[:-1])
     parent = path[:-2]
     is_optional = len(path) > 1 and not _key(section_at(parent), path[-2]).is_required
     return remove(text, path[:-1] if is_optional and len(siblings) == 1 else path)
@@ -133,13 +131,13 @@ def _without(text: str, path: Place) -> str:
 def _rename(text: str, edit: Mapping[str, Any]) -> str:
     path, new = _path(edit["path"]), str(edit["name"])
     section_at(path)
-    old = _at(yaml_data(text), path).get("name")
+    old = value_at(yaml_data(text), path).get("name")
     for place in [[*path, "name"], *_references(text, path, old)]:
         text = put(text, place, new)
     return text
 
 
-def _references(text: str, path: Place, name: object) -> Iterator[Place]:
+def _references(text: str, path: Path, name: object) -> Iterator[Path]:
     """Yield the places that refer to the named item at a path."""
     data = yaml_data(text)
     blocks = [(number, block) for number, block in enumerate(_list(data, "blocks")) if isinstance(block, dict)]
@@ -157,14 +155,14 @@ def _references(text: str, path: Place, name: object) -> Iterator[Place]:
             yield from (("blocks", number, "clock") for number, block in blocks if _is(block.get("clock"), name))
 
 
-def _named(items: Sequence[Any], name: object) -> Iterator[Place]:
+def _named(items: Sequence[Any], name: object) -> Iterator[Path]:
     """Yield the places of a name among the items of a list."""
     for number, item in enumerate(items):
         if isinstance(item, dict) and _is(item.get("name"), name):
             yield [number, "name"]
 
 
-def _members(group: Any, name: object) -> Iterator[Place]:
+def _members(group: Any, name: object) -> Iterator[Path]:
     """Yield the places of a publisher in a group; a single one may stand without brackets."""
     if isinstance(group, dict) and _is(group.get("publishers"), name):
         yield ["publishers"]
@@ -197,7 +195,7 @@ def _block(text: str, name: str) -> int:
     raise EditError(f"there is no block '{name}'")
 
 
-def _item(place: Place) -> Place:
+def _item(place: Path) -> Path:
     """Return the place of the list's item that refers to another one."""
     return place[:-1] if place[-1] == "name" else place
 
@@ -213,21 +211,12 @@ def _path(path: object) -> list[str | int]:
     return path
 
 
-def _at(data: Any, path: Place) -> Any:
-    for step, part in enumerate(path):
-        try:
-            data = data[part]
-        except (LookupError, TypeError):
-            raise EditError(f"there is no {'.'.join(map(str, path[: step + 1]))}") from None
-    return data
-
-
 def _list(data: Any, name: str) -> list[Any]:
     found = data.get(name) if isinstance(data, dict) else None
     return found if isinstance(found, list) else []
 
 
-def _order(place: Place) -> tuple[tuple[str, int], ...]:
+def _order(place: Path) -> tuple[tuple[str, int], ...]:
     return tuple((part, 0) if isinstance(part, str) else ("", part) for part in place)
 
 

@@ -15,10 +15,10 @@ import yaml
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.views.show import derived_description
 from fusesoc_firm.system.written.specification import Specification
-from fusesoc_firm.text.diagnostics import Diagnostic, InputError
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError
 from fusesoc_firm.text.yaml_edit import path_at
 from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
-from fusesoc_firm.text.yaml_text import yaml_data
+from fusesoc_firm.text.yaml_text import parse_yaml, yaml_data
 
 Load = Callable[[str], LoadedSystem]
 """Derives the system of a text in the specification's place. May raise `InputError`."""
@@ -39,9 +39,10 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
         derived = derived_description(loaded.system)
     except InputError as error:
         diagnostics = error.diagnostics
+    root = _root(text)
     return {
-        "specification": _content(text),
-        "faults": [_fault(text, file, item) for item in diagnostics],
+        "specification": content_of(text),
+        "faults": [_fault(root, file, item) for item in diagnostics],
         "derived": derived,
     }
 
@@ -53,7 +54,8 @@ def grammar() -> dict[str, Any]:
     return found
 
 
-def _content(text: str) -> dict[str, Any] | None:
+def content_of(text: str) -> dict[str, Any] | None:
+    """Return the mapping in a text, or None if the text is anything else."""
     try:
         content = yaml_data(text)
     except yaml.YAMLError:
@@ -61,14 +63,18 @@ def _content(text: str) -> dict[str, Any] | None:
     return content if isinstance(content, dict) else None
 
 
-def _fault(text: str, file: str, fault: Diagnostic) -> dict[str, Any]:
+def _root(text: str) -> yaml.Node | None:
+    """Return the root of a text, or of the part above the place from which it is invalid YAML."""
+    # A text that exceeds the limits has no nodes.
+    with suppress(InputError):
+        return parse_yaml(text, "", Diagnostics()).root
+    return None
+
+
+def _fault(root: yaml.Node | None, file: str, fault: Diagnostic) -> dict[str, Any]:
     """Return a fault with the path of the value at its place, if that is in the specification."""
     source = fault.source
-    path = None
-    if source and source.file == file:
-        # A text that exceeds the limits has no nodes.
-        with suppress(InputError):
-            path = path_at(text, source.line, source.column)
+    path = path_at(root, source.line, source.column) if root and source and source.file == file else None
     return fault.data() | {"path": path}
 
 

@@ -17,16 +17,15 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import yaml
 from aiohttp import WSMsgType, web
 
 from fusesoc_firm.studio.document import Document
-from fusesoc_firm.studio.scene import grammar, scene
+from fusesoc_firm.studio.scene import content_of, grammar, scene
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
 from fusesoc_firm.text.files import is_file
 from fusesoc_firm.text.yaml_edit import EditError
-from fusesoc_firm.text.yaml_text import SMALL, yaml_data
+from fusesoc_firm.text.yaml_text import SMALL
 
 HOST = "127.0.0.1"
 _PAGE = Path(__file__).parent / "static"
@@ -149,7 +148,7 @@ class Studio:
         """Search all messages for the words of a query."""
         document = self._document(request.query.get("file", ""))
         words = request.query.get("query", "").lower().split()
-        found = _content(document.text).get("paths") or []
+        found = (content_of(document.text) or {}).get("paths") or []
         paths = [str(item) for item in found] if isinstance(found, list) else [str(found)]
         async with self._turn:
             names = await asyncio.to_thread(self._names, document.path, paths)
@@ -294,12 +293,4 @@ def _text(path: Path) -> str:
 
 
 def _is_specification(path: Path) -> bool:
-    return {"project", "blocks"} <= _content(_text(path)).keys()
-
-
-def _content(text: str) -> dict[str, Any]:
-    with suppress(yaml.YAMLError, InputError):
-        content = yaml_data(text)
-        if isinstance(content, dict):
-            return content
-    return {}
+    return {"project", "blocks"} <= (content_of(_text(path)) or {}).keys()

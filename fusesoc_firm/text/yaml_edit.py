@@ -86,14 +86,10 @@ def word(answer: str) -> str:
     return answer if is_plain and answer.isprintable() else json.dumps(answer)
 
 
-def path_at(text: str, line: int, column: int) -> list[str | int]:
-    """Return the path of the last value that starts at or before a place, counted from 1.
-
-    If the text becomes invalid YAML, the path leads into the part above.
-    """
+def path_at(node: yaml.Node | None, line: int, column: int) -> list[str | int]:
+    """Return the path, below a file's root, of the last value that starts at or before a place, counted from 1."""
     place = (line - 1, column - 1)
     found: list[str | int] = []
-    node = parse_yaml(text, "", Diagnostics()).root
     while isinstance(node, yaml.CollectionNode):
         child = None
         for number, item in enumerate(node.value):
@@ -149,13 +145,19 @@ def _separate(data: Any) -> Any:
     return [*map(_separate, data)] if isinstance(data, list) else data
 
 
-def _inside(data: Any, path: Path) -> Any:
-    """Return the mapping or list at a path."""
+def value_at(data: Any, path: Path) -> Any:
+    """Return the value at a path. Raise `EditError` if the path leads nowhere."""
     for step, part in enumerate(path):
         try:
             data = data[part]
         except (LookupError, TypeError):
             raise EditError(f"there is no {_name(path[: step + 1])}") from None
+    return data
+
+
+def _inside(data: Any, path: Path) -> Any:
+    """Return the mapping or list at a path."""
+    data = value_at(data, path)
     if not isinstance(data, dict | list):
         raise EditError(f"{_name(path)} is neither a mapping nor a list")
     return data
@@ -284,15 +286,14 @@ class _Source:
         if first == len(old) - last:
             return self._insert_items(node, first, added)
         removed = self._lines(self._dash(node, first), self._extent(node.value[len(old) - last - 1])[1])
-        lines = [line for value in added for line in self._item_lines(value, node.start_mark.column)]
-        return _Change(removed.start, removed.end, "".join(line + self._line_end for line in lines))
+        return _Change(removed.start, removed.end, self._whole(self._items_lines(node, added)))
 
     def _insert_items(self, node: yaml.CollectionNode, index: int, values: Sequence[Any]) -> _Change:
-        lines = [line for value in values for line in self._item_lines(value, node.start_mark.column)]
+        lines = self._items_lines(node, values)
         if index:
             return self._new_lines(self._extent(node.value[index - 1])[1], lines)
         start = self._line_start(self._dash(node, 0))
-        return _Change(start, start, "".join(line + self._line_end for line in lines))
+        return _Change(start, start, self._whole(lines))
 
     def _dash(self, node: yaml.CollectionNode, index: int) -> int:
         """Return the place of the dash of an item."""
@@ -357,6 +358,13 @@ class _Source:
             return [f"{indent}- {_flow(value)}"]
         lines = [line for key, item in value.items() for line in self._key_lines(str(key), item, column + 2)]
         return [f"{indent}- {lines[0].lstrip()}", *lines[1:]]
+
+    def _items_lines(self, node: yaml.CollectionNode, values: Sequence[Any]) -> list[str]:
+        """Return the lines of further items of a list."""
+        return [line for value in values for line in self._item_lines(value, node.start_mark.column)]
+
+    def _whole(self, lines: Sequence[str]) -> str:
+        return "".join(line + self._line_end for line in lines)
 
     def _new_lines(self, end: int, lines: Sequence[str]) -> _Change:
         """Return the change that adds lines below the line with a place."""
