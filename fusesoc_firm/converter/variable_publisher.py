@@ -53,6 +53,9 @@ _ZEROS = "(others => '0')"
 _ALWAYS = ""
 # From here on, the multiplexer of all words has so many levels that nothing may follow it.
 _MANY_PLACES = 80
+# The words of a longer block are selected a cycle ahead, in groups of 2**6 words, or of 2**7 if words are wide.
+_MANY_WORDS = 64
+_WIDE_WORD = 32
 
 
 def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> Context:
@@ -104,6 +107,7 @@ class _Publisher:
             "early_bits": 8 * self._early_bytes,
             "is_length_parted": self._early_bytes < LENGTH_BYTES,
             "pieces": list(self._pieces()),
+            **self._ahead_keys(),
             "supplies": _gathered(self._supplies()),
             "sizes": [size for size in _gathered(self._sizes()) if int(size["size"].strip('"'), 2)],
             **self._repeats(),
@@ -142,6 +146,33 @@ class _Publisher:
         ]
         found += [(self.width * area.first, self.width, port.axis("tdata")) for area, port in self._streams]
         return sorted(found)
+
+    def _ahead_keys(self) -> Context:
+        """The ranges of bits whose words are selected a cycle ahead, and the other ranges.
+
+        The first word of a long block is not among them: its place waits for the block's values, which then stay valid.
+        """
+        ends = [0, *(area.last + 1 for area in self._long_areas)]
+        starts = [*(area.first + 1 for area in self._long_areas), self.places.end + 1]
+        ahead = [
+            {
+                **self._word_range(area.first + 1, area.last),
+                "number": number,
+                "words": area.last - area.first,
+                "is_running": _within(area.first, area.last - 1),
+                "is_ahead": _within(area.first + 1, area.last),
+            }
+            for number, area in enumerate(self._long_areas)
+        ]
+        direct = [self._word_range(end, start - 1) for end, start in zip(ends, starts, strict=True)]
+        return {"ahead": ahead, "direct": direct, "group_bits": 7 if self.width > _WIDE_WORD else 6}
+
+    def _word_range(self, first: int, last: int) -> Context:
+        return {"high": self.width * (last + 1) - 1, "low": self.width * first}
+
+    @cached_property
+    def _long_areas(self) -> list[Area]:
+        return [area for area in self.places.areas_of(Block) if area.last - area.first >= _MANY_WORDS]
 
     def _values(self, step: Step) -> Iterator[tuple[int, int, str]]:
         """(offset, bytes, value) of all nonzero values of a step."""
@@ -244,7 +275,7 @@ class _Publisher:
 
     def _count_words(self) -> list[Context]:
         """The words of streams' counts, if a tree of their own is faster: that of all words has many levels."""
-        if self.places.end < _MANY_PLACES:
+        if self.places.end - sum(area.last - area.first for area in self._long_areas) < _MANY_PLACES:
             return []
         places = [place for area in self._data_counts for place in range(area.first, area.last + 1)]
         bits = min(self.width, _COUNTER_BITS)

@@ -100,6 +100,7 @@ def test_the_netlist_of_a_part_does_the_same(tmp_path: Path, part: str) -> None:
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 16, 256])
 def test_every_part_is_latch_free(library: Library, width: int, count: int) -> None:
     assert library.latches("firm_axis_select", {"WORDS": count, "WIDTH": width}) == []
+    assert library.latches("firm_axis_select_ahead", {"WORDS": count, "WIDTH": width, "GROUP_BITS": 2}) == []
     assert library.latches("firm_axis_demux", {"WIDTH": width, "DESTINATIONS": count}) == []
     assert library.latches("firm_axis_mux", {"WIDTH": width, "SOURCES": count}) == []
     assert library.latches("firm_axis_fifo", {"WIDTH": width, "DEPTH": count + 1}) == []

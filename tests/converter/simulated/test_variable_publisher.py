@@ -51,10 +51,16 @@ _KIND_CASES += [(ROS1, f"{PACKAGE}/Times"), (ROS2, f"{PACKAGE}/Wides"), (ROS2, f
 SAMPLE = [case(ros, name, 8) for ros in (ROS1, ROS2) for name in [*_FROM_DISTRIBUTIONS[ros], *_AWKWARD[ros]]]
 SAMPLE += [case(ros, name, 64) for ros in (ROS1, ROS2) for name in _FROM_DISTRIBUTIONS[ros]]
 SAMPLE += [case(ros, name, width) for width in WIDTHS if width > 8 for ros, name in _KIND_CASES]
+# Blocks of so many words that they are selected a cycle ahead: at the end, in the middle, and in an array's elements.
+LONG = [case(ROS2, "nav_msgs/Odometry", width) for width in (8, 64)]
+LONG += [case(ROS1, "sensor_msgs/CameraInfo", 16), case(ROS1, "visualization_msgs/MarkerArray", 8)]
+SAMPLE += LONG
 TROUBLED = [case(ros, name, width) for width in (8, 64) for ros, name in _KIND_CASES]
 TROUBLED += [case(ros, f"{PACKAGE}/Tree", width) for width in (16, 32, 512) for ros in (ROS1, ROS2)]
 TROUBLED += [case(ros, f"sensor_msgs/{name}", 8) for ros in (ROS1, ROS2) for name in ("Image", "PointCloud2")]
+TROUBLED += LONG[:1]
 NETLISTS = [
+    case(ROS2, "sensor_msgs/CameraInfo", 8),
     case(ROS1, "sensor_msgs/Image", 8),
     case(ROS2, "sensor_msgs/JointState", 8),
     case(ROS2, f"{PACKAGE}/Tree", 8),
@@ -111,6 +117,20 @@ def test_a_message_goes_in_any_cycle(
     messages = [each for message in withdrawn for each in (message, second)]
     publisher.run(tmp_path, messages, SEED=SEED)
     publisher.run(tmp_path, messages, SEED=SEED, SINK_STALL_PERCENT=50)
+
+
+@pytest.mark.parametrize(("ros", "name", "width"), LONG[:1])
+def test_a_message_goes_in_its_long_block(
+    bench: PublisherBench, tmp_path: Path, ros: Middleware, name: str, width: int
+) -> None:
+    """No word that was selected ahead gets into the next message."""
+    publisher = bench.publisher(ros, name, width)
+    source = random.Random(SEED)
+    print(f"seed {SEED}")
+    first, second = (publisher.good(value) for value in publisher.values(2, source, [TYPICAL], 3))
+    lifetimes = source.sample(range(len(first.payload) - 680, len(first.payload)), 12)
+    withdrawn = [replace(first, lifetime=cycle, error=SHORT) for cycle in lifetimes]
+    publisher.run(tmp_path, [each for message in withdrawn for each in (message, second)], SEED=SEED)
 
 
 @pytest.mark.one_in(11)
@@ -181,6 +201,20 @@ def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Mid
     assert [end - start for start, end in pairwise(taken)] == [expected] * 2
 
 
+@pytest.mark.parametrize(("ros", "name", "width"), LONG[:1])
+def test_a_long_block_moves_a_beat_a_cycle(
+    bench: PublisherBench, tmp_path: Path, ros: Middleware, name: str, width: int
+) -> None:
+    """The words that are selected ahead take a cycle each, as the others do."""
+    publisher = bench.publisher(ros, name, width)
+    message = publisher.good(publisher.values(1, random.Random(SEED), [TYPICAL])[0])
+    result = publisher.run(tmp_path, [message] * 3, SEED=SEED)
+    taken = [int(cycle) for cycle in re.findall(r"^taken \d+ cycle (\d+)$", result.output, re.MULTILINE)]
+    # Beside the id, the length and the payload: the end, and the openings and the padding of two texts.
+    most = 1 + 4 + len(message.payload) + 1 + 2 * 2
+    assert all(end - start <= most for start, end in pairwise(taken))
+
+
 @pytest.mark.one_in(9)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
@@ -189,6 +223,7 @@ def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Mid
     [
         ("sensor_msgs/Image", ["data", "height"], []),
         ("sensor_msgs/Image", [], ["header", "encoding", "data"]),
+        ("nav_msgs/Odometry", ["pose.covariance", "twist.twist.angular"], []),
         ("sensor_msgs/PointCloud2", ["fields.offset", "data"], []),
         ("sensor_msgs/PointCloud2", [], ["fields"]),
         ("sensor_msgs/JointState", ["header", "effort"], []),
