@@ -43,6 +43,7 @@ architecture rtl of firm_axis_pack is
   constant LANES      : natural  := WIDTH/8;
   constant SHIFT_BITS : natural  := clog2(LANES);
   constant COUNT_BITS : positive := index_bits(LANES+1);
+  constant BYTES_BITS : positive := index_bits(LANES);
 
   subtype count_t is unsigned(COUNT_BITS-1 downto 0);
 
@@ -50,10 +51,14 @@ architecture rtl of firm_axis_pack is
   signal advance : std_logic;  -- the slice takes the available bytes
 
   signal beat_data  : std_logic_vector(WIDTH-1 downto 0);
-  signal beat_keep  : std_logic_vector(LANES-1 downto 0);
-  signal beat_abort : std_logic_vector(0 downto 0);
+  signal beat_abort : std_logic;
   signal beat_last  : std_logic;
   signal beat_valid : std_logic;
+  -- The slice carries the number of a beat's bytes, 0 for all lanes, since that needs fewer registers than `tkeep`; and
+  -- whether the beat is aborted, lowest.
+  signal beat_bytes : std_logic_vector(BYTES_BITS-1 downto 0);
+  signal beat_user  : std_logic_vector(BYTES_BITS downto 0);
+  signal sent_user  : std_logic_vector(BYTES_BITS downto 0);
 
 begin
 
@@ -91,10 +96,10 @@ begin
     end process hold_byte;
 
     beat_data  <= rest_r;
-    beat_keep  <= "1";
+    beat_bytes <= "0";
     beat_valid <= shown;
     beat_last  <= ended_r or not count(0);
-    beat_abort(0) <= abort_r when ended_r = '1' else abort and not count(0);
+    beat_abort <= abort_r when ended_r = '1' else abort and not count(0);
 
   end generate byte_wide;
 
@@ -153,14 +158,14 @@ begin
 
     fill_lanes : for lane in 0 to LANES-1 generate
       waits(lane)     <= not is_below(std_logic_vector(waiting_r), lane+1);
-      beat_keep(lane) <= waits(lane) or not tail_r;
       beat_data(8*lane+7 downto 8*lane) <= rest_r(8*lane+7 downto 8*lane) when waits(lane) = '1' else
                                            turned(8*lane+7 downto 8*lane);
     end generate fill_lanes;
 
     beat_last  <= tail_r;
-    beat_abort(0) <= tail_r and abort_r;
+    beat_abort <= tail_r and abort_r;
     beat_valid <= tail_r or overflow;
+    beat_bytes <= gated(std_logic_vector(waiting_r(SHIFT_BITS-1 downto 0)), tail_r);
 
     move_bytes : process (clk)
     begin
@@ -208,22 +213,31 @@ begin
   -- The assert reports another width.
   legal : if is_stream_width(WIDTH) generate
 
+    beat_user       <= beat_bytes & beat_abort;
+    m_axis_tuser(0) <= sent_user(0);
+
+    mark_lanes : for lane in 0 to LANES-1 generate
+      m_axis_tkeep(lane) <= is_equal(sent_user(BYTES_BITS downto 1), 0) or
+                            not is_below(sent_user(BYTES_BITS downto 1), lane+1);
+    end generate mark_lanes;
+
     u_slice : entity firm.firm_axis_register_slice
       generic map (
-        WIDTH => WIDTH
+        WIDTH     => WIDTH,
+        USER_BITS => BYTES_BITS+1
       )
       port map (
         clk           => clk,
         rst_n         => rst_n,
         s_axis_tdata  => beat_data,
-        s_axis_tkeep  => beat_keep,
-        s_axis_tuser  => beat_abort,
+        s_axis_tkeep  => (others => '1'),
+        s_axis_tuser  => beat_user,
         s_axis_tvalid => beat_valid,
         s_axis_tlast  => beat_last,
         s_axis_tready => advance,
         m_axis_tdata  => m_axis_tdata,
-        m_axis_tkeep  => m_axis_tkeep,
-        m_axis_tuser  => m_axis_tuser,
+        m_axis_tkeep  => open,
+        m_axis_tuser  => sent_user,
         m_axis_tid    => open,
         m_axis_tvalid => m_axis_tvalid,
         m_axis_tlast  => m_axis_tlast,
