@@ -14,7 +14,7 @@ from fusesoc_firm.converter.configuration import publisher_entity, subscriber_en
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
-from fusesoc_firm.converter.pipeline import BORDERS, NONE, pipeline_of
+from fusesoc_firm.converter.pipeline import BORDERS, FULL, NONE, pipeline_of
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
@@ -78,6 +78,7 @@ _REPLACING = ("interconnect", "clock")
 _INCLUDE_SUFFIXES = (".vh", ".svh")
 # Hz. Without register slices, a system in which messages of variable size are passed through reaches 99 MHz on an ECP5.
 _SLICED_ABOVE = 100 * 10**6
+_BYTE_BITS = 8
 
 
 @dataclass(frozen=True)
@@ -241,8 +242,13 @@ def artifacts(loaded: LoadedSystem) -> list[Artifact]:
 
 
 def _least_pipeline(system: DerivedSystem) -> str:
-    """Return the register stages that the frequency of clk needs."""
-    return BORDERS if system.clock is not None and system.clock > _SLICED_ABOVE else NONE
+    """Return the register stages that the frequency of clk needs.
+
+    A window of several bytes has a shifter, so its paths to the fields' registers are longer than at 8 bits.
+    """
+    if system.clock is None or system.clock <= _SLICED_ABOVE:
+        return NONE
+    return BORDERS if system.width == _BYTE_BITS else FULL
 
 
 def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:

@@ -151,8 +151,8 @@ class Project(Section):
         is_asked=False,
     )
     pipeline: Text | None = key(
-        "register stages of subscribers of variable size (default: borders if clock is above 100 MHz, otherwise none;"
-        " full for messages with more than 256 bytes of fields)",
+        "register stages of subscribers of variable size (default: none; if clock is above 100 MHz, borders at 8"
+        " bits and full at more; full for messages with more than 256 bytes of fields)",
         choices=PIPELINES,
         is_asked=False,
     )
