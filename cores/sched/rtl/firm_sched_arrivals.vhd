@@ -64,6 +64,7 @@ architecture rtl of firm_sched_arrivals is
   signal next_row      : row_t;
   signal row_asks      : columns_t;  -- requests of the next row
   signal row_accepted  : columns_t;
+  signal read_finished : columns_t;
   signal row_finished  : columns_t;
   signal row_known     : columns_t;
   signal row_new       : columns_t;
@@ -77,12 +78,17 @@ architecture rtl of firm_sched_arrivals is
   signal padded_id       : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
   signal finished_row    : row_t;
   signal finished_column : columns_t;
-  signal own_of_next     : columns_t;  -- the column of the one that may finish, if it is in the next row
-  signal own_of_batch    : columns_t;  -- the same, if it is in that of the batch
-  signal forgets         : std_logic;
-  signal finish_task     : std_logic;
-  signal old_finished    : columns_t;
-  signal new_finished    : columns_t;
+  signal is_in_next      : std_logic;  -- the one that may finish is in the next row
+  signal own_of_next     : columns_t;  -- its column, if it is
+  signal own_of_batch    : columns_t;  -- the same, if it is in the row of the batch
+  signal is_known        : std_logic;
+
+  -- A task that has finished in the last cycle and was known is recorded in this one.
+  signal finish_r          : std_logic;
+  signal finished_row_r    : row_t;
+  signal finished_column_r : columns_t;
+  signal old_finished      : columns_t;
+  signal new_finished      : columns_t;
 
 begin
 
@@ -118,21 +124,25 @@ begin
       word     => row_asks
     );
 
-  -- Its columns. The request of the one that finishes is its last beat's, not a new task's. Since `finished` arrives
-  -- late, all depends on it only at the end.
+  -- Its columns. The request of the one that finishes is its last beat's, not a new task's. `finished` arrives late, so
+  -- that it only keeps the task out of the batch. The memories count the task as accepted, and record its end a cycle
+  -- later; a row that is read in that cycle already includes it.
 
   padded_id       <= std_logic_vector(resize(unsigned(finished_id), ROW_BITS+COLUMN_BITS));
   finished_row    <= padded_id(ROW_BITS+COLUMN_BITS-1 downto COLUMN_BITS);
   finished_column <= decode(padded_id(COLUMN_BITS-1 downto 0), '1', COLUMNS);
-  own_of_next     <= finished_column when found_row = finished_row else (others => '0');
+  is_in_next      <= '1' when found_row = finished_row else '0';
+  own_of_next     <= gated(finished_column, is_in_next);
   own_of_batch    <= finished_column when row_r = finished_row else (others => '0');
 
+  row_finished <= read_finished xor finished_column_r when finish_r = '1' and next_row = finished_row_r else
+                  read_finished;
   row_known    <= row_accepted xor row_finished;
-  row_new      <= row_asks and not row_known and not gated(own_of_next, finished);
+  row_new      <= row_asks and not row_known;
   load         <= not (any_of(batch_r) or clearing);
 
   accept_row   <= load or clearing;
-  new_accepted <= row_finished when clearing = '1' else row_finished xor (row_known or row_new);
+  new_accepted <= row_finished when clearing = '1' else row_finished xor (row_known or row_asks);
 
   u_accepted : entity firm.firm_sched_ram
     generic map (
@@ -147,10 +157,18 @@ begin
       write_word   => new_accepted
     );
 
-  -- A finished requester is no longer known. A task that is dropped was known, too.
-  forgets      <= any_of(batch_r and own_of_batch);
-  finish_task  <= finished and (finished_known or forgets);
-  new_finished <= old_finished xor finished_column;
+  -- A finished requester is no longer known. A task that is dropped was known, too, or becomes known in this cycle.
+  is_known     <= finished_known or any_of(batch_r and own_of_batch) or (load and is_in_next);
+  new_finished <= old_finished xor finished_column_r;
+
+  hold_finished : process (clk)
+  begin
+    if rising_edge(clk) then
+      finish_r          <= finished and is_known and rst_n;
+      finished_row_r    <= finished_row;
+      finished_column_r <= finished_column;
+    end if;
+  end process hold_finished;
 
   u_finished : entity firm.firm_sched_ram_2
     generic map (
@@ -159,12 +177,12 @@ begin
     )
     port map (
       clk          => clk,
-      address      => finished_row,
+      address      => finished_row_r,
       read_word    => old_finished,
-      write_enable => finish_task,
+      write_enable => finish_r,
       write_word   => new_finished,
       address_2    => next_row,
-      read_word_2  => row_finished
+      read_word_2  => read_finished
     );
 
   hold_batch : process (clk)
@@ -185,7 +203,7 @@ begin
         end if;
         batch_r <= staying;
         if load = '1' and any_of(rows_that_ask) = '1' then
-          batch_r <= row_new;
+          batch_r <= row_new and not gated(own_of_next, finished);
           row_r   <= found_row;
         end if;
         if clearing = '1' then
