@@ -97,7 +97,7 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
     """Return the overheads of the core of a policy (cores/sched).
 
     A scheduler that chooses among all requests at once needs one cycle, or two if it compares times. A scheduler with a
-    queue accepts one request in each cycle. Each request may cause three operations of the queue: the request is
+    queue needs three, and accepts one request in each cycle. Each request may cause three operations of the queue: the request is
     inserted, the interrupted task is inserted, and the next task is removed. In a heap, each operation takes two
     cycles.
     """
@@ -106,7 +106,7 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
     run, resume = (shortest_run, 1) if row.is_preemptive and requesters > 1 else (0, 0)
     if requesters <= row.most_at_once:
         return Overheads(2 if row.has_deadlines else 1, 0, run, resume)
-    return Overheads(2, 3 * row.queue_cycles * requesters + 8, run, resume, shortest_service=4)
+    return Overheads(3, 3 * row.queue_cycles * requesters + 8, run, resume, shortest_service=4)
 
 
 def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *, is_ordered: bool = False) -> Analysis:

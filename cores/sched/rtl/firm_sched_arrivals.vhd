@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Detects new tasks: a task is accepted once and stays `known` until it finishes; accepted tasks leave one per cycle.
 --
--- The requesters are arranged in rows. When no accepted task is left, the next row with a request is read, and all its
--- new requests are accepted at once; they leave lowest index first. Rows take turns, so that lower indices that return
--- again and again cannot starve others. A lone request is accepted in the cycle in which it arrives.
+-- The requesters are arranged in rows. When no accepted task is left, the next row is read, and all its new requests
+-- are accepted at once; they leave lowest index first. Rows take turns, so that lower indices that return again and
+-- again cannot starve others. The next row with a request is found while the tasks of the last one leave, so the search
+-- and the memories are not on one path. A lone request is accepted in the cycle after its arrival.
 --
 -- The set of known tasks is in distributed RAM, one row per word: a requester is known if its bits in `accepted` and
 -- `finished` differ. Accepted rows and finished tasks can therefore write to separate memories.
@@ -30,6 +31,9 @@ entity firm_sched_arrivals is
     valid  : out std_logic;
     id     : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
     leaves : in  std_logic;
+    -- Its place: the number of its row, and its column as the only '1'.
+    row    : out std_logic_vector(row_bits_of(REQUESTERS)-1 downto 0);
+    column : out std_logic_vector(2**column_bits_of(REQUESTERS)-1 downto 0);
 
     -- A requester finishes a task, known or not. If the task has not left, it is dropped.
     finished       : in std_logic;
@@ -51,19 +55,20 @@ architecture rtl of firm_sched_arrivals is
   subtype columns_t is std_logic_vector(COLUMNS-1 downto 0);
   subtype requesters_t is std_logic_vector(ROWS*COLUMNS-1 downto 0);
 
-  signal cleared_r : unsigned(ROW_BITS downto 0);  -- the next row to equalise; the highest bit: all are done
-  signal clearing  : std_logic;
+  signal clearing_r : std_logic;  -- the next row is to be made equal
 
-  signal batch_r : columns_t;  -- accepted, but not yet left
-  signal row_r   : row_t;      -- their row, or the last one if all have left
+  signal batch_r    : columns_t;  -- accepted, but not yet left
+  signal row_r      : row_t;      -- their row, or the last one if all have left
+  signal next_row_r : row_t;      -- the row to be read when all have left
+  signal asked_r    : std_logic;  -- it had a request when it was found
 
   signal asks          : std_logic_vector(ROWS*COLUMNS-1 downto 0);
   signal rows_that_ask : rows_t;
   signal rows_above    : rows_t;
   signal found_row     : row_t;
-  signal next_row      : row_t;
   signal row_asks      : columns_t;  -- requests of the next row
   signal row_accepted  : columns_t;
+  signal read_finished : columns_t;
   signal row_finished  : columns_t;
   signal row_known     : columns_t;
   signal row_new       : columns_t;
@@ -71,22 +76,26 @@ architecture rtl of firm_sched_arrivals is
   signal load          : std_logic;
   signal accept_row    : std_logic;
 
-  signal first   : column_t;  -- the requester that leaves next
-  signal next_id : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
+  signal first    : column_t;   -- the requester that leaves next
+  signal is_first : columns_t;
+  signal next_id  : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
 
   signal padded_id       : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
   signal finished_row    : row_t;
   signal finished_column : columns_t;
-  signal own_of_next     : columns_t;  -- the column of the one that may finish, if it is in the next row
-  signal own_of_batch    : columns_t;  -- the same, if it is in that of the batch
-  signal forgets         : std_logic;
-  signal finish_task     : std_logic;
-  signal old_finished    : columns_t;
-  signal new_finished    : columns_t;
+  signal is_in_next      : std_logic;  -- the one that may finish is in the next row
+  signal own_of_next     : columns_t;  -- its column, if it is
+  signal own_of_batch    : columns_t;  -- the same, if it is in the row of the batch
+  signal is_known        : std_logic;
+
+  -- A task that has finished in the last cycle and was known is recorded in this one.
+  signal finish_r          : std_logic;
+  signal finished_row_r    : row_t;
+  signal finished_column_r : columns_t;
+  signal old_finished      : columns_t;
+  signal new_finished      : columns_t;
 
 begin
-
-  clearing <= not cleared_r(ROW_BITS);
 
   requests : for requester in 0 to ROWS*COLUMNS-1 generate
     used : if requester < REQUESTERS generate
@@ -97,15 +106,33 @@ begin
     end generate unused;
   end generate requests;
 
-  -- The next row: the lowest one above the last one, else the lowest.
+  -- The row after the next one: the lowest one above it, else the lowest.
 
-  search_rows : for row in rows_t'range generate
-    rows_that_ask(row) <= any_of(asks((row+1)*COLUMNS-1 downto row*COLUMNS));
+  search_rows : for place in rows_t'range generate
+    rows_that_ask(place) <= any_of(asks((place+1)*COLUMNS-1 downto place*COLUMNS));
   end generate search_rows;
 
-  rows_above <= rows_that_ask and above(row_r, ROWS);
+  rows_above <= rows_that_ask and above(next_row_r, ROWS);
   found_row  <= first_of(rows_above) when any_of(rows_above) = '1' else first_of(rows_that_ask);
-  next_row <= std_logic_vector(cleared_r(ROW_BITS-1 downto 0)) when clearing = '1' else found_row;
+
+  find_row : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        clearing_r <= '1';
+        next_row_r <= (others => '0');
+        asked_r    <= '0';
+      elsif clearing_r = '1' then
+        clearing_r <= not are_ones(next_row_r);
+        next_row_r <= std_logic_vector(unsigned(next_row_r) + 1);
+      elsif load = '1' or asked_r = '0' then
+        asked_r <= any_of(rows_that_ask);
+        if any_of(rows_that_ask) = '1' then
+          next_row_r <= found_row;
+        end if;
+      end if;
+    end if;
+  end process find_row;
 
   u_row_asks : entity firm.firm_axis_select
     generic map (
@@ -114,25 +141,29 @@ begin
     )
     port map (
       words_in => asks,
-      index    => found_row,
+      index    => next_row_r,
       word     => row_asks
     );
 
-  -- Its columns. The request of the one that finishes is its last beat's, not a new task's. Since `finished` arrives
-  -- late, all depends on it only at the end.
+  -- Its columns. The request of the one that finishes is its last beat's, not a new task's. `finished` arrives late, so
+  -- that it only keeps the task out of the batch. The memories count the task as accepted, and record its end a cycle
+  -- later; a row that is read in that cycle already includes it.
 
   padded_id       <= std_logic_vector(resize(unsigned(finished_id), ROW_BITS+COLUMN_BITS));
   finished_row    <= padded_id(ROW_BITS+COLUMN_BITS-1 downto COLUMN_BITS);
   finished_column <= decode(padded_id(COLUMN_BITS-1 downto 0), '1', COLUMNS);
-  own_of_next     <= finished_column when found_row = finished_row else (others => '0');
+  is_in_next      <= '1' when next_row_r = finished_row else '0';
+  own_of_next     <= gated(finished_column, is_in_next);
   own_of_batch    <= finished_column when row_r = finished_row else (others => '0');
 
+  row_finished <= read_finished xor finished_column_r when finish_r = '1' and next_row_r = finished_row_r else
+                  read_finished;
   row_known    <= row_accepted xor row_finished;
-  row_new      <= row_asks and not row_known and not gated(own_of_next, finished);
-  load         <= not (any_of(batch_r) or clearing);
+  row_new      <= row_asks and not row_known;
+  load         <= not (any_of(batch_r) or clearing_r);
 
-  accept_row   <= load or clearing;
-  new_accepted <= row_finished when clearing = '1' else row_finished xor (row_known or row_new);
+  accept_row   <= load or clearing_r;
+  new_accepted <= row_finished when clearing_r = '1' else row_finished xor (row_known or row_asks);
 
   u_accepted : entity firm.firm_sched_ram
     generic map (
@@ -141,16 +172,24 @@ begin
     )
     port map (
       clk          => clk,
-      address      => next_row,
+      address      => next_row_r,
       read_word    => row_accepted,
       write_enable => accept_row,
       write_word   => new_accepted
     );
 
-  -- A finished requester is no longer known. A task that is dropped was known, too.
-  forgets      <= any_of(batch_r and own_of_batch);
-  finish_task  <= finished and (finished_known or forgets);
-  new_finished <= old_finished xor finished_column;
+  -- A finished requester is no longer known. A task that is dropped was known, too, or becomes known in this cycle.
+  is_known     <= finished_known or any_of(batch_r and own_of_batch) or (load and is_in_next);
+  new_finished <= old_finished xor finished_column_r;
+
+  hold_finished : process (clk)
+  begin
+    if rising_edge(clk) then
+      finish_r          <= finished and is_known and rst_n;
+      finished_row_r    <= finished_row;
+      finished_column_r <= finished_column;
+    end if;
+  end process hold_finished;
 
   u_finished : entity firm.firm_sched_ram_2
     generic map (
@@ -159,12 +198,12 @@ begin
     )
     port map (
       clk          => clk,
-      address      => finished_row,
+      address      => finished_row_r,
       read_word    => old_finished,
-      write_enable => finish_task,
+      write_enable => finish_r,
       write_word   => new_finished,
-      address_2    => next_row,
-      read_word_2  => row_finished
+      address_2    => next_row_r,
+      read_word_2  => read_finished
     );
 
   hold_batch : process (clk)
@@ -172,32 +211,32 @@ begin
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
-        batch_r   <= (others => '0');
-        row_r     <= (others => '1');
-        cleared_r <= (others => '0');
+        batch_r <= (others => '0');
+        row_r   <= (others => '1');
       else
         staying := batch_r;
         if leaves = '1' then
-          staying := staying and not decode(first, '1', COLUMNS);
+          staying := staying and not is_first;
         end if;
         if finished = '1' then
           staying := staying and not own_of_batch;
         end if;
         batch_r <= staying;
-        if load = '1' and any_of(rows_that_ask) = '1' then
-          batch_r <= row_new;
-          row_r   <= found_row;
-        end if;
-        if clearing = '1' then
-          cleared_r <= cleared_r + 1;
+        if load = '1' then
+          batch_r <= row_new and not gated(own_of_next, finished);
+          row_r   <= next_row_r;
         end if;
       end if;
     end if;
   end process hold_batch;
 
-  first   <= first_of(batch_r);
+  first    <= first_of(batch_r);
+  is_first <= only_first_of(batch_r);
+
   next_id <= row_r & first;
   valid   <= any_of(batch_r);
   id      <= next_id(ID_BITS-1 downto 0);
+  row     <= row_r;
+  column  <= is_first;
 
 end architecture rtl;

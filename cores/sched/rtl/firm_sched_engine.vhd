@@ -67,6 +67,8 @@ architecture rtl of firm_sched_engine is
   -- The first task of the arrivals, A.
   signal a_valid    : std_logic;
   signal a_id       : id_t;
+  signal a_row      : std_logic_vector(row_bits_of(REQUESTERS)-1 downto 0);
+  signal a_column   : std_logic_vector(2**column_bits_of(REQUESTERS)-1 downto 0);
   signal a_key      : key_t;
   signal a_is_own   : std_logic;  -- of the requester that has the grant
   signal a_leaves   : std_logic;
@@ -136,6 +138,8 @@ begin
       valid          => a_valid,
       id             => a_id,
       leaves         => a_leaves,
+      row            => a_row,
+      column         => a_column,
       finished       => finished,
       finished_known => keyed_r,
       finished_id    => grant_select_r
@@ -146,26 +150,47 @@ begin
   -- Keys.
 
   timed : if not HAS_STAMPS generate
+    constant COLUMNS : positive := 2**column_bits_of(REQUESTERS);
+    constant ROWS    : positive := 2**row_bits_of(REQUESTERS);
     -- Descending, since an ascending index costs a subtraction in GHDL's netlist.
-    type offsets_t is array (natural range 2**ID_BITS-1 downto 0) of key_t;
+    type offsets_t is array (natural range ROWS-1 downto 0) of key_t;
 
-    function offset_table return offsets_t is
+    function offsets_of_column(place : natural) return offsets_t is
       variable table : offsets_t;
     begin
-      for requester in table'range loop
-        table(requester) := std_logic_vector(to_signed(time_of(requester, OFFSETS), KEY_BITS));
+      for row in table'range loop
+        table(row) := std_logic_vector(to_signed(time_of(row*COLUMNS+place, OFFSETS), KEY_BITS));
       end loop;
       return table;
-    end function offset_table;
+    end function offsets_of_column;
 
-    constant OFFSET_OF : offsets_t := offset_table;
+    -- The column arrives late: the offsets of all columns are read, and it selects one.
+    type columns_t is array (natural range 0 to COLUMNS-1) of key_t;
+    signal of_columns : columns_t;
+    signal offset     : key_t;
 
     signal time_r        : key_t;
     signal is_clearing   : std_logic;
     signal current_waits : std_logic;
     signal root_waits    : std_logic;
   begin
-    a_key     <= std_logic_vector(unsigned(time_r) + unsigned(OFFSET_OF(to_integer(unsigned(a_id)))));
+    read_offsets : for place in columns_t'range generate
+      constant OFFSET_OF : offsets_t := offsets_of_column(place);
+    begin
+      of_columns(place) <= OFFSET_OF(to_integer(unsigned(a_row)));
+    end generate read_offsets;
+
+    select_offset : process (of_columns, a_column)
+      variable found : key_t;
+    begin
+      found := (others => '0');
+      for place in of_columns'range loop
+        found := found or gated(of_columns(place), a_column(place));
+      end loop;
+      offset <= found;
+    end process select_offset;
+
+    a_key     <= std_logic_vector(unsigned(time_r) + unsigned(offset));
     key_ready <= '1';
 
     -- The heap after reset; B may wait for it.

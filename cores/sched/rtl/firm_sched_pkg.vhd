@@ -22,6 +22,9 @@ package firm_sched_pkg is
   function any_of(bits : std_logic_vector) return std_logic;
   function first_of(bits : std_logic_vector) return std_logic_vector;
 
+  -- The same as the only '1' of as many bits; if there is none, zeros.
+  function only_first_of(bits : std_logic_vector) return std_logic_vector;
+
   -- The index of the only '1'; if there is none, any index.
   function index_of(one_hot : std_logic_vector) return std_logic_vector;
 
@@ -104,6 +107,18 @@ package body firm_sched_pkg is
     end if;
     return higher;
   end function first_of;
+
+  function only_first_of(bits : std_logic_vector) return std_logic_vector is
+    constant COUNT : positive := bits'length;
+    alias numbered : std_logic_vector(COUNT-1 downto 0) is bits;
+    variable only  : std_logic_vector(COUNT-1 downto 0);
+  begin
+    only(0) := numbered(0);
+    for place in 1 to COUNT-1 loop
+      only(place) := numbered(place) and not any_of(numbered(place-1 downto 0));
+    end loop;
+    return only;
+  end function only_first_of;
 
   function index_of(one_hot : std_logic_vector) return std_logic_vector is
     variable bits  : std_logic_vector(one_hot'length-1 downto 0);

@@ -41,6 +41,9 @@ class Arrivals:
         self._known: Ints = np.zeros((batch, self._rows), np.int64)
         self._accepted: Ints = np.zeros(batch, np.int64)
         self._row: Ints = np.full(batch, self._rows - 1, np.int64)
+        # The row that is read when all accepted tasks have left, and whether it had a request when it was found.
+        self._next_row: Ints = np.zeros(batch, np.int64)
+        self._asked: Bools = np.zeros(batch, np.bool_)
         self._clearing = self._rows
         self._weights = 1 << np.arange(self._columns)
         self._lowest = np.array([(value & -value).bit_length() - 1 for value in range(2**self._columns)])
@@ -73,14 +76,10 @@ class Arrivals:
         self._accepted = accepted
 
     def _accept(self, request: Bools, where: Bools, accepted: Ints, finished_row: Ints, finished_bit: Ints) -> None:
-        """Accept the next row's new requests into `accepted` where the previous row is empty."""
+        """Accept the next row's new requests into `accepted` where no accepted task is left, and find the row after."""
         self._padded[:, : self._requesters] = request
         by_row: Bools = self._padded.reshape((len(request), self._rows, self._columns))
-        asks: Bools = np.logical_or.reduce(by_row, axis=2)
-        where = where & asks.any(axis=1)
-        # The rows in cyclic order, starting after the last accepted row.
-        order = (self._row[:, np.newaxis] + 1 + np.arange(self._rows)) % self._rows
-        row = order[self._members, np.take_along_axis(asks, order, axis=1).argmax(axis=1)]
+        row = self._next_row
         new = by_row[self._members, row] @ self._weights
         new &= ~self._known[self._members, row]
         # The request of a requester that finishes belongs to the task's last beat.
@@ -88,6 +87,16 @@ class Arrivals:
         self._known[self._members, row] |= np.where(where, new, 0)
         self._row = np.where(where, row, self._row)
         accepted[where] = new[where]
+        self._find_row(np.logical_or.reduce(by_row, axis=2), where | ~self._asked)
+
+    def _find_row(self, asks: Bools, where: Bools) -> None:
+        """Move to the next row with a request in `asks` (B, rows), if there is one."""
+        found = asks.any(axis=1)
+        # The rows in cyclic order, starting after the next one.
+        order = (self._next_row[:, np.newaxis] + 1 + np.arange(self._rows)) % self._rows
+        row = order[self._members, np.take_along_axis(asks, order, axis=1).argmax(axis=1)]
+        self._next_row = np.where(where & found, row, self._next_row)
+        self._asked = np.where(where, found, self._asked)
 
 
 class Queue(ABC):
