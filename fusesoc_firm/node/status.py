@@ -24,7 +24,7 @@ from fusesoc_firm.system.status_frames import answered, read_request, write_requ
 _ANSWER_SECONDS = 5.0
 _MAGIC = 0x4D524946
 _VERSION = 1
-_SHAPE_ADDRESS = 4
+_SHAPE_ADDRESS, _FEATURES_ADDRESS = 0x04, 0x28
 # The highest word first.
 _DIGEST_ADDRESSES = tuple(DIGEST_ADDRESS + 4 * number for number in reversed(range(DIGEST_WORDS)))
 
@@ -40,6 +40,11 @@ class Status:
     def digest(self) -> str:
         """The digest of the hardware's system, in hexadecimal digits."""
         return "".join(f"{self.words[f'digest_{number}']:08x}" for number in reversed(range(DIGEST_WORDS)))
+
+    @property
+    def has_time_stamps(self) -> bool:
+        """Whether there are the words `cycles`, and `stamp` of each channel."""
+        return "cycles" in self.words
 
     def field(self, register: str, name: str) -> int:
         """Return the value of a field."""
@@ -82,7 +87,8 @@ def read_status(transport: Transport) -> Status:
     magic, shape = read_word(transport, 0), read_word(transport, _SHAPE_ADDRESS)
     if magic != _MAGIC or shape >> 24 != _VERSION:
         raise TransportError(f"the hardware has another kind of status: it begins with {magic:08x} {shape:08x}")
-    registers = status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF).registers
+    has_time_stamps = bool(read_word(transport, _FEATURES_ADDRESS) & 1)
+    registers = status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF, has_time_stamps=has_time_stamps).registers
     words = {register.name: read_word(transport, register.address) for register in registers}
     return Status({register.name: register for register in registers}, words)
 
@@ -98,15 +104,25 @@ def status_text(status: Status, names: Sequence[str] = ()) -> str:
     shown = dict(zip(channels, names or channels, strict=True))
     width = max(map(len, shown.values()))
     lines = [f"digest {status.digest}", _events(status, shown, channels)]
-    lines += [f"{'':{width}}  signature    frames   longest wait  faults"]
+    if status.has_time_stamps:
+        lines.append(f"cycle {status.words['cycles']}; stamps: a subscriber's first beat, a publisher's last beat")
+    stamp = f"  {'stamp':>10}" if status.has_time_stamps else ""
+    lines += [f"{'':{width}}  signature    frames   longest wait{stamp}  faults"]
     for channel, name in shown.items():
         words = {word: status.words[f"{channel}.{word}"] for word in ("signature", "frames", "longest_wait")}
         faults = ", ".join(_faults(status, channel)) or "none"
+        stamp = f"  {_stamp(status, channel):>10}" if status.has_time_stamps else ""
         lines.append(
-            f"{name:{width}}  {words['signature']:08x}  {words['frames']:9}  {words['longest_wait']:6} cycles  {faults}"
+            f"{name:{width}}  {words['signature']:08x}  {words['frames']:9}  {words['longest_wait']:6} cycles{stamp}"
+            f"  {faults}"
         )
     counted = sorted({fault for channel in channels for fault in _counts(status, channel)})
     return "\n".join(lines + [f"code {fault.value}: {fault.text}" for fault in counted])
+
+
+def _stamp(status: Status, channel: str) -> str:
+    """Return the time stamp of a channel, which is not valid before its first frame."""
+    return str(status.words[f"{channel}.stamp"]) if status.words[f"{channel}.frames"] else "-"
 
 
 def _faults(status: Status, channel: str) -> list[str]:
