@@ -276,12 +276,12 @@ def test_another_language_reads_the_same(language: str, faulty: Faulty, tmp_path
     sources = ["firm/firm_frame.c", "firm/firm_status.c"]
     driver = cpp_driver("status") if language == "cpp" else compile_c_driver("status", tmp_path, sources, [], {})
     before = _in_python(faulty.transport)
-    told = told([driver.program, faulty.words["digest"]], faulty.transport)
-    assert counted(told) == faulty.words
+    found = told([driver.program, str(faulty.words["digest"])], faulty.transport)
+    assert counted(found) == faulty.words
     # The cycle of the reading itself differs.
-    moving = {"cycles": told["cycles"]}
+    moving = {"cycles": found["cycles"]}
     constant = {name: 0 for name in before if re.match(r"magic|shape|features|digest_|.*signature", name)}
-    assert {**told, **moving} == {name: word for name, word in {**before, **constant, **moving}.items() if word}
+    assert {**found, **moving} == {name: word for name, word in {**before, **constant, **moving}.items() if word}
 
 
 def told(command: Sequence[str | Path], transport: Transport) -> Words:

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.frame.faults import Fault
 from fusesoc_firm.node.status import read_status, status_text
 from fusesoc_firm.node.transport.link_code import LinkDecoder, encode
 from fusesoc_firm.node.transport.simulator import Simulator
@@ -113,5 +112,3 @@ def test_each_broken_frame_is_a_link_error(tmp_path: Path) -> None:
         sources = ["firm/firm_frame.c", "firm/firm_status.c"]
         for driver in (cpp_driver("status"), compile_c_driver("status", tmp_path, sources, [], {})):
             assert counted(told([driver.program, status.digest], line)) == words
-
-
