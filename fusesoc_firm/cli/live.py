@@ -69,7 +69,7 @@ def _live(arguments: argparse.Namespace) -> None:
         opener = at_address(arguments.transport)
     else:
         opener = of_simulator(built_simulator(arguments), arguments.seed, arguments.stall_percent)
-    run_node(description, opener, options, loaded)
+    run_node(description, opener, options, loaded, arguments.transport or "")
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:

@@ -15,11 +15,15 @@ def add_status(commands: Any) -> None:
     status = command(
         commands,
         "status",
-        "print what a system's hardware has counted, over a transport that no node uses",
+        "print what a system's hardware has counted; if a node uses the hardware, the node is asked",
         "firm status uart:/dev/ttyUSB1:1000000:rtscts --system robot.yaml",
         _print_status,
     )
-    status.add_argument("address", metavar="ADDRESS", help="the transport to the hardware")
+    status.add_argument(
+        "address",
+        metavar="ADDRESS",
+        help="the transport to the hardware, or node:SYSTEM for the running node of a system",
+    )
     status.add_argument(
         "--system", type=Path, metavar="SPEC", help="the system's specification, for names and to compare the digest"
     )
@@ -38,7 +42,7 @@ def add_status(commands: Any) -> None:
 
 def _print_status(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.node.status import check_digest, read_status, status_text
-    from fusesoc_firm.node.transport.open_transport import open_transport
+    from fusesoc_firm.node.status_socket import open_status
     from fusesoc_firm.node.transport.transport import TransportError
     from fusesoc_firm.system.system_core import identity
 
@@ -50,7 +54,7 @@ def _print_status(arguments: argparse.Namespace) -> None:
         names = [item.block for item in (*loaded.system.subscribers, *loaded.system.publishers)]
         expected = identity(loaded).digest
     try:
-        with open_transport(arguments.address) as transport:
+        with open_status(arguments.address) as transport:
             if expected:
                 check_digest(transport, expected, loaded.system.name)
             print(status_text(read_status(transport), names))

@@ -17,6 +17,8 @@ from fusesoc_firm.node.description import NodeTopic, node_topic
 
 NAME = "/diagnostics"
 INTERVAL_SECONDS = 1.0
+# The time in each interval in which the hardware's status is read.
+READING_SECONDS = 0.05
 _MESSAGE = MessageName("diagnostic_msgs", "DiagnosticArray")
 # The values of DiagnosticStatus.level.
 _OK, _WARN = 0, 1

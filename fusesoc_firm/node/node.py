@@ -23,10 +23,12 @@ from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.carrier import Carrier, CarrierError, Lost, Published, Taken
 from fusesoc_firm.node.description import DEFAULT_DEPTH, Crossing, NodeDescription, NodeTopic
-from fusesoc_firm.node.diagnostics import INTERVAL_SECONDS, Report
+from fusesoc_firm.node.diagnostics import INTERVAL_SECONDS, READING_SECONDS, Report
 from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.statistics import Statistics
+from fusesoc_firm.node.status import StatusWatch
+from fusesoc_firm.node.status_exchange import ANSWER_SECONDS, NO_ANSWER, StatusExchange
 from fusesoc_firm.node.trace import Entry, Trace, converter_names
 from fusesoc_firm.node.transport.transport import (
     Burst,
@@ -35,6 +37,7 @@ from fusesoc_firm.node.transport.transport import (
     TransportError,
     TransportResetError,
 )
+from fusesoc_firm.system.status_frames import answered, read_request
 
 # The interval at which waiting threads check whether to end.
 _POLL_SECONDS = 0.1
@@ -118,9 +121,10 @@ class Node:
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
-        self._queues: SubscriberQueues[_Message] = SubscriberQueues(
-            len(self._inputs), [self._depth(item) for item in self._inputs], overflow=settings.overflow
-        )
+        self._status = StatusExchange(self._put_request) if description.digest else None
+        # The last queue is that of the status.
+        depths = [*(self._depth(item) for item in self._inputs), *([1] if self._status else [])]
+        self._queues: SubscriberQueues[_Message] = SubscriberQueues(len(depths), depths, overflow=settings.overflow)
         self._carriers: Mapping[int, Carrier] = {}
         self._is_wanted_to_end = threading.Event()
         self._drains = threading.Event()
@@ -174,6 +178,23 @@ class Node:
         self._is_over.set()
         self._hardware.transport.close()
 
+    def access_status(self, request: bytes, seconds: float = ANSWER_SECONDS) -> bytes:
+        """Return the answer of the hardware's status to a request; any thread may call this method.
+
+        Raise `TransportError` if there is none after some seconds.
+        """
+        if not self._status:
+            raise TransportError("the system has no 'status: frames'")
+        return self._status.access(request, seconds)
+
+    def _put_request(self, request: bytes) -> None:
+        try:
+            is_there = self._queues.put(len(self._inputs), _Message(request, None), 0.0)
+        except ClosedError:
+            raise TransportError("the node is ending") from None
+        if not is_there:
+            raise TransportError(NO_ANSWER)
+
     def _start(self, work: Callable[[], None]) -> threading.Thread:
         thread = threading.Thread(target=work, daemon=True)
         thread.start()
@@ -187,15 +208,28 @@ class Node:
         self.stop()
 
     def _diagnose(self) -> None:
-        """Report the counts at intervals."""
-        before = 0
+        """Report the counts of the node, and those of the hardware's status, at intervals."""
+        before = status_before = 0
+        watch = StatusWatch(self._read_word, [*self._subscriber_names.values(), *self._publisher_names.values()])
         while not self._is_wanted_to_end.wait(INTERVAL_SECONDS):
             dropped = {item.block: self._queues.dropped(number) for number, item in enumerate(self._inputs)}
-            counts = self.statistics.counts(dropped)
             now = self.statistics.troubles() + sum(dropped.values())
-            for carrier in self._carriers.values():
-                carrier.diagnose(Report(f"{self._description.name}: node", now > before, counts))
+            self._tell(Report(f"{self._description.name}: node", now > before, self.statistics.counts(dropped)))
             before = now
+            if self._status:
+                watch.advance(READING_SECONDS)
+                now = watch.troubles()
+                self._tell(Report(f"{self._description.name}: hardware", now > status_before, watch.counts))
+                status_before = now
+
+    def _tell(self, report: Report) -> None:
+        for carrier in self._carriers.values():
+            carrier.diagnose(report)
+
+    def _read_word(self, address: int) -> int:
+        answer = answered(self.access_status(read_request(address), INTERVAL_SECONDS))
+        assert answer
+        return answer[1]
 
     def _count_rest(self) -> None:
         for number, item in enumerate(self._inputs):
@@ -248,6 +282,10 @@ class Node:
 
     def _send(self) -> None:
         for number, message in self._queues:
+            if number == len(self._inputs):
+                if not self._send_request(message.payload):
+                    return
+                continue
             item = self._inputs[number]
             if item.id is not None and not self._send_frame(item.id, message):
                 return
@@ -268,6 +306,17 @@ class Node:
             return self._begin_anew(hardware, error)
         if self._trace and message.entry:
             self._trace.sent(message.entry)
+        return True
+
+    def _send_request(self, request: bytes) -> bool:
+        """Send a request of the status; return False if the hardware has failed permanently."""
+        hardware = self._hardware
+        if self._trace:
+            self._trace.sending_other()
+        try:
+            hardware.transport.send(request)
+        except TransportError as error:
+            return self._begin_anew(hardware, error)
         return True
 
     def _run_software(self, block: str, payload: bytes) -> None:
@@ -297,6 +346,8 @@ class Node:
             except TransportError as error:
                 if not self._begin_anew(hardware, error):
                     return
+                continue
+            if burst is not None and self._status and self._status.take(burst.data):
                 continue
             if burst is not None:
                 self._join(hardware, burst)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 
+from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.node import HardwareListener, OpenTransport
+from fusesoc_firm.node.status import check_digest
 from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
+from fusesoc_firm.node.transport.transport import Transport
 from fusesoc_firm.simulation.simulator import BuiltSimulator
 
 # After this many cycles without a beat, the simulation runs only at intervals. These suffice for accelerators that send
@@ -27,6 +30,39 @@ def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -
 def at_address(address: str) -> OpenTransport:
     """Return a function that opens a transport; docs/reference/transports.md describes addresses."""
     return lambda listener: open_transport(address, _PACE, partial(_tell, listener))
+
+
+def checked(open_transport: OpenTransport, description: NodeDescription) -> OpenTransport:
+    """Return a function that opens a transport, and raises `TransportError` if the hardware is another system's."""
+
+    def opened(listener: HardwareListener) -> Transport:
+        late = _LateListener(listener)
+        transport = open_transport(late)
+        try:
+            check_digest(transport, description.digest, description.name)
+        except BaseException:
+            transport.close()
+            raise
+        late.listens = True
+        return transport
+
+    return opened
+
+
+class _LateListener:
+    """A listener that is not told of the frames that read the digest."""
+
+    def __init__(self, listener: HardwareListener) -> None:
+        self._listener = listener
+        self.listens = False
+
+    def taken(self, first_cycle: int, last_cycle: int) -> None:
+        if self.listens:
+            self._listener.taken(first_cycle, last_cycle)
+
+    def refused(self, converter: int | None) -> None:
+        if self.listens:
+            self._listener.refused(converter)
 
 
 def _tell(listener: HardwareListener, event: Event) -> None:

@@ -16,8 +16,9 @@ from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.node import Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.queues import Overflow
+from fusesoc_firm.node.reopening import checked
 from fusesoc_firm.node.software import node_software
-from fusesoc_firm.node.status import checked
+from fusesoc_firm.node.status_socket import StatusServer, served_names
 from fusesoc_firm.node.trace import Trace
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -69,12 +70,16 @@ def run_options(
 
 
 def run_node(
-    description: NodeDescription, open_transport: OpenTransport, options: RunOptions, loaded: LoadedSystem | None = None
+    description: NodeDescription,
+    open_transport: OpenTransport,
+    options: RunOptions,
+    loaded: LoadedSystem | None = None,
+    address: str = "",
 ) -> None:
     """Run the node until Ctrl-C, SIGTERM or ROS stops it; a second Ctrl-C ends it immediately.
 
-    `loaded` is the system, if it has software. Raise `InputError` if ROS or the hardware fails, or if received
-    messages could not be processed in time.
+    `loaded` is the system, if it has software. `address` is that of the transport, if it has one. Raise `InputError` if
+    ROS or the hardware fails, or if received messages could not be processed in time.
     """
     settings = replace(options.settings, report=_say)
     try:
@@ -86,6 +91,9 @@ def run_node(
             # Published messages are sent before the node prints its statistics.
             stack.callback(lambda: _say(node.statistics.text()))
             stack.callback(node.close)
+            if description.digest:
+                names = served_names(description.name, address)
+                stack.enter_context(StatusServer(names, node.access_status, _say))
             carriers = {}
             for ros in options.versions:
                 carriers[ros] = stack.enter_context(closing(RosCarrier(ros, description, options.ros)))

@@ -36,7 +36,7 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
         # `places` includes the folders of message cores.
         loaded = load_beside(folder / specification, places, core_folders=lambda _: ()) if specification else None
         options = run_options(arguments, passed, description)
-        run_node(description, at_address(arguments.transport), options, loaded)
+        run_node(description, at_address(arguments.transport), options, loaded, arguments.transport)
     except InputError as error:
         sys.exit(str(error))
     except KeyboardInterrupt:

@@ -9,22 +9,23 @@ The hardware tells its dimensions, from which its register map follows, so no sp
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import cycle, islice
 
 from fusesoc_firm.frame.faults import Fault
-from fusesoc_firm.node.description import NodeDescription
-from fusesoc_firm.node.node import HardwareListener, OpenTransport
+from fusesoc_firm.node.status_exchange import ANSWER_SECONDS, NO_ANSWER
 from fusesoc_firm.node.transport.transport import Transport, TransportError
 from fusesoc_firm.system.hardware.registers import Register
 from fusesoc_firm.system.hardware.status import DIGEST_ADDRESS, DIGEST_WORDS, status_map
 from fusesoc_firm.system.status_frames import answered, read_request, write_request
 
-# Hardware without a status drops the request as a frame with an unknown id.
-_ANSWER_SECONDS = 5.0
 _MAGIC = 0x4D524946
 _VERSION = 1
-_SHAPE_ADDRESS = 4
+_SHAPE_ADDRESS, _FEATURES_ADDRESS = 0x04, 0x28
+_EVENTS = {"id_errors": "unknown ids", "link_errors": "link errors", "lost": "uncounted faults"}
+_CHANNEL_WORDS = {"frames": "frames", "longest_wait": "longest wait in cycles", "stamp": "time stamp in cycles"}
 # The highest word first.
 _DIGEST_ADDRESSES = tuple(DIGEST_ADDRESS + 4 * number for number in reversed(range(DIGEST_WORDS)))
 
@@ -41,6 +42,11 @@ class Status:
         """The digest of the hardware's system, in hexadecimal digits."""
         return "".join(f"{self.words[f'digest_{number}']:08x}" for number in reversed(range(DIGEST_WORDS)))
 
+    @property
+    def has_time_stamps(self) -> bool:
+        """Whether there are the words `cycles`, and `stamp` of each channel."""
+        return "cycles" in self.words
+
     def field(self, register: str, name: str) -> int:
         """Return the value of a field."""
         fields = {field.name: field for field in self.registers[register].fields}
@@ -54,12 +60,12 @@ def access(transport: Transport, request: bytes) -> int:
     """
     transport.send(request)
     asked = answered(request)
-    end = time.monotonic() + _ANSWER_SECONDS
+    end = time.monotonic() + ANSWER_SECONDS
     while (burst := transport.receive(max(0.0, end - time.monotonic()))) is not None:
         answer = answered(burst.data)
         if answer and asked and answer[0] == asked[0]:
             return answer[1]
-    raise TransportError(f"the hardware did not answer within {_ANSWER_SECONDS:g} s: it has no status, or is stalled")
+    raise TransportError(NO_ANSWER)
 
 
 def read_word(transport: Transport, address: int) -> int:
@@ -79,12 +85,71 @@ def read_digest(transport: Transport) -> str:
 
 def read_status(transport: Transport) -> Status:
     """Read all registers. Raise `TransportError` if the hardware does not answer, or if its map is unknown."""
-    magic, shape = read_word(transport, 0), read_word(transport, _SHAPE_ADDRESS)
+    read = partial(read_word, transport)
+    registers = status_registers(read)
+    words = {register.name: read(register.address) for register in registers}
+    return Status({register.name: register for register in registers}, words)
+
+
+def status_registers(read: Callable[[int], int]) -> tuple[Register, ...]:
+    """Return the registers of hardware; `read` returns the word at an address. May raise `TransportError`."""
+    magic, shape = read(0), read(_SHAPE_ADDRESS)
     if magic != _MAGIC or shape >> 24 != _VERSION:
         raise TransportError(f"the hardware has another kind of status: it begins with {magic:08x} {shape:08x}")
-    registers = status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF).registers
-    words = {register.name: read_word(transport, register.address) for register in registers}
-    return Status({register.name: register for register in registers}, words)
+    has_time_stamps = bool(read(_FEATURES_ADDRESS) & 1)
+    return status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF, has_time_stamps=has_time_stamps).registers
+
+
+class StatusWatch:
+    """Reads the status of hardware for a limited time at once, so that a slow link stays free for messages.
+
+    `read` returns the word at an address, or raises `TransportError`. `names` are the channels' blocks, the subscribers
+    first. `unanswered` counts failed accesses.
+    """
+
+    def __init__(self, read: Callable[[int], int], names: Sequence[str]) -> None:
+        self.unanswered = 0
+        self._read = read
+        self._names = names
+        self._registers: tuple[Register, ...] = ()
+        self._turn: Iterator[Register] = iter(())
+        self._words: dict[str, int] = {}
+
+    def advance(self, seconds: float) -> None:
+        """Read the next registers: at least one, and at most each register once."""
+        end = time.monotonic() + seconds
+        try:
+            if not self._registers:
+                found = status_registers(self._read)
+                self._registers = tuple(item for item in found if not item.is_constant)
+                self._turn = cycle(self._registers)
+            for register in islice(self._turn, len(self._registers)):
+                self._words[register.name] = self._read(register.address)
+                if time.monotonic() >= end:
+                    return
+        except TransportError:
+            self.unanswered += 1
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What was read so far, by texts for the user; faults that are zero are left out."""
+        found = {text: self._words[name] for name, text in _EVENTS.items() if name in self._words}
+        for channel, name in zip(self._channels, self._names, strict=False):
+            words = {text: self._words.get(f"{channel}.{word}") for word, text in _CHANNEL_WORDS.items()}
+            found |= {f"{name} {text}": word for text, word in words.items() if word is not None}
+            faults = {fault: self._words.get(f"{channel}.faults[{fault - 1}]") for fault in Fault}
+            found |= {f"{name}: {fault.text}": count for fault, count in faults.items() if count}
+        return found | {"accesses without an answer": self.unanswered}
+
+    def troubles(self) -> int:
+        """Return the number of faults and of failed accesses."""
+        counted = (word for name, word in self._words.items() if name in _EVENTS or ".faults[" in name)
+        return sum(counted) + self.unanswered
+
+    @property
+    def _channels(self) -> list[str]:
+        suffix = ".frames"
+        return [item.name.removesuffix(suffix) for item in self._registers if item.name.endswith(suffix)]
 
 
 def status_text(status: Status, names: Sequence[str] = ()) -> str:
@@ -98,15 +163,25 @@ def status_text(status: Status, names: Sequence[str] = ()) -> str:
     shown = dict(zip(channels, names or channels, strict=True))
     width = max(map(len, shown.values()))
     lines = [f"digest {status.digest}", _events(status, shown, channels)]
-    lines += [f"{'':{width}}  signature    frames   longest wait  faults"]
+    if status.has_time_stamps:
+        lines.append(f"cycle {status.words['cycles']}; stamps: a subscriber's first beat, a publisher's last beat")
+    stamp = f"  {'stamp':>10}" if status.has_time_stamps else ""
+    lines += [f"{'':{width}}  signature    frames   longest wait{stamp}  faults"]
     for channel, name in shown.items():
         words = {word: status.words[f"{channel}.{word}"] for word in ("signature", "frames", "longest_wait")}
         faults = ", ".join(_faults(status, channel)) or "none"
+        stamp = f"  {_stamp(status, channel):>10}" if status.has_time_stamps else ""
         lines.append(
-            f"{name:{width}}  {words['signature']:08x}  {words['frames']:9}  {words['longest_wait']:6} cycles  {faults}"
+            f"{name:{width}}  {words['signature']:08x}  {words['frames']:9}  {words['longest_wait']:6} cycles{stamp}"
+            f"  {faults}"
         )
     counted = sorted({fault for channel in channels for fault in _counts(status, channel)})
     return "\n".join(lines + [f"code {fault.value}: {fault.text}" for fault in counted])
+
+
+def _stamp(status: Status, channel: str) -> str:
+    """Return the time stamp of a channel, which is not valid before its first frame."""
+    return str(status.words[f"{channel}.stamp"]) if status.words[f"{channel}.frames"] else "-"
 
 
 def _faults(status: Status, channel: str) -> list[str]:
@@ -122,44 +197,8 @@ def _counts(status: Status, channel: str) -> dict[Fault, int]:
 def _events(status: Status, shown: Mapping[str, str], channels: Sequence[str]) -> str:
     code, channel = (status.field("last_fault", name) for name in ("code", "channel"))
     last = f"code {code} of {shown[channels[channel]]}" if code else "none"
-    counts = ", ".join(
-        f"{text} {status.words[name]}"
-        for name, text in (("id_errors", "unknown ids"), ("link_errors", "link errors"), ("lost", "uncounted faults"))
-    )
+    counts = ", ".join(f"{text} {status.words[name]}" for name, text in _EVENTS.items())
     return f"last fault: {last}; {counts}"
-
-
-def checked(open_transport: OpenTransport, description: NodeDescription) -> OpenTransport:
-    """Return a function that opens a transport, and raises `TransportError` if the hardware is another system's."""
-
-    def opened(listener: HardwareListener) -> Transport:
-        late = _LateListener(listener)
-        transport = open_transport(late)
-        try:
-            check_digest(transport, description.digest, description.name)
-        except BaseException:
-            transport.close()
-            raise
-        late.listens = True
-        return transport
-
-    return opened
-
-
-class _LateListener:
-    """A listener that is not told of the frames that read the digest."""
-
-    def __init__(self, listener: HardwareListener) -> None:
-        self._listener = listener
-        self.listens = False
-
-    def taken(self, first_cycle: int, last_cycle: int) -> None:
-        if self.listens:
-            self._listener.taken(first_cycle, last_cycle)
-
-    def refused(self, converter: int | None) -> None:
-        if self.listens:
-            self._listener.refused(converter)
 
 
 def check_digest(transport: Transport, expected: str, system: str) -> None:

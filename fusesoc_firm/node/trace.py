@@ -64,7 +64,7 @@ class _Answer:
 class _Ways:
     """Messages in transit: to the hardware, within the hardware to each publisher, and to each topic."""
 
-    untaken: deque[Entry] = field(default_factory=deque)
+    untaken: deque[Entry | None] = field(default_factory=deque)
     pending: dict[tuple[int, int], deque[Entry]] = field(default_factory=dict)
     unpublished: dict[int, deque[_Answer]] = field(default_factory=dict)
 
@@ -101,6 +101,11 @@ class Trace:
             for publisher in self._reached.get(entry.subscriber, ()):
                 self._ways.pending.setdefault((entry.subscriber, publisher), deque()).append(entry)
 
+    def sending_other(self) -> None:
+        """Record that a frame other than a message is being sent to the hardware."""
+        with self._lock:
+            self._ways.untaken.append(None)
+
     def sent(self, entry: Entry) -> None:
         """Record that the hardware, or a bounded buffer before it, has the message."""
         entry.sent_ns = self._clock()
@@ -108,8 +113,9 @@ class Trace:
     def taken(self, first_cycle: int, last_cycle: int) -> None:
         """Record that simulated hardware took the next sent message."""
         with self._lock:
-            if self._ways.untaken:
-                self._ways.untaken.popleft().cycles = (first_cycle, last_cycle)
+            entry = self._ways.untaken.popleft() if self._ways.untaken else None
+            if entry:
+                entry.cycles = (first_cycle, last_cycle)
 
     def refused(self, subscriber: int) -> None:
         """Record that the hardware rejected the last frame that it took for a subscriber and will not respond."""

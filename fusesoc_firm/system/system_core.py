@@ -293,7 +293,8 @@ def status_text(loaded: LoadedSystem) -> str:
     """Return the description of a system's status in SystemRDL."""
     system = loaded.system
     shape = len(system.subscribers), len(system.publishers)
-    return status_description(system.name, *shape, identity(loaded).digest)
+    digest = identity(loaded).digest
+    return status_description(system.name, *shape, digest, has_time_stamps=system.has_time_stamps)
 
 
 def system_core(loaded: LoadedSystem) -> GeneratedCore:

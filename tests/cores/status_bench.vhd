@@ -7,6 +7,9 @@
 --   f CHANNEL CODE   a fault
 --   b CHANNEL CODE   two faults at once, of this channel and the next
 --   s CHANNEL WAIT   a frame of one beat, which waits this long
+--   m CHANNEL BEATS  a frame of so many beats, with stalls
+--   t CHANNEL 0      read the time stamp of the channel's newest frame
+--   c 0 0            read the counter of the time stamps
 --   i CYCLES KIND    unknown ids (0) or errors of the link (1) in so many cycles
 --   q 0 LEVEL        the line of interrupts has this level
 library ieee;
@@ -58,10 +61,42 @@ architecture simulation of status_bench is
   signal sub_valid, sub_ready : std_logic_vector(1 downto 0) := (others => '0');
   signal pub_valid            : std_logic_vector(0 downto 0) := (others => '0');
   signal pub_beat             : std_logic := '0';
+  signal is_last              : std_logic := '1';
+  signal cycles               : word_t;
+
+  -- The cycles since reset, and what the time stamps must be.
+  type stamps_t is array (0 to 2) of natural;
+  signal count    : natural := 0;
+  signal read_at  : natural := 0;
+  signal stamps   : stamps_t := (others => 0);
+  signal is_first : boolean := true;
 
 begin
 
   clk <= not clk after 5 ns when not is_over else '0';
+
+  keep_time : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '1' then
+        count <= count + 1;
+      end if;
+      if bus_valid = '1' then
+        read_at <= count;
+      end if;
+      for number in 0 to 1 loop
+        if sub_valid(number) = '1' and sub_ready(number) = '1' then
+          is_first <= is_last = '1';
+          if is_first then
+            stamps(number) <= count + 1;
+          end if;
+        end if;
+      end loop;
+      if pub_beat = '1' and is_last = '1' then
+        stamps(2) <= count + 1;
+      end if;
+    end if;
+  end process keep_time;
 
   play : process
 
@@ -74,7 +109,7 @@ begin
     variable row      : natural := 0;
     variable seed_1   : positive := SEED;
     variable seed_2   : positive := 1;
-    variable cycles   : natural;
+    variable duration : natural;
 
     procedure read_word(word : out word_t) is
       variable digit : character;
@@ -136,15 +171,20 @@ begin
       read_word(first);
       read_word(second);
       number := to_integer(unsigned(first(15 downto 0)));
-      cycles := to_integer(unsigned(second(15 downto 0)));
+      duration := to_integer(unsigned(second(15 downto 0)));
       case action is
-        when 'r' =>
+        when 'r' | 't' | 'c' =>
           -- Whatever happened is counted by now.
           for cycle in 1 to 8 loop
             wait until rising_edge(clk);
           end loop;
           pause;
-          araddr  <= first(15 downto 0);
+          araddr <= first(15 downto 0);
+          if action = 't' then
+            araddr <= std_logic_vector(to_unsigned(16#803C# + 64 * number, 16));
+          elsif action = 'c' then
+            araddr <= x"0024";
+          end if;
           arvalid <= '1';
           wait until rising_edge(clk) and arready = '1';
           arvalid <= '0';
@@ -152,6 +192,11 @@ begin
           rready <= '1';
           wait until rising_edge(clk) and rvalid = '1';
           rready <= '0';
+          if action = 't' then
+            second := std_logic_vector(to_unsigned(stamps(number), 32));
+          elsif action = 'c' then
+            second := std_logic_vector(to_unsigned(read_at, 32));
+          end if;
           assert rdata = second and rresp = "00"
             report "line " & integer'image(row) & ": read "
                    & integer'image(to_integer(unsigned(rdata(30 downto 16)))) & " * 65536 + "
@@ -176,7 +221,7 @@ begin
           else
             pub_valid(0) <= '1';
           end if;
-          for cycle in 1 to cycles loop
+          for cycle in 1 to duration loop
             wait until rising_edge(clk);
           end loop;
           if number < 2 then
@@ -189,8 +234,30 @@ begin
           sub_ready <= (others => '0');
           pub_valid <= (others => '0');
           pub_beat  <= '0';
+        when 'm' =>
+          for beat in 1 to duration loop
+            pause;
+            if beat < duration then
+              is_last <= '0';
+            end if;
+            if number < 2 then
+              sub_valid(number) <= '1';
+              pause;
+              sub_ready(number) <= '1';
+            else
+              pub_valid(0) <= '1';
+              pause;
+              pub_beat <= '1';
+            end if;
+            wait until rising_edge(clk);
+            sub_valid <= (others => '0');
+            sub_ready <= (others => '0');
+            pub_valid <= (others => '0');
+            pub_beat  <= '0';
+            is_last   <= '1';
+          end loop;
         when 'i' =>
-          if cycles = 0 then
+          if duration = 0 then
             id_error <= '1';
           else
             link_error <= '1';
@@ -257,6 +324,7 @@ begin
       channel_address              => channel_address,
       channel_word                 => channel_word,
       control_count                => enable,
+      cycles_count                 => cycles,
       interrupt_enable_frame_error => open,
       interrupt_enable_id_error    => open,
       interrupt_enable_link_error  => open,
@@ -278,7 +346,8 @@ begin
       SUBSCRIBERS => 2,
       PUBLISHERS  => 1,
       COUNT_BITS  => COUNT_BITS,
-      WAIT_BITS   => 16
+      WAIT_BITS   => 16,
+      TIME_STAMPS => true
     )
     port map (
       clk              => clk,
@@ -287,10 +356,10 @@ begin
       is_clear         => is_clear,
       sub_axis_tvalid  => sub_valid,
       sub_axis_tready  => sub_ready,
-      sub_axis_tlast   => '1',
+      sub_axis_tlast   => is_last,
       pub_axis_tvalid  => pub_valid,
       sched_beat       => pub_beat,
-      sched_last       => '1',
+      sched_last       => is_last,
       sched_select     => "0",
       frame_error      => frame_error,
       frame_error_code => frame_error_code,
@@ -298,6 +367,7 @@ begin
       fault_channel    => fault_channel,
       fault_code       => fault_code,
       lost             => lost,
+      cycles           => cycles,
       read_address     => channel_address,
       read_word        => channel_word
     );

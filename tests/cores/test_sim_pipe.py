@@ -121,6 +121,15 @@ def test_an_aborted_frame_is_a_burst_that_aborts(bench: PipeBench) -> None:
     assert [(burst.data, burst.is_aborted) for burst in bursts] == [(FRAME, False), (FRAME[:3], True), (FRAME, False)]
 
 
+def test_a_frame_with_a_hole_has_a_byte_that_is_not_kept(bench: PipeBench) -> None:
+    # The bench returns every beat, and the host refuses it.
+    requests = b"H\x03\x00\x00\x00\x06\x00\x00\x00" + FRAME[:6] + b"R\x64\x00\x00\x00"
+    status, reports, printed = ended(bench, requests, 16)
+    assert status != 0
+    assert "cycle 2" in printed and "neither full nor the last" in printed
+    assert reports == VERSION
+
+
 def test_pulses_of_errors(bench: PipeBench) -> None:
     with bench.start(FAULT="id_pulse") as simulator:
         simulator.request(FRAME)
@@ -203,11 +212,12 @@ def test_what_happened_in_the_cycle_of_a_fault_is_reported(bench: PipeBench) -> 
 @pytest.mark.parametrize(
     ("requests", "message"),
     [
-        (b"X", "unknown request 88; legal: F, A, R, Q"),
-        (b"\x00", "unknown request 0; legal: F, A, R, Q"),
+        (b"X", "unknown request 88; legal: F, A, H, R, Q"),
+        (b"\x00", "unknown request 0; legal: F, A, H, R, Q"),
         (b"R\x01\x00", "the requests end within a request"),
         (b"F\x04\x00\x00\x00abc", "the requests end within a request"),
         (b"F\x00\x00\x00\x00", "the requested frame has no bytes"),
+        (b"H\x04\x00\x00\x00\x04\x00\x00\x00abcd", "the requested frame has no byte 4"),
         (b"F\x00\x00\x00\x80", "a number in a request is greater than 2147483647"),
         (b"R\xff\xff\xff\xff", "a number in a request is greater than 2147483647"),
     ],

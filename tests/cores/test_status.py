@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,9 @@ from tests.hdl.ghdl import Library, RunResult, core_files
 BENCH = "status_bench"
 DIGEST = "0123456789abcdef" * 2
 SIGNATURES = ("deadbeef", "00c0ffee", "12345678")
-MAP = status_map("bench", 2, 1, DIGEST)
+MAP = status_map("bench", 2, 1, DIGEST, has_time_stamps=True)
+# The registers that change by themselves.
+RESTING = [register for register in MAP.registers if register.name != "cycles"]
 COUNT_BITS = 4
 CHANNELS = ("subscriber[0]", "subscriber[1]", "publisher[0]")
 
@@ -64,9 +67,9 @@ def at_reset(register: Register) -> int:
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.check)])
 def test_every_register_has_its_reset_value_and_its_access(library: Library, tmp_path: Path, seed: int) -> None:
     script = Script()
-    for register in MAP.registers:
+    for register in RESTING:
         script.read(register.name, at_reset(register))
-    for register in MAP.registers:
+    for register in RESTING:
         script.write(register.name, 0xFFFFFFFF)
         stored = sum((1 << f.width) - 1 << f.low for f in register.fields if f.kind is Kind.STORAGE)
         constant = sum(f.reset << f.low for f in register.fields if f.kind is not Kind.STORAGE)
@@ -113,6 +116,23 @@ def test_counters_stop_at_their_highest_value(library: Library, tmp_path: Path) 
         script.read("subscriber[1].faults[2]", min(count, 2**COUNT_BITS - 1))
         script.read("publisher[0].frames", min(count, 2**COUNT_BITS - 1))
     script.run(library, tmp_path)
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.check)])
+def test_time_stamps_are_the_cycles_of_beats(library: Library, tmp_path: Path, seed: int) -> None:
+    print(f"seed {seed}")
+    source, script = random.Random(seed), Script()
+    for _ in range(60):
+        script.act("m", source.randrange(3), source.choice([1, 2, 5]))
+        script.act("c", 0, 0)
+        for channel in range(3):
+            script.act("t", channel, 0)
+    # Frames of one beat, one after the other.
+    for channel in (0, 1, 2, 2, 0):
+        script.act("s", channel, 0)
+    for channel in range(3):
+        script.act("t", channel, 0)
+    script.run(library, tmp_path, seed)
 
 
 def test_faults_frames_and_waits_are_counted_in_their_channels(library: Library, tmp_path: Path) -> None:

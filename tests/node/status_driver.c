@@ -45,6 +45,8 @@ static void show_channel(const char *name, unsigned number, unsigned channel) {
     unsigned code;
     char field[20];
     show(name, number, "frames", word_at(FIRM_STATUS_CHANNEL(channel) + FIRM_STATUS_FRAMES));
+    show(name, number, "longest_wait", word_at(FIRM_STATUS_CHANNEL(channel) + FIRM_STATUS_LONGEST_WAIT));
+    show(name, number, "stamp", word_at(FIRM_STATUS_CHANNEL(channel) + FIRM_STATUS_STAMP));
     for (code = FIRM_FAULT_BAD_LENGTH; code <= FIRM_FAULT_BAD_CHECKSUM; ++code) {
         snprintf(field, sizeof field, "faults[%u]", code - 1);
         show(name, number, field, word_at(FIRM_STATUS_CHANNEL(channel) + FIRM_STATUS_FAULTS(code)));
@@ -52,18 +54,21 @@ static void show_channel(const char *name, unsigned number, unsigned channel) {
 }
 
 int main(void) {
-    static const char *const names[] = {"id_errors", "link_errors", "lost", "last_fault"};
-    static const uint32_t addresses[] = {FIRM_STATUS_ID_ERRORS, FIRM_STATUS_LINK_ERRORS, FIRM_STATUS_LOST,
-                                         FIRM_STATUS_LAST_FAULT};
+    static const char *const names[] = {"control",   "interrupt",   "interrupt_enable", "last_fault",
+                                        "id_errors", "link_errors", "lost",             "cycles"};
+    static const uint32_t addresses[] = {FIRM_STATUS_CONTROL,          FIRM_STATUS_INTERRUPT,
+                                         FIRM_STATUS_INTERRUPT_ENABLE, FIRM_STATUS_LAST_FAULT,
+                                         FIRM_STATUS_ID_ERRORS,        FIRM_STATUS_LINK_ERRORS,
+                                         FIRM_STATUS_LOST,             FIRM_STATUS_CYCLES};
     const uint32_t shape = word_at(FIRM_STATUS_SHAPE);
     const unsigned subscribers = shape & 0xFFFu, publishers = shape >> 12 & 0xFFFu;
     unsigned number;
     uint32_t digest[4];
     uint8_t request[FIRM_STATUS_FRAME_BYTES];
-    if (word_at(FIRM_STATUS_MAGIC) != FIRM_STATUS_MARK) {
+    if (word_at(FIRM_STATUS_MAGIC) != FIRM_STATUS_MARK || (word_at(FIRM_STATUS_FEATURES) & 1u) == 0) {
         return 3;
     }
-    for (number = 0; number < 4; ++number) {
+    for (number = 0; number < sizeof addresses / sizeof addresses[0]; ++number) {
         const uint32_t word = word_at(addresses[number]);
         if (word > 0) {
             printf("= %s %lu\n", names[number], (unsigned long)word);
@@ -87,6 +92,10 @@ int main(void) {
     firm_status_write_request(request, FIRM_STATUS_CONTROL, 0);
     if (answer_to(request, FIRM_STATUS_CONTROL) != 1 || word_at(FIRM_STATUS_CONTROL) != 0) {
         return 4;
+    }
+    firm_status_write_request(request, FIRM_STATUS_CONTROL, 1);
+    if (answer_to(request, FIRM_STATUS_CONTROL) != 0) {
+        return 5;
     }
     return 0;
 }

@@ -1,4 +1,7 @@
-"""Known faults through a simulated system: each language reads every counter of the status as it was injected."""
+"""Known faults through a simulated system: each language reads every counter of the status as it was injected.
+
+The faults of a link are injected at the pins of a UART, all others at the streams.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,15 @@ import pty
 import random
 import re
 import select
-import shlex
 import subprocess
 import termios
 import threading
 import tty
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -22,9 +26,10 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.faults import Fault
-from fusesoc_firm.node.status import read_status
+from fusesoc_firm.node.status import read_status, read_word, write_word
 from fusesoc_firm.node.transport.link_code import LinkDecoder, encode
-from fusesoc_firm.node.transport.simulator import Simulator, SimulatorTransport
+from fusesoc_firm.node.transport.simulator import Simulator, SimulatorTransport, Taken
+from fusesoc_firm.node.transport.transport import Transport
 from fusesoc_firm.simulation.simulator import BuiltSimulator, build_simulator
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity
@@ -36,9 +41,10 @@ SEED = 20261123
 FRAMES = 200
 MOST_BYTES = 40
 QUEUED = 2
+WATCHDOG = 32
 POINT, TEXT, QUEUE, WATCHED, BUFFERED, NOBODY = 0, 1, 2, 3, 4, 7
 SPECIFICATION = f"""\
-project: {{name: robot, width: 32, status: frames, watchdog: 32}}
+project: {{name: robot, width: 32, status: frames, timeStamps: added, watchdog: {WATCHDOG}}}
 accelerators:
   - {{name: deaf, type: VHDL, sources: deaf.vhd, interface: {{
      input: [{{middleware: ROS2, message: geometry_msgs/Vector3}}],
@@ -62,11 +68,14 @@ blocks:
      outgoing: [{{name: buffered_out}}]}}
   - {{name: buffered_out, middleware: ROS2, mode: publisher, message: std_msgs/String, buffer: {MOST_BYTES}}}
 """
+# Bits of the interrupts.
+CONVERTER_FAULT, UNKNOWN_ID, LINK_FAULT = 1, 2, 4
+# The code of a publisher whose frame was aborted.
 ABORTED = f"faults[{Fault.SHORT_FRAME - 1}]"
 ENCODING = b"\x00\x01\x00\x00"
 # The names of the status that are compared; a word that is missing is zero.
 COUNTED = re.compile(
-    r"(subscriber|publisher)\[\d\]\.(frames|faults\[\d+\])|id_errors|link_errors|lost|last_fault|digest"
+    r"(subscriber|publisher)\[\d\]\.(frames|faults\[\d+\])|id_errors|link_errors|lost|last_fault|digest|control|interrupt.*"
 )
 
 Words = Mapping[str, int | str]
@@ -86,7 +95,9 @@ def _header(id_: int, length: int) -> bytes:
 
 
 def _broken(id_: int, payload: bytes, fault: Fault, source: random.Random) -> bytes:
-    """The frame of a payload with a fault."""
+    """The frame of a payload with a fault, of which that of a stream is not part of its bytes."""
+    if fault in STREAM_FAULTS:
+        return pack_frame(id_, payload)
     if fault is Fault.BAD_LENGTH:
         return pack_frame(id_, payload[:-1])
     if fault is Fault.SHORT_FRAME:
@@ -101,39 +112,74 @@ def _broken(id_: int, payload: bytes, fault: Fault, source: random.Random) -> by
     return pack_frame(id_, payload + bytes(MOST_BYTES))
 
 
-POINT_FAULTS = (Fault.BAD_LENGTH, Fault.SHORT_FRAME, Fault.LONG_FRAME, Fault.BAD_ENCODING)
-TEXT_FAULTS = (Fault.SHORT_FRAME, Fault.LONG_FRAME, Fault.BAD_ENCODING, Fault.BAD_COUNT, Fault.TOO_LONG)
+# Of frames whose bytes are good.
+STREAM_FAULTS = (Fault.BROKEN_BEAT, Fault.ABORTED)
+POINT_FAULTS = (Fault.BAD_LENGTH, Fault.SHORT_FRAME, Fault.LONG_FRAME, Fault.BAD_ENCODING, *STREAM_FAULTS)
+TEXT_FAULTS = (
+    *(Fault.SHORT_FRAME, Fault.LONG_FRAME, Fault.BAD_ENCODING, Fault.BAD_COUNT, Fault.TOO_LONG),
+    *STREAM_FAULTS,
+)
 
 
-def _injected(seed: int) -> tuple[list[bytes], dict[str, int]]:
-    """Frames, good, broken and for nobody; and the words of the status that follow from them.
+@dataclass
+class Injection:
+    """Frames, good, broken and for nobody, with the words of the status that follow from them.
 
-    The last one is broken, and no publisher aborts a frame because of it.
+    `faults` has the frames with a fault of the stream.
     """
+
+    frames: list[bytes] = field(default_factory=list)
+    faults: dict[bytes, Fault] = field(default_factory=dict)
+    words: Counter[str] = field(default_factory=Counter)
+
+    def add(self, id_: int, frame: bytes, fault: Fault | None) -> None:
+        """Append a frame to a subscriber, which reports a fault or none."""
+        self.frames.append(frame)
+        self.words[f"subscriber[{id_}].frames"] += 1
+        if fault:
+            self.words[f"subscriber[{id_}].faults[{fault - 1}]"] += 1
+        if fault in STREAM_FAULTS:
+            self.faults[frame] = fault
+
+
+class FaultySimulator(Simulator):
+    """A simulator whose host makes the faults of the stream."""
+
+    faults: Mapping[bytes, Fault] = {}
+
+    def request(self, frame: bytes, *, is_aborted: bool = False, hole: int | None = None) -> None:
+        fault = self.faults.get(frame)
+        # Not in the last beat, which may end there.
+        super().request(
+            frame, is_aborted=fault is Fault.ABORTED, hole=len(frame) // 2 if fault is Fault.BROKEN_BEAT else None
+        )
+
+
+def _injected(seed: int) -> Injection:
+    """Return what is injected. The last frame is broken, and no publisher aborts a frame because of it."""
     print(f"seed {seed}")
     source = random.Random(seed)
-    frames, words = [], Counter[str]()
+    injected = Injection()
     for _ in range(FRAMES):
         id_ = source.choice((POINT, TEXT, TEXT, QUEUE, WATCHED, BUFFERED, NOBODY))
-        if id_ not in (POINT, TEXT):
-            frames.append(_refused(id_, source))
-            words[f"subscriber[{id_}].frames" if id_ != NOBODY else "id_errors"] += 1
-            continue
-        payload = _point(source) if id_ == POINT else _text(source)
-        fault = source.choice((None, *(POINT_FAULTS if id_ == POINT else TEXT_FAULTS)))
-        frames.append(_broken(id_, payload, fault, source) if fault else pack_frame(id_, payload))
-        words[f"subscriber[{id_}].frames"] += 1
-        if fault:
-            words[f"subscriber[{id_}].faults[{fault - 1}]"] += 1
+        if id_ == NOBODY:
+            injected.frames.append(_refused(id_, source))
+            injected.words["id_errors"] += 1
+        elif id_ in (POINT, TEXT):
+            payload = _point(source) if id_ == POINT else _text(source)
+            fault = source.choice((None, *(POINT_FAULTS if id_ == POINT else TEXT_FAULTS)))
+            injected.add(id_, _broken(id_, payload, fault, source) if fault else pack_frame(id_, payload), fault)
+        else:
+            injected.add(id_, _refused(id_, source), None)
     last = source.choice(POINT_FAULTS)
-    frames.append(_broken(POINT, _point(source), last, source))
-    for name in (f"subscriber[{POINT}].frames", f"subscriber[{POINT}].faults[{last - 1}]"):
-        words[name] += 1
+    injected.add(POINT, _broken(POINT, _point(source), last, source), last)
+    words = injected.words
     # One message is offered to the deaf accelerator; the publisher with a buffer reports what is too long for it.
     words[f"subscriber[{QUEUE}].faults[{Fault.DROPPED - 1}]"] = words[f"subscriber[{QUEUE}].frames"] - QUEUED - 1
     words[f"subscriber[{WATCHED}].faults[{Fault.WATCHDOG - 1}]"] = words[f"subscriber[{WATCHED}].frames"] - 1
     words[f"publisher[{BUFFERED}].faults[{Fault.OVER_BUFFER - 1}]"] = words[f"subscriber[{BUFFERED}].frames"]
-    return frames, {**words, "last_fault": POINT << 4 | last}
+    words |= {"last_fault": POINT << 4 | last, "control": 1, "interrupt": CONVERTER_FAULT | UNKNOWN_ID}
+    return injected
 
 
 def _refused(id_: int, source: random.Random) -> bytes:
@@ -163,12 +209,19 @@ def _digest(built: BuiltSimulator) -> str:
 
 
 @contextmanager
-def _hardware(built: BuiltSimulator) -> Iterator[SimulatorTransport]:
-    with SimulatorTransport(lambda: Simulator(built.command(seed=3, stall_percent=20), built.folder)) as transport:
+def _hardware(
+    built: BuiltSimulator, faults: Mapping[bytes, Fault] = {}, stalls: int = 20
+) -> Iterator[SimulatorTransport]:
+    def start() -> Simulator:
+        simulator = FaultySimulator(built.command(seed=3, stall_percent=stalls), built.folder)
+        simulator.faults = faults
+        return simulator
+
+    with SimulatorTransport(start) as transport:
         yield transport
 
 
-def _exchange(transport: SimulatorTransport, frames: list[bytes]) -> dict[str, int]:
+def _exchange(transport: SimulatorTransport, frames: Sequence[bytes]) -> Counter[str]:
     """Send the frames, the last one after a pause; return the publishers' words that follow from those received.
 
     A publisher aborts a frame that ends early.
@@ -181,71 +234,114 @@ def _exchange(transport: SimulatorTransport, frames: list[bytes]) -> dict[str, i
             if burst:
                 found[f"publisher[{burst.data[0]}].frames"] += 1
                 found[f"publisher[{burst.data[0]}].{ABORTED}"] += burst.is_aborted
-    return dict(+found)
+    return found
 
 
-def _in_python(built: BuiltSimulator, frames: list[bytes]) -> tuple[Words, Words]:
-    with _hardware(built) as transport:
-        received = _exchange(transport, frames)
-        status = read_status(transport)
-    return {**status.words, "digest": status.digest}, received
+@dataclass(frozen=True)
+class Faulty:
+    """Hardware into which faults were injected, and the words of its status that are not zero."""
+
+    transport: SimulatorTransport
+    words: Words
 
 
-def _in_cpp(built: BuiltSimulator, frames: list[bytes]) -> tuple[Words, Words]:
-    digest = _digest(built)
-    *sends, last = [f"send {frame.hex()}" for frame in frames]
-    lines = [*sends, "rest", last, "rest", "status", f"digest {digest}", "digest 00"]
-    script = shlex.quote(str(built.script(seed=3, stall_percent=20)))
-    *answers, same, other = cpp_driver("status").answers(lines, f"pipe:{script} >/dev/null")
-    assert same == "accepted"
-    assert other == f"the hardware is not that of 'robot': its digest is {digest}, and the specification's is 00"
-    rows = [line.split() for line in answers]
-    words = {"received": "frames", "aborted": ABORTED}
-    received: Words = {f"publisher[{row[1]}].{words[row[0]]}": int(row[2]) for row in rows if row[0] in words}
-    return _words([row for row in rows if row[0] not in words]), received
+@pytest.fixture(scope="module")
+def faulty(built: BuiltSimulator) -> Iterator[Faulty]:
+    injected = _injected(SEED)
+    assert len({name for name in injected.words if "faults" in name}) == len(POINT_FAULTS) + len(TEXT_FAULTS) + 3
+    with _hardware(built, injected.faults) as transport:
+        received = _exchange(transport, injected.frames)
+        assert received[f"publisher[{TEXT}].{ABORTED}"]
+        yield Faulty(transport, {**+injected.words, **+received, "digest": _digest(built)})
 
 
-def _in_c(built: BuiltSimulator, frames: list[bytes], folder: Path) -> tuple[Words, Words]:
+def counted(words: Words) -> Words:
+    return {name: word for name, word in words.items() if COUNTED.fullmatch(name) and word}
+
+
+def _in_python(transport: SimulatorTransport) -> Words:
+    status = read_status(transport)
+    return {**status.words, "digest": status.digest}
+
+
+def test_python_reads_what_was_injected(faulty: Faulty) -> None:
+    status = read_status(faulty.transport)
+    assert counted({**status.words, "digest": status.digest}) == faulty.words
+    # The beat that is offered to the deaf accelerator waits until the watchdog acts.
+    assert status.words[f"subscriber[{WATCHED}].longest_wait"] == WATCHDOG
+
+
+@pytest.mark.parametrize("language", ["c", "cpp"])
+def test_another_language_reads_the_same(language: str, faulty: Faulty, tmp_path: Path) -> None:
     sources = ["firm/firm_frame.c", "firm/firm_status.c"]
-    program = compile_c_driver("status", folder, sources, [], {}).program
-    with (
-        _hardware(built) as transport,
-        subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as driver,
-    ):
-        assert driver.stdin and driver.stdout
-        received = _exchange(transport, frames)
-        rows = []
-        for line in driver.stdout:
+    driver = cpp_driver("status") if language == "cpp" else compile_c_driver("status", tmp_path, sources, [], {})
+    before = _in_python(faulty.transport)
+    found = told([driver.program, str(faulty.words["digest"])], faulty.transport)
+    assert counted(found) == faulty.words
+    # The cycle of the reading itself differs.
+    moving = {"cycles": found["cycles"]}
+    constant = {name: 0 for name in before if re.match(r"magic|shape|features|digest_|.*signature", name)}
+    assert {**found, **moving} == {name: word for name, word in {**before, **constant, **moving}.items() if word}
+
+
+def told(command: Sequence[str | Path], transport: Transport) -> Words:
+    """The words that a program reads, whose requests are its lines."""
+    words: dict[str, int | str] = {}
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdin and program.stdout
+        for line in program.stdout:
             if line.startswith("="):
-                rows.append(line.split()[1:])
+                _, name, word = line.split()
+                words[name] = word if name == "digest" else int(word)
                 continue
             transport.send(bytes.fromhex(line))
             answer = transport.receive(20)
             assert answer
-            driver.stdin.write(f"{answer.data.hex()}\n")
-            driver.stdin.flush()
-    assert driver.returncode == 0
-    return _words(rows), received
+            program.stdin.write(f"{answer.data.hex()}\n")
+            program.stdin.flush()
+    assert program.returncode == 0
+    return words
 
 
-def _words(rows: Iterable[list[str]]) -> Words:
-    return {name: word if name == "digest" else int(word) for name, word in rows}
+def test_interrupts_and_counting_can_be_switched(faulty: Faulty) -> None:
+    addresses = {register.name: register.address for register in read_status(faulty.transport).registers.values()}
+
+    def word(name: str) -> int:
+        return read_word(faulty.transport, addresses[name])
+
+    write_word(faulty.transport, addresses["interrupt_enable"], UNKNOWN_ID)
+    write_word(faulty.transport, addresses["control"], 0)
+    before = word(f"subscriber[{POINT}].frames")
+    faulty.transport.send(pack_frame(POINT, bytes(3)))
+    assert word("interrupt_enable") == UNKNOWN_ID
+    assert word(f"subscriber[{POINT}].frames") == before
+    write_word(faulty.transport, addresses["control"], 1)
+    write_word(faulty.transport, addresses["interrupt_enable"], 0)
+    assert counted(_in_python(faulty.transport)) == faulty.words
 
 
-READERS: dict[str, Callable[[BuiltSimulator, list[bytes], Path], tuple[Words, Words]]] = {
-    "python": lambda built, frames, _: _in_python(built, frames),
-    "cpp": lambda built, frames, _: _in_cpp(built, frames),
-    "c": _in_c,
-}
-
-
-@pytest.mark.parametrize("language", READERS)
-def test_the_counters_are_what_was_injected(language: str, built: BuiltSimulator, tmp_path: Path) -> None:
-    frames, expected = _injected(SEED + len(language))
-    found, received = READERS[language](built, frames, tmp_path)
-    assert len(expected) == len(POINT_FAULTS) + len(TEXT_FAULTS) + 10 and received[f"publisher[{TEXT}].{ABORTED}"]
-    counted = {name: word for name, word in found.items() if COUNTED.fullmatch(name) and word}
-    assert counted == {**expected, **received, "digest": _digest(built)}
+def test_time_stamps_are_the_cycles_of_the_first_beat_in_and_the_last_beat_out(built: BuiltSimulator) -> None:
+    """Between two messages, the stamps advance as the cycles at the host do, which the simulator reports."""
+    print(f"seed {SEED}")
+    source = random.Random(SEED)
+    taken: list[Taken] = []
+    differences = set()
+    start = partial(Simulator, built.command(seed=3, stall_percent=0), built.folder)
+    with SimulatorTransport(
+        start, observe=lambda event: taken.append(event) if isinstance(event, Taken) else None
+    ) as transport:
+        addresses = {register.name: register.address for register in read_status(transport).registers.values()}
+        for id_ in (POINT, TEXT, TEXT, POINT, TEXT):
+            transport.send(pack_frame(id_, _point(source) if id_ == POINT else _text(source)))
+            burst = transport.receive(20)
+            first = taken[-1].first_cycle
+            assert burst and burst.last_cycle
+            names = (f"subscriber[{id_}].stamp", f"publisher[{id_}].stamp", "cycles")
+            entered, left, now = (read_word(transport, addresses[name]) for name in names)
+            assert 0 < left - entered <= burst.last_cycle - first
+            assert left < now
+            differences.add((entered - first, left - burst.last_cycle))
+    assert len(differences) == 1
 
 
 @contextmanager
@@ -277,26 +373,29 @@ def _line(transport: SimulatorTransport) -> Iterator[str]:
 
 
 def test_the_command_prints_what_was_injected(
-    built: BuiltSimulator, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    built: BuiltSimulator, faulty: Faulty, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A pseudo-terminal has no breaks.
     monkeypatch.setattr(termios, "tcsendbreak", lambda _line, _duration: None)
-    frames, expected = _injected(SEED)
-    with _hardware(built) as transport:
-        received = _exchange(transport, frames)
-        with _line(transport) as device:
-            assert main(["status", f"uart:{device}:1000000", "--system", str(_specification(built))]) == 0
+    words = _in_python(faulty.transport)
+    with _line(faulty.transport) as device:
+        assert main(["status", f"uart:{device}:1000000", "--system", str(_specification(built))]) == 0
     text = capsys.readouterr().out
     channels = ("point", "text", "queue", "watched", "buffered")
     names = {f"subscriber[{place}]": f"{name}_in" for place, name in enumerate(channels)}
     names |= {f"publisher[{place}]": f"{name}_out" for place, name in enumerate(channels)}
     found: dict[str, int] = {"id_errors": int(text.split("unknown ids ")[1].split(",")[0])}
     for channel, name in names.items():
-        (row,) = [line.split(maxsplit=5) for line in text.splitlines() if line.startswith(f"{name} ")]
+        (row,) = [line.split(maxsplit=6) for line in text.splitlines() if line.startswith(f"{name} ")]
         found[f"{channel}.frames"] = int(row[2])
-        for count, code in re.findall(r"(\d+) of code (\d+)", row[5]):
+        assert (int(row[3]), row[4]) == (words[f"{channel}.longest_wait"], "cycles")
+        assert row[5] == (str(words[f"{channel}.stamp"]) if int(row[2]) else "-")
+        for count, code in re.findall(r"(\d+) of code (\d+)", row[6]):
             found[f"{channel}.faults[{int(code) - 1}]"] = int(count)
-    last = expected.pop("last_fault")
-    assert {name: word for name, word in found.items() if word} == {**expected, **received}
+    others = {"last_fault", "control", "interrupt", "digest"}
+    assert {name: word for name, word in found.items() if word} == {
+        name: word for name, word in faulty.words.items() if name not in others
+    }
+    last = int(faulty.words["last_fault"])
     assert f"last fault: code {last & 15} of {names[f'subscriber[{last >> 4}]']}" in text
     assert f"digest {_digest(built)}" in text

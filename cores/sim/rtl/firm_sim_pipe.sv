@@ -66,7 +66,9 @@ module firm_sim_pipe #(
   reg [7:0]  bytes [$];
   integer    sizes [$];
   reg        aborts [$];
+  integer    holes [$];
   reg        is_aborted;                 // the frame being sent
+  integer    hole;                       // its byte that is not kept, or -1
   integer    sending;                    // the size of the frame being sent; 0 for none
   integer    bytes_sent;                 // of it, without the beat on offer
   reg        is_offered;
@@ -159,12 +161,19 @@ module firm_sim_pipe #(
     end
   endtask
 
-  task read_frame(input reg has_abort);
-    integer size, place, left, count;
+  task read_frame(input reg has_abort, input reg has_hole);
+    integer size, place, left, count, gap;
     begin
+      gap = -1;
+      if (has_hole)
+        read_number(gap);
       read_number(size);
       if (size == 0) begin
         $display("firm_sim_pipe: the requested frame has no bytes");
+        fail;
+      end
+      else if (gap >= size) begin
+        $display("firm_sim_pipe: the requested frame has no byte %0d", gap);
         fail;
       end
       for (left = size; left > 0; left = left - count) begin
@@ -175,6 +184,7 @@ module firm_sim_pipe #(
       end
       sizes.push_back(size);
       aborts.push_back(has_abort);
+      holes.push_back(gap);
     end
   endtask
 
@@ -263,7 +273,7 @@ module firm_sim_pipe #(
       m_axis_tkeep = 0;
       for (lane = 0; lane < LANES && bytes_sent + lane < sending; lane = lane + 1) begin
         m_axis_tdata[8*lane +: 8] = bytes.pop_front();
-        m_axis_tkeep[lane]        = 1;
+        m_axis_tkeep[lane]        = bytes_sent + lane != hole;
       end
       m_axis_tvalid = 1;
       m_axis_tlast  = sending - bytes_sent <= LANES;
@@ -313,6 +323,7 @@ module firm_sim_pipe #(
         if (sending == 0 && sizes.size() != 0) begin
           sending    = sizes.pop_front();
           is_aborted = aborts.pop_front();
+          hole       = holes.pop_front();
         end
         draw_stall(is_stalled);
         if (sending != 0 && !is_stalled)
@@ -542,14 +553,14 @@ module firm_sim_pipe #(
     request = $fgetc(requests);
     // The end of the requests has the same effect as Q.
     while (request >= 0) begin
-      if (request == "F" || request == "A")
-        read_frame(request == "A");
+      if (request == "F" || request == "A" || request == "H")
+        read_frame(request == "A", request == "H");
       else if (request == "R")
         run;
       else if (request == "Q")
         report_stand;
       else begin
-        $display("firm_sim_pipe: unknown request %0d; legal: F, A, R, Q", request);
+        $display("firm_sim_pipe: unknown request %0d; legal: F, A, H, R, Q", request);
         fail;
       end
       request = request == "Q" ? -1 : $fgetc(requests);

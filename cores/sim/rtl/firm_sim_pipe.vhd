@@ -98,6 +98,7 @@ architecture simulation of firm_sim_pipe is
   type frame_t is record
     bytes      : line;
     is_aborted : boolean;
+    hole       : integer;  -- the byte that is not kept, or -1
     next_frame : frame_ptr_t;
   end record frame_t;
 
@@ -209,17 +210,24 @@ begin
       number := sum;
     end procedure read_number;
 
-    procedure read_frame(is_aborted : in boolean) is
+    procedure read_frame(is_aborted, has_hole : in boolean) is
       variable frame : frame_ptr_t;
       variable size  : natural;
+      variable hole  : integer := -1;
     begin
+      if has_hole then
+        read_number(hole);
+      end if;
       read_number(size);
       if size = 0 then
         fail("the requested frame has no bytes");
+      elsif hole >= size then
+        fail("the requested frame has no byte " & integer'image(hole));
       end if;
       frame            := new frame_t;
       frame.bytes      := new string(1 to size);
       frame.is_aborted := is_aborted;
+      frame.hole       := hole;
       for place in 1 to size loop
         read_byte(frame.bytes(place));
       end loop;
@@ -308,7 +316,7 @@ begin
       for lane in 0 to LANES-1 loop
         exit when bytes_sent + lane = sending.bytes'length;
         tdata(8*lane+7 downto 8*lane) := to_byte(sending.bytes(bytes_sent + lane + 1));
-        tkeep(lane)                   := '1';
+        tkeep(lane)                   := LEVEL_OF(bytes_sent + lane /= sending.hole);
       end loop;
       m_axis_tdata  <= tdata after HOLD;
       m_axis_tkeep  <= tkeep after HOLD;
@@ -544,11 +552,12 @@ begin
     while request /= 'Q' and not endfile(requests) loop
       read(requests, request);
       case request is
-        when 'F'    => read_frame(false);
-        when 'A'    => read_frame(true);
+        when 'F'    => read_frame(false, false);
+        when 'A'    => read_frame(true, false);
+        when 'H'    => read_frame(false, true);
         when 'R'    => run;
         when 'Q'    => report_stand;
-        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, A, R, Q");
+        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, A, H, R, Q");
       end case;
     end loop;
     wait;

@@ -4,6 +4,10 @@
 --
 -- Frames are counted in the cycle of their last beat, at any rate. Faults wait in one place for each channel until they
 -- are counted, one in a cycle; a fault that finds its channel's place taken is not counted, and `lost` pulses.
+--
+-- With TIME_STAMPS, a counter runs freely. Each channel has the value of this counter one cycle after an event: the
+-- first beat of a subscriber's newest frame, or the last beat of a publisher's newest frame. The difference of both is
+-- the time that a message took, in cycles modulo 2**32.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -15,7 +19,8 @@ entity firm_status_counters is
     SUBSCRIBERS : integer := 1;
     PUBLISHERS  : integer := 1;
     COUNT_BITS  : integer := 32;
-    WAIT_BITS   : integer := 16
+    WAIT_BITS   : integer := 16;
+    TIME_STAMPS : boolean := false
   );
   port (
     clk   : in std_logic;
@@ -46,8 +51,11 @@ entity firm_status_counters is
     fault_code    : out std_logic_vector(3 downto 0);
     lost          : out std_logic;
 
-    -- The word at an address, two cycles later: the channel, then four bits. These are a code, 13 for the frames, or 14
-    -- for the longest wait.
+    -- The counter of the time stamps; zeros without them.
+    cycles : out std_logic_vector(31 downto 0);
+
+    -- The word at an address, two cycles later: the channel, then four bits. These are a code, 13 for the frames, 14 for
+    -- the longest wait, or 15 for the time stamp.
     read_address : in  std_logic_vector(12 downto 0);
     read_word    : out std_logic_vector(31 downto 0)
   );
@@ -64,6 +72,7 @@ architecture rtl of firm_status_counters is
   constant NO_SUBSCRIBER  : std_logic_vector(SUBSCRIBERS-1 downto 0) := (others => '0');
   constant FRAMES         : std_logic_vector(3 downto 0) := "1101";
   constant WAITED         : std_logic_vector(3 downto 0) := "1110";
+  constant STAMPED        : std_logic_vector(3 downto 0) := "1111";
 
   -- The index of the bit that is '1'; zeros if there is none.
   function position(bits : std_logic_vector; size : positive) return std_logic_vector is
@@ -92,6 +101,7 @@ architecture rtl of firm_status_counters is
   signal sub_frames    : std_logic_vector(COUNT_BITS-1 downto 0);
   signal sub_longest   : std_logic_vector(WAIT_BITS-1 downto 0);
   signal sub_clear     : std_logic;
+  signal sub_stamp     : std_logic_vector(31 downto 0);
 
   -- Beats of publishers.
   signal pub_wait_r    : std_logic_vector(PUBLISHERS*WAIT_BITS-1 downto 0);
@@ -104,6 +114,7 @@ architecture rtl of firm_status_counters is
   signal pub_frames    : std_logic_vector(COUNT_BITS-1 downto 0);
   signal pub_longest   : std_logic_vector(WAIT_BITS-1 downto 0);
   signal pub_clear     : std_logic;
+  signal pub_stamp     : std_logic_vector(31 downto 0);
 
   -- Faults.
   signal waiting_r     : std_logic_vector(CHANNELS-1 downto 0);
@@ -240,6 +251,68 @@ begin
       read_longest => pub_longest
     );
 
+  -- Time stamps
+  without_stamps : if not TIME_STAMPS generate
+    cycles    <= (others => '0');
+    sub_stamp <= (others => '0');
+    pub_stamp <= (others => '0');
+  end generate without_stamps;
+
+  with_stamps : if TIME_STAMPS generate
+    signal cycles_r     : unsigned(31 downto 0);
+    signal is_first_r   : std_logic;  -- the next beat to a subscriber is the first one of its frame
+    signal was_first_r  : std_logic;
+    signal stamps_first : std_logic;
+    signal stamps_last  : std_logic;
+  begin
+
+    count_cycles : process (clk)
+    begin
+      if rising_edge(clk) then
+        cycles_r    <= cycles_r + 1;
+        was_first_r <= is_first_r;
+        if sub_taken /= NO_SUBSCRIBER then
+          is_first_r <= sub_axis_tlast;
+        end if;
+        if rst_n = '0' then
+          cycles_r   <= (others => '0');
+          is_first_r <= '1';
+        end if;
+      end if;
+    end process count_cycles;
+
+    cycles       <= std_logic_vector(cycles_r);
+    stamps_first <= sub_valid and was_first_r;
+    stamps_last  <= pub_beat_r and pub_last_r;
+
+    u_first_beats : entity firm.firm_status_stamps
+      generic map (
+        INDEX_BITS => SUB_BITS
+      )
+      port map (
+        clk        => clk,
+        op_valid   => stamps_first,
+        op_index   => sub_index,
+        op_stamp   => std_logic_vector(cycles_r),
+        read_index => sub_read,
+        read_stamp => sub_stamp
+      );
+
+    u_last_beats : entity firm.firm_status_stamps
+      generic map (
+        INDEX_BITS => PUB_BITS
+      )
+      port map (
+        clk        => clk,
+        op_valid   => stamps_last,
+        op_index   => pub_index_r,
+        op_stamp   => std_logic_vector(cycles_r),
+        read_index => pub_read,
+        read_stamp => pub_stamp
+      );
+
+  end generate with_stamps;
+
   -- Faults. The lowest waiting channel is next; its code is read in the cycle after the choice.
   lowest <= waiting_r and std_logic_vector(unsigned(not waiting_r) + 1);
 
@@ -345,6 +418,10 @@ begin
         read_word(WAIT_BITS-1 downto 0) <= sub_longest;
       elsif word_r = WAITED then
         read_word(WAIT_BITS-1 downto 0) <= pub_longest;
+      elsif word_r = STAMPED and is_sub_r = '1' then
+        read_word <= sub_stamp;
+      elsif word_r = STAMPED then
+        read_word <= pub_stamp;
       else
         read_word(COUNT_BITS-1 downto 0) <= faults;
       end if;

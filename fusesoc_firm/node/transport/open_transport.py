@@ -7,6 +7,7 @@ dma:UIO:BUFFER[:poll]             AXI DMA, such as dma:/dev/uio0:udmabuf0, witho
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 from fusesoc_firm.node.transport.dma import DmaTransport
@@ -36,6 +37,17 @@ def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Ev
         if uio and buffer:
             return DmaTransport(LinuxDmaDevice(uio, buffer, has_interrupt=not is_polled))
     raise TransportError(f"the transport is '{address}'; legal: {LEGAL}")
+
+
+def device_of(address: str) -> str:
+    """Return the kind and the device of an address, such as `uart:/dev/ttyUSB1`, or nothing without a device.
+
+    Two addresses of the same device have the same result.
+    """
+    kind, _, rest = address.partition(":")
+    options = {"uart": ":rtscts", "dma": ":poll"}
+    device = _device(rest, options[kind])[0] if kind in options else ""
+    return f"{kind}:{os.path.realpath(device)}" if device else ""
 
 
 def _device(text: str, option: str) -> tuple[str, str, bool]:

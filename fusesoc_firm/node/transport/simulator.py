@@ -106,14 +106,15 @@ class Simulator:
         """The id of the simulator's process."""
         return self._process.pid
 
-    def request(self, frame: bytes, *, is_aborted: bool = False) -> None:
+    def request(self, frame: bytes, *, is_aborted: bool = False, hole: int | None = None) -> None:
         """Append a frame to the frames that wait to be sent to the system. May raise `TransportError`.
 
-        If `is_aborted`, the last beat aborts the frame.
+        If `is_aborted`, the last beat aborts the frame. Otherwise, the byte at the place `hole` is not kept.
         """
         if not 1 <= len(frame) <= MOST_CYCLES:
             raise ValueError(f"the frame has {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
-        self._write((b"A" if is_aborted else b"F") + len(frame).to_bytes(4, "little"), frame)
+        kind = b"A" if is_aborted else b"F" if hole is None else b"H" + hole.to_bytes(4, "little")
+        self._write(kind + len(frame).to_bytes(4, "little"), frame)
 
     def run(self, cycles: int) -> list[Event]:
         """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""

@@ -45,7 +45,7 @@ from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
 from fusesoc_firm.system.derived.quality import check_quality, quality_of
 from fusesoc_firm.system.derived.queue import queue_of
-from fusesoc_firm.system.derived.status import status_of
+from fusesoc_firm.system.derived.status import has_time_stamps, status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
 from fusesoc_firm.system.derived.tree import tree_of
@@ -128,6 +128,7 @@ def derive(
         names=names,
         link=link,
         status=status_of(project, link, max(len(subscribers), len(publishers)), faults),
+        has_time_stamps=has_time_stamps(project, faults),
         tree=tree,
         pipeline=None if project.pipeline is None else str(project.pipeline),
         watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),

@@ -345,6 +345,7 @@ class DerivedSystem:
     clock: Fraction | None = None
     clocks: tuple[Clock, ...] = ()
     status: StatusAccess | None = None
+    has_time_stamps: bool = False
     watchdog: int = 0
     tree: Tree | None = None
     pipeline: str | None = None

@@ -1,9 +1,9 @@
-"""How the status registers of a system are accessed: the key `status` of the specification."""
+"""How the status registers of a system are accessed: the keys `status` and `timeStamps` of the specification."""
 
 from __future__ import annotations
 
 from fusesoc_firm.system.derived.model import Link, StatusAccess
-from fusesoc_firm.system.written.specification import NO_STATUS, STATUS_FRAMES, Project
+from fusesoc_firm.system.written.specification import ADDED, NO_STATUS, STATUS_AXI_LITE, STATUS_FRAMES, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 # Frames of this id carry accesses in both directions, so no converter has it.
@@ -27,6 +27,18 @@ def status_of(project: Project, link: Link | None, converters: int, faults: Diag
     if access is StatusAccess.FRAMES:
         _check_id(project, converters, faults)
     return access
+
+
+def has_time_stamps(project: Project, faults: Diagnostics) -> bool:
+    """Return whether the status has time stamps; note a fault if there is no status."""
+    is_wanted = project.time_stamps == ADDED
+    if is_wanted and project.status == NO_STATUS:
+        faults.error(
+            f"'timeStamps: {ADDED}' needs a status, which holds the time stamps",
+            project.time_stamps.source,
+            f"add 'status: {STATUS_FRAMES}' or 'status: {STATUS_AXI_LITE}'",
+        )
+    return is_wanted
 
 
 def _check_id(project: Project, converters: int, faults: Diagnostics) -> None:

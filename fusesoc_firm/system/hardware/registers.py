@@ -55,6 +55,11 @@ class Register:
     fields: tuple[Field, ...]
     is_external: bool
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether the register never changes."""
+        return all(field.kind is Kind.CONSTANT for field in self.fields)
+
 
 @dataclass(frozen=True)
 class RegisterMap:

@@ -52,7 +52,9 @@ def _described(item: Converter) -> list[object]:
     return [item.id, item.block, item.name, item.frame.ros.title, str(item.frame.message)]
 
 
-def status_description(name: str, subscribers: int, publishers: int, digest: str = "") -> str:
+def status_description(
+    name: str, subscribers: int, publishers: int, digest: str = "", *, has_time_stamps: bool = False
+) -> str:
     """Return the description of a status in SystemRDL; without a `digest`, its registers have the value 0."""
     digits = digest or "0" * (DIGEST_WORDS * _WORD_DIGITS)
     return render(
@@ -61,6 +63,7 @@ def status_description(name: str, subscribers: int, publishers: int, digest: str
             "name": name,
             "subscribers": subscribers,
             "publishers": publishers,
+            "time_stamps": has_time_stamps,
             "publisher_address": f"{_CHANNELS_ADDRESS + subscribers * _CHANNEL_BYTES:x}",
             "digest": [
                 {
@@ -75,9 +78,11 @@ def status_description(name: str, subscribers: int, publishers: int, digest: str
     )
 
 
-def status_map(name: str, subscribers: int, publishers: int, digest: str = "") -> RegisterMap:
+def status_map(
+    name: str, subscribers: int, publishers: int, digest: str = "", *, has_time_stamps: bool = False
+) -> RegisterMap:
     """Return the registers of a status."""
-    return register_map(status_description(name, subscribers, publishers, digest))
+    return register_map(status_description(name, subscribers, publishers, digest, has_time_stamps=has_time_stamps))
 
 
 def status_entity(system: DerivedSystem) -> str:
@@ -104,6 +109,7 @@ def _instances(system: DerivedSystem) -> Context:
         "entity": status_entity(system),
         "is_frames": system.status is StatusAccess.FRAMES,
         "has_link": bool(system.link),
+        "time_stamps": system.has_time_stamps,
         "host_tid": "open" if system.link else "m_axis_tid",
         "width": system.width,
         "lanes": system.width // 8,

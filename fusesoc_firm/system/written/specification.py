@@ -59,7 +59,7 @@ PROFILES = {
 PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
-# Whether the top level has a synchroniser after an input pin, or a FIFO after a publisher.
+# Whether the top level has a synchroniser after an input pin, a FIFO after a publisher, or time stamps.
 ADDED, NOT_ADDED = ADDITIONS = ("added", "none")
 # `vendor:library:name`, with an optional version.
 _CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
@@ -165,6 +165,14 @@ class Project(Section):
         "access to the status registers, if the system has any: frames of the id 255, or a port for AXI4-Lite",
         choices=(NO_STATUS, *STATUS),
         default=Text(NO_STATUS),
+    )
+    time_stamps: Text = key(
+        "time stamps in the status: the cycle of the first beat to each subscriber, and of the last beat from each"
+        " publisher",
+        name="timeStamps",
+        choices=ADDITIONS,
+        default=Text(NOT_ADDED),
+        is_asked=False,
     )
     clock: Text | None = key("frequency of clk, such as 100 MHz; required for times with a unit and for clocks")
     clocks: tuple[ClockDomain, ...] = key("additional clocks for accelerators", form="sections", section=ClockDomain)

@@ -25,6 +25,8 @@
 #define FIRM_STATUS_ID_ERRORS 0x18u
 #define FIRM_STATUS_LINK_ERRORS 0x1Cu
 #define FIRM_STATUS_LOST 0x20u
+#define FIRM_STATUS_CYCLES 0x24u   /* with time stamps: cycles since reset, modulo 2^32 */
+#define FIRM_STATUS_FEATURES 0x28u /* bit 0: time stamps */
 #define FIRM_STATUS_DIGEST(word) (0x30u + 4u * (word)) /* words 0 to 3, the lowest one first */
 #define FIRM_STATUS_MARK 0x4D524946u
 
@@ -34,6 +36,9 @@
 #define FIRM_STATUS_FAULTS(code) (4u * (code)) /* code of firm_fault_t */
 #define FIRM_STATUS_FRAMES 0x34u
 #define FIRM_STATUS_LONGEST_WAIT 0x38u /* cycles */
+/* With time stamps: FIRM_STATUS_CYCLES one cycle after the first beat of a subscriber's newest frame, or after the last
+ * beat of a publisher's. The difference of two stamps as uint32_t is a time in cycles. */
+#define FIRM_STATUS_STAMP 0x3Cu
 
 /* Write the frame that reads or writes the register at an address. */
 void firm_status_read_request(uint8_t request[FIRM_STATUS_FRAME_BYTES], uint32_t address);

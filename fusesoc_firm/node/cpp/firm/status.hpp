@@ -29,16 +29,19 @@ constexpr std::size_t kFaultCodes = 12;
 namespace status_register {
 constexpr std::uint32_t kMagic = 0x00, kShape = 0x04, kControl = 0x08, kInterrupt = 0x0C, kInterruptEnable = 0x10;
 constexpr std::uint32_t kLastFault = 0x14, kIdErrors = 0x18, kLinkErrors = 0x1C, kLost = 0x20, kDigest = 0x30;
+constexpr std::uint32_t kCycles = 0x24, kFeatures = 0x28;
 constexpr std::uint32_t kChannels = 0x8000, kChannelBytes = 0x40;
-constexpr std::uint32_t kSignature = 0x00, kFrames = 0x34, kLongestWait = 0x38;
+constexpr std::uint32_t kSignature = 0x00, kFrames = 0x34, kLongestWait = 0x38, kStamp = 0x3C;
 }  // namespace status_register
 
-// What is counted of a subscriber or publisher; `longest_wait` is in cycles.
+// What is counted of a subscriber or publisher; `longest_wait` is in cycles. `stamp` is the cycle after the first beat of
+// a subscriber's newest frame, or after the last beat of a publisher's. The difference of two stamps is a time in cycles.
 struct ChannelStatus {
   std::uint32_t signature = 0;
   std::array<std::uint32_t, kFaultCodes + 1> faults{};
   std::uint32_t frames = 0;
   std::uint32_t longest_wait = 0;
+  std::uint32_t stamp = 0;  // 0 without time stamps
 };
 
 // The status of a system. The channels are the subscribers by id, then the publishers by id.
@@ -47,9 +50,14 @@ struct Status {
   unsigned publishers = 0;
   unsigned last_fault = 0;  // its code, or 0 before the first fault
   unsigned last_channel = 0;
+  bool is_counting = false;                // channels are counted
+  std::uint32_t interrupts = 0;            // that occurred
+  std::uint32_t enabled_interrupts = 0;    // that raise the line
   std::uint32_t id_errors = 0;
   std::uint32_t link_errors = 0;
   std::uint32_t lost = 0;  // faults that were not counted in a channel
+  bool has_time_stamps = false;
+  std::uint32_t cycles = 0;  // since reset, modulo 2^32; 0 without time stamps
   std::string digest;
   std::vector<ChannelStatus> channels;
 };
@@ -137,12 +145,17 @@ inline Status read_status(Transport& transport) {
   Status status;
   status.subscribers = shape & 0xFFFu;
   status.publishers = shape >> 12 & 0xFFFu;
+  status.is_counting = access.read(at::kControl) & 1u;
+  status.interrupts = access.read(at::kInterrupt);
+  status.enabled_interrupts = access.read(at::kInterruptEnable);
   const std::uint32_t last = access.read(at::kLastFault);
   status.last_fault = last & 0xFu;
   status.last_channel = last >> 4;
   status.id_errors = access.read(at::kIdErrors);
   status.link_errors = access.read(at::kLinkErrors);
   status.lost = access.read(at::kLost);
+  status.has_time_stamps = access.read(at::kFeatures) & 1u;
+  if (status.has_time_stamps) status.cycles = access.read(at::kCycles);
   status.digest = read_digest(transport);
   status.channels.resize(status.subscribers + status.publishers);
   std::uint32_t base = at::kChannels;
@@ -151,6 +164,7 @@ inline Status read_status(Transport& transport) {
     for (std::uint32_t code = 1; code <= kFaultCodes; ++code) channel.faults[code] = access.read(base + 4 * code);
     channel.frames = access.read(base + at::kFrames);
     channel.longest_wait = access.read(base + at::kLongestWait);
+    if (status.has_time_stamps) channel.stamp = access.read(base + at::kStamp);
     base += at::kChannelBytes;
   }
   return status;
