@@ -25,7 +25,7 @@ ALLOWED: dict[str, str] = {
     "converter": "frame message request store text",
     "netlist": "text tools",
     "scheduling": "text tools",
-    "action": "store text",
+    "action": "store text tools",
     "building": "action request store text tools",
     "system": "converter frame message request scheduling store text tools",
     "accelerator": "converter system text tools",

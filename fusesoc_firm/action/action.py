@@ -34,6 +34,7 @@ from fusesoc_firm.action.sandbox import sandboxed
 from fusesoc_firm.action.trace import Trace, can_trace, fix_addresses, traced
 from fusesoc_firm.action.tree import FILE, PROGRAM, Item, Tree, changed, in_order_of_time, key_of, removed, tree_of
 from fusesoc_firm.store.layout import digest_of
+from fusesoc_firm.tools.launcher import note_launched
 
 TWICE = "FUSESOC_FIRM_ACTIONS_TWICE"
 """The variable with N, if one in N actions is to run twice; 0 for none."""
@@ -142,21 +143,22 @@ class _Execution:
             tree = tree_of(action.folder, self.contents)
             if status:
                 return Done(status, seconds, tree)
-            fault = _fault(action, trace) or (self._difference(copy, tree) if copy else "")
+            outside = _places(action).outside(trace) if trace else None
+            fault = _fault(action, outside) or (self._difference(copy, tree) if copy else "")
         finally:
             if copy:
                 shutil.rmtree(copy, ignore_errors=True)
-        if fault or trace is None:
+        if fault or outside is None:
             return Done(0, seconds, tree, fault)
         try:
-            record = self._record(tree, begin, seconds, trace)
+            record = self._record(tree, begin, seconds, outside)
             self.results.keep_record(key, record)
         except OSError as error:
             return Done(0, seconds, tree, f"the store {self.results.root} cannot be written: {error.strerror}")
         self.results.send(key, record)
         return Done(0, seconds, tree)
 
-    def _record(self, tree: Tree, begin: int, seconds: float, trace: Trace) -> Record:
+    def _record(self, tree: Tree, begin: int, seconds: float, outside: Trace) -> Record:
         """Store the outputs, and return the record of the step. May raise `OSError`."""
         action = self.action
         outputs = changed(action.inputs, tree)
@@ -172,7 +174,7 @@ class _Execution:
             text = output.read().replace(place, _FOLDER_MARK)
         log = self.results.keep_content(text)
         sizes[log] = len(text)
-        facts = facts_of(_places(action).outside(trace), self.contents, action.search)
+        facts = facts_of(outside, self.contents, action.search)
         ordered = {path: outputs[path] for path in in_order_of_time(action.folder, outputs)}
         gone = removed(action.inputs, tree)
         bound_to = str(action.folder) if is_bound else ""
@@ -209,27 +211,29 @@ def _run(action: Action, log: Path) -> tuple[int, Trace | None]:
     try:
         with log.open("ab") as output:
             if can_trace():
-                return traced(command, action.folder, environment, output, within)
-            done = subprocess.run(
-                [*within(), *command],
-                cwd=action.folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                check=False,
-            )
-            return done.returncode, None
+                found = traced(command, action.folder, environment, output, within)
+            else:
+                done = subprocess.run(
+                    [*within(), *command],
+                    cwd=action.folder,
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    check=False,
+                )
+                found = done.returncode, None
+        note_launched(temporary, action.folder)
+        return found
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _fault(action: Action, trace: Trace | None) -> str:
-    """Return why the result of a step cannot be stored, or an empty text."""
-    if trace is None:
+def _fault(action: Action, outside: Trace | None) -> str:
+    """Return why the result of a step cannot be stored, or an empty text; `outside` is its use of other places."""
+    if outside is None:
         return "its use of files cannot be observed: 'strace' is not installed, or not permitted here"
-    places = _places(action)
-    return places.fault(places.outside(trace))
+    return _places(action).fault(outside)
 
 
 def _differing(one: Tree, other: Tree) -> list[str]:

@@ -18,7 +18,22 @@ _TOOLS = ("/bin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/opt", "
 _WRITABLE = ("/dev/full", "/dev/null", "/dev/pts", "/dev/tty", "/dev/zero", "/proc")
 _BYTE_CODE = "/__pycache__"
 # Parts of this package that take part in a step. Other parts are only read to describe a build in its manifest.
-_OURS = tuple(f"{PACKAGE}/{part}" for part in ("action/backend.py", "text", "tools"))
+_PARTS = ("action/backend.py", "text", "tools")
+
+
+class _Below:
+    """The paths of these folders and of everything in them."""
+
+    def __init__(self, folders: tuple[str, ...]) -> None:
+        self._folders = folders
+        self._beginnings = tuple(f"{folder}/" for folder in folders)
+
+    def __contains__(self, path: str) -> bool:
+        return path in self._folders or path.startswith(self._beginnings)
+
+
+_OF_PACKAGE = _Below((str(PACKAGE),))
+_OURS = _Below(tuple(f"{PACKAGE}/{part}" for part in _PARTS))
 
 
 @dataclass(frozen=True)
@@ -34,20 +49,16 @@ class Places:
 
     def outside(self, trace: Trace) -> Trace:
         """Return what a step used outside its folder, without what is not recorded."""
-        apart = (self.folder, self.temporary, *self.caches, *_MACHINE)
+        apart = _Below((self.folder, self.temporary, *self.caches, *_MACHINE))
 
         def kept(paths: Iterable[str]) -> set[str]:
-            return {
-                path
-                for path in paths
-                if not _is_below(path, apart) and (_is_below(path, _OURS) or not _is_below(path, (str(PACKAGE),)))
-            }
+            return {path for path in paths if path not in apart and (path not in _OF_PACKAGE or path in _OURS)}
 
         return Trace(
             kept(trace.programs) | kept(_interpreters(trace.programs)),
             kept(trace.read),
             # A file that a step finds in a folder above its own and reads is not an input.
-            {path for path in kept(trace.listed) if not _is_below(self.folder, (path,))},
+            {path for path in kept(trace.listed) if self.folder not in _Below((path,))},
             kept(trace.asked),
             {path for path in trace.written if not self._may_be_written(path)},
             trace.network,
@@ -63,11 +74,12 @@ class Places:
         return f"it reads {min(undeclared)}, which is not an input of its core" if undeclared else ""
 
     def _is_known(self, path: str) -> bool:
-        return path in self.declared or _is_below(path, self.tools) or _is_below(os.path.realpath(path), self.tools)
+        tools = _Below(self.tools)
+        return path in self.declared or path in tools or os.path.realpath(path) in tools
 
     def _may_be_written(self, path: str) -> bool:
         is_byte_code = _BYTE_CODE in path and self._is_known(path)
-        return is_byte_code or _is_below(path, (self.folder, self.temporary, *self.caches, *_WRITABLE))
+        return is_byte_code or path in _Below((self.folder, self.temporary, *self.caches, *_WRITABLE))
 
 
 def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], declared: Iterable[str] = ()) -> Places:
@@ -124,7 +136,3 @@ def _interpreters(programs: Iterable[str]) -> set[str]:
         if line.startswith(b"#!") and (words := line[2:].split()):
             found.add(os.fsdecode(words[0]))
     return found
-
-
-def _is_below(path: str, folders: Iterable[str]) -> bool:
-    return any(path == folder or path.startswith(f"{folder}/") for folder in folders)

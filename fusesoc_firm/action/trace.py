@@ -39,6 +39,8 @@ _ASK = frozenset("stat lstat newfstatat statx access faccessat faccessat2 readli
 _TO_WRITE = re.compile(r"O_(?:WRONLY|RDWR|CREAT|TRUNC)")
 
 _CALL = re.compile(r"(\w+)\((.*)\) += (-?\d+|\?)(?:<((?:[^>\\]|\\.)*)>)?(?: (E\w+))?")
+# The most frequent call, a question about an absolute path, which needs nothing else of the line.
+_QUESTION = re.compile(r'(?:newfstatat|stat|lstat|access|readlink)\((?:(?:AT_FDCWD|\d+)<[^>\\]*>, )?"(/[^"\\]*)".* = ')
 _UNFINISHED = re.compile(r"(.*?) <unfinished \.\.\.>$")
 _RESUMED = re.compile(r"<\.\.\. (\w+) resumed>(.*)")
 # A path, with the folder to which it is relative if the call names one.
@@ -121,12 +123,15 @@ class _Parser:
     begun: dict[str, str] = field(default_factory=dict)
 
     def run(self, lines: Iterator[str]) -> Trace:
+        questions: set[str] = set()
         for line in lines:
             process, _, text = line.rstrip("\n").partition(" ")
             text = text.strip()
             if process not in self.folders:
                 self.folders[process] = self._parents_folder()
-            if text.startswith(_END):
+            if match := _QUESTION.match(text):
+                questions.add(match[1])
+            elif text.startswith(_END):
                 # Another process may receive the number.
                 del self.folders[process]
             elif match := _UNFINISHED.match(text):
@@ -136,6 +141,7 @@ class _Parser:
                     text = self.begun.pop(process, f"{match[1]}(") + match[2]
                 if match := _CALL.match(text):
                     self._add(process, match)
+        self.trace.asked.update(map(os.path.normpath, questions))
         return self.trace
 
     def _parents_folder(self) -> str:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import shlex
 import shutil
 import subprocess
 import sys
@@ -32,7 +31,7 @@ from fusesoc_firm.building.process import set_up
 from fusesoc_firm.building.steps import Step, StepsRun, backend_of, write_report
 from fusesoc_firm.store.layout import digest_of
 from fusesoc_firm.text.files import write_whole
-from fusesoc_firm.tools.launcher import starts_everything
+from fusesoc_firm.tools.launcher import launcher_of_steps, starts_everything
 from fusesoc_firm.tools.workers import Workers, is_task_wanted
 
 # The environment variables that the steps receive from this machine. Paths of programs differ between machines.
@@ -158,7 +157,7 @@ def run_task(task: Task) -> Answer:
 
 def _tried(task: Task, number: int) -> Answer:
     started = time.monotonic()
-    ours = {_LAUNCHER: shlex.join([sys.executable, "-m", "fusesoc_firm.tools.launcher"])}
+    ours = {_LAUNCHER: launcher_of_steps()}
     with subprocess.Popen(
         [sys.executable, "-m", __name__],
         env={**os.environ, **ours, **task.environment},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache
 
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -51,16 +51,10 @@ class DistributionStore:
         self.title = f"rosbags {_prefix(version)}{chosen}"
         self._name = f"{_prefix(version)}{chosen}"
 
-    @cached_property
-    def _typestore(self) -> Typestore:
-        return get_typestore(Stores(self._name))
-
-    @cached_property
+    @property
     def names(self) -> frozenset[MessageName]:
         """The names of all messages in the distribution."""
-        names = {parse_name(name) for name in self._typestore.fielddefs} | self._added.keys()
-        # rosbags represents the primitives `time` and `duration` of ROS 1 as messages of ROS 2.
-        return frozenset(name for name in names if self._version == 2 or name.package != "builtin_interfaces")
+        return _names(self._version, self._name)
 
     @property
     def _added(self) -> dict[MessageName, str]:
@@ -70,9 +64,21 @@ class DistributionStore:
         """Return the definition of one of `names` as `.msg` text."""
         if name in self._added:
             return self._added[name]
-        text, _ = self._typestore.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=self._version)
+        text, _ = _typestore(self._name).generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=self._version)
         return text.partition(_NEXT_DEFINITION)[0]
 
     def file(self, name: MessageName) -> str:
         """Return the name for a message's definition in errors, in place of a file's name."""
         return f"<{self.title}>/{name}"
+
+
+@cache
+def _typestore(name: str) -> Typestore:
+    return get_typestore(Stores(name))
+
+
+@cache
+def _names(version: int, name: str) -> frozenset[MessageName]:
+    names = {parse_name(known) for known in _typestore(name).fielddefs} | _ADDED.get(version, {}).keys()
+    # rosbags represents the primitives `time` and `duration` of ROS 1 as messages of ROS 2.
+    return frozenset(known for known in names if version == 2 or known.package != "builtin_interfaces")

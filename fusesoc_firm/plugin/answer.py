@@ -118,19 +118,8 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
     start = time.monotonic()
     # The state of the code is recorded first, since its modules are imported from here on.
     basis = Basis(run)
-    basis.further += facts("folder", _searched())
     request = read_request(command, path, generator, run, basis.further)
-    basis.further += facts("program", generator.programs(request))
-    absent = missing(generator.programs(request))
-    loaded = load(request, generator, basis)
-    is_locked = _check_locked(loaded)
-    key, entry = obtain(loaded, generator, basis, is_only_looked_up=is_only_looked_up)
-    marks = find_requesting_core(request.files_root, request.name).name if command == MESSAGES else ""
-    # On every run, check calls with lock files and report missing programs, before the core is written: the current
-    # folder may be in a searched folder.
-    if not (absent or is_locked) and basis.holds():
-        note = {"key": key.digest, "facts": basis.facts(), "name": request.name, "core": request.vlnv, "marks": marks}
-        default_store().note(call_digest(command, path.read_bytes()), note)
+    entry, absent, marks = fulfil(request, generator, basis, path.read_bytes(), is_only_looked_up=is_only_looked_up)
     _write(entry.files, request, marks, run)
     # The core can be generated although it cannot be run.
     if absent:
@@ -154,6 +143,28 @@ def read_request(
         return _folders_of_run(names, str(generated), run)
 
     return make_request(read_call(path, command), generator.parameters, find)
+
+
+def fulfil(
+    request: Request, generator: Generator, basis: Basis, call: bytes, *, is_only_looked_up: bool = False
+) -> tuple[Entry, list[str], str]:
+    """Return the core for a request, the missing programs to run it, and the core whose messages it contains, or "".
+
+    Store a note for FuseSoC's file `call`, so that `recall` can answer this call. Raise errors like `obtain`.
+    """
+    basis.further += facts("folder", _searched())
+    basis.further += facts("program", generator.programs(request))
+    absent = missing(generator.programs(request))
+    loaded = load(request, generator, basis)
+    is_locked = _check_locked(loaded)
+    key, entry = obtain(loaded, generator, basis, is_only_looked_up=is_only_looked_up)
+    marks = find_requesting_core(request.files_root, request.name).name if request.command == MESSAGES else ""
+    # On every run, check calls with lock files and report missing programs, before the core is written: the current
+    # folder may be in a searched folder.
+    if not (absent or is_locked) and (basis.holds() if entry.is_from_store else entry.is_current):
+        note = {"key": key.digest, "facts": basis.facts(), "name": request.name, "core": request.vlnv, "marks": marks}
+        default_store().note(call_digest(request.command, call), note)
+    return entry, absent, marks
 
 
 def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:

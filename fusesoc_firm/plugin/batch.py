@@ -17,7 +17,10 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from fusesoc_firm.plugin.answer import Basis, load, obtain
+import yaml
+from fusesoc.utils import YamlDumper
+
+from fusesoc_firm.plugin.answer import Basis, fulfil
 from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES
 from fusesoc_firm.request.calls import make_request
 from fusesoc_firm.request.request import GeneratorCall, Request
@@ -97,9 +100,15 @@ def main() -> None:
     code = facts("code", [""])
     for item in json.load(sys.stdin):
         with suppress(InputError):
-            request, basis = _request(GeneratorCall(**item)), Basis("", [*code])
-            obtain(load(request, generator, basis), generator, basis)
+            call = GeneratorCall(**item)
+            fulfil(_request(call), generator, Basis("", [*code]), _file_of(call))
         os.write(sys.stdout.fileno(), b".")
+
+
+def _file_of(call: GeneratorCall) -> bytes:
+    """Return FuseSoC's file for a call. If a release of FuseSoC writes another one, the call's note is not used."""
+    content = {"files_root": call.files_root, "gapi": "1.0", "parameters": call.parameters, "vlnv": call.vlnv}
+    return yaml.dump(content, Dumper=YamlDumper, sort_keys=False).encode()
 
 
 def _load(call: GeneratorCall) -> None:

@@ -22,6 +22,7 @@ from fusesoc_firm.plugin.batch import prepare
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.plugin.project import check_locked
 from fusesoc_firm.store import own_code
+from fusesoc_firm.tools.launcher import launcher_of_steps
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.workers import cluster_workers
 
@@ -152,9 +153,8 @@ def recall_or_build(
 
 def _set_launcher(how: How) -> None:
     """Let this package start the programs of builds, unless another launcher is set."""
-    # A step of an action should depend on few of our files.
-    ours = ("fusesoc_firm.tools.launcher",) if how.steps else ("fusesoc_firm.cli", "tool")
-    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", *ours]))
+    of_build = shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"])
+    os.environ.setdefault(_LAUNCHER, launcher_of_steps() if how.steps else of_build)
 
 
 def _generators_run_here() -> bool:

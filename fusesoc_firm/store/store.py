@@ -67,10 +67,14 @@ class Key:
 
 @dataclass(frozen=True)
 class Entry:
-    """Generated files, and whether they were in the store (True) or were built (False)."""
+    """Generated files, and whether they were in the store (True) or were built (False).
+
+    `is_current` is False if an input changed while the files were built.
+    """
 
     files: Files
     is_from_store: bool
+    is_current: bool = True
 
 
 @dataclass(frozen=True)
@@ -108,11 +112,12 @@ class Store:
             if (files := self._find(key)) is not None or (files := self._fetch(key)) is not None:
                 return Entry(files, True)
             files = build()
-            if is_current():
-                data = layout.entry_data(key.about, files)
-                self._keep(key, data)
-                if self.remote:
-                    self.remote.put_entry(key.digest, data)
+            if not is_current():
+                return Entry(files, False, False)
+            data = layout.entry_data(key.about, files)
+            self._keep(key, data)
+            if self.remote:
+                self.remote.put_entry(key.digest, data)
         return Entry(files, False)
 
     def note(self, call: str, note: Mapping[str, object]) -> None:

@@ -106,17 +106,25 @@ class _Partial:
 _Node = _Literal | _Value | _Section | _Partial
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class _Scope:
-    """A scope for key lookup, and its path from the context's root (`ports[3]`), for messages.
+    """A scope for key lookup, entered from `outer` by `key`, and by the item's number if that is a list.
 
-    `turn` contains `@first` and `@last` of the innermost list around the scope.
+    `turn` contains `@first` and `@last` of the innermost list around the scope. A template with many scopes is
+    expanded quickly since a path is computed only for a message.
     """
 
     data: object
-    path: str = ""
     outer: _Scope | None = None
+    key: str = ""
+    number: int | None = None
     turn: Mapping[str, bool] = field(default_factory=dict)
+
+    @property
+    def path(self) -> str:
+        """The path from the context's root, such as `ports[3]`."""
+        above = self.outer.path_to(self.key) if self.outer else ""
+        return above if self.number is None else f"{above}[{self.number}]"
 
     def path_to(self, key: str) -> str:
         if key == ".":
@@ -189,17 +197,16 @@ class _Expansion:
         return text if is_taken else ""
 
     def _node(self, node: _Node, scope: _Scope, is_taken: bool) -> str:
-        match node:
-            case _Literal(text):
-                return self._literal(text, scope)
-            case _Value(key):
-                value = _look_up(key, scope)
-                return self._printed(node, value, scope.path_to(key)) if is_taken else ""
-            case _Section():
-                return self._section(node, scope, is_taken)
-            case _Partial(name, indentation):
-                text = self.expand(self._parse(f"partials/{name}"), scope, is_taken)
-                return _indented(text, indentation)
+        # Most nodes are values and literals.
+        if isinstance(node, _Value):
+            value = _look_up(node.key, scope)
+            return self._printed(node, value, scope) if is_taken else ""
+        if isinstance(node, _Literal):
+            return self._literal(node.text, scope)
+        if isinstance(node, _Section):
+            return self._section(node, scope, is_taken)
+        text = self.expand(self._parse(f"partials/{node.name}"), scope, is_taken)
+        return _indented(text, node.indentation)
 
     def _parse(self, name: str) -> tuple[_Node, ...]:
         return _parse(name, self.templates)
@@ -207,9 +214,14 @@ class _Expansion:
     def _literal(self, text: str, _: _Scope) -> str:
         return text
 
-    def _printed(self, node: _Value, value: object, path: str) -> str:
-        number = value if node.addend is None else _sum(value, node.addend, path)
-        return self._quoted(node.quote, _printed(number, path))
+    def _printed(self, node: _Value, value: object, scope: _Scope) -> str:
+        number = value if node.addend is None else _sum(value, node, scope)
+        # Exact types: a bool is an integer, but has no standard spelling.
+        if type(number) is not str and type(number) is not int:
+            raise TemplateError(
+                f"'{scope.path_to(node.key)}' is {_kind(number)}; only a string or an integer can be printed"
+            )
+        return self._quoted(node.quote, str(number))
 
     def _quoted(self, quote: str, text: str) -> str:
         if not quote:
@@ -221,12 +233,14 @@ class _Expansion:
 
     def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
         value = _look_up(section.key, scope)
-        path = scope.path_to(section.key)
         if not section.is_question and not isinstance(value, bool | list | dict | None):
-            raise TemplateError(f"'{path}' is {_kind(value)}; a section takes a bool, a list, a mapping or None")
+            kind, path = _kind(value), scope.path_to(section.key)
+            raise TemplateError(f"'{path}' is {kind}; a section takes a bool, a list, a mapping or None")
         return "".join(
-            self.expand(section.body, inner, is_taken and is_inner_taken)
-            for inner, is_inner_taken in _turns(section, value, scope, path)
+            [
+                self.expand(section.body, inner, is_taken and is_inner_taken)
+                for inner, is_inner_taken in _turns(section, value, scope)
+            ]
         )
 
 
@@ -240,7 +254,7 @@ class _TracedExpansion(_Expansion):
         return text.replace("\ue001", f"{scope.path}\ue001")
 
 
-def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
+def _turns(section: _Section, value: object, scope: _Scope) -> Iterator[tuple[_Scope, bool]]:
     """Yield each scope in which a section's body is expanded, and whether the resulting text is used."""
     if section.is_inverted:
         yield scope, not _is_there(value)
@@ -249,9 +263,9 @@ def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterat
     elif isinstance(value, list):
         for number, item in enumerate(value):
             turn = {"@first": number == 0, "@last": number == len(value) - 1}
-            yield _Scope(item, f"{path}[{number}]", scope, turn), True
+            yield _Scope(item, scope, section.key, number, turn), True
     elif value is not None:
-        yield _Scope(value, path, scope, scope.turn), True
+        yield _Scope(value, scope, section.key, None, scope.turn), True
 
 
 def _is_there(value: object) -> bool:
@@ -267,6 +281,8 @@ def _look_up(key: str, scope: _Scope) -> object:
         return scope.data
     if key in scope.turn:
         return scope.turn[key]
+    if isinstance(scope.data, dict) and key in scope.data and "." not in key:
+        return scope.data[key]
     value, path = scope.data, scope.path
     for step in key.split("."):
         if not isinstance(value, dict) or step not in value:
@@ -281,16 +297,12 @@ def _quotes(template_name: str) -> Mapping[str, Quote]:
     return QUOTES.get(template_name.rpartition("/")[2].rpartition(".")[2], {})
 
 
-def _printed(value: object, path: str) -> str:
-    if isinstance(value, bool) or not isinstance(value, str | int):
-        raise TemplateError(f"'{path}' is {_kind(value)}; only a string or an integer can be printed")
-    return str(value)
-
-
-def _sum(value: object, addend: int, path: str) -> int:
+def _sum(value: object, node: _Value, scope: _Scope) -> int:
+    assert node.addend is not None
     if isinstance(value, bool) or not isinstance(value, int):
-        raise TemplateError(f"'{path}' is {_kind(value)}; {addend} can be added only to an integer")
-    return value + addend
+        path = scope.path_to(node.key)
+        raise TemplateError(f"'{path}' is {_kind(value)}; {node.addend} can be added only to an integer")
+    return value + node.addend
 
 
 def _kind(value: object) -> str:

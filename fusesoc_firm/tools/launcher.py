@@ -12,12 +12,14 @@ the clock is too slow; otherwise, make would accept this output in the next run.
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
@@ -31,6 +33,8 @@ _OUTPUTS = ("--asc", "--textcfg", "--write")
 # Variables from `firm_launcher.sh`: the file that shows that a program is in the manifest, and the program's path; the
 # user's note of the program, and what decides in which Python the package is found.
 _NOTED, _NOTE, _ENVIRONMENT = "FIRM_NOTED", "FIRM_NOTE", "FIRM_ENVIRONMENT"
+# Where `launch.sh` leaves the names of programs, in the folder for temporary files.
+_LAUNCHED = "firm_launched"
 # The clock of a file system may be late by this.
 _TICK_NANOSECONDS = 20 * 10**6
 
@@ -90,6 +94,19 @@ def starts_everything() -> bool:
     """Return whether this package's launcher starts the build's programs; another launcher may find other programs."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
     return not words or words[-1] in {"tool", __name__}
+
+
+def launcher_of_steps() -> str:
+    """Return the launcher for a step whose result is stored: `launch.sh`, which starts this module if necessary."""
+    script = Path(__file__).with_name("launch.sh")
+    return shlex.join(["sh", str(script), sys.executable, "-m", "fusesoc_firm.tools.launcher"])
+
+
+def note_launched(temporary: Path, folder: Path) -> None:
+    """Record the programs that `launch.sh` has started with this TMPDIR in the folder's manifest."""
+    with suppress(FileNotFoundError):
+        for program in dict.fromkeys((temporary / _LAUNCHED).read_text(encoding="utf-8").split()):
+            note(program, folder)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -19,18 +19,20 @@ from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.tools.programs import PROGRAMS, facts_of, find, packages
 
 FILE = "manifest.json"
+# Edalize's description of a build.
+_OF_A_BUILD = "*.eda.yml"
 _PACKAGES = ("edalize", "fusesoc", "fusesoc-firm")
 # As in Linux.
 _MOST_LINKS = 40
 
 
 def note(program: str, folder: Path) -> str:
-    """Record a program that has run in a folder, and the packages that started it, in the folder's manifest.
+    """Record a program that has run in a build's folder, and the packages that started it, in the folder's manifest.
 
     Several programs may be recorded at the same time. Return the text of the new entries; it is empty for an unknown
-    program, such as mkdir, which is not recorded.
+    program, such as mkdir, and for a folder without a build of Edalize: `firm tool` can run anywhere.
     """
-    if program not in PROGRAMS:
+    if program not in PROGRAMS or not any(folder.glob(_OF_A_BUILD)):
         return ""
     programs = (program, *PROGRAMS[program].starts)
     found = packages(_PACKAGES) | {name: facts_of(name, path) for name in programs if (path := find(name))}

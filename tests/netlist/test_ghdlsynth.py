@@ -68,6 +68,7 @@ class Build:
 
     def __init__(self, folder: Path, **parameters: Any) -> None:
         self.folder = folder
+        (folder / "adding.eda.yml").touch()
         files = {"numbers.vhd": NUMBERS, "adder.vhd": ADDER, "bench.vhd": BENCH_VHDL, "bench.v": BENCH}
         for name, text in files.items():
             (folder / name).write_text(text)

@@ -13,6 +13,7 @@ import yaml
 
 from fusesoc_firm.plugin.batch import prepare
 from fusesoc_firm.request.request import GeneratorCall
+from fusesoc_firm.tools.library_path import library_root
 from tests.hdl.ghdl import REPOSITORY
 
 # Messages of variable and of fixed size, which use different templates.
@@ -70,3 +71,26 @@ def test_few_calls_are_left_to_fusesoc(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setenv("FUSESOC_FIRM_CACHE", str(tmp_path))
     assert list(prepare([call(message) for message in MESSAGES[:3]], 8)) == []
     assert not keys(tmp_path)
+
+
+def test_fusesocs_calls_use_the_notes_of_a_batch(tmp_path: Path) -> None:
+    instances = [f"i{number}: {{generator: firm, parameters: {{message: {name}, ros: 2, name: i{number}, width: 8}}}}"
+                 for number, name in enumerate(MESSAGES)]  # fmt: skip
+    lines = (
+        "CAPI=2:",
+        "name: me:x:core:1.0",
+        'filesets: {base: {depend: ["robot:firm:generators"]}}',
+        f"generate: {{{', '.join(instances)}}}",
+        "targets:",
+        "  default: {filesets: [base], generate: [i0, i1, i2, i3], toplevel: x,",
+        "    flow: generic, flow_options: {tool: ghdl}}",
+    )
+    (tmp_path / "library").mkdir()
+    (tmp_path / "library" / "core.core").write_text("\n".join(lines))
+    conf = f"[library.firm]\nlocation = {library_root()}\n[library.x]\nlocation = library\n"
+    (tmp_path / "fusesoc.conf").write_text(conf)
+    variables = {"PYTHONPATH": str(REPOSITORY), "FUSESOC_FIRM_CACHE": str(tmp_path / "store")}
+    command = [sys.executable, "-m", "fusesoc_firm.cli", "build", "--setup", "me:x:core", "--target", "default"]
+    subprocess.run(command, cwd=tmp_path, env={**os.environ, **variables}, check=True, capture_output=True)
+    # A call without a note of its own leaves a second one.
+    assert len([*(tmp_path / "store").rglob("*.call")]) == len(MESSAGES)

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.node.diagnostics import diagnostics_topic
 from fusesoc_firm.plugin.answer import main, read_request
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.plugin.lock_file import _messages, lock_text
@@ -35,6 +36,9 @@ CALLS: dict[str, tuple[str, dict[str, object]]] = {
 def counts(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     """The number of calls of each function."""
     found: Counter[str] = Counter()
+    # The topic /diagnostics has a library of its own, once in a process.
+    for ros in (1, 2):
+        diagnostics_topic(ros)
 
     def counted(what: str, done: Callable[..., Any], *arguments: Any, **more: Any) -> Any:
         found[what] += 1

@@ -87,7 +87,7 @@ def test_a_build_that_ends_early_keeps_nothing(tmp_path: Path, error: BaseExcept
 
 
 def test_what_was_edited_while_it_was_read_is_not_kept(tmp_path: Path) -> None:
-    assert Store(tmp_path, LARGE).obtain(Key(REQUEST), lambda: FILES, lambda: False) == Entry(FILES, False)
+    assert Store(tmp_path, LARGE).obtain(Key(REQUEST), lambda: FILES, lambda: False) == Entry(FILES, False, False)
     assert stored(tmp_path) == {}
 
 

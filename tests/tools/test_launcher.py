@@ -147,6 +147,7 @@ def build(alone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The work folder of a build, whose Python counts its starts in the file `starts`."""
     folder = tmp_path / "build"
     folder.mkdir()
+    (folder / "core_1.0.eda.yml").touch()
     shutil.copy(REPOSITORY / "generators" / "firm_launcher.sh", folder)
     (folder / "Makefile").write_text("")
     program(alone, "python3", PYTHON.format(python=f"{sys.base_prefix}/bin/python3"))

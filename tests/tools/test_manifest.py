@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import shlex
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -18,6 +20,10 @@ from tests.hdl.ghdl import REPOSITORY
 SHOW = 'if [ "$1" = --version ]; then echo "A simulator"; echo "of version {}, built with care"; else exit {}; fi'
 
 
+# Edalize's description of a build.
+EDAM = "core_1.0.eda.yml"
+
+
 def install(folder: Path, name: str, release: str, status: int = 0) -> None:
     folder.mkdir(exist_ok=True)
     path = folder / name
@@ -30,6 +36,7 @@ def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The work folder of a build, with a PATH of one folder next to it."""
     folder = tmp_path / "work"
     folder.mkdir()
+    (folder / EDAM).touch()
     monkeypatch.chdir(folder)
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "elsewhere" / "python"))
@@ -48,7 +55,7 @@ def test_a_program_is_noted_with_those_that_had_it_run(work: Path) -> None:
     assert found["edalize"] == {"version": version("edalize")}
     assert set(found["fusesoc-firm"]) == {"sha256", "version"}
     # No other files are left over.
-    assert [path.name for path in work.iterdir()] == [manifest.FILE]
+    assert {path.name for path in work.iterdir()} == {EDAM, manifest.FILE}
 
 
 def test_it_is_the_same_elsewhere(work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,6 +64,7 @@ def test_it_is_the_same_elsewhere(work: Path, monkeypatch: pytest.MonkeyPatch) -
     first = (work / manifest.FILE).read_bytes()
     other = work.parent / "other"
     other.mkdir()
+    (other / EDAM).touch()
     monkeypatch.chdir(other)
     monkeypatch.setenv("PATH", str(work.parent / "another bin"))
     install(work.parent / "another bin", "ghdl", "2.0")
@@ -90,6 +98,34 @@ def test_a_program_that_fails_has_run(work: Path) -> None:
 def test_what_is_no_tool_is_not_noted(work: Path) -> None:
     install(work.parent / "bin", "mkdir", "9")
     assert launcher.launch("mkdir", []) == 0
+    assert manifest.read(work) == {}
+
+
+def test_a_folder_without_a_build_has_no_manifest(work: Path) -> None:
+    install(work.parent / "bin", "ghdl", "2.0")
+    (work / EDAM).unlink()
+    assert launcher.launch("ghdl", []) == 0
+    assert [*work.iterdir()] == []
+
+
+def test_programs_that_the_shell_started_for_a_step_are_noted(work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(work.parent / "bin", "ghdl", "2.0")
+    monkeypatch.setenv("TMPDIR", str(work.parent))
+    monkeypatch.setenv("PATH", f"{work.parent / 'bin'}:{os.defpath}")
+    command = shlex.split(launcher.launcher_of_steps())
+    for name in ("ghdl", "mkdir", "ghdl"):
+        subprocess.run([*command, name, "--version"], check=True, capture_output=True)
+    launcher.note_launched(work.parent, work)
+    assert list(manifest.read(work)) == ["edalize", "fusesoc", "fusesoc-firm", "ghdl"]
+
+
+def test_a_missing_program_of_a_step_is_named(work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", f"{sys.base_prefix}/bin/python3")
+    monkeypatch.setenv("PYTHONPATH", f"{REPOSITORY}:{':'.join(sys.path)}")
+    command = ["/bin/sh", *shlex.split(launcher.launcher_of_steps())[1:]]
+    done = subprocess.run([*command, "ecppack"], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr.splitlines()[0]) == (1, "error: the program 'ecppack' is not installed")
+    launcher.note_launched(work.parent, work)
     assert manifest.read(work) == {}
 
 
