@@ -11,15 +11,18 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import json
 import logging
 import os
+import queue
 import socket
 import struct
 import sys
 import threading
 import time
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import Any, NamedTuple
 
 # CONFIGURE, to the bridge: its configuration. READY, from the bridge: the names of the topics after remapping.
@@ -29,6 +32,9 @@ CONFIGURE, READY = b"C", b"R"
 MESSAGE, PUBLISHED = b"M", b"P"
 # LOST, from the bridge: the number of messages of a topic that ROS did not deliver, as text.
 LOST = b"L"
+# CALL, from the bridge: a call of the hardware's service; to the bridge: a call by the hardware. ANSWER, the other way:
+# the answer to a call. The topic is the number of the service.
+CALL, ANSWER = b"Q", b"A"
 # The number of the topic `/diagnostics`.
 DIAGNOSTICS = 0xFFFF
 # STOP, to the bridge: accept no more messages. From the bridge: ROS asks the node to end.
@@ -39,10 +45,34 @@ DONE, FAULT = b"D", b"E"
 
 # The kind, the number of the topic, a time of the system's monotonic clock in ns, and the number of bytes that follow.
 _HEADER = struct.Struct("<cHqI")
+# The number of a call; whether it was answered.
+_CALL, _ANSWER = struct.Struct("<Q"), struct.Struct("<Q?")
 # The maximum time in s to wait until published messages have been sent.
 _FLUSH_SECONDS = 2.0
 # The interval in s at which the types of other nodes' topics are compared.
 _LOOK_SECONDS = 1.0
+
+
+def pack_call(number: int, payload: bytes) -> bytes:
+    """Return the data of a CALL."""
+    return _CALL.pack(number) + payload
+
+
+def unpack_call(data: bytes) -> tuple[int, bytes]:
+    """Return the number and the payload of a CALL."""
+    return _CALL.unpack_from(data)[0], data[_CALL.size :]
+
+
+def pack_answer(number: int, payload: bytes | None, reason: str = "") -> bytes:
+    """Return the data of an ANSWER; without a payload, the call has failed for a reason."""
+    return _ANSWER.pack(number, payload is not None) + (reason.encode() if payload is None else payload)
+
+
+def unpack_answer(data: bytes) -> tuple[int, bytes | None, str]:
+    """Return the number, the payload and the reason of an ANSWER."""
+    number, is_answered = _ANSWER.unpack_from(data)
+    rest = data[_ANSWER.size :]
+    return (number, rest, "") if is_answered else (number, None, rest.decode(errors="replace"))
 
 
 class Parcel(NamedTuple):
@@ -138,6 +168,45 @@ class Ros(ABC):
         self._is_ready = threading.Event()
         self._ended = threading.Event()
         self._reported: set[str] = set()
+        self._servers = {item["number"]: item for item in config["services"] if item["is_server"]}
+        self._clients = {item["number"]: item for item in config["services"] if not item["is_server"]}
+        # The calls of the hardware's services that are not answered yet, by their numbers.
+        self._asked: dict[int, Any] = {}
+        self._call_numbers = itertools.count()
+
+    def ask(self, service: int, payload: bytes, asker: Any) -> bool:
+        """Hand over a call of the hardware's service; return whether it will be answered, through `asker`."""
+        self._is_ready.wait()
+        number = next(self._call_numbers)
+        self._asked[number] = asker
+        try:
+            if self._is_taking:
+                self._channel.send(CALL, service, pack_call(number, payload))
+                return True
+        except OSError:
+            self._is_taking = False
+        del self._asked[number]
+        return False
+
+    def answer(self, service: int, data: bytes) -> None:
+        """Answer a call of the hardware's service."""
+        number, payload, reason = unpack_answer(data)
+        asker = self._asked.pop(number, None)
+        if asker is not None:
+            self.answer_asker(service, asker, payload, reason)
+
+    def give_answer(self, service: int, number: int, payload: bytes | None, reason: str = "") -> None:
+        """Hand over the answer to a call by the hardware."""
+        with contextlib.suppress(OSError):
+            self._channel.send(ANSWER, service, pack_answer(number, payload, reason))
+
+    @abstractmethod
+    def answer_asker(self, service: int, asker: Any, payload: bytes | None, reason: str) -> None:
+        """Answer a call, which has failed if there is no payload."""
+
+    @abstractmethod
+    def call(self, service: int, number: int, payload: bytes) -> None:
+        """Call a service for the hardware; do not wait for the answer."""
 
     def ready(self) -> None:
         """Hand over messages; rospy may have received some, such as latched ones, before the engine expects them."""
@@ -214,6 +283,11 @@ class Ros1(Ros):
             )
             for topic in given
         }
+        self._services = {
+            number: rospy.Service(item["name"], _raw_service(rospy, item), functools.partial(self._serve, number))
+            for number, item in self._servers.items()
+        }
+        self._callers = {number: _Caller(self, rospy, item) for number, item in self._clients.items()}
         self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"] if topic["is_numbered"]}
         self._subscribers = {
             topic["number"]: rospy.Subscriber(
@@ -230,6 +304,25 @@ class Ros1(Ros):
             missing = self._gaps[topic].missing(publisher, int.from_bytes(payload[:4], "little"))
         self.take(topic, payload, missing)
 
+    def _serve(self, service: int, request: Any) -> Any:
+        """Return the response to a request; rospy has a thread for each client."""
+        asker: queue.Queue[tuple[bytes | None, str]] = queue.Queue()
+        is_asked = self.ask(service, request._buff, asker)  # noqa: SLF001
+        payload, reason = asker.get() if is_asked else (None, "the node ends")
+        if payload is None:
+            raise self._rospy.ServiceException(reason)
+        response = self._services[service].response_class()
+        response._buff = payload  # noqa: SLF001
+        return response
+
+    def answer_asker(self, service: int, asker: Any, payload: bytes | None, reason: str) -> None:
+        """Wake the thread of the client."""
+        asker.put((payload, reason))
+
+    def call(self, service: int, number: int, payload: bytes) -> None:
+        """Call a service, in the thread of its client."""
+        self._callers[service].put(number, payload)
+
     def _stopped_by_ros(self) -> None:
         """Report a stop by ROS, such as `rosnode kill`.
 
@@ -239,8 +332,10 @@ class Ros1(Ros):
             self._channel.send(STOP)
 
     def names(self) -> dict[str, dict[int, str]]:
-        """Return the names of the topics after remapping."""
+        """Return the names of the topics and services after remapping."""
+        ends = {**self._services, **{number: caller.proxy for number, caller in self._callers.items()}}
         return {
+            "services": {number: end.resolved_name for number, end in ends.items()},
             "subscribers": {number: topic.resolved_name for number, topic in self._subscribers.items()},
             "publishers": {
                 number: topic.resolved_name for number, topic in self._publishers.items() if number != DIAGNOSTICS
@@ -285,6 +380,36 @@ class Ros1(Ros):
         self._rospy.signal_shutdown("the hardware is disconnected")
 
 
+class _Caller:
+    """A client of a service: a thread that calls it, and that a server without an answer may block."""
+
+    def __init__(self, ros: Ros1, rospy: Any, service: dict[str, Any]) -> None:
+        self.proxy = rospy.ServiceProxy(service["name"], _raw_service(rospy, service))
+        self._ros = ros
+        self._errors = (rospy.ServiceException, rospy.ROSException, OSError)
+        self._service = service
+        self._calls: queue.Queue[tuple[float, int, bytes]] = queue.Queue()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def put(self, number: int, payload: bytes) -> None:
+        self._calls.put((time.monotonic(), number, payload))
+
+    def _run(self) -> None:
+        while True:
+            begin, number, payload = self._calls.get()
+            # The engine no longer waits for it.
+            if time.monotonic() - begin > self._service["time_limit"]:
+                continue
+            request = self.proxy.request_class()
+            request._buff = payload  # noqa: SLF001
+            try:
+                response = self.proxy.call(request)
+            except self._errors as error:
+                self._ros.give_answer(self._service["number"], number, None, str(error))
+            else:
+                self._ros.give_answer(self._service["number"], number, response._buff)  # noqa: SLF001
+
+
 class _Once(logging.Filter):
     """Passes each report of a refused peer once, since a peer with another type of a topic tries again and again."""
 
@@ -319,6 +444,15 @@ def _raw_class(rospy: Any, topic: dict[str, Any]) -> Any:
     return type("RawMessage", (rospy.AnyMsg,), names)
 
 
+def _raw_service(rospy: Any, service: dict[str, Any]) -> Any:
+    """Return a service class whose messages are raw bytes, and that announces the service's type to peers."""
+    messages = {
+        f"_{end}_class": type("RawMessage", (rospy.AnyMsg,), {"_type": service[f"{end}_type"], "__slots__": ()})
+        for end in ("request", "response")
+    }
+    return type("RawService", (), {"_type": service["type"], "_md5sum": service["signature"], **messages})
+
+
 def _flush(connection: Any, latest: float) -> None:
     """Wait until a connection's thread has sent all messages that were queued before the call.
 
@@ -351,6 +485,9 @@ class Ros2(Ros):
         self._executor.add_node(self._node)
         # The number of callbacks so far.
         self._handled = 0
+        # The functions that send responses, and the futures of calls by the hardware, by service.
+        self._senders: dict[int, Any] = {}
+        self._called: dict[int, tuple[Any, ...]] = {}
         self._stops_at: float | None = None
         self._looks_at = 0.0
         self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"]}
@@ -359,6 +496,8 @@ class Ros2(Ros):
             for topic in config["publishers"]
         }
         self._add_diagnostics(config["diagnostics"])
+        self._services = {number: self._service(number, item) for number, item in self._servers.items()}
+        self._callers = {number: self._caller(item) for number, item in self._clients.items()}
         self._subscribers = {
             topic["number"]: self._subscription(topic, types[topic["type"]]) for topic in config["subscribers"]
         }
@@ -371,6 +510,63 @@ class Ros2(Ros):
             self.report(f"{topic['name']} is not published: {error}")
             return
         self._publishers[topic["number"]] = self._node.create_publisher(message, topic["name"], _quality(topic))
+
+    def _service(self, number: int, service: dict[str, Any]) -> Any:
+        """Return a server whose requests are handed over, instead of being answered at once."""
+
+        def kept(request: Any, _: Any) -> Any:
+            return request
+
+        made = self._node.create_service(_service_class(service), service["name"], kept)
+        self._senders[number] = made.send_response
+        # The executor sends what the callback returns: the request, with the header for its response.
+        made.send_response = functools.partial(self._asked_for, number)
+        return made
+
+    def _asked_for(self, service: int, request: Any, header: Any) -> None:
+        from rclpy.serialization import serialize_message
+
+        self._handled += 1
+        self.ask(service, serialize_message(request), header)
+
+    def answer_asker(self, service: int, asker: Any, payload: bytes | None, reason: str) -> None:
+        """Send the response; a call that failed has none in ROS 2."""
+        from rclpy.serialization import deserialize_message
+
+        if payload is None:
+            return
+        try:
+            self._senders[service](deserialize_message(payload, self._services[service].srv_type.Response), asker)
+        except Exception as error:  # noqa: BLE001 - the client has gone, or the response is malformed
+            self.report(f"a response of {self._services[service].service_name} is not sent: {error}")
+
+    def _caller(self, service: dict[str, Any]) -> Any:
+        return self._node.create_client(_service_class(service), service["name"])
+
+    def call(self, service: int, number: int, payload: bytes) -> None:
+        """Call a service; it fails at once without a server."""
+        from rclpy.serialization import deserialize_message
+
+        client = self._callers[service]
+        if not client.service_is_ready():
+            self.give_answer(service, number, None, f"there is no server of {client.srv_name}")
+            return
+        # The engine no longer waits for an earlier call.
+        for earlier in self._called.pop(service, ()):
+            client.remove_pending_request(earlier)
+        try:
+            future = client.call_async(deserialize_message(payload, client.srv_type.Request))
+        except Exception as error:  # noqa: BLE001 - the request is malformed
+            self.give_answer(service, number, None, str(error))
+            return
+        self._called[service] = (future,)
+        future.add_done_callback(functools.partial(self._called_back, service, number))
+
+    def _called_back(self, service: int, number: int, future: Any) -> None:
+        from rclpy.serialization import serialize_message
+
+        if not future.cancelled():
+            self.give_answer(service, number, serialize_message(future.result()))
 
     def _subscription(self, topic: dict[str, Any], message: Any) -> Any:
         """Return a subscription that counts what ROS loses, by an event or by the numbers of a single publisher."""
@@ -440,8 +636,12 @@ class Ros2(Ros):
                         )
 
     def names(self) -> dict[str, dict[int, str]]:
-        """Return the names of the topics after remapping."""
+        """Return the names of the topics and services after remapping."""
         return {
+            "services": {
+                **{number: end.service_name for number, end in self._services.items()},
+                **{number: end.service_name for number, end in self._callers.items()},
+            },
             "subscribers": {number: topic.topic_name for number, topic in self._subscribers.items()},
             "publishers": {
                 number: topic.topic_name for number, topic in self._publishers.items() if number != DIAGNOSTICS
@@ -508,7 +708,7 @@ _KINDS = ("subscribers", "publishers")
 _VERSIONS = {1: Ros1, 2: Ros2}
 
 
-def _message_class(name: str) -> Any:
+def _message_class(name: str, word: str = "message") -> Any:
     import importlib
 
     package, kind, message = name.split("/")
@@ -516,10 +716,38 @@ def _message_class(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), message)
     except (ImportError, AttributeError):
         raise BridgeError(
-            f"the message '{name}' is not installed for {sys.executable}; 'firm ros install {package}' or"
+            f"the {word} '{name}' is not installed for {sys.executable}; 'firm ros install {package}' or"
             f" 'apt-get install ros-$ROS_DISTRO-{package.replace('_', '-')}' installs a released package;"
             " build and source a package of your own"
         ) from None
+
+
+def _service_class(service: dict[str, Any]) -> Any:
+    """Return the class of a service, whose definition must be that of the hardware if ROS 2 tells its hash."""
+    found = _message_class(service["type"], "service")
+    known = _installed_hash(service["type"])
+    if known and service["signature"] and known != service["signature"]:
+        raise BridgeError(
+            "the installed definition of '{}' ({}) differs from the system's definition ({})".format(
+                service["type"], known, service["signature"]
+            )
+        )
+    return found
+
+
+def _installed_hash(name: str) -> str:
+    """Return the hash of an installed type, or nothing; older ROS 2 releases have none."""
+    from ament_index_python.packages import (  # type: ignore[import-not-found, unused-ignore]
+        get_package_share_directory,
+    )
+
+    package, kind, word = name.split("/")
+    try:
+        text = Path(get_package_share_directory(package), kind, f"{word}.json").read_text(encoding="utf-8")
+        hashes = json.loads(text)["type_hashes"]
+    except (OSError, LookupError, ValueError):
+        return ""
+    return next((str(item["hash_string"]) for item in hashes if item["type_name"] == name), "")
 
 
 def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
@@ -532,6 +760,10 @@ def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
             ros.publish(parcel.topic, parcel.data)
             if is_timed and parcel.topic != DIAGNOSTICS:
                 channel.send(PUBLISHED, parcel.topic, time_ns=time.monotonic_ns())
+        elif parcel.kind == ANSWER:
+            ros.answer(parcel.topic, parcel.data)
+        elif parcel.kind == CALL:
+            ros.call(parcel.topic, *unpack_call(parcel.data))
         elif parcel.kind == STOP:
             ros.stop()
     ros.end()

@@ -19,6 +19,7 @@ from fusesoc_firm.node.description import NodeDescription, NodeTopic
 from fusesoc_firm.node.diagnostics import Report, diagnostics_payload, diagnostics_topic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.ros_wheels import ros_python
+from fusesoc_firm.node.services import NodeService
 
 # For each version of ROS, a module that only the Python with that version can import.
 _MODULES = {1: "rospy", 2: "rclpy"}
@@ -59,7 +60,40 @@ class Lost:
     count: int
 
 
-Event = Taken | Published | Lost
+@dataclass(frozen=True)
+class Call:
+    """A call of a service: its number, with which it is answered, and the payload of the request."""
+
+    number: int
+    payload: bytes
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer to a call: the payload of the response, or None if the call failed, for a `reason`."""
+
+    payload: bytes | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Called:
+    """A call, from ROS, of the service with this number."""
+
+    service: int
+    call: Call
+
+
+@dataclass(frozen=True)
+class Answered:
+    """ROS's answer to the call with a `number`, of the hardware, of the service with this number."""
+
+    service: int
+    number: int
+    answer: Answer
+
+
+Event = Taken | Published | Lost | Called | Answered
 
 
 class Carrier(Protocol):
@@ -70,6 +104,12 @@ class Carrier(Protocol):
 
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message; any thread may call this method. After the middleware has ended, messages are dropped."""
+
+    def call(self, service: int, call: Call) -> None:
+        """Call a service; an `Answered` follows, unless the middleware ends. Any thread may call this method."""
+
+    def answer(self, service: int, number: int, answer: Answer) -> None:
+        """Answer a `Called`; any thread may call this method."""
 
     def diagnose(self, report: Report) -> None:
         """Publish a report on `/diagnostics`."""
@@ -141,25 +181,27 @@ class RosCarrier:
             "is_timed": options.is_timed,
             "subscribers": _numbered(ros, description.subscribers, options),
             "publishers": _numbered(ros, description.publishers, options),
+            "services": _services(ros, description.services),
             "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
             self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
-            self.subscribers, self.publishers = self._wait_until_ready()
+            self.subscribers, self.publishers, self.services = self._wait_until_ready()
         except BaseException:
             self._end(0)
             raise
 
-    def _wait_until_ready(self) -> tuple[dict[int, str], dict[int, str]]:
-        """Wait for the bridge; return the names of the subscribed and the published topics after remapping."""
+    def _wait_until_ready(self) -> tuple[dict[int, str], dict[int, str], dict[int, str]]:
+        """Wait for the bridge; return the names of subscribed topics, published topics and services."""
         parcel = self._channel.receive()
         if parcel is None or parcel.kind == bridge.FAULT:
             raise self._fault(parcel)
         names = json.loads(parcel.data)
-        subscribers, publishers = (
-            {int(number): name for number, name in names[kind].items()} for kind in ("subscribers", "publishers")
+        subscribers, publishers, services = (
+            {int(number): name for number, name in names[kind].items()}
+            for kind in ("subscribers", "publishers", "services")
         )
-        return subscribers, publishers
+        return subscribers, publishers, services
 
     def receive(self) -> Iterator[Event]:
         """Yield events until the carrier is closed or ROS asks the node to end. May raise `CarrierError`."""
@@ -172,6 +214,8 @@ class RosCarrier:
                     yield Published(parcel.topic, parcel.time_ns)
                 elif parcel.kind == bridge.LOST:
                     yield Lost(parcel.topic, int(parcel.data))
+                elif parcel.kind in (bridge.CALL, bridge.ANSWER):
+                    yield _event_of_service(parcel)
                 elif parcel.kind == bridge.DONE:
                     self._stopped.set()
                 elif parcel.kind == bridge.STOP:
@@ -186,6 +230,14 @@ class RosCarrier:
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message."""
         self._send(bridge.MESSAGE, topic, payload)
+
+    def call(self, service: int, call: Call) -> None:
+        """Call a service."""
+        self._send(bridge.CALL, service, bridge.pack_call(call.number, call.payload))
+
+    def answer(self, service: int, number: int, answer: Answer) -> None:
+        """Answer a call."""
+        self._send(bridge.ANSWER, service, bridge.pack_answer(number, answer.payload, answer.reason))
 
     def diagnose(self, report: Report) -> None:
         """Publish a report on `/diagnostics`."""
@@ -226,10 +278,23 @@ class RosCarrier:
         return CarrierError(f"{self.title}: {parcel.data.decode(errors='replace')}")
 
 
+def _event_of_service(parcel: bridge.Parcel) -> Called | Answered:
+    if parcel.kind == bridge.CALL:
+        return Called(parcel.topic, Call(*bridge.unpack_call(parcel.data)))
+    number, payload, reason = bridge.unpack_answer(parcel.data)
+    return Answered(parcel.topic, number, Answer(payload, reason))
+
+
 def _numbered(ros: int, topics: Sequence[NodeTopic], options: RosOptions) -> list[dict[str, object]]:
     given = {"depth": options.depth, "is_reliable": options.is_reliable}
     common = {name: value for name, value in given.items() if value is not None}
     return [{"number": number, **asdict(topic), **common} for number, topic in enumerate(topics) if topic.ros == ros]
+
+
+def _services(ros: int, services: Sequence[NodeService]) -> list[dict[str, object]]:
+    found = [(number, asdict(service)) for number, service in enumerate(services) if service.ros == ros]
+    # Bytes are not part of JSON, and the bridge needs no failures.
+    return [{"number": number, **{name: item[name] for name in item if name != "failure"}} for number, item in found]
 
 
 def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:

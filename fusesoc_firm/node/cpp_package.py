@@ -63,6 +63,8 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
     not belong to it.
     """
     description = describe(loaded)
+    if description.services:
+        fail(f"'{description.name}' has services, which nodes in C++ do not support")
     version = _only_version(description, ros)
     dialect = _DIALECTS[version]
     package = f"{description.name}_node"
@@ -92,6 +94,8 @@ def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
     """
     system = loaded.system
     topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
+    if system.services:
+        return {}
     spoken = {item.frame.ros.number for item in topics}
     if len(spoken) != 1 or not spoken <= {*_DIALECTS}:
         return {}

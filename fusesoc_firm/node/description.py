@@ -13,6 +13,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import Definitions, MessageName, MessageType
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
+from fusesoc_firm.node.services import NodeService, node_service
 from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere, way_to
 from fusesoc_firm.system.derived.model import Converter, Quality, StatusAccess, Topic
 from fusesoc_firm.system.system_core import LoadedSystem, identity
@@ -51,7 +52,7 @@ class NodeTopic:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A converter between hardware and software on this host, with an id but without a topic."""
+    """A converter with an id but without a topic: of software on this host, or of a service."""
 
     block: str
     id: int
@@ -62,7 +63,8 @@ class NodeDescription:
     """A system from its node's view.
 
     The node takes messages from the topics of `subscribers` and publishes messages on the topics of `publishers`.
-    Software on this host sends to the hardware through `entering` and receives from the hardware through `leaving`. For
+    Software on this host, and the clients and servers of `services`, send to the hardware through `entering` and
+    receive from the hardware through `leaving`. For
     each publisher in hardware, `sources` lists the ids of the subscribers whose messages cause the publisher's
     messages. `longest_payload` is the size in bytes of the longest payload from any publisher, or None without a bound.
     `clock_hz` is None if the specification has no clock. `digest` is that of the hardware's identity, or empty if the
@@ -79,6 +81,7 @@ class NodeDescription:
     longest_payload: int | None = None
     clock_hz: float | None = None
     digest: str = ""
+    services: tuple[NodeService, ...] = ()
 
     @property
     def inputs(self) -> tuple[NodeTopic | Crossing, ...]:
@@ -92,8 +95,9 @@ class NodeDescription:
 
     @property
     def versions(self) -> tuple[int, ...]:
-        """The versions of ROS to which the topics belong."""
-        return tuple(sorted({topic.ros for topic in (*self.subscribers, *self.publishers)}))
+        """The versions of ROS to which the topics and services belong."""
+        topics = (*self.subscribers, *self.publishers)
+        return tuple(sorted({topic.ros for topic in topics} | {item.ros for item in self.services}))
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:
@@ -124,15 +128,16 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         max(length for length in lengths if length is not None) if None not in lengths else None,
         None if system.clock is None else float(system.clock),
         identity(loaded).digest if system.status is StatusAccess.FRAMES else "",
+        tuple(node_service(item, loaded) for item in system.services),
     )
 
 
 def _parted(converters: Iterable[Converter], here: Collection[str]) -> tuple[list[Converter], tuple[Crossing, ...]]:
-    """Split converters into those with topics and those connected to software on this host."""
+    """Split converters into those with topics and those without."""
     topics: list[Converter] = []
     crossings: list[Crossing] = []
     for item in converters:
-        if item.software and item.software.block in here:
+        if item.service or (item.software and item.software.block in here):
             crossings.append(Crossing(item.block, item.id))
         else:
             topics.append(item)

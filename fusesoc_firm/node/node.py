@@ -21,7 +21,8 @@ from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
-from fusesoc_firm.node.carrier import Carrier, CarrierError, Lost, Published, Taken
+from fusesoc_firm.node.calls import NodeCalls
+from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Lost, Published, Taken
 from fusesoc_firm.node.description import DEFAULT_DEPTH, Crossing, NodeDescription, NodeTopic
 from fusesoc_firm.node.diagnostics import INTERVAL_SECONDS, READING_SECONDS, Report
 from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
@@ -110,13 +111,14 @@ class Node:
         trace: Trace | None = None,
     ) -> None:
         """Open the transport. May raise `TransportError`."""
-        self.statistics = Statistics.of(description)
+        self._report = _Reporter(settings.report)
+        self._calls = NodeCalls(description.services, self._put_request, self._report)
+        self.statistics = Statistics.of(description, self._calls.counts)
         self._description = description
         self._open_transport = open_transport
         self._settings = settings
         self._software = software
         self._trace = trace
-        self._report = _Reporter(settings.report)
         self._inputs = description.inputs
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
@@ -148,6 +150,7 @@ class Node:
         or `CarrierError` if the transport or a carrier fails permanently.
         """
         self._carriers = carriers
+        self._calls.start(carriers)
         takers = [self._start(partial(self._take, carrier)) for carrier in carriers.values()]
         sender, receiver = self._start(self._send), self._start(self._receive)
         self._start(self._diagnose)
@@ -160,6 +163,7 @@ class Node:
         self._drains.set()
         receiver.join(_left(latest))
         self._queues.close()
+        self._calls.close()
         self.close()
         for thread in (sender, receiver, *takers):
             # A thread that receives messages ends with its carrier, which the caller closes.
@@ -246,6 +250,10 @@ class Node:
                     self._note_published(event)
                 elif isinstance(event, Lost):
                     self.statistics.inputs[self._inputs[event.topic].block].lost += event.count
+                elif isinstance(event, Called):
+                    self._calls.called(event)
+                elif isinstance(event, Answered):
+                    self._calls.answered(event)
                 else:
                     self._take_message(event)
         except CarrierError as error:
@@ -257,6 +265,10 @@ class Node:
 
     def _take_message(self, taken: Taken) -> None:
         self._put(taken.topic, taken.payload, taken.time_ns, None)
+
+    def _put_request(self, block: str, payload: bytes) -> None:
+        """Send a message of a service to the hardware."""
+        self._put(self._numbers[block], payload, time.monotonic_ns(), None)
 
     def _put(self, number: int, payload: bytes, received_ns: int, timeout: float | None) -> None:
         """Add a message to a queue; if a full queue blocks, wait `timeout` seconds at most."""
@@ -354,10 +366,12 @@ class Node:
                 self._last_traffic = time.monotonic()
             elif self._drains.is_set() and self._is_at_rest(hardware):
                 return
+            elif not self._waiting() and hardware.transport.is_at_rest():
+                self._calls.rest()
 
     def _is_at_rest(self, hardware: _Hardware) -> bool:
         """Return whether all messages have been processed, as far as the transport can know."""
-        if self._waiting() or hardware.joiner.unfinished:
+        if self._waiting() or hardware.joiner.unfinished or not self._calls.is_idle:
             return False
         is_silent = time.monotonic() - self._last_traffic > self._settings.settle
         return is_silent and hardware.transport.is_at_rest() is not False
@@ -369,10 +383,12 @@ class Node:
             hardware.first_cycles.pop(burst.data[0], None)
             self.statistics.faults += 1
             self._report(f"the hardware ended a frame: {error}")
+            self._refuse_call(burst, "the hardware aborted the response")
             return
         except BurstError as error:
             self.statistics.faults += 1
             self._report(f"the hardware sent an invalid burst: {error}")
+            self._refuse_call(burst, "the hardware sent an invalid response")
             return
         hardware.has_answered = True
         first = None
@@ -383,6 +399,12 @@ class Node:
             cycles = None if first is None or burst.last_cycle is None else (first, burst.last_cycle)
             self._deliver(frame, cycles)
 
+    def _refuse_call(self, burst: Burst, reason: str) -> None:
+        """Let the call fail whose response had a fault, if the burst belongs to a response."""
+        block = self._publisher_names.get(burst.data[0]) if burst.data else None
+        if block is not None:
+            self._calls.refuse(block, reason)
+
     def _deliver(self, frame: JoinedFrame, cycles: tuple[int, int] | None) -> None:
         block = self._publisher_names[frame.id]
         self.statistics.outputs[block].frames += 1
@@ -390,7 +412,7 @@ class Node:
             self._trace.came(frame.id, len(frame.payload), cycles, is_published=self._has_carrier(block))
         if block in self._topics:
             self._publish(block, frame.payload)
-        else:
+        elif not self._calls.take(block, frame.payload):
             self._run_software(block, frame.payload)
 
     def _has_carrier(self, block: str) -> bool:
@@ -420,6 +442,7 @@ class Node:
             block = self._subscriber_names[converter]
             self.statistics.inputs[block].refused += 1
             self._report(f"the hardware rejected a malformed message from '{block}'")
+            self._calls.refuse(block, "the hardware rejected the request")
             if self._trace:
                 self._trace.refused(converter)
         else:
@@ -455,6 +478,7 @@ class Node:
         if self._trace:
             self._trace.forget()
         self._hardware = _Hardware(transport, self._description)
+        self._calls.forget("the hardware was restarted")
 
 
 class _Reporter:

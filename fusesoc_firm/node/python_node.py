@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.services import NodeService
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import identifier
@@ -58,6 +60,7 @@ def _table(description: NodeDescription) -> dict[str, Any]:
         "longest_payload": repr(description.longest_payload),
         "clock_hz": repr(description.clock_hz),
         "digest": description.digest,
+        "services": [*map(_service, description.services)],
     }
 
 
@@ -75,6 +78,11 @@ def _topic(topic: NodeTopic) -> dict[str, Any]:
         "is_numbered": repr(topic.is_numbered),
         "definition": {"constant": _constant(topic.type)} if topic.definition else None,
     }
+
+
+def _service(service: NodeService) -> dict[str, Any]:
+    values = ("ros", "is_server", "time_limit", "failure")
+    return {name: repr(value) if name in values else str(value) for name, value in asdict(service).items()}
 
 
 def _constant(message: str) -> str:

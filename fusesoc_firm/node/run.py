@@ -17,6 +17,7 @@ from fusesoc_firm.node.node import Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.reopening import checked
+from fusesoc_firm.node.services import NodeService
 from fusesoc_firm.node.software import node_software
 from fusesoc_firm.node.status_socket import StatusServer, served_names
 from fusesoc_firm.node.trace import Trace
@@ -110,7 +111,12 @@ def _topics(carrier: RosCarrier, description: NodeDescription) -> str:
     """Return a text for the user that lists a running node's topics."""
     taken = [f"  {name} -> {description.subscribers[number].block}" for number, name in carrier.subscribers.items()]
     given = [f"  {description.publishers[number].block} -> {name}" for number, name in carrier.publishers.items()]
-    return "\n".join([f"{description.name} is a node of {carrier.title}", *taken, *given])
+    called = [_service(name, description.services[number]) for number, name in carrier.services.items()]
+    return "\n".join([f"{description.name} is a node of {carrier.title}", *taken, *given, *called])
+
+
+def _service(name: str, service: NodeService) -> str:
+    return f"  service {name} -> {service.block}" if service.is_server else f"  {service.block} -> service {name}"
 
 
 @contextmanager

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
+from fusesoc_firm.node.calls import CallCounts
 from fusesoc_firm.node.description import NodeDescription
 
 
@@ -35,6 +36,7 @@ class Statistics:
 
     inputs: dict[str, Input] = field(default_factory=dict)
     outputs: dict[str, Output] = field(default_factory=dict)
+    services: Mapping[str, CallCounts] = field(default_factory=dict)
     faults: int = 0
     software_faults: int = 0
     restarts: int = 0
@@ -42,11 +44,12 @@ class Statistics:
     """messages in queues, and incomplete frames, when the time limit for ending expired"""
 
     @classmethod
-    def of(cls, description: NodeDescription) -> Statistics:
-        """Return the statistics of a node with all counts at zero."""
+    def of(cls, description: NodeDescription, services: Mapping[str, CallCounts] | None = None) -> Statistics:
+        """Return the statistics of a node with all counts at zero; `services` are those of its services."""
         return cls(
             {item.block: Input() for item in description.inputs},
             {item.block: Output() for item in description.outputs},
+            services or {},
         )
 
     def counts(self, dropped: Mapping[str, int]) -> dict[str, int]:
@@ -57,12 +60,15 @@ class Statistics:
             found |= {f"{name} sent": item.sent, f"{name} refused": item.refused, f"{name} lost": item.lost}
         for name, output in self.outputs.items():
             found |= {f"{name} frames": output.frames, f"{name} published": output.published}
+        for name, calls in self.services.items():
+            found |= {f"{name} {count}": value for count, value in asdict(calls).items()}
         return found | {"faults": self.faults, "faults in software": self.software_faults, "restarts": self.restarts}
 
     def troubles(self) -> int:
-        """Return the number of messages that were dropped, lost or refused, and of faults and restarts."""
+        """Return the number of messages that were dropped, lost or refused, of failed calls, faults and restarts."""
         inputs = sum(item.dropped + item.refused + item.lost for item in self.inputs.values())
-        return inputs + self.faults + self.software_faults + self.restarts
+        calls = sum(item.failed + item.unasked for item in self.services.values())
+        return inputs + calls + self.faults + self.software_faults + self.restarts
 
     def text(self) -> str:
         """Return the counts as a table for the user."""
@@ -73,6 +79,12 @@ class Statistics:
         ]
         rows.append(("to", "frames", "published", "", "", ""))
         rows += [(name, str(item.frames), str(item.published), "", "", "") for name, item in self.outputs.items()]
+        if self.services:
+            rows.append(("service", "called", "answered", "failed", "unasked", ""))
+        rows += [
+            (name, *map(str, (item.called, item.answered, item.failed, item.unasked)), "")
+            for name, item in self.services.items()
+        ]
         notes = {
             "faults on the route from the hardware": self.faults,
             "faults in software": self.software_faults,

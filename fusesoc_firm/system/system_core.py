@@ -47,6 +47,7 @@ from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.derived.services import with_services
 from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import wrapper
@@ -141,6 +142,7 @@ def load_system(
     spoken = {MIDDLEWARES[word] for word in specification.middlewares if word in MIDDLEWARES} or {*libraries}
     needed = Libraries({ros: partial(libraries.__getitem__, ros) for ros in libraries if ros in spoken})
     libraries = with_paths(needed, own, path.parent, core_folders, faults)
+    specification = with_services(specification, libraries, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system, None, faults.warnings)
 

@@ -6,11 +6,12 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.carrier import CarrierError, Event, Lost, Published, Taken
+from fusesoc_firm.node.carrier import Answer, Answered, Call, Called, CarrierError, Event, Lost, Published, Taken
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.diagnostics import Report
 from fusesoc_firm.node.node import HardwareListener, Node, NodeSettings, OpenTransport
@@ -30,6 +31,8 @@ class FakeCarrier:
     def __init__(self) -> None:
         self.published: list[tuple[int, bytes]] = []
         self.reports: list[Report] = []
+        self.answers: list[tuple[int, int, Answer]] = []
+        self.calls: list[tuple[int, Call]] = []
         self._events: SimpleQueue[Event | CarrierError | None] = SimpleQueue()
         self._stopped = threading.Event()
 
@@ -57,6 +60,20 @@ class FakeCarrier:
     def publish(self, topic: int, payload: bytes) -> None:
         self.published.append((topic, payload))
         self._events.put(Published(topic, time.monotonic_ns()))
+
+    def ask(self, service: int, call: Call) -> None:
+        """A call from ROS."""
+        self._events.put(Called(service, call))
+
+    def reply(self, service: int, number: int, answer: Answer) -> None:
+        """ROS's answer to a call by the hardware."""
+        self._events.put(Answered(service, number, answer))
+
+    def call(self, service: int, call: Call) -> None:
+        self.calls.append((service, call))
+
+    def answer(self, service: int, number: int, answer: Answer) -> None:
+        self.answers.append((service, number, answer))
 
     def diagnose(self, report: Report) -> None:
         self.reports.append(report)
@@ -97,7 +114,7 @@ class FakeHardware:
         self._cycle += len(frame)
         for burst in self._answers(identifier, payload):
             first, self._cycle = self._cycle, self._cycle + len(burst.data)
-            self._bursts.put(Burst(burst.data, burst.tid, first, self._cycle - 1))
+            self._bursts.put(replace(burst, first_cycle=first, last_cycle=self._cycle - 1))
 
     def receive(self, timeout: float | None = None) -> Burst | None:
         self._check()

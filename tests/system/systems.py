@@ -9,6 +9,7 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.derived.services import with_services
 from fusesoc_firm.system.written.specification import Specification, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
@@ -57,7 +58,7 @@ def read(folder: Path, text: str) -> tuple[Specification, Diagnostics]:
 
 def derived(folder: Path, text: str) -> DerivedSystem:
     found, faults = read(folder, text)
-    return derive(found, folder, LIBRARIES, faults)
+    return derive(with_services(found, LIBRARIES, faults), folder, LIBRARIES, faults)
 
 
 _INSTANCE = re.compile(

@@ -72,6 +72,21 @@ def run(path: Path, answers: Answers) -> str:
     return path.read_text(encoding="utf-8")
 
 
+def server() -> Answers:
+    """A system whose only block is a server."""
+    return Answers(name=["serve", "lamp"], middleware=["ROS"], mode=["server"], service=["demo/Switch"])
+
+
+def test_a_server_is_asked_for_its_service(tmp_path: Path) -> None:
+    answers = server()
+    text = run(tmp_path / "robot.yaml", answers)
+    assert "mode: server" in text
+    assert "service: demo/Switch" in text
+    asked = [question.name for question in answers.asked]
+    assert "service" in asked
+    assert not {"message", "include", "exclude", "timeLimit"} & {*asked[asked.index("mode") :]}
+
+
 def test_a_new_specification(tmp_path: Path) -> None:
     text = run(tmp_path / "robot.yaml", turner())
     system = derived(tmp_path, text)
@@ -130,7 +145,9 @@ def test_every_key_is_explained_once(tmp_path: Path) -> None:
 def test_every_key_of_the_grammar_is_asked_for(tmp_path: Path) -> None:
     answers = turner()
     run(tmp_path / "robot.yaml", answers)
-    asked = {question.name for question in answers.asked}
+    others = server()
+    run(tmp_path / "server.yaml", others)
+    asked = {question.name for question in (*answers.asked, *others.asked)}
     for section in (Project, Accelerator, Block, Outgoing):
         for name, (_, entry) in keys_of(section).items():
             is_asked = name in asked or f"add to '{name}'" in asked or (entry.form == "section" and entry.is_required)

@@ -45,6 +45,7 @@ from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
 from fusesoc_firm.system.derived.quality import check_quality, quality_of
 from fusesoc_firm.system.derived.queue import queue_of
+from fusesoc_firm.system.derived.services import services_of
 from fusesoc_firm.system.derived.status import has_time_stamps, status_of
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
@@ -54,10 +55,10 @@ from fusesoc_firm.system.written.sources import declares_width
 from fusesoc_firm.system.written.specification import (
     CONVERTER,
     CONVERTER_KEYS,
-    MODES,
     PUBLISHER,
     SOURCE_SUFFIXES,
     SUBSCRIBER,
+    TOPIC_MODES,
     Accelerator,
     Block,
     InterfaceType,
@@ -84,6 +85,7 @@ def derive(
 ) -> DerivedSystem:
     """Derive the system of a specification in `folder`; unless `needs_sources` is set, source files may be missing.
 
+    `with_services` has replaced the servers and clients of the specification.
     Raise `InputError` with the faults found here and the faults already in `faults`.
     """
     analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
@@ -95,6 +97,7 @@ def derive(
     names = message_names(analysis.blocks, analysis.inputs, analysis.outputs)
     check_topics(analysis.topic_uses(names), faults)
     parts = analysis.parts(analysis.wiring().connect(), names)
+    services = services_of(analysis.blocks, parts, faults)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
     faults.raise_if_any()
     parts.check(analysis.blocks, specification.project.id_bytes, faults)
@@ -132,6 +135,7 @@ def derive(
         tree=tree,
         pipeline=None if project.pipeline is None else str(project.pipeline),
         watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),
+        services=services,
     )
     check_entities(system, parts.blocks, faults)
     faults.raise_if_any()
@@ -255,7 +259,7 @@ class _Analysis:
                 self._resolve_converter(block)
         # With software, the hardware part is not known yet.
         if not any(accelerator.is_software for accelerator in self.specification.accelerators):
-            for mode in MODES:
+            for mode in TOPIC_MODES:
                 self._check_count(mode)
 
     def _resolve_accelerator_block(self, block: Block) -> None:
@@ -317,7 +321,7 @@ class _Analysis:
         """Yield the topics of all converters and of software in other programs; `names` are from `message_names`."""
         for name, block in self.blocks.items():
             is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
-            if block.type is not None and not is_elsewhere:
+            if (block.type is not None and not is_elsewhere) or block.service_block is not None:
                 continue
             for sides, is_published in ((self.inputs, True), (self.outputs, False)):
                 for side in sides.get(name, ()):
@@ -374,6 +378,7 @@ def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> t
         # Converters with the same fields share the entity of the first one.
         suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(name).lower()}")
         block = parts.blocks[name]
-        topic: dict[str, Any] = {"given_name": str(block.topic or ""), "quality": quality_of(block)}
+        service = str(block.service_block.name) if block.service_block else ""
+        topic: dict[str, Any] = {"service": service, "given_name": str(block.topic or ""), "quality": quality_of(block)}
         found.append(Converter(str(name), frame, number, suffix, software=parts.crossings.get(name), **topic))
     return tuple(found)

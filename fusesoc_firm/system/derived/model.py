@@ -89,7 +89,8 @@ class Converter(Topic):
     """An instance of a converter; `id` counts subscribers and publishers separately, from 0, in the blocks' order.
 
     With `has_default_length`, `max_length` is a default, since neither bounds nor the specification limit the payload.
-    A publisher's `late_bytes` are stored in a FIFO while its frames are late (section 6.3.2).
+    A publisher's `late_bytes` are stored in a FIFO while its frames are late (section 6.3.2). If the converter carries
+    the requests or responses of a service, `service` is the block of the service.
     """
 
     id: int
@@ -99,11 +100,36 @@ class Converter(Topic):
     software: End | None = None
     queue: Queue | None = None
     late_bytes: int = 0
+    service: str = ""
 
     @property
     def may_pause(self) -> bool:
         """Whether the frames of this publisher may pause: one of fixed size or with a buffer has the whole frame."""
         return not self.frame.is_fixed_size and not self.buffer
+
+
+class ServiceEnd(Enum):
+    """The end of a service that a system is: a server answers calls, a client calls."""
+
+    SERVER = "server"
+    CLIENT = "client"
+
+
+@dataclass(frozen=True)
+class Service:
+    """A service that a system serves or calls: `block` is its block in the specification, `type` is the service's name.
+
+    `request` and `response` are the blocks of the converters. A call is answered within `time_limit` seconds.
+    """
+
+    block: str
+    end: ServiceEnd
+    type: MessageName
+    ros: Middleware
+    ros_name: str
+    request: str
+    response: str
+    time_limit: float
 
 
 class LengthSource(Enum):
@@ -322,6 +348,8 @@ class Clock:
 class DerivedSystem:
     """The whole system; `name` is an identifier, `width` the width of the streams, `clocks` all clocks except clk.
 
+    The messages of `services` have converters, but no topics.
+
     `clock` is the frequency of clk in Hz, if it is given. A publisher that stops in the middle of a frame is cut off
     after `watchdog` cycles, if this is not 0.
 
@@ -349,6 +377,7 @@ class DerivedSystem:
     watchdog: int = 0
     tree: Tree | None = None
     pipeline: str | None = None
+    services: tuple[Service, ...] = ()
 
     @property
     def id_bytes(self) -> int:

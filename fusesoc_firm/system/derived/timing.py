@@ -51,6 +51,12 @@ _IN_GROUPS = "round_robin", ("publishers are in groups by period, so those with 
 Rounding = Callable[[Fraction], int]
 
 
+def seconds_of(time: str) -> Fraction | None:
+    """Return a time with a unit, such as `500 ms`, in seconds, or None if the text is not a time with a unit."""
+    found = _QUANTITY.fullmatch(time)
+    return Fraction(found[1]) * _SECONDS[found[2]] if found and found[2] in _SECONDS else None
+
+
 def scheduling_of(
     project: Project,
     clock: Fraction | None,

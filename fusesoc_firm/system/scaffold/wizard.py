@@ -20,7 +20,10 @@ from ruamel.yaml.util import load_yaml_guess_indent
 from fusesoc_firm.system.written.specification import (
     ACCELERATOR,
     CONVERTER_KEYS,
-    MODES,
+    MESSAGE_KEYS,
+    SERVICE_KEYS,
+    SERVICE_MODES,
+    TOPIC_MODES,
     Accelerator,
     Block,
     Outgoing,
@@ -145,7 +148,7 @@ class _Wizard:
         """Ask for one section, key by key."""
         draft = _Draft(section, siblings)
         for name, (field_name, entry) in keys_of(section).items():
-            if draft.has(entry) and (value := self._value(draft, name, field_name, entry)):
+            if draft.has(name, entry) and (value := self._value(draft, name, field_name, entry)):
                 draft.made[name] = value
                 self._explain(draft.made, name, entry)
         return draft.made
@@ -230,17 +233,21 @@ class _Draft:
     siblings: Sequence[CommentedMap]
     made: CommentedMap = field(default_factory=CommentedMap)
 
-    def has(self, entry: Key) -> bool:
+    def has(self, name: str, entry: Key) -> bool:
         """Return whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
+        if self.section is Block and name in SERVICE_KEYS | MESSAGE_KEYS:
+            is_service = self.made.get("mode") in SERVICE_MODES
+            if is_service is not (name in SERVICE_KEYS):
+                return False
         if self.section is not Block or not entry.only_of:
             return entry.is_asked
-        if entry.only_of in MODES:
+        if entry.only_of in TOPIC_MODES:
             return entry.is_asked and self.made.get("mode") == entry.only_of
         return entry.is_asked and ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, name: str, entry: Key) -> bool:
         """Return whether a key is mandatory; the keys of a converter are optional in a block's grammar."""
-        return entry.is_needed(self.made) or (self.section is Block and name in CONVERTER_KEYS)
+        return entry.is_needed(self.made) or (self.section is Block and name in (*CONVERTER_KEYS, "service"))
 
 
 def _default(section: type[Section], field_name: str) -> str:

@@ -187,11 +187,18 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
         "nameMW": str(converter.frame.message),
         "ROS": converter.frame.ros.number,
         "block": converter.block,
-        **({"software": converter.software.block} if converter.software else {"topic": converter.name}),
+        **_host_end(converter),
         "id": converter.id,
         "payloadBytes": _payload_bytes(converter.frame),
         **_queue(converter.queue),
     }
+
+
+def _host_end(converter: Converter) -> dict[str, Any]:
+    """Return the other end of a converter's messages: a block in software, a service, or a topic."""
+    if converter.software:
+        return {"software": converter.software.block}
+    return {"service": converter.service} if converter.service else {"topic": converter.name}
 
 
 def _queue(queue: Queue | None) -> dict[str, Any]:

@@ -31,11 +31,16 @@ SOURCE_SUFFIXES = {
     SOFTWARE: (".py",),
 }
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
-SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
+SUBSCRIBER, PUBLISHER = TOPIC_MODES = ("subscriber", "publisher")
+SERVER, CLIENT = SERVICE_MODES = ("server", "client")
+MODES = (*TOPIC_MODES, *SERVICE_MODES)
 # The two kinds of blocks.
 CONVERTER, ACCELERATOR = "converter", "accelerator"
 # The keys that make a block a converter.
 CONVERTER_KEYS = ("middleware", "mode", "message")
+# The keys of servers and clients, and those of the messages and topics of other converters.
+SERVICE_KEYS = frozenset({"service", "timeLimit"})
+MESSAGE_KEYS = frozenset({"message", "qos", "include", "exclude"})
 # The keyword for the smallest scheduler that meets all deadlines.
 AUTO_SCHEDULER = "auto"
 # The routes of frames between the host and the system: streams of the top level, or a byte link (cores/board).
@@ -285,10 +290,24 @@ class Block(Section):
     middleware: Text | None = key(
         "the middleware of a converter's message", choices=tuple(MIDDLEWARES), only_of=CONVERTER
     )
-    mode: Text | None = key("direction of a converter", choices=MODES, only_of=CONVERTER)
-    message: Text | None = key("a converter's message", only_of=CONVERTER)
+    mode: Text | None = key(
+        "direction of a converter; server answers calls of a service, client calls a service",
+        choices=MODES,
+        only_of=CONVERTER,
+    )
+    message: Text | None = key("a converter's message; not legal for a service", only_of=CONVERTER)
+    service: Text | None = key(
+        "the type of the service of a server or client, such as std_srvs/SetBool", only_of=CONVERTER
+    )
+    time_limit: Text | None = key(
+        "the longest time in which a call of a service is answered, such as 500 ms (default: 5 s)",
+        name="timeLimit",
+        only_of=CONVERTER,
+        is_asked=False,
+    )
     topic: Text | None = key(
-        "the topic of a converter's messages, such as /arm/left or left (default: the block's name)",
+        "the topic of a converter's messages, or the name of its service, such as /arm/left or left (default: the"
+        " block's name)",
         only_of=CONVERTER,
     )
     qos: Qos | None = key(
@@ -328,6 +347,8 @@ class Block(Section):
     outgoing: tuple[Outgoing, ...] = key(
         "connections to the blocks that receive the block's message", form="sections", section=Outgoing
     )
+    # The server or client whose request or response this converter carries.
+    service_block: Block | None = None
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,284 @@
+"""The calls of services: each service has one call under way, and further calls wait in the order of their arrival.
+
+A frame does not tell who asked. With one call of a service in the hardware, its response, its errors and its time-out
+belong to that call. The same holds for the calls that hardware makes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+
+from fusesoc_firm.node.carrier import Answer, Answered, Call, Called, Carrier
+from fusesoc_firm.node.queues import ClosedError
+from fusesoc_firm.node.services import NodeService
+
+# Calls of one service that may wait; a further call fails.
+MOST_WAITING = 1000
+# s; short time limits are exceeded by busy hosts.
+LEAST_WAIT = 2.0
+
+
+@dataclass
+class CallCounts:
+    """The counts of a service's calls; `unasked` are responses of the hardware to no call."""
+
+    called: int = 0
+    answered: int = 0
+    failed: int = 0
+    unasked: int = 0
+
+
+class CallLine:
+    """The calls of one service. Any thread may call the methods; a thread of the line's own hands calls over.
+
+    An answer that does not tell its call and comes late would be taken for that of the next call. Therefore, if a call
+    is not answered in time, or if more may follow its answer, the next call waits until something follows or until
+    `rest`, but for another `limit` seconds at most, or for `LEAST_WAIT` seconds if this is longer.
+    """
+
+    def __init__(
+        self,
+        limit: float,
+        hand_over: Callable[[Call], None],
+        answer: Callable[[Call, Answer], None],
+        *,
+        has_numbers: bool,
+    ) -> None:
+        """Create a line that answers each call once, by `answer`; `hand_over` may raise `ClosedError`.
+
+        With `has_numbers`, each answer tells its call.
+        """
+        self._limit = limit
+        self._hand_over = hand_over
+        self._give = answer
+        self._has_numbers = has_numbers
+        self._waiting: deque[Call] = deque()
+        self._held: Call | None = None
+        self._answer: Answer | None = None
+        self._is_final = self._is_late = False
+        self._is_closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def put(self, call: Call) -> None:
+        """Add a call; it fails if too many calls wait, or if the line is closed."""
+        with self._changed:
+            is_taken = not self._is_closed and len(self._waiting) < MOST_WAITING
+            if is_taken:
+                self._waiting.append(call)
+                self._changed.notify_all()
+        if not is_taken:
+            self._give(call, Answer(reason="too many calls wait, or the node ends"))
+
+    def settle(self, answer: Answer, number: int | None = None, *, is_final: bool = True) -> bool:
+        """Answer the call that is under way, if it has this `number`; return whether there is such a call.
+
+        Unless `is_final` is set, more may follow from the hardware for this call.
+        """
+        with self._changed:
+            is_other = self._held is None or number not in (None, self._held.number)
+            if is_other or self._answer is not None:
+                return False
+            self._answer, self._is_final = answer, is_final
+            self._changed.notify_all()
+            return True
+
+    def rest(self) -> None:
+        """Take note that nothing more follows from the hardware for a call that was given up."""
+        with self._changed:
+            if self._is_late:
+                self._answer = Answer()
+                self._changed.notify_all()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no call is under way or waits."""
+        with self._changed:
+            return self._held is None and not self._waiting
+
+    def close(self) -> None:
+        """Let all calls fail that are not answered yet."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+        self._thread.join()
+
+    def _run(self) -> None:
+        ended = Answer(reason="the node ends")
+        while call := self._next():
+            try:
+                self._hand_over(call)
+            except ClosedError:
+                self._give(call, ended)
+                break
+            answer = self._wait()
+            self._give(call, answer or (ended if self._is_closed else self._no_answer()))
+            self._wait_for_late()
+        for call in self._rest():
+            self._give(call, ended)
+
+    def _no_answer(self) -> Answer:
+        return Answer(reason=f"no answer within {self._limit:g} s")
+
+    def _next(self) -> Call | None:
+        """Return the next call, or None if the line is closed."""
+        with self._changed:
+            self._held = self._answer = None
+            self._is_late = False
+            self._changed.wait_for(lambda: self._is_closed or self._waiting)
+            if self._is_closed:
+                return None
+            self._held = self._waiting.popleft()
+            return self._held
+
+    def _wait(self) -> Answer | None:
+        """Return the answer to the call under way, or None if it does not come in time or the line is closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._is_closed or self._answer, self._limit)
+            return self._answer
+
+    def _wait_for_late(self) -> None:
+        """Wait for what may follow from the hardware for the call under way."""
+        with self._changed:
+            if self._has_numbers or (self._answer and self._is_final):
+                return
+            self._answer, self._is_late = None, True
+            self._changed.wait_for(lambda: self._is_closed or self._answer, max(self._limit, LEAST_WAIT))
+
+    def _rest(self) -> list[Call]:
+        with self._changed:
+            self._is_closed = True
+            self._held = None
+            rest = [*self._waiting]
+            self._waiting.clear()
+            return rest
+
+
+class NodeCalls:
+    """The calls of all services of a node, between carriers and hardware; any thread may call the methods."""
+
+    def __init__(
+        self,
+        services: Sequence[NodeService],
+        put: Callable[[str, bytes], None],
+        report: Callable[[str], None],
+    ) -> None:
+        """Prepare the calls; `put` sends a payload to a block of the hardware, and may raise `ClosedError`."""
+        self.counts = {service.block: CallCounts() for service in services}
+        self._services = services
+        self._put = put
+        self._report = report
+        self._numbers = count()
+        self._lines: list[CallLine] = []
+        self._carriers: Mapping[int, Carrier] = {}
+        # The hardware's publishers and subscribers of services.
+        self._leaving = {item.response if item.is_server else item.request: n for n, item in enumerate(services)}
+        self._requests = {item.request: n for n, item in enumerate(services) if item.is_server}
+
+    def start(self, carriers: Mapping[int, Carrier]) -> None:
+        """Begin to hand over calls; `carriers` are those of `Node.run`."""
+        self._carriers = carriers
+        self._lines = [
+            CallLine(
+                service.time_limit,
+                partial(self._to_hardware if service.is_server else self._to_ros, number),
+                partial(self._answer_ros if service.is_server else self._answer_hardware, number),
+                has_numbers=not service.is_server,
+            )
+            for number, service in enumerate(self._services)
+        ]
+
+    def called(self, event: Called) -> None:
+        """Take a call from ROS."""
+        self._call(event.service, event.call)
+
+    def answered(self, event: Answered) -> None:
+        """Take ROS's answer to a call of the hardware; late answers are ignored."""
+        self._lines[event.service].settle(event.answer, event.number)
+
+    def take(self, block: str, payload: bytes) -> bool:
+        """Take a message of the hardware, if it belongs to a service; return whether it does."""
+        number = self._leaving.get(block)
+        if number is None:
+            return False
+        service = self._services[number]
+        if not service.is_server:
+            self._call(number, Call(next(self._numbers), payload))
+        elif not self._lines[number].settle(Answer(payload)):
+            self.counts[service.block].unasked += 1
+            self._report(f"the hardware sent a response of '{service.block}' to no call")
+        return True
+
+    def refuse(self, block: str, reason: str) -> None:
+        """Let the call fail that a fault of the hardware concerns, if the block is that of a service.
+
+        After a fault in a request, an aborted response may follow.
+        """
+        number = self._requests.get(block, self._leaving.get(block))
+        if number is not None and self._services[number].is_server:
+            self._lines[number].settle(Answer(reason=reason), is_final=block not in self._requests)
+
+    def forget(self, reason: str) -> None:
+        """Let all calls fail that the hardware holds."""
+        for service in self._services:
+            self.refuse(service.response, reason)
+
+    def rest(self) -> None:
+        """Take note that the hardware has no work."""
+        for line in self._lines:
+            line.rest()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether all calls are answered."""
+        return all(line.is_idle for line in self._lines)
+
+    def close(self) -> None:
+        """Let all calls fail that are not answered yet."""
+        for line in self._lines:
+            line.close()
+
+    def _call(self, number: int, call: Call) -> None:
+        self.counts[self._services[number].block].called += 1
+        self._lines[number].put(call)
+
+    def _to_hardware(self, number: int, call: Call) -> None:
+        self._put(self._services[number].request, call.payload)
+
+    def _to_ros(self, number: int, call: Call) -> None:
+        carrier = self._carriers.get(self._services[number].ros)
+        if carrier:
+            carrier.call(number, call)
+        else:
+            self._lines[number].settle(Answer(reason="the node has not joined this version of ROS"), call.number)
+
+    def _answer_ros(self, number: int, call: Call, answer: Answer) -> None:
+        service = self._services[number]
+        # ROS 2 has no answer for a call that fails.
+        if self._counted(service, answer) and service.ros != 1:
+            answer = Answer(service.failure or None, answer.reason)
+        self._carriers[service.ros].answer(number, call.number, answer)
+
+    def _answer_hardware(self, number: int, _: Call, answer: Answer) -> None:
+        service = self._services[number]
+        payload = (service.failure or None) if self._counted(service, answer) else answer.payload
+        if payload is not None:
+            with suppress(ClosedError):
+                self._put(service.response, payload)
+
+    def _counted(self, service: NodeService, answer: Answer) -> bool:
+        """Count an answer, and report a failure; return whether the call failed."""
+        counts, has_failed = self.counts[service.block], answer.payload is None
+        counts.answered += not has_failed
+        counts.failed += has_failed
+        if has_failed:
+            lost = "" if service.failure or (service.is_server and service.ros == 1) else ", and gets no response"
+            self._report(f"a call of '{service.block}' failed{lost}: {answer.reason}")
+        return has_failed
