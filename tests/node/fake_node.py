@@ -99,6 +99,9 @@ class FakeHardware:
             first, self._cycle = self._cycle, self._cycle + len(burst.data)
             self._bursts.put(Burst(burst.data, burst.tid, first, self._cycle - 1))
 
+    def is_ready(self) -> bool:
+        return not self._gate or self._gate.is_set()
+
     def receive(self, timeout: float | None = None) -> Burst | None:
         self._check()
         try:
