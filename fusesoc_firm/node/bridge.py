@@ -213,15 +213,21 @@ class Ros(ABC):
         self._channel.send(READY, data=json.dumps(self.names()).encode())
         self._is_ready.set()
 
-    def take(self, topic: int, payload: bytes, missing: int = 0) -> None:
-        """Hand over a message, before which `missing` ones were lost; block until the engine accepts it."""
+    def take(self, topic: int, payload: bytes) -> None:
+        """Hand over a message; block until the engine accepts it."""
+        self._hand_over(MESSAGE, topic, payload)
+
+    def lose(self, topic: int, count: int) -> None:
+        """Report messages that ROS did not deliver."""
+        if count:
+            self._hand_over(LOST, topic, str(count).encode())
+
+    def _hand_over(self, kind: bytes, topic: int, data: bytes) -> None:
         self._is_ready.wait()
         if not self._is_taking:
             return
         try:
-            if missing:
-                self._channel.send(LOST, topic, str(missing).encode())
-            self._channel.send(MESSAGE, topic, payload, time.monotonic_ns())
+            self._channel.send(kind, topic, data, time.monotonic_ns())
         except OSError:
             self._is_taking = False
 
@@ -302,7 +308,8 @@ class Ros1(Ros):
         if topic in self._gaps:
             publisher = message._connection_header["callerid"]  # noqa: SLF001
             missing = self._gaps[topic].missing(publisher, int.from_bytes(payload[:4], "little"))
-        self.take(topic, payload, missing)
+        self.take(topic, payload)
+        self.lose(topic, missing)
 
     def _serve(self, service: int, request: Any) -> Any:
         """Return the response to a request; rospy has a thread for each client."""
@@ -576,12 +583,14 @@ class Ros2(Ros):
 
         def taken(payload: bytes, info: dict[str, int]) -> None:
             self._handled += 1
-            self.take(number, payload, self._missing(number, info))
+            self.take(number, payload)
+            # The message need not wait for the look at the publishers.
+            self.lose(number, self._missing(number, info))
 
         def lost(event: Any) -> None:
             self._handled += 1
             if not self._has_one_publisher(number):
-                self._channel.send(LOST, number, str(event.total_count_change).encode())
+                self.lose(number, event.total_count_change)
 
         create = functools.partial(
             self._node.create_subscription, message, topic["name"], taken, _quality(topic), raw=True

@@ -4,10 +4,11 @@
     node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails permanently
 
 A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next) and
-is sent as a frame. The response returns as bursts, which are joined. If software is part of the system, the thread that
-delivers a message calls the software's functions. While a function runs, the node takes no burst from the hardware; the
-hardware stalls as with any accelerator that is not ready. A function's output never waits for space in a queue, since
-this could cause a deadlock: if the output's queue to the hardware is full, a message is dropped and counted.
+is sent as a frame. If no message waits and the hardware is ready, the thread that takes the message sends it. The
+response returns as bursts, which are joined. If software is part of the system, the thread that delivers a message
+calls the software's functions. While a function runs, the node takes no burst from the hardware; the hardware stalls as
+with any accelerator that is not ready. A function's output never waits for space in a queue, since this could cause a
+deadlock: if the output's queue to the hardware is full, a message is dropped and counted.
 """
 
 from __future__ import annotations
@@ -132,7 +133,7 @@ class Node:
         self._drains = threading.Event()
         self._is_over = threading.Event()
         self._fault: TransportError | CarrierError | None = None
-        self._lock, self._restarting = threading.Lock(), threading.Lock()
+        self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
         self._offered = self._declined = self._handled = 0
         self._failed_restarts = 0
         self._last_traffic = time.monotonic()
@@ -276,10 +277,16 @@ class Node:
         counts = self.statistics.inputs[item.block]
         if self._trace and item.id is not None:
             entry = Entry(item.id, len(payload), received_ns, time.monotonic_ns())
+        message = _Message(payload, entry)
         with self._lock:
+            is_alone = not self._waiting()
             counts.received += 1
             self._offered += 1
-        is_there = self._queues.put(number, _Message(payload, entry), timeout)
+        if is_alone and self._software is None and self._hardware.transport.is_ready():
+            self._queues.pass_by(number)
+            self._handle(number, message)
+            return
+        is_there = self._queues.put(number, message, timeout)
         if not is_there and self._settings.overflow is Overflow.BLOCK:
             # No other thread counts this message.
             with self._lock:
@@ -288,24 +295,28 @@ class Node:
 
     def _waiting(self) -> int:
         """Return the number of messages that are in queues or being sent."""
-        dropped = sum(self._queues.dropped(number) for number in range(len(self._inputs)))
+        dropped = self._queues.dropped_in_all
         with self._lock:
             return self._offered - self._declined - self._handled - dropped
 
     def _send(self) -> None:
         for number, message in self._queues:
-            if number == len(self._inputs):
-                if not self._send_request(message.payload):
-                    return
-                continue
-            item = self._inputs[number]
-            if item.id is not None and not self._send_frame(item.id, message):
+            is_request = number == len(self._inputs)
+            if not (self._send_request(message.payload) if is_request else self._handle(number, message)):
                 return
+
+    def _handle(self, number: int, message: _Message) -> bool:
+        """Pass a message on to the hardware and to software; return False if the hardware has failed permanently."""
+        item = self._inputs[number]
+        with self._sending:
+            if item.id is not None and not self._send_frame(item.id, message):
+                return False
             self._run_software(item.block, message.payload)
             self.statistics.inputs[item.block].sent += 1
             self._last_traffic = time.monotonic()
             with self._lock:
                 self._handled += 1
+        return True
 
     def _send_frame(self, subscriber: int, message: _Message) -> bool:
         """Send a frame to the hardware; return False if the hardware has failed permanently."""
@@ -323,12 +334,13 @@ class Node:
     def _send_request(self, request: bytes) -> bool:
         """Send a request of the status; return False if the hardware has failed permanently."""
         hardware = self._hardware
-        if self._trace:
-            self._trace.sending_other()
-        try:
-            hardware.transport.send(request)
-        except TransportError as error:
-            return self._begin_anew(hardware, error)
+        with self._sending:
+            if self._trace:
+                self._trace.sending_other()
+            try:
+                hardware.transport.send(request)
+            except TransportError as error:
+                return self._begin_anew(hardware, error)
         return True
 
     def _run_software(self, block: str, payload: bytes) -> None:

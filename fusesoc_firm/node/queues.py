@@ -206,6 +206,17 @@ class SubscriberQueues(Generic[Item]):
             self._closed = True
             self._changed.notify_all()
 
+    def pass_by(self, subscriber: int) -> None:
+        """Record that an item of a subscriber was served without a queue."""
+        with self._changed:
+            self._policy.served(subscriber)
+
+    @property
+    def dropped_in_all(self) -> int:
+        """The number of items that all queues have dropped."""
+        with self._changed:
+            return sum(self._dropped)
+
     def dropped(self, subscriber: int) -> int:
         """Return the number of items that a subscriber's queue has dropped."""
         with self._changed:

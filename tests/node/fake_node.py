@@ -116,6 +116,9 @@ class FakeHardware:
             first, self._cycle = self._cycle, self._cycle + len(burst.data)
             self._bursts.put(replace(burst, first_cycle=first, last_cycle=self._cycle - 1))
 
+    def is_ready(self) -> bool:
+        return not self._gate or self._gate.is_set()
+
     def receive(self, timeout: float | None = None) -> Burst | None:
         self._check()
         try:

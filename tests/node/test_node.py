@@ -70,6 +70,33 @@ def test_messages_come_back_whole_and_in_order(tmp_path: Path) -> None:
     assert (counts.inputs["a0"].received, counts.inputs["a0"].sent, counts.outputs["z1"].published) == (40, 40, 40)
 
 
+def test_a_message_that_nothing_delays_is_sent_at_once(tmp_path: Path) -> None:
+    """The thread that takes it sends it; while the hardware is not ready, messages wait in queues, in order."""
+    gate = threading.Event()
+    gate.set()
+    senders: list[str] = []
+
+    def noted(identifier: int, payload: bytes) -> list[Burst]:
+        senders.append(threading.current_thread().name)
+        return echo(identifier, payload)
+
+    bench = Bench(noted, gate)
+    run = Run(describe(pairs(tmp_path)), bench.open)
+    run.carrier.give(0, POINTS[0])
+    until(lambda: len(run.carrier.published) == 1)
+    gate.clear()
+    run.carrier.give(0, *POINTS[1:10])
+    until(lambda: run.node.statistics.inputs["a0"].received == 10)
+    gate.set()
+    until(lambda: len(run.carrier.published) == 10)
+    run.carrier.give(1, POINTS[10])
+    until(lambda: len(run.carrier.published) == 11)
+    run.stop()
+    assert run.carrier.published == [*((0, item) for item in POINTS[:10]), (1, POINTS[10])]
+    assert senders[0] == senders[-1] and {*senders[1:10]} == {senders[1]} and senders[0] != senders[1]
+    assert run.is_complete and run.node.statistics.inputs["a0"].sent == 10
+
+
 def test_the_least_recently_used_subscriber_is_next(tmp_path: Path) -> None:
     """Section 6.3.3: behind three messages of another one, a message waits for one of them at most."""
     gate = threading.Event()

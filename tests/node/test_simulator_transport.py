@@ -30,6 +30,8 @@ while kind := requests.read(1):
         if b"die" in frames[-1]:
             print("the model dies", file=sys.stderr)
             sys.exit(3)
+        if b"hang" in frames[-1]:
+            time.sleep(1000)
         if b"garbage" in frames[-1]:
             say(b"!!!!")
         if b"half" in frames[-1]:
@@ -132,7 +134,7 @@ def test_the_shell_runs_the_command(model: list[str]) -> None:
         opened.receive(60)
 
 
-def test_a_thread_runs_it_while_there_is_work(transport: Transport) -> None:
+def test_one_thread_sends_and_another_receives(transport: Transport) -> None:
     frames = [bytes([number]) * (number + 1) for number in range(200)]
 
     def send() -> None:
@@ -150,24 +152,67 @@ def test_a_thread_runs_it_while_there_is_work(transport: Transport) -> None:
 def test_at_rest_it_sleeps_and_is_woken(model: list[str]) -> None:
     events: list[Event] = []
     with Simulator(model) as simulator, SimulatorTransport(lambda: simulator, observe=events.append) as transport:
-        wait_until(lambda: simulator.quiet >= 100_000)
+        wait_until(lambda: transport.receive(0.01) is None and transport.is_at_rest())
         cycle = simulator.cycle
-        time.sleep(0.2)
+        assert transport.receive(0.2) is None
         assert simulator.cycle == cycle
         transport.send(b"wake")
         assert (burst := transport.receive(60)) and burst.data == b"wake"
-        wait_until(lambda: len(events) == 2)
         assert events == [Taken(cycle, cycle), burst]
 
 
 def test_idle_stepping(model: list[str]) -> None:
     with (
         Simulator(model) as simulator,
-        SimulatorTransport(lambda: simulator, Pace(rest_cycles=1, idle_seconds=0.01)),
+        SimulatorTransport(lambda: simulator, Pace(rest_cycles=1, idle_seconds=0.01)) as transport,
     ):
-        wait_until(lambda: simulator.quiet >= 10)
+        wait_until(lambda: transport.receive(0.01) is None and simulator.quiet >= 10)
         cycle = simulator.cycle
-        wait_until(lambda: simulator.cycle > cycle)
+        wait_until(lambda: transport.receive(0.01) is None and simulator.cycle > cycle)
+
+
+def test_a_sender_without_a_receiver_runs_it(transport: Transport) -> None:
+    """More frames than may wait for the system."""
+    frames = [bytes([number]) * 10 for number in range(20)]
+    for frame in frames:
+        transport.send(frame)
+    assert [(burst := transport.receive(60)) and burst.data for _ in frames] == frames
+
+
+def test_a_simulator_that_hangs_keeps_nobody(transport: Transport) -> None:
+    transport.send(b"hang")
+    start = time.monotonic()
+    assert transport.receive(0.2) is None
+    assert time.monotonic() - start >= 0.2
+    found: list[Burst | None] = []
+    receiver = threading.Thread(target=lambda: found.append(transport.receive()))
+    receiver.start()
+    assert transport.receive(0.2) is None
+    transport.close()
+    receiver.join()
+    assert found == [None]
+
+
+def test_a_frame_begins_the_run_that_brings_its_answer(model: list[str]) -> None:
+    """`send` starts the simulator; the receiver only collects, and the runs after a burst begin short."""
+    begun: list[tuple[int, int]] = []
+
+    class Noted(Simulator):
+        def begin(self, cycles: int, runs: int = 1) -> None:
+            begun.append((cycles, runs))
+            super().begin(cycles, runs)
+
+    with SimulatorTransport(lambda: Noted(model), Pace(rest_cycles=2**22)) as transport:
+        wait_until(lambda: transport.receive(0.01) is None and transport.is_at_rest())
+        begun.clear()
+        transport.send(b"frame")
+        assert [runs for _, runs in begun] == [2]
+        assert (burst := transport.receive(60)) and burst.data == b"frame"
+        assert len(begun) == 1
+        wait_until(lambda: transport.receive(0.01) is None and transport.is_at_rest())
+        # The second run may have ended without a burst, which doubles the next one.
+        assert begun[1] in [(64, 1), (128, 1)]
+        assert all(runs == 1 for _, runs in begun[1:])
 
 
 def test_frames_that_are_not_taken_hold_the_sender(transport: Transport) -> None:
@@ -193,12 +238,18 @@ def test_frames_that_are_not_taken_hold_the_sender(transport: Transport) -> None
 
 def test_bursts_that_nobody_takes_hold_the_simulator(model: list[str]) -> None:
     with SimulatorTransport(lambda: Simulator(model), Pace(most_bytes=1000, most_frames=100)) as transport:
-        for number in range(20):
-            transport.send(bytes([number]) * 300)
+
+        def send() -> None:
+            for number in range(120):
+                transport.send(bytes([number]) * 300)
+
+        sender = threading.Thread(target=send)
+        sender.start()
         wait_until(lambda: transport.waiting_bytes == 1200)
         time.sleep(0.1)
         assert transport.waiting_bytes == 1200
-        assert [(burst := transport.receive(60)) and burst.data[0] for _ in range(20)] == list(range(20))
+        assert [(burst := transport.receive(60)) and burst.data[0] for _ in range(120)] == list(range(120))
+        sender.join()
 
 
 def test_closing_wakes_who_waits(transport: Transport) -> None:
@@ -217,7 +268,6 @@ def test_closing_wakes_who_waits(transport: Transport) -> None:
 def test_the_end_of_the_simulator_is_told_to_both_sides(model: list[str]) -> None:
     transport = SimulatorTransport(lambda: Simulator(model))
     transport.send(b"right")
-    wait_until(lambda: transport.waiting_bytes == len(b"right"))
     transport.send(b"die")
     # What came before is there before it.
     assert (burst := transport.receive(60)) and burst.data == b"right"

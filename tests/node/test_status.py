@@ -87,6 +87,9 @@ class Hardware:
     def receive(self, timeout: float | None = None) -> Burst | None:
         return self.bursts.popleft() if self.bursts else None
 
+    def is_ready(self) -> bool:
+        return True
+
     def is_at_rest(self) -> bool:
         return True
 

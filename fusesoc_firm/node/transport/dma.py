@@ -170,6 +170,10 @@ class DmaTransport:
                 self._handed_over += 1
                 mark = 0
 
+    def is_ready(self) -> bool:
+        """Return False, because the number of buffers that a frame needs is unknown."""
+        return False
+
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next burst, as `Transport.receive` does."""
         end = None if timeout is None else time.monotonic() + timeout

@@ -5,7 +5,7 @@
         for event in simulator.run(1000):
             ...
 
-    with SimulatorTransport(lambda: Simulator(command, folder)) as transport:   # a thread runs it while there is work
+    with SimulatorTransport(lambda: Simulator(command, folder)) as transport:   # it runs while someone waits for it
         transport.send(pack_frame(0, payload))
         burst = transport.receive()
 
@@ -15,6 +15,7 @@ The simulator is a separate process. If it ends unexpectedly, its output is show
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import tempfile
@@ -24,6 +25,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import NoReturn
@@ -43,9 +45,12 @@ _SHOWN_LINES = 20
 # A simulator normally ends immediately on request, or when its pipes close.
 _END_SECONDS = 10.0
 
-# The thread runs the simulator for this time before it checks for new frames, within the limits on cycles.
+# The simulator runs for this time before new frames are checked for, within the limits on cycles.
 _STEP_SECONDS = 0.001
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
+_PIECE_BYTES = 2**16
+# The longest wait of `poll`, in ms.
+_MOST_POLLED = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -67,22 +72,49 @@ class ErrorPulse:
 Event = Taken | Burst | ErrorPulse
 
 
+class _Reports:
+    """The reading end of a pipe, which can tell whether anything has arrived."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._data = bytearray()
+        self._poll = select.poll()
+        self._poll.register(descriptor, select.POLLIN)
+
+    def read(self, size: int) -> bytes:
+        """Return this many bytes, or fewer at the end of the stream."""
+        while len(self._data) < size and (piece := os.read(self._descriptor, _PIECE_BYTES)):
+            self._data += piece
+        data = bytes(self._data[:size])
+        del self._data[:size]
+        return data
+
+    def has_data(self, seconds: float) -> bool:
+        """Return whether bytes or the end of the stream have arrived, after `seconds` at most."""
+        return bool(self._data or self._poll.poll(min(1000 * seconds, _MOST_POLLED)))
+
+    def close(self) -> None:
+        os.close(self._descriptor)
+
+
 class Simulator:
-    """A simulator in lock-step, which runs only on request and may be used by only one thread.
+    """A simulator in lock-step, which runs only on request and may be used by only one thread at a time.
 
     `cycle` is the number of cycles run so far; the last `quiet` of these cycles had no beat in either direction.
+    `begun` is the number of runs that have begun and are not finished.
     """
 
     def __init__(self, command: Sequence[str], folder: Path | None = None) -> None:
         """Start `command` in `folder`. May raise `TransportError`."""
         self.cycle = 0
         self.quiet = 0
+        self.begun = 0
         self._has_version = False
         self._printed = tempfile.TemporaryFile()  # noqa: SIM115
         from_us, to_simulator = os.pipe()
         from_simulator, to_us = os.pipe()
         self._requests = open(to_simulator, "wb")  # noqa: PTH123, SIM115
-        self._reports = open(from_simulator, "rb")  # noqa: PTH123, SIM115
+        self._reports = _Reports(from_simulator)
         try:
             self._process = subprocess.Popen(
                 ["/bin/sh", "-c", _SHELL, "sh", f"/dev/fd/{from_us}", f"/dev/fd/{to_us}", *command],
@@ -114,18 +146,37 @@ class Simulator:
         if not 1 <= len(frame) <= MOST_CYCLES:
             raise ValueError(f"the frame has {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
         kind = b"A" if is_aborted else b"F" if hole is None else b"H" + hole.to_bytes(4, "little")
-        self._write(kind + len(frame).to_bytes(4, "little"), frame)
+        self._write(kind + len(frame).to_bytes(4, "little"))
+        self._write(frame)
 
     def run(self, cycles: int) -> list[Event]:
         """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""
+        self.begin(cycles)
+        return self.finish()
+
+    def begin(self, cycles: int, runs: int = 1) -> None:
+        """Begin consecutive runs, which the simulator does not interrupt to wait for this process.
+
+        `finish` must be called for each run before the next request. May raise `TransportError`.
+        """
         if not 0 <= cycles <= MOST_CYCLES:
             raise ValueError(f"cycles is {cycles}; legal: 0 to {MOST_CYCLES}")
-        self._write(b"R" + cycles.to_bytes(4, "little"))
-        return self._events()
+        self._write((b"R" + cycles.to_bytes(4, "little")) * runs, is_last=True)
+        self.begun += runs
+
+    def finish(self) -> list[Event]:
+        """Return the events of the first run that is not finished. May raise `TransportError`."""
+        events = self._events()
+        self.begun -= 1
+        return events
+
+    def has_report(self, seconds: float) -> bool:
+        """Return whether a run has ended, or begun to report events, after `seconds` at most."""
+        return self._reports.has_data(seconds)
 
     def quit(self) -> None:
         """End the simulation. Raise `TransportError` if it does not end normally."""
-        self._write(b"Q")
+        self._write(b"Q", is_last=True)
         self._events()
         status = self._wait()
         if status:
@@ -153,7 +204,7 @@ class Simulator:
             try:
                 file.close()
             except OSError:
-                # Unwritten data has no reader.
+                # Unwritten data has no reader, or the file is closed.
                 continue
 
     def printed(self) -> str:
@@ -171,11 +222,11 @@ class Simulator:
     ) -> None:
         self.close()
 
-    def _write(self, *parts: bytes) -> None:
+    def _write(self, data: bytes, *, is_last: bool = False) -> None:
         try:
-            for part in parts:
-                self._requests.write(part)
-            self._requests.flush()
+            self._requests.write(data)
+            if is_last:
+                self._requests.flush()
         except (OSError, ValueError):
             self._end_unasked()
 
@@ -257,7 +308,11 @@ class Pace:
 
 
 class SimulatorTransport:
-    """A transport to a simulator that runs in a thread of the transport."""
+    """A transport to a simulator, which runs while a thread waits in `receive` or `send`.
+
+    `send` starts a simulator at rest; the thread in `receive` runs it further. Without such a thread, one that waits in
+    `send` runs it.
+    """
 
     def __init__(
         self,
@@ -265,7 +320,7 @@ class SimulatorTransport:
         pace: Pace | None = None,
         observe: Callable[[Event], None] | None = None,
     ) -> None:
-        """Start the simulator with `start`; the thread passes every event to `observe`, which must not raise.
+        """Start the simulator with `start`; `observe` is called with every event, and must not raise or call this.
 
         Raise `TransportError` if the simulator cannot be started.
         """
@@ -280,27 +335,37 @@ class SimulatorTransport:
         self._bytes = 0  # in `_received`
         self._error: TransportError | None = None
         self._is_closed = False
-        self._step = _FEWEST_CYCLES
+        self._receivers = 0
+        self._is_used = False  # the simulator, by a thread that does not hold the lock
+        self._step = self._quiet_step = _FEWEST_CYCLES
+        self._began = self._wakes_at = 0.0
         self._simulator = start()
-        self._thread = threading.Thread(target=self._serve, name="simulator", daemon=True)
-        self._thread.start()
 
     def send(self, frame: bytes) -> None:
         """Send a whole frame; wait while the system is not ready. May raise `TransportError`."""
         with self._changed:
-            self._changed.wait_for(lambda: self._is_over or self._frames < self._pace.most_frames)
+            self._work_until(self._has_room, None, lambda: not self._receivers and self._bytes < self._pace.most_bytes)
             if self._is_closed:
                 raise TransportError("the transport is closed")
             if self._error:
                 raise self._error
             self._frames += 1
             self._sent.append(frame)
+            if not self._is_used and not self._simulator.begun:
+                self._use(self._begin)
             self._changed.notify_all()
+
+    def is_ready(self) -> bool:
+        """Return whether `send` does not wait for the system."""
+        return not self._is_over and self._has_room()
 
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next burst, as `Transport.receive` does; all bursts that arrived before an error precede it."""
         with self._changed:
-            self._changed.wait_for(lambda: self._received or self._is_over, timeout)
+            self._receivers += 1
+            self._work_until(lambda: bool(self._received), timeout, lambda: True)
+            self._receivers -= 1
+            self._changed.notify_all()
             if not self._received:
                 if self._error and not self._is_closed:
                     raise self._error
@@ -309,13 +374,12 @@ class SimulatorTransport:
             if isinstance(item, TransportResetError):
                 raise item
             self._bytes -= len(item.data)
-            self._changed.notify_all()
             return item
 
     def is_at_rest(self) -> bool:
         """Return whether the system has taken all frames and has had no beat for `rest_cycles` since then."""
         with self._changed:
-            is_busy = self._frames or self._received
+            is_busy = self._frames or self._received or self._simulator.begun
             return not is_busy and self._simulator.quiet >= self._pace.rest_cycles
 
     def close(self) -> None:
@@ -324,7 +388,8 @@ class SimulatorTransport:
             self._is_closed = True
             self._simulator.kill()
             self._changed.notify_all()
-        self._thread.join()
+            self._changed.wait_for(lambda: not self._is_used)
+            self._simulator.close()
 
     def __enter__(self) -> SimulatorTransport:
         return self
@@ -343,41 +408,74 @@ class SimulatorTransport:
     def _is_over(self) -> bool:
         return self._is_closed or self._error is not None
 
-    def _serve(self) -> None:
-        """Run the simulator in the thread; if it ends and restarts remain, start another one."""
+    def _has_room(self) -> bool:
+        return self._frames < self._pace.most_frames
+
+    def _work_until(self, is_done: Callable[[], bool], timeout: float | None, may_run: Callable[[], bool]) -> None:
+        """Wait for a condition, the end, or `timeout` seconds; run the simulator meanwhile if this thread may."""
+        latest = time.monotonic() + (threading.TIMEOUT_MAX if timeout is None else timeout)
+        while not (is_done() or self._is_over):
+            left = latest - time.monotonic()
+            rest = self._rest_seconds() if may_run() and not self._is_used else threading.TIMEOUT_MAX
+            if rest <= 0:
+                self._use(partial(self._run, max(0.0, left)))
+            else:
+                self._changed.wait(max(0.0, min(left, rest)))
+            if left <= 0:
+                return
+
+    def _rest_seconds(self) -> float:
+        """Return the seconds for which there is no work."""
+        if self._simulator.begun or self._sent or self._simulator.quiet < self._pace.rest_cycles:
+            return 0.0
+        return self._wakes_at - time.monotonic()
+
+    def _use(self, work: Callable[[], Sequence[Event]]) -> None:
+        """Call a method that uses the simulator, without the lock, which the caller holds."""
+        self._is_used = True
+        self._changed.release()
+        events: Sequence[Event] = ()
         try:
-            while not self._is_over:
-                try:
-                    self._run(self._wait_for_work())
-                except TransportError as error:
-                    self._recover(error)
+            events = work()
+        except TransportError as error:
+            self._recover(error)
         finally:
-            self._simulator.close()
-            self._end(TransportError("the thread that runs the simulator has ended"))
-
-    def _wait_for_work(self) -> list[bytes]:
-        """Sleep while there is no work; return the next frames to send."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._is_over or self._bytes < self._pace.most_bytes)
-            if self._simulator.quiet >= self._pace.rest_cycles:
-                self._changed.wait_for(lambda: self._is_over or self._sent, self._pace.idle_seconds)
-            frames = list(self._sent)
-            self._sent.clear()
-            return frames
-
-    def _run(self, frames: Sequence[bytes]) -> None:
-        for frame in frames:
-            self._simulator.request(frame)
-        start, first = time.monotonic(), self._simulator.cycle
-        events = self._simulator.run(self._step)
-        self._adapt(self._simulator.cycle - first, time.monotonic() - start)
-        if self._observe:
-            for event in events:
-                self._observe(event)
-        with self._changed:
+            self._changed.acquire()
+            self._is_used = False
             for event in events:
                 self._note(event)
             self._changed.notify_all()
+
+    def _begin(self) -> Sequence[Event]:
+        """Pass on the frames, and run until they are taken and the first of them is answered."""
+        frames = 0
+        while self._sent:
+            self._simulator.request(self._sent.popleft())
+            frames += 1
+        self._began = time.monotonic()
+        # A run ends when a frame is taken. To wait for this process then would cost more time than the simulation.
+        self._simulator.begin(self._step if frames else self._quiet_step, frames + 1)
+        return ()
+
+    def _run(self, seconds: float) -> Sequence[Event]:
+        """Return the events of a run if it ends within `seconds`."""
+        if not self._simulator.begun:
+            self._begin()
+        if not self._simulator.has_report(seconds):
+            return ()
+        first = self._simulator.cycle
+        events = self._simulator.finish()
+        now = time.monotonic()
+        self._adapt(self._simulator.cycle - first, now - self._began)
+        # After a burst, those to whom it goes need the processor more than hardware that may do nothing.
+        has_burst = any(isinstance(event, Burst) for event in events)
+        self._quiet_step = _FEWEST_CYCLES if has_burst else min(2 * self._quiet_step, self._step)
+        self._began = now
+        self._wakes_at = now + (threading.TIMEOUT_MAX if self._pace.idle_seconds is None else self._pace.idle_seconds)
+        if self._observe:
+            for event in events:
+                self._observe(event)
+        return events
 
     def _adapt(self, cycles: int, seconds: float) -> None:
         """Adapt the number of cycles in a step to the simulator's speed."""
@@ -410,10 +508,8 @@ class SimulatorTransport:
             self._received.append(TransportResetError(str(error)))
             if self._is_closed:
                 simulator.kill()
-            self._changed.notify_all()
 
     def _end(self, error: TransportError) -> None:
         """End the transport with an error; only the first error counts."""
         with self._changed:
             self._error = self._error or error
-            self._changed.notify_all()

@@ -47,6 +47,9 @@ class Transport(Protocol):
     def send(self, frame: bytes) -> None:
         """Send a whole frame; return when the hardware, or a bounded buffer, has it. May raise `TransportError`."""
 
+    def is_ready(self) -> bool:
+        """Return whether the hardware takes the next frame without a wait; False also if this is unknown."""
+
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next burst, or None after `timeout` seconds (None: no limit) or when the transport is closed.
 

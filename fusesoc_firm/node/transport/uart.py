@@ -78,6 +78,10 @@ class UartTransport:
                 select.select([self._wake], [self._line], [])
                 rest = rest[self._write(rest) :]
 
+    def is_ready(self) -> bool:
+        """Return False, because a line takes its time for each frame."""
+        return False
+
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next frame as a burst. May raise `TransportError`, and `LostFrameError` for a broken frame."""
         with self._receiving:
