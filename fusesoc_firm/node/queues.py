@@ -206,6 +206,10 @@ class SubscriberQueues(Generic[Item]):
             self._closed = True
             self._changed.notify_all()
 
+    def waiting(self, subscriber: int) -> int:
+        """Return the number of items in a subscriber's queue."""
+        return len(self._queues[subscriber])
+
     def dropped(self, subscriber: int) -> int:
         """Return the number of items that a subscriber's queue has dropped."""
         with self._changed:

@@ -20,6 +20,7 @@ from fusesoc_firm.node.software import node_software
 from fusesoc_firm.node.status import checked
 from fusesoc_firm.node.trace import Trace
 from fusesoc_firm.node.transport.transport import TransportError
+from fusesoc_firm.node.watch import Watch
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.written.specification import RELIABLE
 from fusesoc_firm.text.diagnostics import fail
@@ -69,14 +70,18 @@ def run_options(
 
 
 def run_node(
-    description: NodeDescription, open_transport: OpenTransport, options: RunOptions, loaded: LoadedSystem | None = None
+    description: NodeDescription,
+    open_transport: OpenTransport,
+    options: RunOptions,
+    loaded: LoadedSystem | None = None,
+    watch: Watch | None = None,
 ) -> None:
     """Run the node until Ctrl-C, SIGTERM or ROS stops it; a second Ctrl-C ends it immediately.
 
-    `loaded` is the system, if it has software. Raise `InputError` if ROS or the hardware fails, or if received
-    messages could not be processed in time.
+    `loaded` is the system, if it has software; `watch` records all messages. Raise `InputError` if ROS or the hardware
+    fails, or if received messages could not be processed in time.
     """
-    settings = replace(options.settings, report=_say)
+    settings = replace(options.settings, report=_say, watch=watch)
     try:
         with ExitStack() as stack:
             software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
