@@ -8,6 +8,7 @@ from typing import Any
 
 from fusesoc_firm.cli.common import add_sources, command, load
 from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
+from fusesoc_firm.cli.studio import add_watch, watched
 from fusesoc_firm.text.diagnostics import fail
 
 
@@ -29,6 +30,7 @@ def add_live(commands: Any) -> None:
     live.add_argument(
         "--transport", metavar="ADDRESS", help="the transport to the hardware (default: build and start a simulator)"
     )
+    add_watch(live)
     add_node_options(live)
     add_simulator_options(live)
     live.set_defaults(remappings=[])
@@ -69,7 +71,8 @@ def _live(arguments: argparse.Namespace) -> None:
         opener = at_address(arguments.transport)
     else:
         opener = of_simulator(built_simulator(arguments), arguments.seed, arguments.stall_percent)
-    run_node(description, opener, options, loaded, arguments.transport or "")
+    with watched(arguments, loaded, "firm live") as run:
+        run_node(description, opener, options, loaded, arguments.transport or "", run.watch if run else None)
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from fusesoc_firm.cli.common import command, load, positive
 from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
+from fusesoc_firm.cli.studio import add_watch, watched
 
 _QUIET = 1000
 
@@ -70,6 +71,7 @@ def add_replay(commands: Any) -> None:
         metavar="CYCLES",
         help="number of cycles without a beat after which the system is considered idle (default: %(default)s)",
     )
+    add_watch(replay)
     replay.add_argument("--json", action="store_true", help="print the summary as JSON, for other programs")
     add_simulator_options(replay)
 
@@ -94,16 +96,20 @@ def _seconds(text: str) -> float:
 def _replay(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.bag_reader import Form
     from fusesoc_firm.node.transport.simulator import Simulator
+    from fusesoc_firm.node.watch import Control
     from fusesoc_firm.replay.command import Settings, Source, Target, replay
 
     def start() -> Simulator:
         built = built_simulator(arguments)
         return Simulator(built.command(seed=arguments.seed, stall_percent=arguments.stall_percent), built.folder)
 
-    replay(
-        load(arguments),
-        Source(arguments.source, arguments.limit, arguments.start, arguments.duration),
-        Target(arguments.target, Form(arguments.format) if arguments.format else None, arguments.force),
-        Settings(dict(arguments.map), arguments.quiet, arguments.latency, arguments.json),
-        start,
-    )
+    loaded, control = load(arguments), Control() if arguments.watch else None
+    with watched(arguments, loaded, f"replay of {arguments.source.name}", control, stays=True) as run:
+        watch = run.watch if run else None
+        replay(
+            loaded,
+            Source(arguments.source, arguments.limit, arguments.start, arguments.duration),
+            Target(arguments.target, Form(arguments.format) if arguments.format else None, arguments.force),
+            Settings(dict(arguments.map), arguments.quiet, arguments.latency, arguments.json, watch, control),
+            start,
+        )

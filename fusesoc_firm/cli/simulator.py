@@ -74,11 +74,15 @@ def _build_simulator(arguments: argparse.Namespace) -> None:
 
 
 def _seed(text: str) -> int:
-    return _within(1, 2147483562, text)
+    from fusesoc_firm.simulation.simulator import MOST_SEED
+
+    return _within(1, MOST_SEED, text)
 
 
 def _percent(text: str) -> int:
-    return _within(0, 99, text)
+    from fusesoc_firm.simulation.simulator import MOST_STALL_PERCENT
+
+    return _within(0, MOST_STALL_PERCENT, text)
 
 
 def _within(least: int, greatest: int, text: str) -> int:

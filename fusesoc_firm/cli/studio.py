@@ -1,15 +1,26 @@
-"""`firm studio`: open a page in the browser that draws, edits and checks systems."""
+"""`firm studio`: open a page in the browser that draws, edits, checks and runs systems, or watches a run."""
 
 from __future__ import annotations
 
 import argparse
+import signal
+import sys
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from fusesoc_firm.cli.common import add_sources, check_sources, command, core_folders
 from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    import threading
+
+    from fusesoc_firm.node.watch import Control
+    from fusesoc_firm.studio.run import Run
+    from fusesoc_firm.studio.server import Studio
+    from fusesoc_firm.system.system_core import LoadedSystem
 
 
 def add_studio(commands: Any) -> None:
@@ -17,7 +28,7 @@ def add_studio(commands: Any) -> None:
     studio = command(
         commands,
         "studio",
-        "draw, edit and check systems in the browser; the files stay the truth",
+        "draw, edit, check and run systems in the browser; the files stay the truth",
         "firm studio robot.yaml",
         _open,
     )
@@ -34,20 +45,112 @@ def add_studio(commands: Any) -> None:
     add_sources(studio)
 
 
-def _open(arguments: argparse.Namespace) -> None:
+def add_watch(parser: argparse.ArgumentParser) -> None:
+    """Add the option of commands whose run the page can show, for `watched`."""
+    parser.add_argument("--watch", action="store_true", help="open a page in the browser that shows the messages")
+    parser.add_argument("--no-browser", action="store_true", help="with --watch, only print the page's address")
+
+
+@contextmanager
+def watched(
+    arguments: argparse.Namespace,
+    loaded: LoadedSystem,
+    title: str,
+    control: Control | None = None,
+    *,
+    stays: bool = False,
+) -> Iterator[Run | None]:
+    """Serve the page of a run within the context if the arguments ask for it.
+
+    `control` pauses the run. If the page `stays`, the context ends with Ctrl-C, after the run.
+    """
+    if not arguments.watch:
+        yield None
+        return
+    _require_aiohttp()
+    import threading
+
+    from fusesoc_firm.studio.run import Run
+
+    run = Run(loaded, arguments.spec, title, control)
+    studio = _studio(arguments, arguments.spec)
+    studio.live.take(run)
+    begins, ends = threading.Event(), threading.Event()
+    server = threading.Thread(target=_serve_beside, args=(studio, begins, ends), name="studio")
+    server.start()
+    begins.wait()
+    _show(studio, arguments, sys.stderr)
     try:
-        import aiohttp  # noqa: F401
-    except ModuleNotFoundError:
-        fail("firm studio requires the Python package aiohttp", hint="pip install 'fusesoc-firm[studio]'")
+        yield run
+        run.end()
+        if stays:
+            print("the page stays until Ctrl-C", file=sys.stderr, flush=True)
+            with suppress(KeyboardInterrupt):
+                signal.pause()
+    finally:
+        ends.set()
+        server.join()
+
+
+def _serve_beside(studio: Studio, begins: threading.Event, ends: threading.Event) -> None:
+    """Serve a page in a thread, from `begins` to `ends`."""
     import asyncio
 
-    from fusesoc_firm.studio.server import Studio
-    from fusesoc_firm.system.message_sources import known_names, load_beside, sources_of
-    from fusesoc_firm.system.system_core import LoadedSystem
-    from fusesoc_firm.system.written.specification import Draft
+    async def serve() -> None:
+        runner = await studio.start()
+        begins.set()
+        await asyncio.to_thread(ends.wait)
+        await runner.cleanup()
+
+    try:
+        asyncio.run(serve())
+    finally:
+        begins.set()
+
+
+def _open(arguments: argparse.Namespace) -> None:
+    _require_aiohttp()
+    import asyncio
 
     if not arguments.place.exists():
         fail(f"there is no file or folder {arguments.place}")
+    studio = _studio(arguments, arguments.place)
+
+    async def serve() -> None:
+        try:
+            runner = await studio.start(arguments.port)
+        except OSError as error:
+            fail(f"port {arguments.port} cannot be used: {error.strerror}")
+        _show(studio, arguments, sys.stdout)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await runner.cleanup()
+
+    asyncio.run(serve())
+
+
+def _require_aiohttp() -> None:
+    try:
+        import aiohttp  # noqa: F401
+    except ModuleNotFoundError:
+        fail("the page requires the Python package aiohttp", hint="pip install 'fusesoc-firm[studio]'")
+
+
+def _show(studio: Studio, arguments: argparse.Namespace, to: TextIO) -> None:
+    """Print the page's address, and open it."""
+    print(f"{studio.address}\nCtrl-C ends it", file=to, flush=True)
+    if not arguments.no_browser:
+        webbrowser.open(studio.address)
+
+
+def _studio(arguments: argparse.Namespace, place: Path) -> Studio:
+    """Return the server of a place with the command's message sources."""
+    from fusesoc_firm.simulation.simulator import BuiltSimulator, CoreSources, build_simulator
+    from fusesoc_firm.studio.server import Studio
+    from fusesoc_firm.system.message_sources import known_names, load_beside, sources_of
+    from fusesoc_firm.system.written.specification import Draft
+
     paths, distro = arguments.path, arguments.distro
 
     def load(spec: Path, text: str) -> LoadedSystem:
@@ -56,18 +159,7 @@ def _open(arguments: argparse.Namespace) -> None:
     def names(spec: Path, own: Sequence[str]) -> list[str]:
         return known_names(spec, own, sources_of(spec, paths, distro, core_folders), core_folders)
 
-    async def serve() -> None:
-        studio = Studio(arguments.place, load, check_sources, names)
-        try:
-            runner = await studio.start(arguments.port)
-        except OSError as error:
-            fail(f"port {arguments.port} cannot be used: {error.strerror}")
-        print(f"{studio.address}\nCtrl-C ends it", flush=True)
-        if not arguments.no_browser:
-            webbrowser.open(studio.address)
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await runner.cleanup()
+    def build(spec: Path, tool: str) -> BuiltSimulator:
+        return build_simulator(spec, tool, sources=CoreSources(paths, distro or "", core_folders=core_folders))
 
-    asyncio.run(serve())
+    return Studio(place, load, check_sources, names, build)

@@ -39,6 +39,7 @@ from fusesoc_firm.node.transport.transport import (
     TransportError,
     TransportResetError,
 )
+from fusesoc_firm.node.watch import Latency, Load, Watch
 from fusesoc_firm.system.status_frames import answered, read_request
 
 # The interval at which waiting threads check whether to end.
@@ -70,7 +71,7 @@ class NodeSettings:
 
     After a stop request, the node processes received messages until the hardware has been silent for `settle` seconds
     and does not report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
-    `report` receives messages to the user.
+    `report` receives messages to the user, and `watch` records all messages.
     """
 
     depth: int | None = None
@@ -79,6 +80,7 @@ class NodeSettings:
     drain: float = 10.0
     restarts: bool = False
     report: Callable[[str], None] = print
+    watch: Watch | None = None
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,9 @@ class Node:
         self._open_transport = open_transport
         self._settings = settings
         self._software = software
-        self._trace = trace
+        # The trace knows which message caused which.
+        self._trace = trace or (Trace(None, description) if settings.watch else None)
+        self._watch = settings.watch
         self._inputs = description.inputs
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
@@ -135,9 +139,22 @@ class Node:
         self._fault: TransportError | CarrierError | None = None
         self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
         self._offered = self._declined = self._handled = 0
+        self._is_counted = False
         self._failed_restarts = 0
         self._last_traffic = time.monotonic()
+        if self._watch:
+            self._watch.measure(self.loads)
         self._hardware = _Hardware(open_transport(self), description)
+
+    def loads(self) -> dict[str, Load]:
+        """Return the loads of the inputs, by block; any thread may call it."""
+        found = {}
+        for number, item in enumerate(self._inputs):
+            counts = self.statistics.inputs[item.block]
+            dropped = counts.dropped + (0 if self._is_counted else self._queues.dropped(number))
+            waiting = self._queues.waiting(number)
+            found[item.block] = Load(waiting, self._depth(item), dropped, counts.refused, counts.lost)
+        return found
 
     def _depth(self, item: NodeTopic | Crossing) -> int:
         return self._settings.depth or (item.depth if isinstance(item, NodeTopic) else DEFAULT_DEPTH)
@@ -152,7 +169,8 @@ class Node:
         """
         self._carriers = carriers
         self._calls.start(carriers)
-        takers = [self._start(partial(self._take, carrier)) for carrier in carriers.values()]
+        # One carrier may have the topics of several versions.
+        takers = [self._start(partial(self._take, carrier)) for carrier in dict.fromkeys(carriers.values())]
         sender, receiver = self._start(self._send), self._start(self._receive)
         self._start(self._diagnose)
         self._is_wanted_to_end.wait()
@@ -237,6 +255,7 @@ class Node:
         return answer[1]
 
     def _count_rest(self) -> None:
+        self._is_counted = True
         for number, item in enumerate(self._inputs):
             self.statistics.inputs[item.block].dropped += self._queues.dropped(number)
         self.statistics.unfinished = self._waiting() + len(self._hardware.joiner.unfinished)
@@ -277,6 +296,10 @@ class Node:
         counts = self.statistics.inputs[item.block]
         if self._trace and item.id is not None:
             entry = Entry(item.id, len(payload), received_ns, time.monotonic_ns())
+        if self._watch:
+            seen = self._watch.saw(item.block, payload, received_ns - self._watch.start_ns)
+            if entry:
+                entry.seen = seen
         message = _Message(payload, entry)
         with self._lock:
             is_alone = not self._waiting()
@@ -349,6 +372,8 @@ class Node:
             return
         for name, made in self._software.take(block, payload):
             if name in self._topics:
+                if self._watch:
+                    self._record(self._watch, name, made, None, None)
                 self._publish(name, made)
             else:
                 self._put(self._numbers[name], made, time.monotonic_ns(), 0.0)
@@ -420,12 +445,25 @@ class Node:
     def _deliver(self, frame: JoinedFrame, cycles: tuple[int, int] | None) -> None:
         block = self._publisher_names[frame.id]
         self.statistics.outputs[block].frames += 1
+        cause = None
         if self._trace:
-            self._trace.came(frame.id, len(frame.payload), cycles, is_published=self._has_carrier(block))
+            cause = self._trace.came(frame.id, len(frame.payload), cycles, is_published=self._has_carrier(block))
+        if self._watch:
+            self._record(self._watch, block, frame.payload, cause, cycles)
         if block in self._topics:
             self._publish(block, frame.payload)
         elif not self._calls.take(block, frame.payload):
             self._run_software(block, frame.payload)
+
+    def _record(
+        self, watch: Watch, block: str, payload: bytes, cause: Entry | None, cycles: tuple[int, int] | None
+    ) -> None:
+        now = time.monotonic_ns()
+        latency = Latency()
+        if cause:
+            taken = cycles[1] - cause.cycles[0] if cause.cycles and cycles else None
+            latency = Latency(cause.seen, taken, now - cause.received_ns)
+        watch.saw(block, payload, now - watch.start_ns, latency)
 
     def _has_carrier(self, block: str) -> bool:
         return block in self._topics and self._topics[block][1].ros in self._carriers

@@ -217,6 +217,10 @@ class SubscriberQueues(Generic[Item]):
         with self._changed:
             return sum(self._dropped)
 
+    def waiting(self, subscriber: int) -> int:
+        """Return the number of items in a subscriber's queue."""
+        return len(self._queues[subscriber])
+
     def dropped(self, subscriber: int) -> int:
         """Return the number of items that a subscriber's queue has dropped."""
         with self._changed:

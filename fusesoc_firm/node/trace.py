@@ -20,12 +20,15 @@ from itertools import count
 from pathlib import Path
 from threading import RLock
 from time import monotonic_ns
+from typing import TextIO
 
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output
 
 WALL_TIMES = ("received_ns", "queued_ns", "sent_ns", "came_ns", "published_ns")
+# The number of messages that wait for a response, if no table is written.
+_MOST_PENDING = 10_000
 CYCLES = ("first_beat_in_cycle", "last_beat_in_cycle", "first_beat_out_cycle", "last_beat_out_cycle")
 COLUMNS = (
     *("message", "subscriber", "publisher", "bytes_in", "bytes_out"),
@@ -47,6 +50,8 @@ class Entry:
     cycles: tuple[int, int] | None = None
     number: int = -1
     is_answered: bool = False
+    seen: int | None = None
+    """the number in the record of a `Watch`"""
 
 
 @dataclass
@@ -72,22 +77,26 @@ class _Ways:
 class Trace:
     """The writer of the table; any thread may report events. Times count from the creation of the `Trace`."""
 
-    def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
-        """Create the file at `path`; `clock` returns the time in ns. May raise `InputError`."""
-        check_output(path)
-        try:
-            self._file = path.open("w", newline="", encoding="utf-8")
-        except OSError as error:
-            fail(f"cannot write {path}: {error.strerror}")
-        self._rows = csv.writer(self._file, lineterminator="\n")
-        self._rows.writerow(COLUMNS)
+    def __init__(
+        self, path: Path | None, description: NodeDescription, clock: Callable[[], int] = monotonic_ns
+    ) -> None:
+        """Create the file at `path`; `clock` returns the time in ns. May raise `InputError`.
+
+        Without a path, nothing is written, and the messages that wait for a response are bounded: the oldest are
+        forgotten.
+        """
+        self._file = _created(path) if path else None
+        self._most = None if path else _MOST_PENDING
+        self._rows = csv.writer(self._file, lineterminator="\n") if self._file else None
+        if self._rows:
+            self._rows.writerow(COLUMNS)
         self._description = description
         self._subscribers, self._publishers = converter_names(description)
         self._reached: dict[int, list[int]] = {}
         for publisher, subscribers in enumerate(description.sources):
             for subscriber in subscribers:
                 self._reached.setdefault(subscriber, []).append(publisher)
-        self._ways = _Ways()
+        self._ways = _Ways(deque(maxlen=self._most))
         self._numbers = count()
         self._lock = RLock()
         self._clock = clock
@@ -99,7 +108,7 @@ class Trace:
             entry.number = next(self._numbers)
             self._ways.untaken.append(entry)
             for publisher in self._reached.get(entry.subscriber, ()):
-                self._ways.pending.setdefault((entry.subscriber, publisher), deque()).append(entry)
+                self._ways.pending.setdefault((entry.subscriber, publisher), deque(maxlen=self._most)).append(entry)
 
     def sending_other(self) -> None:
         """Record that a frame other than a message is being sent to the hardware."""
@@ -126,14 +135,18 @@ class Trace:
                 if queue and taken:
                     queue.remove(taken[-1])
 
-    def came(self, publisher: int, size: int, cycles: tuple[int, int] | None, *, is_published: bool) -> None:
-        """Record a message from the hardware, which goes to a topic if `is_published` is set, otherwise to software."""
+    def came(self, publisher: int, size: int, cycles: tuple[int, int] | None, *, is_published: bool) -> Entry | None:
+        """Record a message from the hardware, which goes to a topic if `is_published` is set, otherwise to software.
+
+        Return the message that caused it, if that is known.
+        """
         with self._lock:
             answer = _Answer(self._cause(publisher), publisher, size, cycles, self._clock())
-            if is_published:
-                self._ways.unpublished.setdefault(publisher, deque()).append(answer)
-            else:
+            if not is_published:
                 self._write(answer.entry, answer, None)
+            elif self._file:
+                self._ways.unpublished.setdefault(publisher, deque()).append(answer)
+            return answer.entry
 
     def published(self, publisher: int, time_ns: int) -> None:
         """Record that the middleware has published the next message of a publisher."""
@@ -146,13 +159,14 @@ class Trace:
         """Record that the hardware was reset and has lost its messages."""
         with self._lock:
             self._write_rest()
-            self._ways = _Ways()
+            self._ways = _Ways(deque(maxlen=self._most))
 
     def close(self) -> None:
         """Write the messages without a response, and close the file."""
         with self._lock:
             self._write_rest()
-            self._file.close()
+            if self._file:
+                self._file.close()
 
     def _cause(self, publisher: int) -> Entry | None:
         queues = [self._ways.pending.get((source, publisher)) for source in self._description.sources[publisher]]
@@ -171,6 +185,8 @@ class Trace:
                 self._write(entry, None, None)
 
     def _write(self, entry: Entry | None, answer: _Answer | None, published_ns: int | None) -> None:
+        if not self._rows:
+            return
         came = answer.came_ns if answer else None
         times = (entry.received_ns, entry.queued_ns, entry.sent_ns) if entry else (None,) * 3
         inwards = (entry.cycles if entry else None) or (None, None)
@@ -196,6 +212,14 @@ class Trace:
         clock = self._description.clock_hz
         nanoseconds = None if whole is None or not clock else round(whole * 1e9 / clock, 3)
         return _minus(last_in, first_in), _minus(first_out, last_in), _minus(last_out, first_out), nanoseconds
+
+
+def _created(path: Path) -> TextIO:
+    check_output(path)
+    try:
+        return path.open("w", newline="", encoding="utf-8")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
 
 
 def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:

@@ -22,6 +22,7 @@ from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.transport.transport import TransportError
+from fusesoc_firm.node.watch import Control, Latency, Watch
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
 from fusesoc_firm.simulation.functions import Functions, importable_sources
 from fusesoc_firm.simulation.software_run import stimulated
@@ -66,13 +67,16 @@ class Settings:
     """The settings of a replay: `names` renames topics of blocks.
 
     The hardware is at rest after `quiet` cycles without a beat. If latency is included, a response's stamp is the
-    cause's stamp plus the hardware's latency. The summary is a table, or JSON if `is_json` is set.
+    cause's stamp plus the hardware's latency. The summary is a table, or JSON if `is_json` is set. `watch` records all
+    messages, and `control` pauses the replay.
     """
 
     names: Mapping[str, str]
     quiet: int
     has_latency: bool = False
     is_json: bool = False
+    watch: Watch | None = None
+    control: Control | None = None
 
 
 def replay(
@@ -107,7 +111,7 @@ def replay(
             write_bag(target.path, form, list(topics.values())) as written,
         ):
             run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
-            going = _Replay(bag, routes, run, topics, written, clock)
+            going = _Replay(bag, routes, run, topics, written, clock, settings)
             going.play(source)
         if settings.is_json:
             print(json.dumps(going.summary(target.path), indent=2, ensure_ascii=False))
@@ -128,6 +132,7 @@ class _Replay:
     topics: Mapping[str, RecordedTopic]
     written: BagWriter
     clock: Fraction | None
+    settings: Settings
     played: Counter[Stream] = field(default_factory=Counter)
     sent: Counter[str] = field(default_factory=Counter)
     refused: int = 0
@@ -144,6 +149,8 @@ class _Replay:
         with tqdm(total=total, unit="msg", disable=None, file=sys.stderr) as bar:
             try:
                 for recorded in source.messages(self.bag, topics):
+                    if self.settings.control and not self.settings.control.passes():
+                        break
                     self._play(recorded)
                     bar.update()
                     if self.is_over:
@@ -163,7 +170,7 @@ class _Replay:
             faults.append(route.misfit)
         try:
             for subscriber in () if route.misfit else route.subscribers:
-                self.run.take(subscriber, recorded.payload, recorded.stamp)
+                self.run.take(subscriber, recorded.payload, recorded.stamp, self._seen(subscriber, recorded))
         except (StuckError, TransportError) as error:
             faults.append(f"the rest of the bag was not replayed: {error}")
             self.is_over = True
@@ -174,6 +181,10 @@ class _Replay:
         for fault in faults:
             self._report(f"{recorded.stream.topic}, message {recorded.number}, at {seconds(recorded.stamp)}: {fault}")
         faults.clear()
+
+    def _seen(self, subscriber: Topic, recorded: Recorded) -> int | None:
+        watch = self.settings.watch
+        return watch.saw(subscriber.block, recorded.payload, recorded.stamp - self.bag.start) if watch else None
 
     def _end(self) -> None:
         """End the simulation, and report its errors."""
@@ -186,6 +197,9 @@ class _Replay:
         latency = sent.latency(self.clock) if self.clock else 0
         self.written.write(self.topics[sent.topic.block], sent.cause.stamp + latency, sent.payload)
         self.sent[sent.topic.block] += 1
+        if watch := self.settings.watch:
+            since = sent.cause.stamp + latency - self.bag.start
+            watch.saw(sent.topic.block, sent.payload, since, Latency(sent.cause.seen, sent.cycles))
 
     def _report(self, fault: str) -> None:
         self.errors += 1

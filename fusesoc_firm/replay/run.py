@@ -30,10 +30,14 @@ _CYCLES_A_BYTE = 64
 
 @dataclass
 class Cause:
-    """A message that was sent to the system: the stamp in ns, and the cycle of the first beat into the hardware."""
+    """A message that was sent to the system: the stamp in ns, and the cycle of the first beat into the hardware.
+
+    `seen` is its number in the record of a `Watch`.
+    """
 
     stamp: int
     first_cycle: int | None = None
+    seen: int | None = None
 
 
 @dataclass(frozen=True)
@@ -48,11 +52,16 @@ class Sent:
     cause: Cause
     last_cycle: int | None
 
-    def latency(self, clock_hz: Fraction) -> int:
-        """Return the time in ns from the cause's first to the response's last beat; 0 if one bypassed the hardware."""
+    @property
+    def cycles(self) -> int | None:
+        """The cycles from the cause's first to the response's last beat; None if one bypassed the hardware."""
         if self.last_cycle is None or self.cause.first_cycle is None:
-            return 0
-        return round((self.last_cycle - self.cause.first_cycle) * 10**9 / clock_hz)
+            return None
+        return self.last_cycle - self.cause.first_cycle
+
+    def latency(self, clock_hz: Fraction) -> int:
+        """Return the time in ns of `cycles`, or 0."""
+        return round((self.cycles or 0) * 10**9 / clock_hz)
 
 
 class StuckError(Exception):
@@ -105,8 +114,8 @@ class SystemRun:
             found.setdefault(item.source.block, set()).update(end.block for end in item.sinks)
         return found
 
-    def take(self, topic: Topic, payload: bytes, stamp: int) -> None:
-        """Send a message to the system, and wait until the hardware is at rest.
+    def take(self, topic: Topic, payload: bytes, stamp: int, seen: int | None = None) -> None:
+        """Send a message to the system, and wait until the hardware is at rest. `seen` is its number in a record.
 
         If the message is rejected, add a fault. May raise `StuckError` and `TransportError`.
         """
@@ -116,7 +125,7 @@ class SystemRun:
             self.faults.append(str(error))
             return
         entry = self._entries.get(topic.block, End(topic.block))
-        cause = Cause(stamp)
+        cause = Cause(stamp, seen=seen)
         self._causes |= dict.fromkeys(self._reached(entry.block), cause)
         if entry.block == topic.block and topic.block in self._subscribers:
             self._request(self._subscribers[topic.block], payload)

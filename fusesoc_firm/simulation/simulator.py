@@ -36,6 +36,8 @@ from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import missing, simulation_programs, ways
 from fusesoc_firm.tools.simulators import Live, default_simulator, fitting
 
+MOST_SEED, MOST_STALL_PERCENT = 2147483562, 99
+"""The largest seed and percentage of stalls that a test bench takes."""
 _SHOWN_LINES = 20
 
 

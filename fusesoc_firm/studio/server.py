@@ -11,7 +11,7 @@ import hmac
 import json
 import os
 import secrets
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -19,13 +19,17 @@ from typing import Any
 
 from aiohttp import WSMsgType, web
 
+from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.document import Document
+from fusesoc_firm.studio.live import Live
+from fusesoc_firm.studio.run import Build, SimulatedRun, Wishes
 from fusesoc_firm.studio.scene import content_of, grammar, scene
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
 from fusesoc_firm.text.files import is_file
 from fusesoc_firm.text.yaml_edit import EditError
 from fusesoc_firm.text.yaml_text import SMALL
+from fusesoc_firm.tools.simulators import fitting
 
 HOST = "127.0.0.1"
 _PAGE = Path(__file__).parent / "static"
@@ -36,6 +40,8 @@ _NO_SOURCES = ("build", "node_modules")
 _LOOK = 0.3
 # The largest number of messages in an answer to a search, and of specifications in a list.
 _MOST_NAMES, _MOST_FILES = 50, 1000
+# The highest rate of messages a second that the page may ask for.
+_MOST_RATE = 100_000
 # Everything comes from this server; nothing that a file contains can run.
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self';"
@@ -60,11 +66,12 @@ Names = Callable[[Path, Sequence[str]], Sequence[str]]
 class Studio:
     """The page's server for a folder of specifications, or for one specification."""
 
-    def __init__(self, place: Path, load: Load, check: Check, names: Names) -> None:
-        """Serve a file or folder; `load`, `check` and `names` are what the command line uses."""
+    def __init__(self, place: Path, load: Load, check: Check, names: Names, build: Build) -> None:
+        """Serve a file or folder; `load`, `check`, `names` and `build` are what the command line uses."""
         self._place = place.resolve()
         self._folder = self._place if self._place.is_dir() else self._place.parent
-        self._load, self._check, self._names = load, check, names
+        self._load, self._check, self._names, self._build = load, check, names, build
+        self.live = Live(self._name)
         self._documents: dict[str, Document] = {}
         self._listeners: set[web.WebSocketResponse] = set()
         # Derivations share caches, so one runs at a time.
@@ -86,12 +93,15 @@ class Studio:
                 web.get(f"{under}/api/sources", self._sources),
                 web.get(f"{under}/api/changes", self._changes),
                 web.post(f"{under}/api/check", self._check_text),
+                web.post(f"{under}/api/run", self._run),
+                *self.live.routes(f"{under}/api"),
                 *(web.post(f"{under}/api/{step}", self._step) for step in ("edit", "write", "undo", "redo")),
             ]
         )
         if (_PAGE / "assets").is_dir():
             app.router.add_static(f"{under}/assets", _PAGE / "assets")
         app.cleanup_ctx.append(self._following)
+        app.on_shutdown.append(lambda _: self.live.close())
         runner = web.AppRunner(app, access_log=None)
         await runner.setup()
         site = web.TCPSite(runner, HOST, port)
@@ -182,6 +192,16 @@ class Studio:
             case _:
                 document.redo(version)
         return await self._answer(document)
+
+    async def _run(self, request: web.Request) -> web.Response:
+        """Simulate the system of a file with the stimuli of its core; the run before ends."""
+        body = await _body(request)
+        document, wishes = self._document(body.get("file")), _wishes(body)
+        async with self._turn:
+            loaded = await asyncio.to_thread(self._load, document.path, document.text)
+            run = await asyncio.to_thread(SimulatedRun, loaded, document.path, wishes, self._build)
+        self.live.take(run)
+        return _json({})
 
     async def _answer(self, document: Document, unsaved: str | None = None) -> web.Response:
         text, file = document.text if unsaved is None else unsaved, str(document.path)
@@ -278,6 +298,22 @@ async def _body(request: web.Request) -> dict[str, Any]:
     if not isinstance(body, dict):
         raise web.HTTPBadRequest(reason="the request is not a mapping in JSON")
     return body
+
+
+def _wishes(body: Mapping[str, Any]) -> Wishes:
+    """Return what a request asks of a simulation; raise 400 for anything else."""
+    tools = [*fitting(is_live=True)]
+    tool, rate = body.get("tool", tools[0]), body.get("rate", 0)
+    is_endless, is_paused = body.get("isEndless", False), body.get("isPaused", False)
+    seed, stall_percent = body.get("seed", 1), body.get("stallPercent", 0)
+    bounds = {"rate": (rate, 0, _MOST_RATE), "seed": (seed, 1, MOST_SEED)}
+    bounds["stallPercent"] = (stall_percent, 0, MOST_STALL_PERCENT)
+    for name, (value, least, most) in bounds.items():
+        if not isinstance(value, int) or not least <= value <= most:
+            raise web.HTTPBadRequest(reason=f"'{name}' is a whole number of {least} to {most}")
+    if tool not in tools or not isinstance(is_endless, bool) or not isinstance(is_paused, bool):
+        raise web.HTTPBadRequest(reason=f"the simulators are {', '.join(tools)}")
+    return Wishes(tool, rate, is_endless, is_paused, seed, stall_percent)
 
 
 def _json(data: object, status: int = 200) -> web.Response:

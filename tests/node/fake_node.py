@@ -164,7 +164,7 @@ class Run:
         self.error: Exception | None = None
         self.is_complete: bool | None = None
         given = settings or NodeSettings()
-        parts = {name: getattr(given, name) for name in ("depth", "overflow", "settle", "drain", "restarts")}
+        parts = {name: getattr(given, name) for name in ("depth", "overflow", "settle", "drain", "restarts", "watch")}
         settings = NodeSettings(**parts, report=self.reports.append)
         self.node = Node(description, open_transport, settings, software, trace)
         self._thread = threading.Thread(target=self._run, daemon=True)

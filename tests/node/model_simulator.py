@@ -113,7 +113,8 @@ def main() -> None:
     parser.add_argument("--run-beats", type=int, default=0, help="beats of a burst; 0: frames are whole")
     parser.add_argument("--fault", choices=FAULTS, default="")
     parser.add_argument("--at", type=int, default=0)
-    arguments = parser.parse_args()
+    # The options of a real simulator are for its test bench.
+    arguments, _ = parser.parse_known_args()
     simulator = Simulator(arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at)
     with open(3, "rb") as requests, open(4, "wb") as reports:
         reports.write(b"V\2")

@@ -28,6 +28,7 @@ from fusesoc_firm.node.software import node_software
 from fusesoc_firm.node.trace import COLUMNS, CYCLES, WALL_TIMES, Trace
 from fusesoc_firm.node.trace_picture import draw_trace
 from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.node.watch import Latency, Load, Watch
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
 from tests.node.fake_node import FakeHardware, Run, echo, loaded, pairs, until
@@ -392,6 +393,49 @@ def test_the_trace_has_each_message_and_both_times(tmp_path: Path) -> None:
         # 29 bytes, a beat each; the answer begins in the cycle behind.
         assert [int(row[name]) for name in ("input_cycles", "accelerator_cycles", "output_cycles")] == [28, 1, 28]
         assert float(row["hardware_ns"]) == 570.0
+
+
+def test_a_watch_has_each_message_with_its_cause_and_latency(tmp_path: Path) -> None:
+    watch = Watch()
+    run = Run(
+        describe(pairs(tmp_path)), Bench().open, NodeSettings(depth=2, overflow=Overflow.DROP_NEWEST, watch=watch)
+    )
+    run.carrier.give(0, *POINTS[:1])
+    run.carrier.give(1, POINTS[1])
+    until(lambda: watch.since(-1, 9).last == 3)
+    run.stop()
+    seen = watch.since(-1, 9).messages
+    assert sorted((item.block, item.payload) for item in seen) == sorted(
+        [("a0", POINTS[0]), ("z0", POINTS[0]), ("a1", POINTS[1]), ("z1", POINTS[1])]
+    )
+    for item in seen:
+        if item.block.startswith("z"):
+            cause = watch.find(item.latency.cause or 0)
+            assert cause
+            assert cause.block == item.block.replace("z", "a")
+            # 29 bytes, a beat each; the answer begins in the cycle behind.
+            assert item.latency.cycles == 57
+            assert item.latency.wall_ns is not None
+            assert 0 <= item.latency.wall_ns <= item.time_ns
+        else:
+            assert item.latency == Latency()
+
+
+def test_a_watch_tells_how_full_the_queues_are(tmp_path: Path) -> None:
+    watch, gate = Watch(), threading.Event()
+    settings = NodeSettings(depth=3, overflow=Overflow.DROP_OLDEST, drain=60, watch=watch)
+    run = Run(describe(pairs(tmp_path)), Bench(gate=gate).open, settings)
+    run.carrier.give(0, POINTS[0])
+    until(lambda: run.node._waiting() == 1 and not any(run.node._queues._queues))
+    run.carrier.give(0, *POINTS[:9])
+    until(lambda: watch.since(-1, 0).last == 9)
+    # One message waits for the hardware outside the queue.
+    until(lambda: watch.loads()["a0"] == Load(3, 3, 6, 0, 0))
+    gate.set()
+    until(lambda: watch.loads()["a0"].waiting == 0)
+    run.stop()
+    assert watch.loads()["a0"] == Load(0, 3, 6, 0, 0)
+    assert run.node.statistics.inputs["a0"].dropped == 6
 
 
 def test_the_trace_knows_what_got_no_answer(tmp_path: Path) -> None:

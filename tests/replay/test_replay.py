@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 from fusesoc_firm.cli import main
 from fusesoc_firm.message.bag_reader import Form
 from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.watch import Control, Watch
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
@@ -531,3 +534,41 @@ def test_software_elsewhere_takes_and_gives_topics(tmp_path: Path) -> None:
     found = read(tmp_path / "o.bag")
     for topic in ("/scaled_in", "/far", "/near"):
         assert [item for item in found if item[0] == topic] == renamed(points("ros1", 3), topic)
+
+
+def test_a_watch_records_the_replay_and_pauses_it(tmp_path: Path) -> None:
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point")))
+    items, watch, control = points("ros1", 20), Watch(), Control()
+    control.step()
+    control.step()
+    source = bag(tmp_path, "ros1", items)
+    replaying = threading.Thread(
+        target=run, args=(loaded, source, tmp_path / "out.bag", "echo"), kwargs={"watch": watch, "control": control}
+    )
+    replaying.start()
+    while watch.since(-1, 0).last < 3:
+        time.sleep(0.01)
+    replaying.join(0.1)
+    assert replaying.is_alive()
+    assert watch.since(-1, 0).last == 3
+    control.resume()
+    replaying.join(60)
+    assert not replaying.is_alive()
+    seen = watch.since(-1, 100).messages
+    assert [item.block for item in seen] == ["p", "p_out"] * 20
+    for number, item in enumerate(seen):
+        assert item.payload == items[number // 2][3]
+        assert item.time_ns == 10**7 * (number // 2)
+        if item.block == "p_out":
+            assert item.latency.cause == number - 1
+            # 29 bytes come in 4 beats and go out in as many, the first of them 20 cycles after the last.
+            assert item.latency.cycles == 3 + 20 + 3
+    assert read(tmp_path / "out.bag") == renamed(items, "/p_out")
+
+
+def test_a_replay_that_is_ended_in_the_page_has_recorded_what_came(tmp_path: Path) -> None:
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point")))
+    control = Control()
+    control.end()
+    run(loaded, bag(tmp_path, "ros1", points("ros1", 20)), tmp_path / "out.bag", "echo", control=control)
+    assert read(tmp_path / "out.bag") == []

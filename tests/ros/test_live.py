@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import random
 import re
@@ -13,6 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 
@@ -416,3 +419,28 @@ def test_a_version_that_the_system_does_not_speak_is_told(place: Place) -> None:
     with place.echo("--ros", str(other)) as node:
         assert node.wait() == 1
         assert f"error: system 'echo' has no ROS {other} topics, only topics of ROS {place.ros.version}" in node.said()
+
+
+def test_a_page_shows_the_messages_of_the_node(place: Place) -> None:
+    """`--watch` serves the page of a run that the page does not control."""
+    text = struct.pack("<I", 5) + (b"hello" if place.ros.version == 1 else b"hell\0")
+    payload = text if place.ros.version == 1 else b"\0\1\0\0" + text
+    with place.echo("--watch", "--no-browser") as node, place.peer(text="std_msgs/String") as peer:
+        node.wait_until_ready()
+        peer.wait_until_connected()
+        peer.publish("/text_in", payload)
+        peer.take()
+        address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", node.said())
+        assert address
+        with urlopen(f"{address[0]}api/record?before=2", timeout=60) as answer:
+            rows = json.load(answer)["messages"]
+        assert [row[:2] for row in rows] == [[0, "text_in"], [1, "text_out"]]
+        assert rows[1][4] == 0
+        assert rows[1][6] > 0
+        with urlopen(f"{address[0]}api/message?number=1", timeout=60) as answer:
+            fields = json.load(answer)["fields"]
+        assert fields == [["data", "hello" if place.ros.version == 1 else "hell"]]
+        body = Request(f"{address[0]}api/control", b'{"do": "stop"}', {"Content-Type": "application/json"})
+        with pytest.raises(HTTPError, match="400"):
+            urlopen(body, timeout=60)
+        assert node.stop() == 0

@@ -59,7 +59,7 @@ def ask(
     text = answer.read()
     connection.close()
     is_json = (answer.getheader("Content-Type") or "").startswith("application/json")
-    return answer.status, answer, json.loads(text) if is_json else text.decode()
+    return answer.status, answer, json.loads(text) if is_json else text.decode(errors="replace")
 
 
 def scene(studio: Studio, file: str = "arm/arm.yaml") -> dict[str, Any]:

@@ -1,5 +1,7 @@
 // Requests to the server, whose address is that of the page.
 
+import type { Row } from "./live.svelte";
+
 export type Path = (string | number)[];
 
 export interface Fault {
@@ -66,6 +68,29 @@ export const edit = (file: string, version: string, change: object) =>
 export const write = (file: string, version: string, text: string) => post<Scene>("write", { file, version, text });
 export const step = (what: "undo" | "redo", file: string, version: string) => post<Scene>(what, { file, version });
 export const check = (file: string, text: string) => post<Scene>("check", { file, text });
+
+/** A message with its fields as texts. */
+export interface Message {
+  row: Row;
+  type: string;
+  hasPicture: boolean;
+  fields: [string, string][];
+  isShortened: boolean;
+  fault: string;
+}
+
+export interface Wishes {
+  tool: string;
+  rate: number;
+  isEndless: boolean;
+  isPaused: boolean;
+  stallPercent: number;
+}
+
+export const run = (file: string, wishes: Wishes) => post<object>("run", { file, ...wishes });
+export const control = (what: "pause" | "resume" | "step" | "stop") => post<object>("control", { do: what });
+export const message = (number: number) => get<Message>("message", { number: String(number) });
+export const record = (before: number) => get<{ messages: Row[] }>("record", { before: String(before) });
 
 /** Call a function whenever another program has changed a file; reconnects if the server was restarted. */
 export function follow(changed: (file: string) => void): () => void {

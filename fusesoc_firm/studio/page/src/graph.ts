@@ -90,13 +90,14 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
   nodes.push(manager("manager:out", "to the host", [`scheduler ${project.scheduler ?? "fixed_priority"}`], faults));
   const edges: Edge[] = [];
   blocks.forEach((block, index) => {
-    if (block?.mode === "subscriber") edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`));
-    if (block?.mode === "publisher") edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out"));
+    if (block?.mode === "subscriber") edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, scene.file, block.name));
+    if (block?.mode === "publisher") edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", scene.file, block.name));
     list(block?.outgoing).forEach((way, number) => {
       const sink = blocks.findIndex((other) => other?.name === way?.name);
       if (sink < 0) return;
       const fields = [...list(way.include), ...list(way.exclude).map((field) => `without ${field}`)];
       edges.push({
+        type: "wire",
         id: `way:${index}:${number}`,
         source: `block:${index}`,
         target: `block:${sink}`,
@@ -109,8 +110,11 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
   return { nodes, edges };
 }
 
-function fixed(id: string, source: string, target: string): Edge {
-  return { id, source, target, selectable: false, deletable: false, focusable: false, class: "stream" };
+/** The stream between the Manager and a converter, whose wire shows the live words of its block. */
+function fixed(id: string, source: string, target: string, file: string, block: string): Edge {
+  const type = "wire";
+  const still = { selectable: false, deletable: false, focusable: false };
+  return { id, source, target, type, ...still, class: "stream", data: { file, block } };
 }
 
 /** Place the nodes, from left to right along the data. */
@@ -121,7 +125,7 @@ export async function placed(nodes: BlockNode[], edges: Edge[]): Promise<BlockNo
       "elk.algorithm": "layered",
       "elk.direction": "RIGHT",
       "elk.spacing.nodeNode": "24",
-      "elk.layered.spacing.nodeNodeBetweenLayers": "70",
+      "elk.layered.spacing.nodeNodeBetweenLayers": "110",
       "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
     },
     children: nodes.map(({ id, width, height }) => ({ id, width, height })),

@@ -1,0 +1,62 @@
+"""A carrier that plays given messages to a node, at a rate or as fast as the node takes them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from itertools import count, islice
+
+from fusesoc_firm.node.carrier import Event, Taken
+from fusesoc_firm.node.diagnostics import Report
+from fusesoc_firm.node.watch import Control
+
+
+class Player:
+    """A carrier for the topics of all middlewares; what the node publishes is only recorded by its watch."""
+
+    def __init__(
+        self, messages: Sequence[tuple[int, bytes]], control: Control, rate: float = 0.0, rounds: int | None = 1
+    ) -> None:
+        """Play messages, each with the number of its topic, at `rate` in messages a second (0: as fast as possible).
+
+        All messages are played `rounds` times (None: until the end). `control` pauses them.
+        """
+        self._messages = messages
+        self._control = control
+        self._seconds = 1 / rate if rate else 0.0
+        self._rounds = rounds
+        self._stopped = threading.Event()
+
+    def receive(self) -> Iterator[Event]:
+        """Yield the messages."""
+        due = time.monotonic()
+        for _ in islice(count(), self._rounds):
+            for topic, payload in self._messages:
+                self._control.wait(due - time.monotonic())
+                if not self._control.passes():
+                    self._stopped.set()
+                    return
+                now = time.monotonic()
+                # After a pause or on a busy machine, what is late is not made up for.
+                due = max(due, now - self._seconds) + self._seconds
+                yield Taken(topic, payload, time.monotonic_ns())
+        self._stopped.set()
+
+    def publish(self, topic: int, payload: bytes) -> None:
+        """Do nothing: nobody subscribes."""
+
+    def diagnose(self, report: Report) -> None:
+        """Do nothing: nobody subscribes."""
+
+    def stop(self) -> None:
+        """Play no more messages."""
+        self._control.end()
+
+    def wait_until_stopped(self, timeout: float) -> bool:
+        """Wait until the last message has been yielded."""
+        return self._stopped.wait(timeout)
+
+    def close(self) -> None:
+        """End the player."""
+        self._control.end()

@@ -1,0 +1,239 @@
+"""The record of a run for those who watch it: the latest messages and the counts of each block, in bounded memory.
+
+    watch = Watch()
+    watch.saw("camera", payload, time_ns)           # the run; this call never waits for a reader
+    news = watch.since(number, 100)                 # any reader, as often as it likes
+
+A reader that is too slow misses messages and learns how many.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+_MOST_BYTES, _MOST_MESSAGES = 64 * 2**20, 20_000
+# The number of latencies of a block from which percentiles are computed.
+_MOST_LATENCIES = 1000
+
+
+@dataclass(frozen=True)
+class Latency:
+    """What is known about a response: its cause, the cycles of clk and the time that it took.
+
+    `cause` is the number of a message in the record. `cycles` last from the cause's first beat to the response's last
+    beat, in simulation; `wall_ns` from the cause's arrival at the host.
+    """
+
+    cause: int | None = None
+    cycles: int | None = None
+    wall_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A message at a subscriber or publisher; `number` counts all messages of the run.
+
+    `time_ns` is the time since the begin of the record, or in the replayed bag.
+    """
+
+    number: int
+    block: str
+    time_ns: int
+    payload: bytes
+    latency: Latency = Latency()
+
+
+@dataclass(frozen=True)
+class Load:
+    """The load of an input: messages in its queue, of at most `capacity`, and messages that did not get through."""
+
+    waiting: int
+    capacity: int
+    dropped: int
+    refused: int
+    lost: int
+
+
+@dataclass(frozen=True)
+class Percentiles:
+    """The median, the 99th percentile and the maximum of the latest latencies."""
+
+    median: int
+    most: int
+    maximum: int
+
+    @classmethod
+    def of(cls, values: Sequence[int]) -> Percentiles | None:
+        """Return the percentiles of values, or None without values."""
+        found = sorted(values)
+        return cls(found[len(found) // 2], found[(len(found) * 99) // 100], found[-1]) if found else None
+
+
+@dataclass(frozen=True)
+class Count:
+    """The messages of a block so far, their bytes, and their latencies in cycles of clk and in ns of the wall clock."""
+
+    messages: int
+    bytes: int
+    cycles: Percentiles | None
+    wall_ns: Percentiles | None
+
+
+@dataclass(frozen=True)
+class News:
+    """The messages after one that a reader knows, of which `skipped` are missing; `last` is the newest number."""
+
+    messages: tuple[Seen, ...]
+    skipped: int
+    last: int
+
+
+@dataclass
+class _Counting:
+    messages: int = 0
+    bytes: int = 0
+    cycles: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_LATENCIES))
+    wall_ns: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_LATENCIES))
+
+
+class Watch:
+    """The record; any thread may call its methods. The oldest messages leave when the bounds are reached."""
+
+    def __init__(self, most_bytes: int = _MOST_BYTES, most_messages: int = _MOST_MESSAGES) -> None:
+        """Keep at most `most_bytes` of payloads, or the newest message, and at most `most_messages`."""
+        self._most_bytes, self._most_messages = most_bytes, most_messages
+        self._lock = threading.Lock()
+        self._messages: deque[Seen] = deque()
+        self._bytes = 0
+        self._next = 0
+        self._counts: dict[str, _Counting] = {}
+        self._loads: Callable[[], Mapping[str, Load]] = dict
+        self.start_ns = time.monotonic_ns()
+
+    def measure(self, loads: Callable[[], Mapping[str, Load]]) -> None:
+        """Name the source of the inputs' loads, by block; readers call it."""
+        self._loads = loads
+
+    def saw(self, block: str, payload: bytes, time_ns: int, latency: Latency = Latency()) -> int:
+        """Record a message, and return its number."""
+        with self._lock:
+            seen = Seen(self._next, block, time_ns, payload, latency)
+            self._next += 1
+            self._messages.append(seen)
+            self._bytes += len(payload)
+            while len(self._messages) > self._most_messages or (
+                self._bytes > self._most_bytes and len(self._messages) > 1
+            ):
+                self._bytes -= len(self._messages.popleft().payload)
+            count = self._counts.setdefault(block, _Counting())
+            count.messages += 1
+            count.bytes += len(payload)
+            if latency.cycles is not None:
+                count.cycles.append(latency.cycles)
+            if latency.wall_ns is not None:
+                count.wall_ns.append(latency.wall_ns)
+            return seen.number
+
+    def since(self, number: int, most: int) -> News:
+        """Return the newest messages after the one with this number, at most `most`; -1 is before the first."""
+        with self._lock:
+            new = self._next - 1 - number
+            taken = max(0, min(new, most, len(self._messages)))
+            return News(tuple(self._last(taken)), max(0, new - taken), self._next - 1)
+
+    def find(self, number: int) -> Seen | None:
+        """Return the message with a number, or None if it is not in the record (any more)."""
+        with self._lock:
+            return self._messages[number - self.first] if self.first <= number < self._next else None
+
+    def before(self, number: int, most: int) -> list[Seen]:
+        """Return the messages of the record before the one with this number, at most `most` of the latest."""
+        with self._lock:
+            first, end = self.first, min(number, self._next)
+            return [self._messages[index - first] for index in range(max(first, end - most), end)]
+
+    @property
+    def first(self) -> int:
+        """The number of the oldest message in the record."""
+        return self._next - len(self._messages)
+
+    def counts(self) -> dict[str, Count]:
+        """Return the counts of all blocks of which a message was recorded."""
+        with self._lock:
+            found = {block: (item, [*item.cycles], [*item.wall_ns]) for block, item in self._counts.items()}
+            return {
+                block: Count(item.messages, item.bytes, Percentiles.of(cycles), Percentiles.of(wall_ns))
+                for block, (item, cycles, wall_ns) in found.items()
+            }
+
+    def loads(self) -> Mapping[str, Load]:
+        """Return the loads of the inputs, by block."""
+        return self._loads()
+
+    def _last(self, count: int) -> Iterator[Seen]:
+        """Yield the newest messages, the oldest of them first; the deque is fast at its ends only."""
+        found: list[Seen] = []
+        for seen in reversed(self._messages):
+            if len(found) == count:
+                break
+            found.append(seen)
+        yield from reversed(found)
+
+
+class Control:
+    """A valve for messages: closed, it lets single messages pass. Any thread may call its methods."""
+
+    def __init__(self) -> None:
+        """Begin with the valve open."""
+        self._changed = threading.Condition()
+        self._is_open, self._is_over = True, False
+        self._singles = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether messages pass."""
+        return self._is_open
+
+    def passes(self) -> bool:
+        """Wait until a message may pass; return False if no more messages may."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._is_over or self._is_open or self._singles)
+            if not self._is_open and self._singles:
+                self._singles -= 1
+            return not self._is_over
+
+    def wait(self, seconds: float) -> None:
+        """Wait for a time, or until the valve is closed or the run ends."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._is_over or not self._is_open, seconds)
+
+    def pause(self) -> None:
+        """Close the valve."""
+        self._set(is_open=False)
+
+    def resume(self) -> None:
+        """Open the valve."""
+        self._set(is_open=True)
+
+    def step(self) -> None:
+        """Close the valve, and let one message pass."""
+        with self._changed:
+            self._singles += 1
+        self._set(is_open=False)
+
+    def end(self) -> None:
+        """Let no more messages pass."""
+        with self._changed:
+            self._is_over = True
+            self._changed.notify_all()
+
+    def _set(self, *, is_open: bool) -> None:
+        with self._changed:
+            self._is_open = is_open
+            if is_open:
+                self._singles = 0
+            self._changed.notify_all()

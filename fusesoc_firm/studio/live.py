@@ -1,0 +1,188 @@
+"""What the page gets of a run: its news over a WebSocket, the record, single messages and their pictures.
+
+The page asks for the next news when it has shown the last ones, so a slow page gets fewer; the run never waits for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from aiohttp import WSMsgType, web
+
+from fusesoc_firm.node.watch import Seen
+from fusesoc_firm.studio.message import fields_of, has_picture, picture_of
+from fusesoc_firm.studio.run import Run
+
+# The least time between two news, and the number of messages in one and in an answer about the record.
+_SECONDS = 0.05
+_MOST_NEW, _MOST_ROWS = 50, 200
+_CONTROLS = ("pause", "resume", "step", "stop")
+
+
+class Live:
+    """The current run, and the requests about it; `name` names a specification for the page."""
+
+    def __init__(self, name: Callable[[Path], str]) -> None:
+        """Begin without a run."""
+        self._name = name
+        self._count = 0
+        self._sockets: set[web.WebSocketResponse] = set()
+        self.run: Run | None = None
+
+    def take(self, run: Run) -> None:
+        """Watch another run; the former one ends."""
+        if self.run:
+            self.run.stop()
+        self.run = run
+        self._count += 1
+
+    def routes(self, under: str) -> list[web.RouteDef]:
+        """Return the requests, whose addresses begin with `under`."""
+        return [
+            web.get(f"{under}/watch", self._watch),
+            web.get(f"{under}/record", self._record),
+            web.get(f"{under}/message", self._message),
+            web.get(f"{under}/picture", self._picture),
+            web.post(f"{under}/control", self._control),
+        ]
+
+    async def close(self) -> None:
+        """End the run that was started here, and all connections."""
+        if self.run:
+            self.run.stop()
+            await asyncio.to_thread(self.run.wait)
+        for socket in [*self._sockets]:
+            await socket.close()
+
+    # --- requests --------------------------------------------------------------------------------------------------
+
+    async def _watch(self, request: web.Request) -> web.WebSocketResponse:
+        """Send news each time that the page asks with the number of the last message it knows."""
+        socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024)
+        await socket.prepare(request)
+        self._sockets.add(socket)
+        asked: asyncio.Queue[int] = asyncio.Queue()
+        sender = asyncio.create_task(self._send(socket, asked))
+        try:
+            async for message in socket:
+                if message.type == WSMsgType.TEXT and message.data.lstrip("-").isdecimal() and asked.empty():
+                    asked.put_nowait(int(message.data))
+        finally:
+            self._sockets.discard(socket)
+            sender.cancel()
+            with suppress(asyncio.CancelledError, ConnectionError):
+                await sender
+        return socket
+
+    async def _send(self, socket: web.WebSocketResponse, asked: asyncio.Queue[int]) -> None:
+        """Answer each question as soon as there is something new."""
+        known: object = None
+        while True:
+            after = await asked.get()
+            while (now := self._mark()) == known:
+                await asyncio.sleep(_SECONDS)
+            known = now
+            await socket.send_json(self._news(after))
+            await asyncio.sleep(_SECONDS)
+
+    def _mark(self) -> object:
+        """Return a value that changes with what the page shows."""
+        run = self.run
+        if not run:
+            return None, 0
+        is_paused = run.control is not None and not run.control.is_open
+        return self._count, run.state, run.text, is_paused, run.watch.since(-1, 0).last, {**run.watch.loads()}
+
+    def _news(self, after: int) -> dict[str, Any]:
+        run = self.run
+        if not run:
+            return {"run": None}
+        watch, clock = run.watch, run.system.clock
+        news = watch.since(after, _MOST_NEW)
+        return {
+            "run": {
+                "number": self._count,
+                "file": self._name(run.spec),
+                "title": run.title,
+                "state": run.state,
+                "text": run.text,
+                "isPaused": run.control is not None and not run.control.is_open,
+                "isControlled": run.control is not None,
+                "clock": None if clock is None else float(clock),
+                "first": watch.first,
+                "last": news.last,
+            },
+            "seconds": time.monotonic() - watch.start_ns / 1e9,
+            "counts": {block: asdict(count) for block, count in watch.counts().items()},
+            "loads": {block: asdict(load) for block, load in watch.loads().items()},
+            "messages": [*map(_row, news.messages)],
+            "skipped": news.skipped,
+        }
+
+    async def _record(self, request: web.Request) -> web.Response:
+        """Return the rows of the record before a message."""
+        rows = self._current().watch.before(_number(request, "before"), _MOST_ROWS)
+        return web.json_response({"messages": [*map(_row, rows)]})
+
+    async def _message(self, request: web.Request) -> web.Response:
+        """Return the fields of a message."""
+        run, seen = self._seen(request)
+        frame = run.frames[seen.block]
+        found = await asyncio.to_thread(fields_of, frame, seen.payload)
+        return web.json_response(
+            {"row": _row(seen), "type": str(frame.message), "hasPicture": has_picture(frame), **found}
+        )
+
+    async def _picture(self, request: web.Request) -> web.Response:
+        """Return the picture in a message."""
+        run, seen = self._seen(request)
+        found = await asyncio.to_thread(picture_of, run.frames[seen.block], seen.payload)
+        if not found:
+            raise web.HTTPNotFound(reason="this message has no picture that a browser shows")
+        return web.Response(body=found[0], content_type=found[1])
+
+    async def _control(self, request: web.Request) -> web.Response:
+        """Pause the run, continue it, let one message pass, or end it."""
+        run, body = self._current(), await request.json()
+        wish = body.get("do") if isinstance(body, Mapping) else None
+        if wish not in _CONTROLS or not run.control:
+            raise web.HTTPBadRequest(reason=f"legal for a run that the page controls: {', '.join(_CONTROLS)}")
+        if wish == "stop":
+            run.stop()
+        else:
+            getattr(run.control, wish)()
+        return web.json_response({})
+
+    # --- the run ---------------------------------------------------------------------------------------------------
+
+    def _current(self) -> Run:
+        if not self.run:
+            raise web.HTTPNotFound(reason="nothing has run yet")
+        return self.run
+
+    def _seen(self, request: web.Request) -> tuple[Run, Seen]:
+        run = self._current()
+        seen = run.watch.find(_number(request, "number"))
+        if not seen:
+            raise web.HTTPNotFound(reason="this message is not in the record any more")
+        return run, seen
+
+
+def _row(seen: Seen) -> tuple[object, ...]:
+    """Return a message without its content: number, block, time, bytes, cause, cycles, and ns of the wall clock."""
+    latency = seen.latency
+    row = (seen.number, seen.block, seen.time_ns / 1e9, len(seen.payload))
+    return *row, latency.cause, latency.cycles, latency.wall_ns
+
+
+def _number(request: web.Request, name: str) -> int:
+    text = request.query.get(name, "")
+    if not (text.isascii() and text.isdecimal()) or len(text) > 15:
+        raise web.HTTPBadRequest(reason=f"'{name}' is the number of a message")
+    return int(text)

@@ -1,0 +1,125 @@
+"""A recorded message as the page shows it: its fields as texts, or its picture."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Any
+
+from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.frame.model import Frame
+
+# The largest parts of a message that the page gets.
+_MOST_FIELDS, _MOST_ITEMS, _MOST_CHARACTERS, _MOST_BYTES = 500, 16, 500, 32
+_MOST_PIXELS = 2**24
+_IMAGE, _COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
+# For each encoding of sensor_msgs/Image: bits of a value, and the places of red, green and blue or of gray in a pixel.
+_ENCODINGS: dict[str, tuple[int, tuple[int, ...], int]] = {
+    "mono8": (8, (0,), 1),
+    "8UC1": (8, (0,), 1),
+    "rgb8": (8, (0, 1, 2), 3),
+    "bgr8": (8, (2, 1, 0), 3),
+    "8UC3": (8, (2, 1, 0), 3),
+    "rgba8": (8, (0, 1, 2), 4),
+    "bgra8": (8, (2, 1, 0), 4),
+    "mono16": (16, (0,), 1),
+    "16UC1": (16, (0,), 1),
+    **{f"bayer_{order}8": (8, (0,), 1) for order in ("rggb", "bggr", "gbrg", "grbg")},
+}
+# What browsers show, by its first bytes; other formats might contain scripts.
+_SAFE = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+
+
+def fields_of(frame: Frame, payload: bytes) -> dict[str, Any]:
+    """Return the fields of a message: rows of a dotted name and a shortened text, and how many rows are left out.
+
+    A payload that is not a message of the frame has a `fault`.
+    """
+    try:
+        rows = [*islice(_rows("", decode(frame, payload)), _MOST_FIELDS + 1)]
+    except CodecError as error:
+        return {"fields": [], "isShortened": False, "fault": str(error)}
+    return {"fields": rows[:_MOST_FIELDS], "isShortened": len(rows) > _MOST_FIELDS, "fault": ""}
+
+
+def has_picture(frame: Frame) -> bool:
+    """Return whether messages of a frame are pictures."""
+    return str(frame.message) in (_IMAGE, _COMPRESSED)
+
+
+def picture_of(frame: Frame, payload: bytes) -> tuple[bytes, str] | None:
+    """Return the picture in a message, and its media type; None if it has none that a browser can show."""
+    if not has_picture(frame):
+        return None
+    try:
+        message = decode(frame, payload)
+    except CodecError:
+        return None
+    data = bytes(message["data"])
+    if str(frame.message) == _COMPRESSED:
+        return next(((data, kind) for start, kind in _SAFE.items() if data.startswith(start)), None)
+    made = _png(message, data)
+    return (made, "image/png") if made else None
+
+
+def _rows(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _rows(f"{name}.{key}" if name else str(key), item)
+    elif isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
+        for number, item in enumerate(value):
+            yield from _rows(f"{name}[{number}]", item)
+    else:
+        yield name, _text(value)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bytes | bytearray):
+        return _shortened(value[:_MOST_BYTES].hex(" "), len(value), _MOST_BYTES, "bytes")
+    if isinstance(value, str):
+        return value if len(value) <= _MOST_CHARACTERS else f"{value[:_MOST_CHARACTERS]}... ({len(value)} characters)"
+    if isinstance(value, Sequence):
+        return _shortened(", ".join(_text(item) for item in value[:_MOST_ITEMS]), len(value), _MOST_ITEMS, "items")
+    return str(value)
+
+
+def _shortened(text: str, count: int, most: int, unit: str) -> str:
+    return text if count <= most else f"{text}, ... ({count} {unit})"
+
+
+def _png(message: Mapping[str, Any], data: bytes) -> bytes | None:
+    """Return an image as PNG, or None if its fields do not describe one."""
+    width, height, step = (int(message.get(name, 0)) for name in ("width", "height", "step"))
+    bits, places, values = _ENCODINGS.get(str(message.get("encoding")), (0, (), 0))
+    size = bits // 8
+    if not bits or not width or not height or width * height > _MOST_PIXELS:
+        return None
+    if step < width * values * size or len(data) < step * (height - 1) + width * values * size:
+        return None
+    is_swapped = size == 2 and not message.get("is_bigendian")
+    lines = bytearray()
+    for line in range(height):
+        lines += b"\0" + _pixels(data[line * step :][: width * values * size], places, values, size, is_swapped)
+    header = struct.pack(">IIBBBBB", width, height, bits, 2 if len(places) == 3 else 0, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(bytes(lines), 1)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks)
+
+
+def _pixels(line: bytes, places: Sequence[int], values: int, size: int, is_swapped: bool) -> bytes:
+    """Return the pixels of a line in the order of PNG: red, green, blue, the high byte first."""
+    if is_swapped:
+        made = bytearray(len(line))
+        made[0::2], made[1::2] = line[1::2], line[0::2]
+        return bytes(made)
+    if size == 2 or (places == tuple(range(values))):
+        return line
+    made = bytearray(len(line) // values * len(places))
+    for place, source in enumerate(places):
+        made[place :: len(places)] = line[source::values]
+    return bytes(made)
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))

@@ -1,0 +1,171 @@
+"""A run that the page watches, and the run that the page starts: a simulation that is played its core's stimuli."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.node.carrier import CarrierError
+from fusesoc_firm.node.description import NodeDescription, describe
+from fusesoc_firm.node.node import Node, NodeSettings
+from fusesoc_firm.node.player import Player
+from fusesoc_firm.node.queues import Overflow
+from fusesoc_firm.node.reopening import of_simulator
+from fusesoc_firm.node.software import node_software
+from fusesoc_firm.node.status import checked
+from fusesoc_firm.node.transport.transport import TransportError
+from fusesoc_firm.node.watch import Control, Watch
+from fusesoc_firm.request.core_reader import CoreFile
+from fusesoc_firm.simulation.simulator import BuiltSimulator
+from fusesoc_firm.simulation.software_run import stimulated, taken_elsewhere
+from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
+from fusesoc_firm.system.message_sources import core_of
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import InputError, fail
+
+BUILDING, RUNNING, ENDED, FAILED = "building", "running", "ended", "failed"
+# The time limits for messages that are in the system when a run ends.
+_SETTLE_SECONDS, _DRAIN_SECONDS = 0.2, 2.0
+# The seconds that a run gets to end when the server ends; its simulator ends with it in any case.
+_END_SECONDS = 5.0
+
+Build = Callable[[Path, str], BuiltSimulator]
+"""Builds the simulator of a specification in a tool. May raise `InputError`."""
+
+
+class Run:
+    """A run of the system of a specification: its record, its state, and its control, if it can be paused.
+
+    `text` says why a run has failed, or what it has counted at its end.
+    """
+
+    def __init__(self, loaded: LoadedSystem, spec: Path, title: str, control: Control | None = None) -> None:
+        """Begin a record; the run itself is what another part of the program does."""
+        self.spec, self.title, self.control = spec.resolve(), title, control
+        self.system = loaded.system
+        self.watch = Watch()
+        self.state, self.text = RUNNING, ""
+
+    @property
+    def frames(self) -> Mapping[str, Frame]:
+        """The frames of all messages that the record may hold, by block."""
+        system = self.system
+        topics = [*stimulated(system), *taken_elsewhere(system), *system.software.publishers]
+        topics += [*system.subscribers, *system.publishers]
+        return {topic.block: topic.frame for topic in topics}
+
+    def end(self, text: str = "", state: str = ENDED) -> None:
+        """Record the end of the run."""
+        self.state, self.text = state, text
+
+    def stop(self) -> None:
+        """End the run, if that is possible from here."""
+
+    def wait(self) -> None:
+        """Wait until the run has ended after `stop`."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the user of the page asks of a simulation: `rate` in messages a second, 0 for as many as the system takes.
+
+    The stimuli are played again and again if `is_endless` is set; the run begins paused if `is_paused` is set.
+    """
+
+    tool: str
+    rate: float = 0.0
+    is_endless: bool = False
+    is_paused: bool = False
+    seed: int = 1
+    stall_percent: int = 0
+
+
+class SimulatedRun(Run):
+    """A simulation in a thread of this process, with the system's software, without a middleware."""
+
+    def __init__(self, loaded: LoadedSystem, spec: Path, wishes: Wishes, build: Build) -> None:
+        """Read the stimuli, and begin to build the simulator. May raise `InputError`."""
+        super().__init__(loaded, spec, f"simulation in {wishes.tool}", Control())
+        self.state = BUILDING
+        if wishes.is_paused and self.control:
+            self.control.pause()
+        self._loaded, self._wishes, self._build = loaded, wishes, build
+        self._description = describe(loaded)
+        self._stimuli = stimuli_of(self.spec, loaded)
+        self._is_over = threading.Event()
+        self._node: Node | None = None
+        self._thread = threading.Thread(target=self._work, name="watched run", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the simulation; a build that has begun goes on to its end."""
+        self._is_over.set()
+        if self.control:
+            self.control.end()
+        if self._node:
+            self._node.stop()
+
+    def wait(self) -> None:
+        """Wait until the simulation has ended."""
+        self._thread.join(_END_SECONDS)
+
+    def _work(self) -> None:
+        try:
+            built = self._build(self.spec, self._wishes.tool)
+            self.end(self._run(built) if not self._is_over.is_set() else "")
+        except (InputError, TransportError, CarrierError) as error:
+            self.end(str(error).removeprefix("error: "), FAILED)
+
+    def _run(self, built: BuiltSimulator) -> str:
+        """Run the simulation to its end, and return the counts."""
+        wishes, description = self._wishes, self._description
+        opener = of_simulator(built, wishes.seed, wishes.stall_percent)
+        # Without a rate, the system takes the messages as fast as it can, and none is dropped.
+        overflow = Overflow.DROP_OLDEST if wishes.rate else Overflow.BLOCK
+        settings = NodeSettings(
+            overflow=overflow, settle=_SETTLE_SECONDS, drain=_DRAIN_SECONDS, report=self._tell, watch=self.watch
+        )
+        with ExitStack() as stack:
+            software = stack.enter_context(node_software(self._loaded, lambda error: self._tell(str(error))))
+            opener = checked(opener, description) if description.digest else opener
+            node = Node(description, opener, settings, software)
+            stack.callback(node.close)
+            self._node = node
+            if self._is_over.is_set():
+                return ""
+            self.watch.start_ns = time.monotonic_ns()
+            self.state = RUNNING
+            assert self.control
+            rounds = None if wishes.is_endless else 1
+            player = Player(_numbered(self._stimuli, description), self.control, wishes.rate, rounds)
+            node.run(dict.fromkeys(description.versions, player))
+            return node.statistics.text()
+
+    def _tell(self, report: str) -> None:
+        self.text = report
+
+
+def stimuli_of(spec: Path, loaded: LoadedSystem) -> list[Stimulus]:
+    """Return the stimuli that the core beside a specification names. May raise `InputError`."""
+    core = core_of(spec)
+    name = _stimuli(core) if core else None
+    if not core or not name:
+        missing = f"{core.path.name} names no stimuli" if core else f"no core beside {spec.name} generates this system"
+        fail(missing, hint=f"write a core: firm system core {spec.name} --stimuli stimuli.yaml")
+    return read_stimuli(core.path.parent / name, stimulated(loaded.system))
+
+
+def _stimuli(core: CoreFile) -> str | None:
+    name = core.parameters("simulation").get("stimuli")
+    return name if isinstance(name, str) else None
+
+
+def _numbered(stimuli: list[Stimulus], description: NodeDescription) -> list[tuple[int, bytes]]:
+    """Return the payloads of stimuli with the numbers of their topics."""
+    numbers = {topic.block: number for number, topic in enumerate(description.subscribers)}
+    return [(numbers[item.subscriber.block], item.payload) for item in stimuli]

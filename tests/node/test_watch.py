@@ -1,0 +1,155 @@
+"""The record of a run: bounded, never waiting, honest about what a reader has missed; and the source that it pauses."""
+
+from __future__ import annotations
+
+import random
+import statistics
+import threading
+import time
+import tracemalloc
+
+import pytest
+
+from fusesoc_firm.node.player import Player
+from fusesoc_firm.node.watch import Control, Latency, Percentiles, Watch
+
+
+def test_the_record_is_bounded_and_tells_what_is_missing() -> None:
+    watch = Watch(most_bytes=1000, most_messages=30)
+    for number in range(100):
+        assert watch.saw("a", bytes([number]) * 10, number) == number
+    news = watch.since(-1, 20)
+    assert [seen.number for seen in news.messages] == [*range(80, 100)]
+    assert (news.skipped, news.last, watch.first) == (80, 99, 70)
+    assert watch.since(97, 20).messages[0].payload == bytes([98]) * 10
+    assert watch.since(99, 20) == watch.since(500, 20)
+    assert watch.since(99, 20).messages == ()
+    assert watch.find(69) is None
+    assert watch.find(100) is None
+    found = watch.find(70)
+    assert found
+    assert found.payload == bytes([70]) * 10
+    assert [seen.number for seen in watch.before(75, 3)] == [72, 73, 74]
+    assert [seen.number for seen in watch.before(75, 300)] == [*range(70, 75)]
+    assert [seen.number for seen in watch.before(9999, 2)] == [98, 99]
+    # A message that is larger than the bound stands alone.
+    watch.saw("b", bytes(5000), 100)
+    assert watch.first == 100
+    assert watch.counts()["a"].messages == 100
+    assert watch.counts()["b"].bytes == 5000
+
+
+def test_a_long_run_needs_no_more_memory() -> None:
+    watch = Watch(most_bytes=100_000, most_messages=1000)
+
+    def run() -> int:
+        for number in range(20_000):
+            watch.saw("a", bytes(50), number, Latency(number - 1, number % 77, number))
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        first = run()
+        assert run() < first + 20_000
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("size", [1, 2, 99, 100, 101, 5000])
+def test_percentiles_are_those_of_the_latest_thousand(size: int) -> None:
+    seed = random.randrange(2**32)
+    print("seed", seed)
+    values = [random.Random(seed + number).randrange(10**9) for number in range(size)]
+    watch = Watch()
+    for value in values:
+        watch.saw("a", b"", 0, Latency(None, value, 2 * value))
+    latest = sorted(values[-1000:])
+    found = watch.counts()["a"]
+    assert found.cycles
+    assert found.wall_ns
+    assert found.cycles.median == statistics.median_high(latest)
+    # At most one value in a hundred is above.
+    assert sum(value > found.cycles.most for value in latest) <= len(latest) / 100
+    assert sum(value >= found.cycles.most for value in latest) >= len(latest) / 100
+    assert found.cycles.maximum == max(latest)
+    assert found.wall_ns.maximum == 2 * max(latest)
+    assert Percentiles.of([]) is None
+
+
+def test_many_threads_report_at_once() -> None:
+    watch = Watch(most_messages=100)
+
+    def report() -> None:
+        for _ in range(2000):
+            watch.saw("a", b"x", 0)
+
+    threads = [threading.Thread(target=report) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    last, seen = -1, 0
+    while any(thread.is_alive() for thread in threads) or watch.since(last, 0).skipped:
+        news = watch.since(last, 50)
+        seen += len(news.messages) + news.skipped
+        last = news.last
+    assert seen == 8000
+    assert watch.counts()["a"].messages == 8000
+
+
+def test_a_player_is_paused_and_steps() -> None:
+    control = Control()
+    control.pause()
+    got: list[int] = []
+    more = threading.Semaphore(0)
+    player = Player([(0, b"a"), (1, b"b"), (0, b"c")], control, rounds=None)
+
+    def take() -> None:
+        for event in player.receive():
+            got.append(event.topic)
+            more.release()
+
+    thread = threading.Thread(target=take)
+    thread.start()
+    assert not more.acquire(timeout=0.05)
+    for expected in ([0], [0, 1], [0, 1, 0], [0, 1, 0, 0]):
+        control.step()
+        assert more.acquire(timeout=60)
+        assert got == expected
+    assert not more.acquire(timeout=0.05)
+    control.resume()
+    for _ in range(10):
+        assert more.acquire(timeout=60)
+    control.pause()
+    assert not player.wait_until_stopped(0)
+    player.stop()
+    assert player.wait_until_stopped(60)
+    thread.join(60)
+    assert not thread.is_alive()
+
+
+def test_a_player_keeps_its_rate_and_ends() -> None:
+    """On a busy machine it is slower, never faster."""
+    player = Player([(0, b"a")] * 10, Control(), rate=100, rounds=2)
+    start = time.monotonic()
+    assert len([*player.receive()]) == 20
+    assert time.monotonic() - start >= 19 / 100
+    assert player.wait_until_stopped(0)
+
+
+def test_a_step_that_nobody_took_is_forgotten_when_all_pass() -> None:
+    control = Control()
+    control.step()
+    control.step()
+    control.resume()
+    control.pause()
+    passed = threading.Event()
+
+    def wait() -> None:
+        control.passes()
+        passed.set()
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    assert not passed.wait(0.05)
+    control.end()
+    assert passed.wait(60)
+    assert not control.passes()

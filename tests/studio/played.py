@@ -1,0 +1,61 @@
+"""A system that the page simulates with a model of its hardware: what a subscriber takes, its publisher sends."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import yaml
+
+from fusesoc_firm.simulation.simulator import BuiltSimulator
+from fusesoc_firm.text.diagnostics import fail
+from tests.node import model_simulator
+
+HOSTILE = "<img src=x onerror=window.broken=1><script>window.broken=1</script>"
+IMAGE = {
+    "header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": HOSTILE},
+    "is_bigendian": 0,
+    "height": 2,
+    "width": 3,
+    "encoding": "bgr8",
+    "step": 10,
+    "data": [0, 0, 255, 0, 255, 0, 255, 0, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8, 9, 7],
+}
+STIMULI = [
+    {"point": {"x": 1.5, "y": -2.0, "z": 1e300}},
+    {"text": {"data": HOSTILE}},
+    {"image": IMAGE},
+]
+TYPES = {"point": "geometry_msgs/Point", "text": "std_msgs/String", "image": "sensor_msgs/Image"}
+
+
+def write_system(folder: Path, stimuli: Sequence[object] = STIMULI) -> Path:
+    """Write a specification, the core beside it and the stimuli that it names."""
+    blocks: list[dict[str, object]] = []
+    for name, message in TYPES.items():
+        common = {"middleware": "ROS2", "message": message}
+        blocks.append({"name": name, "mode": "subscriber", **common, "outgoing": [{"name": f"{name}_out"}]})
+        blocks.append({"name": f"{name}_out", "mode": "publisher", **common})
+    spec = folder / "robot.yaml"
+    project = {"name": "robot", "width": 64, "clock": "100 MHz"}
+    spec.write_text(yaml.safe_dump({"project": project, "blocks": blocks}, sort_keys=False), encoding="utf-8")
+    generate = {
+        "system": {"generator": "far", "parameters": {"spec": spec.name}},
+        "simulation": {"generator": "far", "parameters": {"spec": spec.name, "stimuli": "stimuli.yaml"}},
+    }
+    core = {"name": "robot:sys:robot:0", "generate": generate}
+    (folder / "robot.core").write_text(f"CAPI=2:\n{yaml.safe_dump(core)}", encoding="utf-8")
+    (folder / "stimuli.yaml").write_text(yaml.safe_dump([*stimuli], sort_keys=False), encoding="utf-8")
+    return spec
+
+
+def modelled(*options: str) -> Callable[[Path, str], BuiltSimulator]:
+    """What builds the model in the place of a simulator."""
+
+    def build(spec: Path, tool: str) -> BuiltSimulator:
+        if tool == "verilator":
+            fail(f"cannot build the simulator for {spec}", hint=HOSTILE)
+        return BuiltSimulator(tool, spec.parent, (sys.executable, model_simulator.__file__, "--width=64", *options))
+
+    return build

@@ -1,0 +1,345 @@
+"""A run that the page starts and watches: what the server tells of it, and what it refuses."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import aiohttp
+import pytest
+from matplotlib import image as pictures
+
+from fusesoc_firm.frame.codec import encode
+from fusesoc_firm.studio.message import fields_of, picture_of
+from fusesoc_firm.studio.server import Studio
+from tests.studio.played import HOSTILE, modelled, write_system
+from tests.studio.served import load, served
+from tests.studio.test_server import ask
+
+News = dict[str, Any]
+
+
+@pytest.fixture
+def spec(tmp_path: Path) -> Path:
+    return write_system(tmp_path)
+
+
+@pytest.fixture
+def studio(spec: Path) -> Iterator[Studio]:
+    with served(spec, modelled()) as studio:
+        yield studio
+
+
+def begin(studio: Studio, **wishes: object) -> None:
+    body = {"file": "robot.yaml", "tool": "ghdl", **wishes}
+    assert ask(studio, "POST", "api/run", body)[0] == 200
+
+
+def control(studio: Studio, what: str) -> None:
+    assert ask(studio, "POST", "api/control", {"do": what})[0] == 200
+
+
+def following(studio: Studio, steps: Callable[[Callable[[int], Awaitable[News]]], Awaitable[None]]) -> None:
+    """Do steps with a function that asks for the news after a message."""
+
+    async def all_steps() -> None:
+        async with aiohttp.ClientSession() as session, session.ws_connect(f"{studio.address}api/watch") as socket:
+
+            async def news(after: int) -> News:
+                await socket.send_str(str(after))
+                return dict(await socket.receive_json(timeout=60))
+
+            await steps(news)
+
+    asyncio.run(all_steps())
+
+
+def until(studio: Studio, condition: Callable[[News], bool]) -> News:
+    """Return the first news that fulfil a condition."""
+    found: News = {}
+
+    async def steps(news: Callable[[int], Awaitable[News]]) -> None:
+        while not found:
+            now = await news(-1)
+            if condition(now):
+                found.update(now)
+
+    following(studio, steps)
+    return found
+
+
+def test_a_run_is_told_to_its_end(studio: Studio) -> None:
+    assert until(studio, lambda _: True) == {"run": None}
+    begin(studio)
+    news = until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
+    run = news["run"]
+    assert (run["file"], run["isControlled"], run["clock"], run["first"], run["last"]) == (
+        "robot.yaml",
+        True,
+        1e8,
+        0,
+        5,
+    )
+    assert {name: count["messages"] for name, count in news["counts"].items()} == dict.fromkeys(
+        ["point", "text", "image", "point_out", "text_out", "image_out"], 1
+    )
+    assert news["loads"]["point"] == {"waiting": 0, "capacity": 100, "dropped": 0, "refused": 0, "lost": 0}
+    rows = {row[1]: row for row in news["messages"]}
+    assert len(rows) == 6
+    for name in "point", "text", "image":
+        number, _, seconds, size, *others = rows[name]
+        assert others == [None, None, None]
+        answer = rows[f"{name}_out"]
+        beats = -(-(size + 5) // 8)
+        # The model of the hardware takes this long.
+        assert answer[3:6] == [size, number, 2 * beats - 1 + 10]
+        assert answer[2] >= seconds
+        assert answer[6] > 0
+    assert "sent" in run["text"]
+
+
+def test_it_pauses_steps_and_ends(studio: Studio) -> None:
+    begin(studio, isEndless=True, isPaused=True)
+    until(studio, lambda now: now["run"] and now["run"]["state"] == "running")
+    for number in range(1, 4):
+        control(studio, "step")
+        # A message and its response.
+        expected = 2 * number - 1
+        now = until(studio, lambda now: bool(now["run"]["last"] >= expected))  # noqa: B023
+        assert (now["run"]["last"], now["run"]["isPaused"]) == (expected, True)
+    control(studio, "resume")
+    until(studio, lambda now: now["run"]["last"] > 20)
+    control(studio, "pause")
+    assert until(studio, lambda now: now["run"]["isPaused"])["run"]["state"] == "running"
+    control(studio, "stop")
+    ended = until(studio, lambda now: now["run"]["state"] == "ended")
+    counts = {name: count["messages"] for name, count in ended["counts"].items()}
+    assert counts["point"] == counts["point_out"]
+    # The record stays.
+    assert ask(studio, "GET", f"api/message?number={ended['run']['last']}")[0] == 200
+
+
+def test_a_page_that_does_not_ask_holds_nothing_up(studio: Studio) -> None:
+    begin(studio, isEndless=True)
+
+    async def steps(news: Callable[[int], Awaitable[News]]) -> None:
+        first = await news(-1)
+        while not first["run"] or first["run"]["last"] < 0:
+            first = await news(-1)
+        known = first["run"]["last"]
+        while (await asyncio.to_thread(ask, studio, "GET", f"api/message?number={known + 500}"))[0] != 200:
+            await asyncio.sleep(0.01)
+        later = await news(known)
+        assert len(later["messages"]) <= 50
+        assert later["skipped"] == later["run"]["last"] - known - len(later["messages"])
+        assert later["skipped"] >= 450
+        assert [row[0] for row in later["messages"]] == [*range(later["messages"][0][0], later["run"]["last"] + 1)]
+
+    following(studio, steps)
+    control(studio, "stop")
+
+
+def test_at_most_twenty_news_a_second(studio: Studio) -> None:
+    begin(studio, isEndless=True)
+
+    async def steps(news: Callable[[int], Awaitable[News]]) -> None:
+        start = asyncio.get_running_loop().time()
+        last = -1
+        for _ in range(10):
+            run = (await news(last))["run"]
+            last = run["last"] if run else -1
+        assert asyncio.get_running_loop().time() - start >= 9 * 0.05
+
+    following(studio, steps)
+    control(studio, "stop")
+
+
+def test_the_record_goes_back(studio: Studio) -> None:
+    begin(studio)
+    until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
+    rows = ask(studio, "GET", "api/record?before=4")[2]["messages"]
+    assert [row[0] for row in rows] == [0, 1, 2, 3]
+    assert ask(studio, "GET", "api/record?before=0")[2] == {"messages": []}
+
+
+def test_messages_are_opened(studio: Studio) -> None:
+    begin(studio)
+    ended = until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
+    numbers = {row[1]: row[0] for row in ended["messages"]}
+    for name in "point", "point_out":
+        found = ask(studio, "GET", f"api/message?number={numbers[name]}")[2]
+        assert (found["type"], found["hasPicture"]) == ("geometry_msgs/Point", False)
+        assert found["fields"] == [["x", "1.5"], ["y", "-2.0"], ["z", "1e+300"]]
+    found = ask(studio, "GET", f"api/message?number={numbers['text_out']}")[2]
+    assert found["fields"] == [["data", HOSTILE]]
+    found = ask(studio, "GET", f"api/message?number={numbers['image_out']}")[2]
+    assert found["hasPicture"]
+    assert ["header.frame_id", HOSTILE] in found["fields"]
+    status, answer, _ = ask(studio, "GET", f"api/picture?number={numbers['text_out']}")
+    assert status == 404
+    status, answer, _ = ask(studio, "GET", f"api/picture?number={numbers['image_out']}")
+    assert (status, answer.getheader("Content-Type")) == (200, "image/png")
+    assert answer.getheader("X-Content-Type-Options") == "nosniff"
+
+
+def test_a_run_that_cannot_begin_says_why(studio: Studio, spec: Path) -> None:
+    begin(studio, tool="verilator")
+    failed = until(studio, lambda now: now["run"] and now["run"]["state"] == "failed")
+    assert "cannot build the simulator" in failed["run"]["text"]
+    (spec.parent / "stimuli.yaml").write_text("- nobody: {x: 1}\n", encoding="utf-8")
+    status, _, found = ask(studio, "POST", "api/run", {"file": "robot.yaml"})
+    assert (status, "'nobody' is not a subscriber" in found["reason"]) == (409, True)
+    (spec.parent / "robot.core").unlink()
+    status, _, found = ask(studio, "POST", "api/run", {"file": "robot.yaml"})
+    assert (status, "no core beside robot.yaml" in found["reason"]) == (409, True)
+
+
+@pytest.mark.parametrize("fault", ["exit", "kill", "garbage"])
+def test_a_simulator_that_fails_ends_the_run(spec: Path, fault: str) -> None:
+    with served(spec, modelled(f"--fault={fault}", "--at=3")) as studio:
+        begin(studio, isEndless=True)
+        failed = until(studio, lambda now: now["run"] and now["run"]["state"] == "failed")
+        assert "the simulator" in failed["run"]["text"]
+        # The next one begins anew.
+        begin(studio)
+        assert until(studio, lambda now: now["run"]["number"] == 2)["run"]["text"] is not None
+
+
+def test_another_run_ends_the_first(studio: Studio) -> None:
+    begin(studio, isEndless=True)
+    until(studio, lambda now: now["run"] and now["run"]["last"] > 5)
+    first = studio.live.run
+    begin(studio)
+    assert first
+    first.wait()
+    assert first.state == "ended"
+    assert until(studio, lambda now: now["run"]["state"] == "ended")["run"]["number"] == 2
+
+
+@pytest.mark.parametrize(
+    "wishes",
+    [
+        {"tool": "sh -c true"},
+        {"tool": ["ghdl"]},
+        {"rate": -1},
+        {"rate": float("nan")},
+        {"rate": "10"},
+        {"rate": 10**9},
+        {"seed": 0},
+        {"seed": None},
+        {"stallPercent": 100},
+        {"isEndless": "yes"},
+        {"isPaused": 1},
+    ],
+    ids=str,
+)
+def test_wishes_that_are_none_are_refused(studio: Studio, wishes: dict[str, object]) -> None:
+    assert ask(studio, "POST", "api/run", {"file": "robot.yaml", **wishes})[0] == 400
+    assert ask(studio, "POST", "api/run", {"file": "../robot.yaml"})[0] == 404
+
+
+def test_questions_about_nothing_are_refused(studio: Studio) -> None:
+    for path in "record?before=1", "message?number=1", "picture?number=1":
+        assert ask(studio, "GET", f"api/{path}")[0] == 404
+    begin(studio)
+    until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
+    for number in "", "-1", "x", "1.0", "٣", "9" * 400:
+        assert ask(studio, "GET", f"api/message?number={quote(number)}")[0] == 400
+    assert ask(studio, "GET", "api/message?number=999")[0] == 404
+    bodies: list[object] = [{}, {"do": "explode"}, {"do": ["stop"]}, []]
+    for body in bodies:
+        assert ask(studio, "POST", "api/control", body)[0] == 400
+
+
+# --- messages --------------------------------------------------------------------------------------------------------
+
+
+def frame(spec: Path, block: str) -> Any:
+    system = load(spec, spec.read_text(encoding="utf-8")).system
+    return next(item.frame for item in system.subscribers if item.block == block)
+
+
+def image(encoding: str, values: list[int], **other: int) -> dict[str, object]:
+    header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    fields = {"height": 1, "width": 2, "is_bigendian": 0, "step": len(values), **other}
+    return {"header": header, "encoding": encoding, "data": bytes(values), **fields}
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        (image("rgb8", [1, 2, 3, 4, 5, 6]), [[[1, 2, 3], [4, 5, 6]]]),
+        (image("bgr8", [1, 2, 3, 4, 5, 6]), [[[3, 2, 1], [6, 5, 4]]]),
+        (image("rgba8", [1, 2, 3, 9, 4, 5, 6, 9]), [[[1, 2, 3], [4, 5, 6]]]),
+        (image("bgra8", [1, 2, 3, 9, 4, 5, 6, 9]), [[[3, 2, 1], [6, 5, 4]]]),
+        (image("mono8", [7, 200]), [[7, 200]]),
+        (image("bayer_rggb8", [7, 200]), [[7, 200]]),
+        (image("mono16", [1, 2, 3, 4]), [[0x0201, 0x0403]]),
+        (image("mono16", [1, 2, 3, 4], is_bigendian=1), [[0x0102, 0x0304]]),
+        (image("mono8", [1, 2, 9, 3, 4], height=2, step=3), [[1, 2], [3, 4]]),
+    ],
+)
+def test_pictures_are_what_their_encoding_says(spec: Path, message: dict[str, object], expected: object) -> None:
+    """Matplotlib, by the library Pillow, reads the picture."""
+    layout = frame(spec, "image")
+    found = picture_of(layout, encode(layout, message))
+    assert found
+    read = pictures.imread(io.BytesIO(found[0]))
+    scale = 65535 if "16" in str(message["encoding"]) else 255
+    assert (read * scale).round().astype(int).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        image("yuv422", [1, 2, 3, 4]),
+        image("", [1, 2]),
+        image("mono8", [1]),
+        image("mono8", [1, 2], width=0),
+        image("mono8", [1, 2], step=1),
+        image("mono8", [1, 2], height=2**32 - 1, width=2**32 - 1, step=2**32 - 1),
+        image("rgb8", [1, 2, 3, 4, 5]),
+    ],
+)
+def test_fields_that_are_no_picture_give_none(spec: Path, message: dict[str, object]) -> None:
+    layout = frame(spec, "image")
+    assert picture_of(layout, encode(layout, message)) is None
+
+
+def test_only_pictures_without_scripts_are_shown(tmp_path: Path) -> None:
+    text = "project: {name: r}\nblocks:\n"
+    for name, mode in ("a", "subscriber, outgoing: [{name: b}]"), ("b", "publisher"):
+        text += f"  - {{name: {name}, middleware: ROS2, message: sensor_msgs/CompressedImage, mode: {mode}}}\n"
+    spec = tmp_path / "r.yaml"
+    spec.write_text(text, encoding="utf-8")
+    layout = frame(spec, "a")
+    header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    png = b"\x89PNG\r\n\x1a\n" + bytes(9)
+    for data, expected in (
+        (png, (png, "image/png")),
+        (b"\xff\xd8\xff\xe0", (b"\xff\xd8\xff\xe0", "image/jpeg")),
+        (b"<svg xmlns='http://www.w3.org/2000/svg' onload='alert(1)'/>", None),
+        (b"<html><script>alert(1)</script>", None),
+        (b"", None),
+    ):
+        payload = encode(layout, {"header": header, "format": "png", "data": data})
+        assert picture_of(layout, payload) == expected
+
+
+def test_large_messages_are_shortened(spec: Path) -> None:
+    layout = frame(spec, "image")
+    payload = encode(layout, image("mono8", [5] * 100_000))
+    shown = dict(fields_of(layout, payload)["fields"])
+    assert shown["data"].startswith("05 05")
+    assert shown["data"].endswith("(100000 bytes)")
+    assert len(json.dumps(shown)) < 1000
+    text = frame(spec, "text")
+    assert len(json.dumps(fields_of(text, encode(text, {"data": "x" * 10**6})))) < 1000
+    broken = fields_of(text, b"\0")
+    assert broken["fields"] == []
+    assert broken["fault"]

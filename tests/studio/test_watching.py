@@ -1,0 +1,166 @@
+"""The page watches a run: rates and latencies at the wires, the list of messages, one of them opened, and control."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+from tests.studio.browser import PROGRAM, Page, opened
+from tests.studio.played import HOSTILE, modelled, write_system
+from tests.studio.served import served
+from tests.studio.test_page import AXE, ROOM
+
+pytestmark = [
+    pytest.mark.check,
+    pytest.mark.skipif(not PROGRAM, reason="Chromium is missing"),
+    pytest.mark.skipif(not (ROOM / "static" / "index.html").exists(), reason="make studio builds the page"),
+]
+ROWS = "document.querySelectorAll('.messages tbody tr')"
+STATE = "document.querySelector('.run output').textContent"
+
+
+def button(text: str, inside: str) -> str:
+    """The script that finds a button."""
+    return f"[...document.querySelectorAll('{inside} button')].find(button => button.textContent === '{text}')"
+
+
+async def press(page: Page, text: str, inside: str = ".run") -> None:
+    """Use a button by the keyboard."""
+    await page.until(f"{button(text, inside)} && !{button(text, inside)}.disabled")
+    await page.evaluate(f"{button(text, inside)}.focus()")
+    await page.press("Enter")
+
+
+def watching(folder: Path, steps: Callable[[Page], Awaitable[None]], *options: str) -> None:
+    """Open the page of a system whose hardware is a model."""
+
+    async def all_steps(address: str) -> None:
+        async with opened(address, folder / "profile") as page:
+            await page.until("document.querySelectorAll('.svelte-flow__node').length > 2")
+            try:
+                await steps(page)
+            finally:
+                await page.picture(folder / "page.png")
+                print(f"the page at the end: {folder / 'page.png'}")
+            assert page.trouble == []
+
+    with served(write_system(folder), modelled(*options)) as studio:
+        asyncio.run(all_steps(studio.address))
+
+
+def row_of(block: str) -> str:
+    """The script that finds the first listed message of a block."""
+    return f"[...{ROWS}].find(row => row.children[2].textContent === '{block}')"
+
+
+async def open_message(page: Page, block: str) -> None:
+    """Open a message of a block."""
+    await page.until(row_of(block))
+    await page.evaluate(f"{row_of(block)}.querySelector('button').click()")
+
+
+def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
+    async def steps(page: Page) -> None:
+        await page.evaluate("[...document.querySelectorAll('.run [type=checkbox]')].at(-1).focus()")
+        await page.press(" ")
+        await press(page, "run")
+        count = "Number(document.querySelector('.messages p')?.innerText.match(/(\\d+) messages/)?.[1])"
+        await page.until(f"{STATE} === 'robot.yaml, simulation in ghdl: paused' && {count} === 0")
+        await press(page, "one message")
+        await page.until(f"{count} === 2")
+        await press(page, "one message")
+        await page.until(f"{count} === 4")
+        await press(page, "continue")
+        wires = "[...document.querySelectorAll('.wire')].map(wire => wire.textContent.trim())"
+        await page.until(f"{wires}.length === 6 && {wires}.every(words => words.includes('/s'))")
+        # A frame of 5 beats in and out and a latency of 10 cycles at 100 MHz, as the model says.
+        await page.until(f"{wires}.some(words => words.includes('190 ns'))")
+        await page.until(f"{ROWS}.length > 10")
+        await press(page, "pause")
+        await page.until(f"{STATE} === 'robot.yaml, simulation in ghdl: paused'")
+        # A response, and the messages before it.
+        await page.evaluate(f"{row_of('point_out')}.querySelector('button').focus()")
+        await page.press("Enter")
+        title = "document.querySelector('.message h2')?.textContent"
+        await page.until(f"{title}?.endsWith(': point_out, geometry_msgs/Point')")
+        last = int(str(await page.evaluate(title)).split(":")[0])
+        assert "19 cycles, 190 ns" in await page.evaluate("document.querySelector('.message').innerText")
+        await press(page, "previous", ".message")
+        await page.until(f"{title}.startsWith('{last - 1}:')")
+        await press(page, "next", ".message")
+        await page.until(f"{title}.startsWith('{last}:')")
+        await page.evaluate("[...document.querySelectorAll('.message p button')].at(-1).focus()")
+        await page.press("Enter")
+        await page.until(f"{title}.endsWith(': point, geometry_msgs/Point')")
+        await press(page, "continue")
+        await page.until(f"{count} > {last} + 10")
+        await press(page, "newest", ".messages")
+        await page.until(f"Number([...{ROWS}].at(-1).querySelector('button').textContent) > {last} + 10")
+        await press(page, "stop")
+        await page.until(f"{STATE} === 'robot.yaml, simulation in ghdl: ended'")
+        await page.until("document.querySelector('.messages pre').textContent.includes('received')")
+
+    watching(tmp_path, steps)
+
+
+def test_a_picture_is_shown_and_no_content_runs(tmp_path: Path) -> None:
+    async def steps(page: Page) -> None:
+        await press(page, "run")
+        await open_message(page, "text_out")
+        await page.until(f"document.querySelector('.message dd')?.textContent === {json.dumps(HOSTILE)}")
+        await open_message(page, "image_out")
+        await page.until("document.querySelector('.message img')?.naturalWidth === 3")
+        colours = """(image => {
+            const canvas = document.createElement('canvas');
+            [canvas.width, canvas.height] = [3, 2];
+            const context = canvas.getContext('2d');
+            context.drawImage(image, 0, 0);
+            return [...context.getImageData(0, 0, 3, 2).data];
+        })(document.querySelector('.message img'))"""
+        pixels = await page.evaluate(colours)
+        assert pixels == [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 3, 2, 1, 255, 6, 5, 4, 255, 9, 8, 7, 255]
+        assert await page.evaluate("window.broken") is None
+        # The reason of a failure comes from a tool, which may print anything.
+        await page.evaluate("document.querySelector('.run select').value = 'verilator'")
+        await page.evaluate("document.querySelector('.run select').dispatchEvent(new Event('change', {bubbles: true}))")
+        await page.evaluate("[...document.querySelectorAll('.run button')][0].click()")
+        await page.until(f"document.querySelector('.messages pre')?.textContent.includes({json.dumps(HOSTILE)})")
+        assert await page.evaluate("window.broken") is None
+
+    watching(tmp_path, steps)
+
+
+def test_a_full_queue_is_seen_at_its_wire(tmp_path: Path) -> None:
+    """The model takes no frame after 20, so messages wait and are dropped."""
+
+    async def steps(page: Page) -> None:
+        await page.evaluate("document.querySelector('.run input[type=number]').focus()")
+        await page.evaluate("document.activeElement.select()")
+        await page.write("5000")
+        await press(page, "run")
+        wires = "[...document.querySelectorAll('.wire')]"
+        await page.until(f"{wires}.some(wire => wire.textContent.includes('100 of 100 wait'))")
+        await page.until(f"{wires}.some(wire => wire.textContent.includes('dropped'))")
+        await page.until("document.querySelector('.wire.crowded') !== null")
+
+    watching(tmp_path, steps, "--fault=hang", "--at=20")
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_people_with_impairments_can_watch(tmp_path: Path, scheme: str) -> None:
+    async def steps(page: Page) -> None:
+        await page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        await page.evaluate(AXE.read_text(encoding="utf-8") + ";0")
+        await press(page, "run")
+        await open_message(page, "image_out")
+        await page.until("document.querySelector('.message img')?.naturalWidth === 3")
+        violations = "violations.map(rule => [rule.id, rule.nodes.map(node => [node.html, node.failureSummary])])"
+        found = await page.evaluate(f"axe.run().then(({{violations}}) => {violations})")
+        assert found == [], json.dumps(found, indent=1)
+
+    watching(tmp_path, steps)
