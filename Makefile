@@ -40,6 +40,7 @@ EMULATION_TOOLS := qemu-system-arm arm-none-eabi-gcc:gcc-arm-none-eabi \
   /usr/lib/arm-none-eabi/include/string.h:libnewlib-arm-none-eabi \
   qemu-arm:qemu-user $(foreach triple,arm-linux-gnueabihf aarch64-linux-gnu,$(triple)-g++:g++-$(triple))
 STUDIO_TOOLS := chromium
+NETWORK_TOOLS := ip:iproute2 tshark
 TEST_TOOLS := bwrap:bubblewrap ccache iverilog strace verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET))) $(if $(SEED),--seed $(SEED)) \
@@ -70,7 +71,7 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 	@$(BIN)/firm sim $(SYSTEM) $(SIM_FLAGS)
 
 test: TOOLS = $(TEST_TOOLS)
-check: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS)
+check: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS) $(NETWORK_TOOLS)
 test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -137,7 +138,7 @@ lint: setup $(VENV)/.extra-lint ## Check style and types of Python and VHDL, inc
 
 # All extras, since all of them are listed.
 licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
-licences: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS)
+licences: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS) $(NETWORK_TOOLS)
 licences: tools ros ## List the project's dependencies and their licences in docs/reference/licences.md
 	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 

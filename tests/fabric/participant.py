@@ -1,0 +1,660 @@
+"""The reference of a node in fabric: what it sends, and when, as a model that the hardware's control is compared with.
+
+All tables have a fixed size, and time is an input, in milliseconds. A sample is never kept for another one: a reliable
+reader takes its samples in order, and asks for what it lacks. Of the samples that one request asks for, only the last
+carries a heartbeat, and a request is repeated only after a while. Otherwise each sample would cause a further request
+for many samples, and a network that loses packets would be flooded.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.node import Endpoint, Node
+from fusesoc_firm.fabric.rtps import (
+    PUBLICATIONS_READER,
+    PUBLICATIONS_WRITER,
+    SUBSCRIPTIONS_READER,
+    SUBSCRIPTIONS_WRITER,
+    Durability,
+    Parameter,
+    Reliability,
+)
+from tests.fabric.messages import (
+    AckNack,
+    Address,
+    Data,
+    DataFrag,
+    Gap,
+    Heartbeat,
+    InfoDestination,
+    NackFrag,
+    Numbers,
+    ParameterList,
+    Submessage,
+    Writer,
+    parse,
+)
+
+FIRST_ANNOUNCEMENTS, SOON, LATER = 5, 100, 3000
+# A farewell, in case peers know an earlier life of the node, and the announcements that follow it.
+AFTER_FAREWELL = 200
+DISCOVERY_REQUEST, DISCOVERY_HEARTBEAT = 200, 500
+# A writer that has written nothing may not answer.
+USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
+REASSEMBLY = 1000
+WINDOW = 64
+MOST_REQUESTED = 8
+FRAGMENT_BYTES = 1344
+XCDR1 = 0
+# The reader of each of the two writers of discovery.
+DISCOVERY = {PUBLICATIONS_WRITER: PUBLICATIONS_READER, SUBSCRIPTIONS_WRITER: SUBSCRIPTIONS_READER}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The sizes of a node's tables: peers, matched endpoints, samples in reassembly, and bytes of a payload."""
+
+    peers: int = 8
+    matches: int = 32
+    reassemblies: int = 2
+    longest: int = 65536
+
+
+@dataclass
+class Window:
+    """The numbers that have come from a writer of discovery: all below `expected`, and some of those after it."""
+
+    expected: int = 1
+    came: int = 0
+    last: int = 0
+    is_heard: bool = False
+
+    def take(self, number: int) -> bool:
+        """Note a number; whether it is new."""
+        place = number - self.expected
+        if not 0 <= place < WINDOW or self.came >> place & 1:
+            return False
+        self.came |= 1 << place
+        self.last = max(self.last, number)
+        while self.came & 1:
+            self.came, self.expected = self.came >> 1, self.expected + 1
+        return True
+
+    def begin(self, first: int) -> None:
+        """All numbers below `first` are gone."""
+        while self.expected < first and self.came:
+            self.came, self.expected = self.came >> 1, self.expected + 1
+        self.expected = max(self.expected, first)
+        while self.came & 1:
+            self.came, self.expected = self.came >> 1, self.expected + 1
+
+    @property
+    def missing(self) -> Numbers:
+        """The numbers to ask for."""
+        reach = range(self.expected, min(self.last + 1, self.expected + WINDOW))
+        return Numbers.of((number for number in reach if not self.came >> (number - self.expected) & 1), self.expected)
+
+
+@dataclass
+class Peer:
+    """Another participant: where it listens, its lease, and the state of discovery between the two."""
+
+    prefix: bytes
+    metatraffic: Address
+    user: Address
+    lease: int
+    heard: int
+    windows: dict[bytes, Window] = field(default_factory=lambda: {writer: Window() for writer in DISCOVERY})
+    acknowledged: set[bytes] = field(default_factory=set)
+    next_request: int = 0
+    next_heartbeat: int = 0
+
+
+@dataclass
+class Reassembly:
+    """The fragments of a sample that have come."""
+
+    number: int
+    size: int
+    fragment_bytes: int
+    touched: int
+    data: bytearray
+    missing: set[int]
+
+
+@dataclass
+class Source:
+    """A peer's writer that a reader of the node matches; `expected` is the next number to take."""
+
+    peer: Peer
+    entity: bytes
+    endpoint: Endpoint
+    address: Address
+    expected: int = 1
+    last: int = 0
+    is_heard: bool = False
+    requested: int = 0
+    next_request: int = 0
+    reassembly: Reassembly | None = None
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether the reader asks for what it lacks."""
+        return self.endpoint.quality.is_reliable
+
+    def advance(self, expected: int) -> None:
+        """Expect a higher number, and forget the fragments of a lower one."""
+        self.expected = max(self.expected, expected)
+        if self.reassembly and self.reassembly.number < self.expected:
+            self.reassembly = None
+
+
+@dataclass
+class History:
+    """A writer of the node with its last samples."""
+
+    endpoint: Endpoint
+    number: int = 0
+    samples: OrderedDict[int, bytes] = field(default_factory=OrderedDict)
+
+    def add(self, payload: bytes) -> None:
+        """Keep a sample, and no more than the topic's depth."""
+        self.number += 1
+        self.samples[self.number] = payload
+        while len(self.samples) > self.endpoint.quality.depth:
+            self.samples.popitem(last=False)
+
+
+@dataclass
+class Sink:
+    """A peer's reader that matches a writer of the node: it gets samples from `start` on, and has those below."""
+
+    peer: Peer
+    entity: bytes
+    history: History
+    address: Address
+    is_reliable: bool
+    start: int
+    acknowledged: int = 0
+    next_heartbeat: int = 0
+
+    @property
+    def first(self) -> int:
+        """The first number that it can get."""
+        return max(self.start, next(iter(self.history.samples), self.history.number + 1))
+
+
+class Participant:
+    """A node; `take` is called with each sample for a reader, in order.
+
+    What it sends is in `outbox`, as addresses and packets. `counts` tells what was refused, and why.
+    """
+
+    def __init__(self, node: Node, take: Callable[[Endpoint, bytes], None], limits: Limits = Limits()) -> None:
+        self.node, self._take, self._limits = node, take, limits
+        self.outbox: list[tuple[Address, bytes]] = []
+        self.counts: Counter[str] = Counter()
+        self.peers: dict[bytes, Peer] = {}
+        self.sources: list[Source] = []
+        self.sinks: list[Sink] = []
+        self.histories = {item.entity: History(item) for item in node.writers}
+        self._announced = {
+            PUBLICATIONS_WRITER: [node.endpoint_data(item) for item in node.writers],
+            SUBSCRIPTIONS_WRITER: [node.endpoint_data(item) for item in node.readers],
+        }
+        self._group = Address(rtps.MULTICAST, rtps.multicast_port(node.host.domain))
+        self._writer = Writer()
+        self._announcements = 0
+        self._next_announcement = 0
+        self._count = 0
+        self._now = 0
+
+    # --- life ------------------------------------------------------------------------------------------------------
+
+    def start(self, now: int) -> None:
+        """End an earlier life of the node, whose GUID is the same, and begin."""
+        self._now = now
+        self.leave()
+        self._next_announcement = now + AFTER_FAREWELL
+        graph = self.node.writers[0]
+        self.histories[graph.entity].add(self.node.graph)
+
+    def leave(self) -> None:
+        """Tell all that the node ends."""
+        inline, key = self.node.farewell
+        items = ((Parameter.STATUS_INFO, inline[4:8]), (Parameter.KEY_HASH, inline[12:28]))
+        ending = Data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 2, key, items, is_key=True)
+        for address in (self._group, *(peer.metatraffic for peer in self.peers.values())):
+            self._send(address, ending)
+
+    def publish(self, endpoint: Endpoint, payload: bytes, now: int) -> None:
+        """Send a sample."""
+        self._now = now
+        history = self.histories[endpoint.entity]
+        history.add(payload)
+        for sink in self.sinks:
+            if sink.history is history:
+                self._send_sample(sink, history.number)
+
+    def tick(self, now: int) -> None:
+        """Do what is due."""
+        self._now = now
+        if now >= self._next_announcement:
+            self._announcements += 1
+            self._next_announcement = now + (SOON if self._announcements < FIRST_ANNOUNCEMENTS else LATER)
+            self._announce(self._group)
+        for peer in list(self.peers.values()):
+            if now - peer.heard > peer.lease:
+                self.counts["leases that ended"] += 1
+                self._forget(peer)
+            else:
+                self._tick_peer(peer)
+        for sink in self.sinks:
+            if sink.is_reliable and sink.acknowledged <= sink.history.number and now >= sink.next_heartbeat:
+                self._send_heartbeat(sink)
+        for source in self.sources:
+            self._tick_source(source)
+
+    def _tick_peer(self, peer: Peer) -> None:
+        if self._now >= peer.next_request:
+            peer.next_request = self._now + DISCOVERY_REQUEST
+            if not any(window.is_heard for window in peer.windows.values()):
+                self._announce(peer.metatraffic)
+            for writer, window in peer.windows.items():
+                if not window.is_heard or window.missing.size:
+                    self._request_discovery(peer, writer)
+        if self._now >= peer.next_heartbeat:
+            peer.next_heartbeat = self._now + DISCOVERY_HEARTBEAT
+            for writer in DISCOVERY:
+                if writer not in peer.acknowledged:
+                    self._send_to(peer, peer.metatraffic, self._discovery_heartbeat(writer))
+
+    def _tick_source(self, source: Source) -> None:
+        if source.reassembly and self._now - source.reassembly.touched > REASSEMBLY:
+            source.reassembly = None
+        is_behind = not source.is_heard or source.last >= source.expected
+        if source.is_reliable and is_behind and self._now >= source.next_request:
+            self._request(source)
+
+    # --- sending ---------------------------------------------------------------------------------------------------
+
+    def _send(self, address: Address, *items: Submessage) -> None:
+        self.outbox.append((address, self._writer.message(self.node.prefix, *items)))
+
+    def _send_to(self, peer: Peer, address: Address, *items: Submessage) -> None:
+        self._send(address, InfoDestination(peer.prefix), *items)
+
+    def _next_count(self) -> int:
+        self._count += 1
+        return self._count
+
+    def _announce(self, address: Address) -> None:
+        self._send(address, Data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 1, self.node.participant_data))
+
+    def _discovery_heartbeat(self, writer: bytes) -> Heartbeat:
+        return Heartbeat(DISCOVERY[writer], writer, 1, len(self._announced[writer]), self._next_count())
+
+    def _request_discovery(self, peer: Peer, writer: bytes) -> None:
+        window = peer.windows[writer]
+        request = AckNack(DISCOVERY[writer], writer, window.missing, self._next_count(), is_final=window.is_heard)
+        self._send_to(peer, peer.metatraffic, request)
+
+    def _heartbeat(self, sink: Sink) -> Heartbeat:
+        sink.next_heartbeat = self._now + USER_HEARTBEAT
+        writer = sink.history.endpoint.entity
+        return Heartbeat(sink.entity, writer, sink.first, sink.history.number, self._next_count())
+
+    def _send_heartbeat(self, sink: Sink) -> None:
+        self._send_to(sink.peer, sink.address, self._heartbeat(sink))
+
+    def _send_sample(self, sink: Sink, number: int, *, is_last: bool = True) -> None:
+        payload = sink.history.samples[number]
+        ends = sink.entity, sink.history.endpoint.entity, number
+        parts: list[Submessage] = [Data(*ends, payload)]
+        if len(payload) > FRAGMENT_BYTES:
+            count = -(-len(payload) // FRAGMENT_BYTES)
+            parts = [_fragment(ends, payload, place) for place in range(1, count + 1)]
+        for place, part in enumerate(parts, 1):
+            told = [self._heartbeat(sink)] if sink.is_reliable and is_last and place == len(parts) else []
+            self._send_to(sink.peer, sink.address, part, *told)
+
+    def _request(self, source: Source) -> None:
+        """Ask for what is missing, or for a heartbeat if the writer has not told what it has."""
+        source.requested = source.expected
+        source.next_request = self._now + (USER_REQUEST if source.is_heard else UNHEARD_REQUEST)
+        ends = source.endpoint.entity, source.entity
+        if source.reassembly:
+            missing = Numbers.of(source.reassembly.missing, min(source.reassembly.missing))
+            self._send_to(
+                source.peer,
+                source.address,
+                AckNack(*ends, Numbers(source.expected), self._next_count(), is_final=True),
+                NackFrag(*ends, source.reassembly.number, missing, self._next_count()),
+            )
+            return
+        wanted = range(source.expected, min(source.last + 1, source.expected + MOST_REQUESTED))
+        numbers = Numbers.of(wanted, source.expected) if source.is_heard else Numbers(source.expected)
+        request = AckNack(*ends, numbers, self._next_count(), is_final=source.is_heard)
+        self._send_to(source.peer, source.address, request)
+
+    # --- receiving -------------------------------------------------------------------------------------------------
+
+    def receive(self, packet: bytes, now: int) -> None:
+        """Take a packet; whatever its bytes are, it leaves the node alive."""
+        self._now = now
+        message = parse(packet)
+        if message is None or message.prefix == self.node.prefix:
+            self.counts["packets of others"] += 1
+            return
+        self.counts["faulty packets"] += not message.is_whole
+        if peer := self.peers.get(message.prefix):
+            peer.heard = now
+        is_mine = True
+        for item in message.submessages:
+            if isinstance(item, InfoDestination):
+                is_mine = item.prefix in (self.node.prefix, bytes(12))
+            elif is_mine:
+                self._submessage(message.prefix, item)
+
+    def _submessage(self, prefix: bytes, item: Submessage) -> None:
+        if isinstance(item, Data) and item.writer == rtps.PARTICIPANT_WRITER:
+            self._participant(prefix, item)
+        elif peer := self.peers.get(prefix):
+            match item:
+                case Data() if item.writer in DISCOVERY:
+                    self._endpoint(peer, item)
+                case Heartbeat() if item.writer in DISCOVERY:
+                    self._discovery_told(peer, item)
+                case AckNack() if item.writer in DISCOVERY:
+                    self._discovery_asked(peer, item)
+                case Gap() if item.writer in DISCOVERY:
+                    self._discovery_gap(peer, item)
+                case Data() | DataFrag() | Heartbeat() | Gap():
+                    self._from_writer(peer, item)
+                case AckNack() | NackFrag():
+                    self._from_reader(peer, item)
+
+    def _participant(self, prefix: bytes, item: Data) -> None:
+        if item.status & (rtps.DISPOSED | rtps.UNREGISTERED):
+            if peer := self.peers.get(prefix):
+                self._forget(peer)
+            return
+        facts = ParameterList.of(item.payload or b"")
+        metatraffic = facts.address(Parameter.METATRAFFIC_UNICAST_LOCATOR)
+        if prefix in self.peers or metatraffic is None or facts.all(Parameter.PARTICIPANT_GUID)[:1] != [_guid(prefix)]:
+            return
+        if len(self.peers) == self._limits.peers:
+            self.counts["peers without room"] += 1
+            return
+        seconds, _ = facts.integers(Parameter.LEASE_DURATION, "iI") or (100, 0)
+        user = facts.address(Parameter.DEFAULT_UNICAST_LOCATOR) or metatraffic
+        peer = self.peers[prefix] = Peer(prefix, metatraffic, user, 1000 * max(1, seconds), self._now)
+        self._announce(metatraffic)
+        self._tick_peer(peer)
+
+    def _forget(self, peer: Peer) -> None:
+        del self.peers[peer.prefix]
+        self.sources = [item for item in self.sources if item.peer is not peer]
+        self.sinks = [item for item in self.sinks if item.peer is not peer]
+
+    def _discovery_told(self, peer: Peer, item: Heartbeat) -> None:
+        window = peer.windows[item.writer]
+        window.is_heard = True
+        window.begin(item.first)
+        window.last = max(window.last, item.last)
+        if not item.is_final or window.missing.size:
+            self._request_discovery(peer, item.writer)
+
+    def _discovery_gap(self, peer: Peer, item: Gap) -> None:
+        window = peer.windows[item.writer]
+        if item.start <= window.expected:
+            window.begin(item.others.base)
+        for number in (*range(item.start, min(item.others.base, item.start + WINDOW)), *item.others):
+            if number >= window.expected:
+                window.take(number)
+
+    def _discovery_asked(self, peer: Peer, item: AckNack) -> None:
+        announced = self._announced[item.writer]
+        if item.missing.base > len(announced):
+            peer.acknowledged.add(item.writer)
+        else:
+            peer.acknowledged.discard(item.writer)
+        wanted = [number for number in item.missing if 1 <= number <= len(announced)]
+        for number in wanted:
+            told = [self._discovery_heartbeat(item.writer)] if number == wanted[-1] else []
+            data = Data(item.reader, item.writer, number, announced[number - 1])
+            self._send_to(peer, peer.metatraffic, data, *told)
+        if not wanted and item.writer not in peer.acknowledged:
+            self._send_to(peer, peer.metatraffic, self._discovery_heartbeat(item.writer))
+
+    # --- matching --------------------------------------------------------------------------------------------------
+
+    def _endpoint(self, peer: Peer, item: Data) -> None:
+        if not peer.windows[item.writer].take(item.number):
+            return
+        facts = ParameterList.of(item.payload or b"")
+        guid = next(iter(facts.all(Parameter.ENDPOINT_GUID)), item.key) or b""
+        if guid[:12] != peer.prefix or len(guid) != 16:
+            return
+        if item.status & (rtps.DISPOSED | rtps.UNREGISTERED):
+            self.sources = [other for other in self.sources if not _is(other, peer, guid[12:])]
+            self.sinks = [other for other in self.sinks if not _is(other, peer, guid[12:])]
+            return
+        is_writer = item.writer == PUBLICATIONS_WRITER
+        name = facts.octets(Parameter.TOPIC_NAME).decode(errors="replace")
+        for endpoint in self.node.readers if is_writer else self.node.writers:
+            if endpoint.topic == name and self._is_compatible(endpoint, facts):
+                self._match(peer, endpoint, guid[12:], facts)
+
+    def _is_compatible(self, endpoint: Endpoint, facts: ParameterList) -> bool:
+        """Whether type, hash, encoding and quality of service agree; otherwise, the reason is counted."""
+        hash_ = _type_hash(facts)
+        ours = endpoint.quality.is_reliable, endpoint.quality.is_transient_local
+        theirs = _quality(facts, is_writer=not endpoint.is_writer)
+        offered, requested = (ours, theirs) if endpoint.is_writer else (theirs, ours)
+        reasons = {
+            "other types": facts.octets(Parameter.TYPE_NAME).decode(errors="replace") != endpoint.type,
+            "other hashes": hash_ not in ("", endpoint.hash),
+            "other encodings": XCDR1 not in _encodings(facts),
+            "other partitions": bool(facts.octets(Parameter.PARTITION).strip(b"\0")),
+            "other qualities": any(wanted and not given for wanted, given in zip(requested, offered, strict=True)),
+        }
+        reason = next((name for name, applies in reasons.items() if applies), None)
+        self.counts.update([reason] if reason else [])
+        return reason is None
+
+    def _match(self, peer: Peer, endpoint: Endpoint, entity: bytes, facts: ParameterList) -> None:
+        known: list[Source | Sink] = [*self.sources, *self.sinks]
+        if any(_is(item, peer, entity) and _ours(item) is endpoint for item in known):
+            return
+        if len(known) == self._limits.matches:
+            self.counts["endpoints without room"] += 1
+            return
+        address = facts.address(Parameter.UNICAST_LOCATOR) or peer.user
+        if not endpoint.is_writer:
+            self.sources.append(Source(peer, entity, endpoint, address))
+            if endpoint.quality.is_reliable:
+                self._request(self.sources[-1])
+            return
+        history = self.histories[endpoint.entity]
+        is_reliable, wants_history = _quality(facts, is_writer=False)
+        start = 1 if endpoint.quality.is_transient_local and wants_history else history.number + 1
+        sink = Sink(peer, entity, history, address, is_reliable, start)
+        self.sinks.append(sink)
+        if is_reliable:
+            self._send_heartbeat(sink)
+        else:
+            for number in history.samples:
+                if number >= start:
+                    self._send_sample(sink, number)
+
+    # --- samples that come -----------------------------------------------------------------------------------------
+
+    def _from_writer(self, peer: Peer, item: Data | DataFrag | Heartbeat | Gap) -> None:
+        for source in self.sources:
+            if _is(source, peer, item.writer) and item.reader in (rtps.NO_ENTITY, source.endpoint.entity):
+                match item:
+                    case Data():
+                        self._sample(source, item)
+                    case DataFrag():
+                        self._fragments(source, item)
+                    case Heartbeat():
+                        self._told(source, item)
+                    case Gap():
+                        self._gap(source, item)
+
+    def _is_next(self, source: Source, number: int) -> bool:
+        """Whether to take this sample now; what a reliable reader misses before it is asked for once, at once."""
+        source.last = max(source.last, number) if source.is_reliable else 0
+        if number <= source.expected or not source.is_reliable:
+            return number >= source.expected
+        if self._may_request(source):
+            self._request(source)
+        return False
+
+    def _may_request(self, source: Source) -> bool:
+        return source.requested != source.expected or self._now >= source.next_request
+
+    def _sample(self, source: Source, item: Data) -> None:
+        if self._is_next(source, item.number):
+            source.advance(item.number + 1)
+            if item.payload is not None and not item.is_key:
+                self._give(source, item.payload)
+
+    def _give(self, source: Source, payload: bytes) -> None:
+        if len(payload) > self._limits.longest:
+            self.counts["payloads that are too long"] += 1
+        else:
+            self._take(source.endpoint, payload)
+
+    def _fragments(self, source: Source, item: DataFrag) -> None:
+        if not self._is_next(source, item.number) or not _is_sound(item):
+            return
+        if item.size > self._limits.longest:
+            self.counts["payloads that are too long"] += 1
+            source.advance(item.number + 1)
+            return
+        part = source.reassembly
+        if part is None or part.number != item.number:
+            others = sum(other.reassembly is not None for other in self.sources if other is not source)
+            if others >= self._limits.reassemblies:
+                self.counts["samples without room"] += 1
+                return
+            missing = set(range(1, 1 - (-item.size // item.fragment_bytes)))
+            part = Reassembly(item.number, item.size, item.fragment_bytes, self._now, bytearray(item.size), missing)
+            source.reassembly = part
+        if (part.size, part.fragment_bytes) == (item.size, item.fragment_bytes):
+            _place(part, item, self._now)
+        if not part.missing:
+            source.advance(item.number + 1)
+            self._give(source, bytes(part.data))
+
+    def _told(self, source: Source, item: Heartbeat) -> None:
+        if source.is_reliable and 1 <= item.first <= item.last + 1:
+            source.is_heard = True
+            source.advance(item.first)
+            source.last = max(source.last, item.last)
+            is_behind = source.last >= source.expected
+            if self._may_request(source) if is_behind else not item.is_final:
+                self._request(source)
+
+    def _gap(self, source: Source, item: Gap) -> None:
+        if item.start <= source.expected:
+            source.advance(item.others.base)
+            others = set(item.others)
+            while source.expected in others:
+                source.advance(source.expected + 1)
+
+    # --- samples that are asked for --------------------------------------------------------------------------------
+
+    def _from_reader(self, peer: Peer, item: AckNack | NackFrag) -> None:
+        for sink in self.sinks:
+            if _is(sink, peer, item.reader) and sink.history.endpoint.entity == item.writer and sink.is_reliable:
+                if isinstance(item, AckNack):
+                    self._asked(sink, item)
+                elif item.number in sink.history.samples and item.number >= sink.first:
+                    self._asked_for_fragments(sink, item)
+
+    def _asked(self, sink: Sink, item: AckNack) -> None:
+        sink.acknowledged = item.missing.base
+        wanted = [number for number in item.missing if number <= sink.history.number]
+        if gone := [number for number in wanted if number < sink.first]:
+            self._send_to(
+                sink.peer,
+                sink.address,
+                Gap(sink.entity, sink.history.endpoint.entity, gone[0], Numbers(sink.first)),
+            )
+        for number in wanted:
+            if number >= sink.first:
+                self._send_sample(sink, number, is_last=number == wanted[-1])
+        if not wanted and not item.is_final:
+            self._send_heartbeat(sink)
+
+    def _asked_for_fragments(self, sink: Sink, item: NackFrag) -> None:
+        payload = sink.history.samples[item.number]
+        ends = sink.entity, sink.history.endpoint.entity, item.number
+        for place in item.missing:
+            if 1 <= place <= -(-len(payload) // FRAGMENT_BYTES) and len(payload) > FRAGMENT_BYTES:
+                self._send_to(sink.peer, sink.address, _fragment(ends, payload, place))
+
+
+def _guid(prefix: bytes) -> bytes:
+    return prefix + rtps.PARTICIPANT
+
+
+def _is(item: Source | Sink, peer: Peer, entity: bytes) -> bool:
+    return item.peer is peer and item.entity == entity
+
+
+def _ours(item: Source | Sink) -> Endpoint:
+    return item.endpoint if isinstance(item, Source) else item.history.endpoint
+
+
+def _fragment(ends: tuple[bytes, bytes, int], payload: bytes, place: int) -> DataFrag:
+    """The fragment at a place, from 1."""
+    start = (place - 1) * FRAGMENT_BYTES
+    return DataFrag(*ends, place, 1, FRAGMENT_BYTES, len(payload), payload[start : start + FRAGMENT_BYTES])
+
+
+def _is_sound(item: DataFrag) -> bool:
+    """Whether its fragments are part of the sample and all there."""
+    if not item.fragment_bytes or item.first < 1 or item.is_key:
+        return False
+    end = (item.first - 1 + item.count) * item.fragment_bytes
+    start = (item.first - 1) * item.fragment_bytes
+    return (
+        start < item.size and end < item.size + item.fragment_bytes and len(item.payload) >= min(end, item.size) - start
+    )
+
+
+def _place(part: Reassembly, item: DataFrag, now: int) -> None:
+    start = (item.first - 1) * part.fragment_bytes
+    end = min(start + item.count * part.fragment_bytes, part.size)
+    part.data[start:end] = item.payload[: end - start]
+    part.missing -= set(range(item.first, item.first + item.count))
+    part.touched = now
+
+
+def _type_hash(facts: ParameterList) -> str:
+    """The hash in the user data of an endpoint, if there is one."""
+    data = facts.octets(Parameter.USER_DATA).decode(errors="replace")
+    return next((part.removeprefix("typehash=") for part in data.split(";") if part.startswith("typehash=")), "")
+
+
+def _encodings(facts: ParameterList) -> Iterable[int]:
+    """The encodings that a reader accepts, or that a writer prefers; XCDR version 1 unless told."""
+    (count,) = facts.integers(Parameter.DATA_REPRESENTATION, "I") or (0,)
+    told = facts.integers(Parameter.DATA_REPRESENTATION, f"I{min(count, 16)}h")
+    return told[1:] if told and count else (XCDR1,)
+
+
+def _quality(facts: ParameterList, *, is_writer: bool) -> tuple[bool, bool]:
+    """Whether an endpoint is reliable and transient-local; each kind has a default of its own."""
+    default = Reliability.RELIABLE if is_writer else Reliability.BEST_EFFORT
+    (reliability,) = facts.integers(Parameter.RELIABILITY, "I") or (default,)
+    (durability,) = facts.integers(Parameter.DURABILITY, "I") or (Durability.VOLATILE,)
+    return reliability == Reliability.RELIABLE, durability >= Durability.TRANSIENT_LOCAL

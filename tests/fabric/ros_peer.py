@@ -1,0 +1,75 @@
+"""rclpy as a peer of a node in fabric; see peer.py."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import rclpy
+from peer import DEPTH, FIELDS, run
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+PACKAGES = {"Quaternion": "geometry_msgs", "String": "std_msgs"}
+BOARD = "board"
+
+
+class RosPeer:
+    """A node of rclpy, which also waits for the name of the node in fabric."""
+
+    def __init__(self, types: dict[str, str], is_reliable: bool) -> None:
+        self.types = types
+        rclpy.init()
+        self.node = rclpy.create_node("peer")
+        kind = ReliabilityPolicy.RELIABLE if is_reliable else ReliabilityPolicy.BEST_EFFORT
+        quality = QoSProfile(depth=DEPTH, reliability=kind)
+        self.came: list[tuple[str, list[Any]]] = []
+        self.classes = {
+            name: getattr(importlib.import_module(f"{PACKAGES[kind]}.msg"), kind) for name, kind in types.items()
+        }
+        self.writers = {
+            name: self.node.create_publisher(made, f"/{name}_in", quality) for name, made in self.classes.items()
+        }
+        for name, made in self.classes.items():
+            self.node.create_subscription(made, f"/{name}_out", lambda text, name=name: self.take(name, text), quality)
+
+    def take(self, name: str, message: Any) -> None:
+        self.came.append((name, [getattr(message, field) for field in FIELDS[self.types[name]]]))
+
+    def is_matched(self) -> bool:
+        return BOARD in self.node.get_node_names() and all(
+            writer.get_subscription_count() and self.node.count_publishers(f"/{name}_out")
+            for name, writer in self.writers.items()
+        )
+
+    def write(self, name: str, values: list[Any]) -> None:
+        fields = dict(zip(FIELDS[self.types[name]], values, strict=True))
+        self.writers[name].publish(self.classes[name](**fields))
+
+    def poll(self) -> list[tuple[str, list[Any]]]:
+        rclpy.spin_once(self.node, timeout_sec=0.005)
+        came, self.came = self.came, []
+        return came
+
+    def graph(self) -> dict[str, Any]:
+        ends = [
+            end
+            for name in self.types
+            for end in (
+                *self.node.get_publishers_info_by_topic(f"/{name}_out"),
+                *self.node.get_subscriptions_info_by_topic(f"/{name}_in"),
+            )
+        ]
+        facts = [[end.node_name, end.node_namespace, end.topic_type, str(end.topic_type_hash)] for end in ends]
+        return {
+            "nodes": self.node.get_node_names_and_namespaces(),
+            "topics": self.node.get_topic_names_and_types(),
+            "ends": facts,
+        }
+
+    def end(self) -> None:
+        self.node.destroy_node()
+        rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    run(RosPeer)
