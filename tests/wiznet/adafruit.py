@@ -6,7 +6,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from tests.wiznet.spi import Slave
+from tests.wiznet.spi import Slave, exchange
 
 
 class Bus:
@@ -28,11 +28,11 @@ class Bus:
     def write(self, data: bytes | bytearray) -> None:
         """Bytes to the slave."""
         for byte in data:
-            self._slave.exchange(byte)
+            exchange(self._slave, byte)
 
     def readinto(self, data: bytearray) -> None:
         """Bytes from the slave."""
-        data[:] = bytes(self._slave.exchange(0) for _ in data)
+        data[:] = bytes(exchange(self._slave, 0) for _ in data)
 
 
 class Select:

@@ -6,21 +6,23 @@ from typing import Protocol
 
 
 class Slave(Protocol):
-    """What a chip is for its host. A frame begins at `select` and ends at `deselect`."""
+    """What a chip is for its host. A frame begins with `select` and ends with `deselect`."""
 
     def select(self) -> None:
         """The chip select becomes active."""
 
-    def exchange(self, byte: int) -> int:
-        """The byte from the chip while one comes from the host."""
+    def answer(self) -> int:
+        """The byte for the host, which the chip sends while the host's next one is on its way."""
+
+    def take(self, byte: int) -> None:
+        """A byte of the host has come."""
 
     def deselect(self) -> None:
         """The chip select becomes inactive."""
 
 
-def transfer(slave: Slave, sent: bytes) -> bytes:
-    """One frame. What the chip answers, as long as what is sent."""
-    slave.select()
-    answer = bytes(slave.exchange(byte) for byte in sent)
-    slave.deselect()
+def exchange(slave: Slave, byte: int) -> int:
+    """A byte to the chip, and the one that comes back."""
+    answer = slave.answer()
+    slave.take(byte)
     return answer

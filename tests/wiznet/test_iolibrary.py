@@ -19,6 +19,7 @@ import pytest
 
 from tests.wiznet.chip import Chip
 from tests.wiznet.peers import echo, free_port
+from tests.wiznet.spi import exchange
 from tests.wiznet.w5200 import W5200
 from tests.wiznet.w5500 import W5500
 
@@ -63,8 +64,8 @@ def driven(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Driven]:
     functions = (
         _SELECT(chip.select),
         _SELECT(chip.deselect),
-        _READ(lambda: chip.exchange(0)),
-        _WRITE(lambda byte: (chip.exchange(byte), None)[1]),
+        _READ(lambda: exchange(chip, 0)),
+        _WRITE(chip.take),
     )
     driver.reg_wizchip_cs_cbfunc(*functions[:2])
     driver.reg_wizchip_spi_cbfunc(*functions[2:])

@@ -34,23 +34,24 @@ class W5200(Chip):
         if len(self._header) == _HEADER and self._left:
             self.misuses.append(f"a frame ends {self._left} bytes early")
 
-    def exchange(self, byte: int) -> int:
-        """Take a byte of the header, or read or write one. After a frame's length, the next header follows."""
+    def answer(self) -> int:
+        """What is read at the present address, or 0."""
+        return 0 if len(self._header) < _HEADER or self._header[2] & 0x80 else self._read(self._position)
+
+    def take(self, byte: int) -> None:
+        """A byte of the header, or one to write; the address advances. A further header follows the last byte."""
         if len(self._header) < _HEADER:
             self._header.append(byte)
             if len(self._header) == _HEADER:
                 self._position = int.from_bytes(self._header[:2], "big")
                 self._left = int.from_bytes(self._header[2:], "big") & 0x7FFF
-            return 0
-        address, self._position = self._position, (self._position + 1) & 0xFFFF
+            return
+        if self._header[2] & 0x80:
+            self._write(self._position, byte)
+        self._position = (self._position + 1) & 0xFFFF
         self._left -= 1
-        is_write = self._header[2] & 0x80
         if self._left == 0:
             self._header.clear()
-        if is_write:
-            self._write(address, byte)
-            return 0
-        return self._read(address)
 
     def _read(self, address: int) -> int:
         if address < _SOCKETS:

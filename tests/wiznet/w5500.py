@@ -33,25 +33,28 @@ class W5500(Chip):
         if len(self._header) == _HEADER and self._left:
             self.misuses.append(f"a frame of fixed length ends {self._left} bytes early")
 
-    def exchange(self, byte: int) -> int:
-        """Take a byte of the header, or read or write one."""
+    def answer(self) -> int:
+        """What is read at the present address, or 0."""
+        if len(self._header) < _HEADER or self._header[2] & 4 or self._left == 0:
+            return 0
+        return self._read(self._header[2] >> 3, self._position)
+
+    def take(self, byte: int) -> None:
+        """A byte of the header, or one to write; the address advances."""
         if len(self._header) < _HEADER:
             self._header.append(byte)
             if len(self._header) == _HEADER:
                 self._position = int.from_bytes(self._header[:2], "big")
                 self._left = _FIXED_LENGTHS.get(byte & 3)
-            return 0
+            return
         if self._left == 0:
             self.misuses.append("a frame of fixed length goes on")
-            return 0
+            return
+        if self._header[2] & 4:
+            self._write(self._header[2] >> 3, self._position, byte)
+        self._position = (self._position + 1) & 0xFFFF
         if self._left is not None:
             self._left -= 1
-        address, self._position = self._position, (self._position + 1) & 0xFFFF
-        block = self._header[2] >> 3
-        if self._header[2] & 4:
-            self._write(block, address, byte)
-            return 0
-        return self._read(block, address)
 
     def _read(self, block: int, address: int) -> int:
         if block == 0:
