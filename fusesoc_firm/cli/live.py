@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,8 @@ def _live(arguments: argparse.Namespace) -> None:
     else:
         opener = of_simulator(built_simulator(arguments), arguments.seed, arguments.stall_percent)
     with watched(arguments, loaded, "firm live") as run:
-        run_node(description, opener, options, loaded, arguments.transport or "", run.watch if run else None)
+        settings = replace(options.settings, watch=run.watch if run else None)
+        run_node(description, opener, replace(options, settings=settings), loaded, arguments.transport or "")
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:

@@ -115,7 +115,7 @@ class Node:
     ) -> None:
         """Open the transport. May raise `TransportError`."""
         self._report = _Reporter(settings.report)
-        self._calls = NodeCalls(description.services, self._put_request, self._report)
+        self._calls = NodeCalls(description.services, self._put_service_message, self._report)
         self.statistics = Statistics.of(description, self._calls.counts)
         self._description = description
         self._open_transport = open_transport
@@ -128,7 +128,7 @@ class Node:
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
-        self._status = StatusExchange(self._put_request) if description.digest else None
+        self._status = StatusExchange(self._put_status_request) if description.digest else None
         # The last queue is that of the status.
         depths = [*(self._depth(item) for item in self._inputs), *([1] if self._status else [])]
         self._queues: SubscriberQueues[_Message] = SubscriberQueues(len(depths), depths, overflow=settings.overflow)
@@ -210,7 +210,7 @@ class Node:
             raise TransportError("the system has no 'status: frames'")
         return self._status.access(request, seconds)
 
-    def _put_request(self, request: bytes) -> None:
+    def _put_status_request(self, request: bytes) -> None:
         try:
             is_there = self._queues.put(len(self._inputs), _Message(request, None), 0.0)
         except ClosedError:
@@ -286,7 +286,7 @@ class Node:
     def _take_message(self, taken: Taken) -> None:
         self._put(taken.topic, taken.payload, taken.time_ns, None)
 
-    def _put_request(self, block: str, payload: bytes) -> None:
+    def _put_service_message(self, block: str, payload: bytes) -> None:
         """Send a message of a service to the hardware."""
         self._put(self._numbers[block], payload, time.monotonic_ns(), None)
 
@@ -325,7 +325,7 @@ class Node:
     def _send(self) -> None:
         for number, message in self._queues:
             is_request = number == len(self._inputs)
-            if not (self._send_request(message.payload) if is_request else self._handle(number, message)):
+            if not (self._send_status_request(message.payload) if is_request else self._handle(number, message)):
                 return
 
     def _handle(self, number: int, message: _Message) -> bool:
@@ -354,7 +354,7 @@ class Node:
             self._trace.sent(message.entry)
         return True
 
-    def _send_request(self, request: bytes) -> bool:
+    def _send_status_request(self, request: bytes) -> bool:
         """Send a request of the status; return False if the hardware has failed permanently."""
         hardware = self._hardware
         with self._sending:

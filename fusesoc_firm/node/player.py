@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from itertools import count, islice
 
-from fusesoc_firm.node.carrier import Event, Taken
+from fusesoc_firm.node.carrier import Answer, Call, Event, Taken
 from fusesoc_firm.node.diagnostics import Report
 from fusesoc_firm.node.watch import Control
 
@@ -45,6 +45,12 @@ class Player:
 
     def publish(self, topic: int, payload: bytes) -> None:
         """Do nothing: nobody subscribes."""
+
+    def call(self, service: int, call: Call) -> None:
+        """Do nothing: no server answers, and the call ends at its time limit."""
+
+    def answer(self, service: int, number: int, answer: Answer) -> None:
+        """Do nothing: the player makes no calls."""
 
     def diagnose(self, report: Report) -> None:
         """Do nothing: nobody subscribes."""

@@ -22,7 +22,6 @@ from fusesoc_firm.node.software import node_software
 from fusesoc_firm.node.status_socket import StatusServer, served_names
 from fusesoc_firm.node.trace import Trace
 from fusesoc_firm.node.transport.transport import TransportError
-from fusesoc_firm.node.watch import Watch
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.written.specification import RELIABLE
 from fusesoc_firm.text.diagnostics import fail
@@ -77,14 +76,13 @@ def run_node(
     options: RunOptions,
     loaded: LoadedSystem | None = None,
     address: str = "",
-    watch: Watch | None = None,
 ) -> None:
     """Run the node until Ctrl-C, SIGTERM or ROS stops it; a second Ctrl-C ends it immediately.
 
-    `loaded` is the system, if it has software. `address` is that of the transport, if it has one. `watch` records all
-    messages. Raise `InputError` if ROS or the hardware fails, or if received messages could not be processed in time.
+    `loaded` is the system, if it has software. `address` is that of the transport, if it has one. Raise `InputError` if
+    ROS or the hardware fails, or if received messages could not be processed in time.
     """
-    settings = replace(options.settings, report=_say, watch=watch)
+    settings = replace(options.settings, report=_say)
     try:
         with ExitStack() as stack:
             software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None

@@ -118,6 +118,10 @@ class NodeTransport:
             raise TransportError(reply.decode(errors="replace") or "the node has ended")
         return Burst(reply)
 
+    def is_ready(self) -> bool:
+        """Return False, since the node's frames are unknown."""
+        return False
+
     def is_at_rest(self) -> bool | None:
         """Return None, since the node's frames are unknown."""
         return None

@@ -15,9 +15,8 @@ from fusesoc_firm.node.description import NodeDescription, describe
 from fusesoc_firm.node.node import Node, NodeSettings
 from fusesoc_firm.node.player import Player
 from fusesoc_firm.node.queues import Overflow
-from fusesoc_firm.node.reopening import of_simulator
+from fusesoc_firm.node.reopening import checked, of_simulator
 from fusesoc_firm.node.software import node_software
-from fusesoc_firm.node.status import checked
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Watch
 from fusesoc_firm.request.core_reader import CoreFile

@@ -58,6 +58,9 @@ class SimulatedLine:
                     self._frames.extend(frame for frame in frames if frame is not None)
         return None
 
+    def is_ready(self) -> bool:
+        return False
+
     def is_at_rest(self) -> bool | None:
         return None
 

@@ -10,6 +10,7 @@ import tracemalloc
 
 import pytest
 
+from fusesoc_firm.node.carrier import Taken
 from fusesoc_firm.node.player import Player
 from fusesoc_firm.node.watch import Control, Latency, Percentiles, Watch
 
@@ -104,6 +105,7 @@ def test_a_player_is_paused_and_steps() -> None:
 
     def take() -> None:
         for event in player.receive():
+            assert isinstance(event, Taken)
             got.append(event.topic)
             more.release()
 
