@@ -89,11 +89,13 @@ architecture rtl of firm_sched_arrivals is
   signal is_known        : std_logic;
 
   -- A task that has finished in the last cycle and was known is recorded in this one.
-  signal finish_r          : std_logic;
-  signal finished_row_r    : row_t;
-  signal finished_column_r : columns_t;
-  signal old_finished      : columns_t;
-  signal new_finished      : columns_t;
+  signal finish_r         : std_logic;
+  signal finished_id_r    : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
+  signal recorded_row     : row_t;
+  signal recorded_column  : columns_t;
+  signal is_being_updated : std_logic;  -- the row that is read
+  signal old_finished     : columns_t;
+  signal new_finished     : columns_t;
 
 begin
 
@@ -156,8 +158,11 @@ begin
   own_of_next     <= gated(finished_column, is_in_next);
   own_of_batch    <= finished_column when row_r = finished_row else (others => '0');
 
-  row_finished <= read_finished xor finished_column_r when finish_r = '1' and next_row_r = finished_row_r else
-                  read_finished;
+  recorded_row     <= finished_id_r(ROW_BITS+COLUMN_BITS-1 downto COLUMN_BITS);
+  recorded_column  <= decode(finished_id_r(COLUMN_BITS-1 downto 0), '1', COLUMNS);
+  is_being_updated <= finish_r when next_row_r = recorded_row else '0';
+
+  row_finished <= read_finished xor gated(recorded_column, is_being_updated);
   row_known    <= row_accepted xor row_finished;
   row_new      <= row_asks and not row_known;
   load         <= not (any_of(batch_r) or clearing_r);
@@ -180,14 +185,13 @@ begin
 
   -- A finished requester is no longer known. A task that is dropped was known, too, or becomes known in this cycle.
   is_known     <= finished_known or any_of(batch_r and own_of_batch) or (load and is_in_next);
-  new_finished <= old_finished xor finished_column_r;
+  new_finished <= old_finished xor recorded_column;
 
   hold_finished : process (clk)
   begin
     if rising_edge(clk) then
-      finish_r          <= finished and is_known and rst_n;
-      finished_row_r    <= finished_row;
-      finished_column_r <= finished_column;
+      finish_r      <= finished and is_known and rst_n;
+      finished_id_r <= padded_id;
     end if;
   end process hold_finished;
 
@@ -198,7 +202,7 @@ begin
     )
     port map (
       clk          => clk,
-      address      => finished_row_r,
+      address      => recorded_row,
       read_word    => old_finished,
       write_enable => finish_r,
       write_word   => new_finished,

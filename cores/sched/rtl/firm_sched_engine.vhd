@@ -152,40 +152,47 @@ begin
   timed : if not HAS_STAMPS generate
     constant COLUMNS : positive := 2**column_bits_of(REQUESTERS);
     constant ROWS    : positive := 2**row_bits_of(REQUESTERS);
-    -- Descending, since an ascending index costs a subtraction in GHDL's netlist.
-    type offsets_t is array (natural range ROWS-1 downto 0) of key_t;
+    subtype words_t is std_logic_vector(ROWS*COLUMNS*KEY_BITS-1 downto 0);
 
-    function offsets_of_column(place : natural) return offsets_t is
-      variable table : offsets_t;
+    function words_of_offsets return words_t is
+      variable words : words_t;
     begin
-      for row in table'range loop
-        table(row) := std_logic_vector(to_signed(time_of(row*COLUMNS+place, OFFSETS), KEY_BITS));
+      for requester in 0 to ROWS*COLUMNS-1 loop
+        words((requester+1)*KEY_BITS-1 downto requester*KEY_BITS) :=
+          std_logic_vector(to_signed(time_of(requester, OFFSETS), KEY_BITS));
       end loop;
-      return table;
-    end function offsets_of_column;
+      return words;
+    end function words_of_offsets;
 
-    -- The column arrives late: the offsets of all columns are read, and it selects one.
-    type columns_t is array (natural range 0 to COLUMNS-1) of key_t;
-    signal of_columns : columns_t;
-    signal offset     : key_t;
+    constant OFFSET_WORDS : words_t := words_of_offsets;
+
+    signal of_row : std_logic_vector(COLUMNS*KEY_BITS-1 downto 0);
+    signal offset : key_t;
 
     signal time_r        : key_t;
     signal is_clearing   : std_logic;
     signal current_waits : std_logic;
     signal root_waits    : std_logic;
   begin
-    read_offsets : for place in columns_t'range generate
-      constant OFFSET_OF : offsets_t := offsets_of_column(place);
-    begin
-      of_columns(place) <= OFFSET_OF(to_integer(unsigned(a_row)));
-    end generate read_offsets;
+    -- The column arrives late, so it selects among the offsets of its row. Words of an array would become registers:
+    -- Yosys moves the row's across them.
+    u_of_row : entity firm.firm_axis_select
+      generic map (
+        WORDS => ROWS,
+        WIDTH => COLUMNS*KEY_BITS
+      )
+      port map (
+        words_in => OFFSET_WORDS,
+        index    => a_row,
+        word     => of_row
+      );
 
-    select_offset : process (of_columns, a_column)
+    select_offset : process (of_row, a_column)
       variable found : key_t;
     begin
       found := (others => '0');
-      for place in of_columns'range loop
-        found := found or gated(of_columns(place), a_column(place));
+      for place in a_column'range loop
+        found := found or gated(of_row((place+1)*KEY_BITS-1 downto place*KEY_BITS), a_column(place));
       end loop;
       offset <= found;
     end process select_offset;
