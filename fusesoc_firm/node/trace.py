@@ -21,7 +21,7 @@ from pathlib import Path
 from threading import RLock
 from time import monotonic_ns
 
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.description import NodeDescription, converter_names
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output
 
@@ -196,14 +196,6 @@ class Trace:
         clock = self._description.clock_hz
         nanoseconds = None if whole is None or not clock else round(whole * 1e9 / clock, 3)
         return _minus(last_in, first_in), _minus(first_out, last_in), _minus(last_out, first_out), nanoseconds
-
-
-def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:
-    """Return the names of the subscribers and of the publishers by id."""
-    return (
-        {item.id: item.block for item in description.inputs if item.id is not None},
-        {item.id: item.block for item in description.outputs if item.id is not None},
-    )
 
 
 def _minus(later: int | None, earlier: int | None) -> int | None:
