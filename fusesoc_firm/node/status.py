@@ -27,7 +27,7 @@ _MAGIC = 0x4D524946
 _VERSION = 1
 _SHAPE_ADDRESS, _FEATURES_ADDRESS = 0x04, 0x28
 _EVENTS = {"id_errors": "unknown ids", "link_errors": "link errors", "lost": "uncounted faults"}
-_CHANNEL_WORDS = {"frames": "frames", "longest_wait": "longest wait in cycles", "stamp": "time stamp in cycles"}
+_CHANNEL_WORDS = {"frames": "frames", "longest_wait": "longest wait in cycles"}
 # The highest word first.
 _DIGEST_ADDRESSES = tuple(DIGEST_ADDRESS + 4 * number for number in reversed(range(DIGEST_WORDS)))
 
