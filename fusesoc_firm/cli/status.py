@@ -22,7 +22,8 @@ def add_status(commands: Any) -> None:
     status.add_argument(
         "address",
         metavar="ADDRESS",
-        help="the transport to the hardware, or node:SYSTEM for the running node of a system",
+        help="the transport to the hardware, node:SYSTEM for the running node of a system, or axi:UIO for a status "
+        "with AXI4-Lite, such as axi:/dev/uio1",
     )
     status.add_argument(
         "--system", type=Path, metavar="SPEC", help="the system's specification, for names and to compare the digest"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware, middleware_of
-from fusesoc_firm.node.description import DEFAULT_DEPTH, NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.description import DEFAULT_DEPTH, NodeDescription, NodeTopic, channel_names, describe
 from fusesoc_firm.node.diagnostics import diagnostics_topic
 from fusesoc_firm.node.software_process import software_ports
 from fusesoc_firm.request.request import GeneratedFile
@@ -142,6 +142,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "subscribers": [_row(topic) for topic in description.subscribers],
         "publishers": [_row(topic) for topic in description.publishers],
         "diagnostics": _row(diagnostics_topic(description.versions[0])),
+        "channels": channel_names(description) if description.digest else [],
         "software": _software(loaded, description),
     }
 

@@ -132,6 +132,19 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
     )
 
 
+def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:
+    """Return the names of the subscribers and of the publishers by id."""
+    return (
+        {item.id: item.block for item in description.inputs if item.id is not None},
+        {item.id: item.block for item in description.outputs if item.id is not None},
+    )
+
+
+def channel_names(description: NodeDescription) -> list[str]:
+    """Return the names of the channels of the hardware's status: the subscribers by id, then the publishers by id."""
+    return [name for names in converter_names(description) for _, name in sorted(names.items())]
+
+
 def _parted(converters: Iterable[Converter], here: Collection[str]) -> tuple[list[Converter], tuple[Crossing, ...]]:
     """Split converters into those with topics and those without."""
     topics: list[Converter] = []

@@ -24,14 +24,21 @@ from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.calls import NodeCalls
 from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Lost, Published, Taken
-from fusesoc_firm.node.description import DEFAULT_DEPTH, Crossing, NodeDescription, NodeTopic
+from fusesoc_firm.node.description import (
+    DEFAULT_DEPTH,
+    Crossing,
+    NodeDescription,
+    NodeTopic,
+    channel_names,
+    converter_names,
+)
 from fusesoc_firm.node.diagnostics import INTERVAL_SECONDS, READING_SECONDS, Report
 from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.statistics import Statistics
 from fusesoc_firm.node.status import StatusWatch
 from fusesoc_firm.node.status_exchange import ANSWER_SECONDS, NO_ANSWER, StatusExchange
-from fusesoc_firm.node.trace import Entry, Trace, converter_names
+from fusesoc_firm.node.trace import Entry, Trace
 from fusesoc_firm.node.transport.transport import (
     Burst,
     LostFrameError,
@@ -233,7 +240,7 @@ class Node:
     def _diagnose(self) -> None:
         """Report the counts of the node, and those of the hardware's status, at intervals."""
         before = status_before = 0
-        watch = StatusWatch(self._read_word, [*self._subscriber_names.values(), *self._publisher_names.values()])
+        watch = StatusWatch(self._read_word, channel_names(self._description))
         while not self._is_wanted_to_end.wait(INTERVAL_SECONDS):
             dropped = {item.block: self._queues.dropped(number) for number, item in enumerate(self._inputs)}
             now = self.statistics.troubles() + sum(dropped.values())

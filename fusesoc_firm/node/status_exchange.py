@@ -14,6 +14,7 @@ from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.status_frames import answered
 
 # Hardware without a status drops the request as a frame with an unknown id.
+# Shorter than the time that `access` of node/status.py waits for the node.
 ANSWER_SECONDS = 5.0
 NO_ANSWER = "the hardware did not answer: it has no status, or is stalled"
 

@@ -24,10 +24,12 @@ from contextlib import suppress
 from types import TracebackType
 
 from fusesoc_firm.node.transport.open_transport import device_of, open_transport
+from fusesoc_firm.node.transport.status_registers import open_registers
 from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError
 from fusesoc_firm.system.status_frames import answered
 
 NODE = "node"
+_AXI = "axi"
 _PREFIX = b"\0firm status "
 _LONGEST_NAME = 90
 _LONGEST_PACKET = 1000
@@ -142,8 +144,12 @@ class NodeTransport:
 def open_status(address: str) -> Transport:
     """Return a transport for the status at an address: that of the node that uses it, or else one of its own.
 
-    `node:SYSTEM` is the running node of a system. May raise `TransportError`.
+    `node:SYSTEM` is the running node of a system, and `axi:UIO` a status with AXI4-Lite at a UIO device. May raise
+    `TransportError`.
     """
+    kind, _, device = address.partition(":")
+    if kind == _AXI and device:
+        return open_registers(device)
     is_node = address.startswith(f"{NODE}:")
     name = address if is_node else device_of(address)
     if name and (peer := _connected(name)):

@@ -22,7 +22,7 @@ from threading import RLock
 from time import monotonic_ns
 from typing import TextIO
 
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.description import NodeDescription, converter_names
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output
 
@@ -220,14 +220,6 @@ def _created(path: Path) -> TextIO:
         return path.open("w", newline="", encoding="utf-8")
     except OSError as error:
         fail(f"cannot write {path}: {error.strerror}")
-
-
-def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:
-    """Return the names of the subscribers and of the publishers by id."""
-    return (
-        {item.id: item.block for item in description.inputs if item.id is not None},
-        {item.id: item.block for item in description.outputs if item.id is not None},
-    )
 
 
 def _minus(later: int | None, earlier: int | None) -> int | None:

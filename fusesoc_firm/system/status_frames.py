@@ -5,7 +5,8 @@ from __future__ import annotations
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.system.derived.status import STATUS_ID
 
-_WRITE = 1 << 31
+# The bit of an address that makes an access a write.
+WRITE = 1 << 31
 _WORD_BYTES = 4
 
 
@@ -16,7 +17,7 @@ def read_request(address: int) -> bytes:
 
 def write_request(address: int, word: int) -> bytes:
     """Return the frame that writes a word to the register at an address."""
-    return _frame(address | _WRITE, word)
+    return _frame(address | WRITE, word)
 
 
 def status_answer(address: int, word: int) -> bytes:

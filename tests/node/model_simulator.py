@@ -1,5 +1,7 @@
 """A simulator's end of the pipe (docs/reference/transports.md) before a model of a system: each frame comes back.
 
+With `--word ADDRESS=WORD`, in hexadecimal digits, it has a status whose other registers are zero.
+
 It is started as a command. `--fault` says what is to go wrong, when the frame with number `--at` has been taken.
 """
 
@@ -16,6 +18,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from fusesoc_firm.node.bursts import split_frame
+from fusesoc_firm.system.status_frames import answered, status_answer
 
 FAULTS = ("exit", "kill", "cut", "garbage", "hang", "unsent", "backwards", "long", "deaf", "error", "later")
 
@@ -29,6 +32,7 @@ class Simulator:
     run_beats: int
     fault: str
     at: int
+    words: dict[int, int] = field(default_factory=dict)
     cycle: int = 0
     moved: int = 0
     taken: int = 0
@@ -62,6 +66,8 @@ class Simulator:
     def take(self, now: int) -> bytes:
         frame = self.waiting.popleft()
         self.begun = now
+        if self.words and (request := answered(frame)):
+            frame = status_answer(request[0], self.words.get(request[0], 0))
         runs = [self.run_beats] * ((self.beats(frame) - 1) // self.run_beats) if self.run_beats else []
         out = max(now + self.latency, self.out_free)
         for number, burst in enumerate(split_frame(frame, self.width, runs)):
@@ -113,9 +119,11 @@ def main() -> None:
     parser.add_argument("--run-beats", type=int, default=0, help="beats of a burst; 0: frames are whole")
     parser.add_argument("--fault", choices=FAULTS, default="")
     parser.add_argument("--at", type=int, default=0)
+    parser.add_argument("--word", action="append", default=[], metavar="ADDRESS=WORD")
     # The options of a real simulator are for its test bench.
     arguments, _ = parser.parse_known_args()
-    simulator = Simulator(arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at)
+    words = {int(address, 16): int(word, 16) for address, _, word in (item.partition("=") for item in arguments.word)}
+    simulator = Simulator(arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at, words)
     with open(3, "rb") as requests, open(4, "wb") as reports:
         reports.write(b"V\2")
         while (letter := requests.read(1)) not in (b"", b"Q"):

@@ -1,8 +1,9 @@
 // Speaks for firm/node.hpp, with a transport by its address: ADDRESS WIDTH SUBSCRIBERS PUBLISHERS DEPTH OVERFLOW RESTARTS
-// DRAIN_MS [TRACE]. A line for each `put SUBSCRIBER HEX`, and for `await COUNT`, which waits until so many payloads were
+// DRAIN_MS [TRACE [NAME]]. With NAME, the hardware has a status, which is served with it. A line for each `put SUBSCRIBER HEX`, and for `await COUNT`, which waits until so many payloads were
 // published; the end of the input stops the node. It writes a line for each payload that comes back, then what the node
 // has to say in the end.
 #include <firm/node.hpp>
+#include <firm/status_server.hpp>
 
 #include <fstream>
 #include <iostream>
@@ -83,10 +84,13 @@ int main(int, char** arguments) {
   configuration.longest_payload = 10'000'000;
   const std::chrono::milliseconds drain(std::stoul(arguments[8]));
   std::ofstream trace;
-  if (arguments[9]) {
-    trace.open(arguments[9]);
+  const std::string trace_path = arguments[9] ? arguments[9] : "";
+  if (!trace_path.empty()) {
+    trace.open(trace_path);
     configuration.trace = &trace;
   }
+  const std::string served = arguments[9] && arguments[10] ? arguments[10] : "";
+  configuration.has_status = !served.empty();
   std::ostringstream log;
   configuration.log = &log;
   std::ostringstream published;
@@ -96,6 +100,12 @@ int main(int, char** arguments) {
   const std::string address = arguments[1];
   firm::Node node(
       configuration, [&](const firm::TransportOptions& options) { return open(address, options); }, publish);
+  std::optional<firm::StatusServer> server;
+  if (!served.empty()) {
+    const auto access = [&](const firm::Bytes& request) { return node.access_status(request, std::chrono::seconds(2)); };
+    server.emplace(std::vector<std::string>{served}, access, log);
+    std::cout << "serves" << std::endl;
+  }
   int status = -1;
   std::thread engine([&] { status = node.run(); });
   feed(node);

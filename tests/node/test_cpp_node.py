@@ -5,14 +5,21 @@ from __future__ import annotations
 import csv
 import random
 import shlex
+import subprocess
 import sys
+import threading
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from uuid import uuid4
 
 import pytest
 
+from fusesoc_firm.node.status import access
+from fusesoc_firm.node.status_socket import open_status
+from fusesoc_firm.node.transport.transport import TransportError
+from fusesoc_firm.system.status_frames import write_request
 from tests.node.drivers import HERE, Driver, cpp_driver
 
 SEED = 20261121
@@ -101,6 +108,41 @@ def test_large_and_empty_payloads(node_driver: Driver) -> None:
     messages = [(0, b""), (1, source.randbytes(6_000_000)), (0, b"\0"), (1, b"")]
     outcome = run(node_driver, puts(messages), f"pipe:{SIMULATOR} --width 64", width=64)
     assert outcome.published == by_converter(messages)
+
+
+@pytest.mark.parametrize("sanitizers", ["address,undefined", pytest.param("thread", marks=pytest.mark.check)])
+def test_another_process_asks_for_the_status(tmp_path: Path, sanitizers: str) -> None:
+    """The model returns requests as they are, so the answer to a write is its word."""
+    print(f"seed {SEED}")
+    source = random.Random(SEED)
+    name, trace = f"node:model_{uuid4().hex[:8]}", tmp_path / "steps.csv"
+    messages = payloads_of(source, 2, 200, 100)
+    arguments = [f"pipe:{SIMULATOR}", "8", "2", "2", "10", "block", "0", "20000", str(trace), name]
+    with subprocess.Popen(
+        [cpp_driver("node", sanitizers).program, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdin and program.stdout
+        assert program.stdout.readline() == "serves\n"
+        feeder = threading.Thread(target=program.stdin.write, args=["\n".join([*puts(messages), ""])])
+        feeder.start()
+        with open_status(name) as transport:
+            for address in range(0, 400, 4):
+                word = source.randrange(2**32)
+                assert access(transport, write_request(address, word)) == word
+            transport.send(b"another frame")
+            with pytest.raises(TransportError, match="not a request of the status"):
+                transport.receive(20)
+        feeder.join()
+        rest, _ = program.communicate()
+    assert program.returncode == 0
+    said = dict(line.split(" ", 1) for line in rest.splitlines() if not line.startswith("published"))
+    assert (said["status"], said["sent"], said["errors"]) == ("0", "200", "0")
+    assert Counter(line.split(" ", 1)[1] for line in rest.splitlines() if line.startswith("published")) == Counter(
+        f"{converter} {payload.hex()}" for converter, payload in messages
+    )
+    with trace.open() as table:
+        steps = Counter(row["event"] for row in csv.DictReader(table))
+    assert (steps["taken"], steps["burst"]) == (200, 200)
 
 
 @pytest.mark.check

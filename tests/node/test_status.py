@@ -13,8 +13,9 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.reopening import checked
-from fusesoc_firm.node.status import access, read_status, status_text, write_word
+from fusesoc_firm.node.status import access, read_status, read_word, status_text, write_word
 from fusesoc_firm.node.transport.simulator import Simulator, SimulatorTransport
+from fusesoc_firm.node.transport.status_registers import open_registers
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
 from fusesoc_firm.system.message_sources import load_beside
@@ -144,3 +145,30 @@ def test_a_status_with_faults_is_text() -> None:
     assert "last fault: code 2 of right" in text
     assert "left   00000000         13      14 cycles  1 of code 1, 2 of code 2" in text
     assert "code 1: the length is not that of the message\n" in text
+
+
+def test_a_status_with_axi_lite_is_read_at_a_uio_device(tmp_path: Path) -> None:
+    """Files instead of the device."""
+    words = {0: 0x4D524946, 4: 0x01001001, 0x18: 5, **DIGEST}
+    maps = tmp_path / "sys/class/uio/uio7/maps/map0"
+    maps.mkdir(parents=True)
+    (maps / "size").write_text("0x10000\n")
+    (tmp_path / "dev").mkdir()
+    device = tmp_path / "dev" / "uio7"
+    device.write_bytes(b"".join(words.get(address, 0).to_bytes(4, "little") for address in range(0, 2**16, 4)))
+    with open_registers("/dev/uio7", tmp_path) as transport:
+        status = read_status(transport)
+        assert (status.words["id_errors"], status.digest) == (5, DESCRIPTION.digest)
+        write_word(transport, 0x10, 3)
+        assert read_word(transport, 0x10) == 3
+        with pytest.raises(TransportError, match="no register at 0x10000"):
+            read_word(transport, 2**16)
+    assert int.from_bytes(device.read_bytes()[0x10:0x14], "little") == 3
+    (maps / "size").write_text("0x1000\n")
+    with pytest.raises(TransportError, match="/dev/uio7 has a map of 4096 bytes; a status has 65536"):
+        open_registers("/dev/uio7", tmp_path)
+
+
+def test_a_missing_uio_device_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["status", "axi:/dev/uio_that_is_missing"]) == 1
+    assert "cannot use the status at /dev/uio_that_is_missing" in capsys.readouterr().err

@@ -21,24 +21,43 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
+from fusesoc_firm.system.message_sources import load_beside
+from fusesoc_firm.system.system_core import identity
 from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import LiveNode, model_address, paced, specification
 
 RATE, SECONDS = 1000, 30
+# Processes on a computer share the names of systems whose status they serve.
+NAME = f"qos_echo_{os.getpid()}"
 # The node's own queue is short, and what it publishes is kept.
-ECHO = """\
-project: {name: qos_echo, width: 64}
+ECHO = f"""\
+project: {{name: {NAME}, width: 64, status: frames}}
 blocks:
-  - {name: image_in, middleware: ROS, mode: subscriber, message: sensor_msgs/Image, qos: {depth: 3},
-     maxLength: 100000, outgoing: [{name: image_out}]}
-  - {name: image_out, middleware: ROS, mode: publisher, message: sensor_msgs/Image, qos: {depth: 1000}}
-  - {name: text_in, middleware: ROS, mode: subscriber, message: std_msgs/String, qos: {durability: transient_local},
-     maxLength: 100, outgoing: [{name: text_out}]}
-  - {name: text_out, middleware: ROS, mode: publisher, message: std_msgs/String,
-     qos: {profile: action_status_default}}
+  - {{name: image_in, middleware: ROS, mode: subscriber, message: sensor_msgs/Image, qos: {{depth: 3}},
+     maxLength: 100000, outgoing: [{{name: image_out}}]}}
+  - {{name: image_out, middleware: ROS, mode: publisher, message: sensor_msgs/Image, qos: {{depth: 1000}}}}
+  - {{name: text_in, middleware: ROS, mode: subscriber, message: std_msgs/String, qos: {{durability: transient_local}},
+     maxLength: 100, outgoing: [{{name: text_out}}]}}
+  - {{name: text_out, middleware: ROS, mode: publisher, message: std_msgs/String,
+     qos: {{profile: action_status_default}}}}
 """
+# The registers of the status: two subscribers, two publishers, three unknown ids, 17 texts of which two were too
+# long, and 16 back.
+STATUS = {0x0: 0x4D524946, 0x4: 0x01002002, 0x18: 3, 0x8074: 17, 0x805C: 2, 0x80F4: 16}
 PIXELS = 50_000
 MESSAGES = 400
+
+
+_BLOCKS = ("image_in", "text_in", "image_out", "text_out")
+HARDWARE = {
+    **{f"{block} {text}": 0 for block in _BLOCKS for text in ("frames", "longest wait in cycles")},
+    "unknown ids": 3,
+    "link errors": 0,
+    "uncounted faults": 0,
+    "text_in frames": 17,
+    "text_out frames": 16,
+    "text_in: the payload is longer than maxLength": 2,
+}
 
 
 @dataclass
@@ -50,14 +69,17 @@ class Place:
     programs: dict[Path, Path] = field(default_factory=dict)
 
     def specification(self) -> Path:
-        path = self.folder / "qos_echo.yaml"
+        path = self.folder / f"{NAME}.yaml"
         text = ECHO if self.ros.version == 1 else re.sub(r"\bROS\b", "ROS2", ECHO)
         path.write_text(text, encoding="utf-8")
         return path
 
     def node(self, kind: str) -> NodeProcess:
         """A node of this kind before a model of the hardware."""
-        address = model_address("--width", "64")
+        digest = identity(load_beside(self.specification(), [], None, needs_sources=False)).digest
+        words = {**STATUS, **{0x3C - 4 * place: int(digest[8 * place :][:8], 16) for place in range(4)}}
+        options = [word for address, value in words.items() for word in ("--word", f"{address:x}={value:x}")]
+        address = model_address("--width", "64", *options)
         if kind == "live":
             command = ["live", str(self.specification()), "--transport", address]
             return LiveNode(self.ros, self.folder / "node.log", command)
@@ -210,7 +232,7 @@ def test_a_peer_with_another_type_is_reported_once(place: Place, kind: str) -> N
 
 @check
 @both_kinds
-def test_counts_are_published_as_diagnostics(place: Place, kind: str) -> None:
+def test_counts_are_published_as_diagnostics(place: Place, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Two strings are in the counts of some later second; what was lost is a warning there, and only then."""
     image = place.type("sensor_msgs/Image")
     script = str(Path(__file__).with_name("diagnostics_peer.py"))
@@ -225,7 +247,11 @@ def test_counts_are_published_as_diagnostics(place: Place, kind: str) -> None:
             statuses = (json.loads(line) for line in watcher.stdout)
             peer.wait_until_connected()
             first = next(statuses)
-            assert (first["name"], first["level"]) == ("qos_echo: node", 0)
+            assert (first["name"], first["level"]) == (f"{NAME}: node", 0)
+            hardware = next(
+                status for status in statuses if status["name"] == f"{NAME}: hardware" and len(status["values"]) == 13
+            )
+            assert main(["status", f"node:{NAME}", "--system", str(place.specification())]) == 0
             for number in range(2):
                 peer.publish("/image_in", place.image(number))
                 peer.take()
@@ -233,11 +259,16 @@ def test_counts_are_published_as_diagnostics(place: Place, kind: str) -> None:
                 for number in range(2, MESSAGES):
                     peer.publish("/image_in", place.image(number))
                 peer.wait_until_published()
-            warning = next(status for status in statuses if status["level"])
-            calm = next(status for status in statuses if not status["level"])
+            own = (status for status in statuses if status["name"] == f"{NAME}: node")
+            warning = next(status for status in own if status["level"])
+            calm = next(status for status in own if not status["level"])
         finally:
             watcher.kill()
         assert node.stop() == 0
+    # A busy machine may take longer for an answer than the node waits.
+    hardware["values"].pop("accesses without an answer")
+    assert hardware["values"] == {name: str(count) for name, count in HARDWARE.items()}
+    assert re.search(r"text_in +\w{8} +17 +0 cycles  2 of code 7\n", capsys.readouterr().out)
     prefix = "image_in " if kind == "live" else ""
     assert warning["level"] == 1
     assert int(first["values"][prefix + "received"]) == 0

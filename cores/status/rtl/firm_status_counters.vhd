@@ -54,8 +54,8 @@ entity firm_status_counters is
     -- The counter of the time stamps; zeros without them.
     cycles : out std_logic_vector(31 downto 0);
 
-    -- The word at an address, two cycles later: the channel, then four bits. These are a code, 13 for the frames, 14 for
-    -- the longest wait, or 15 for the time stamp.
+    -- The word at an address, two cycles later: the channel, then four bits. These are a code, 13 for the frames, 14
+    -- for the longest wait, or 15 for the time stamp.
     read_address : in  std_logic_vector(12 downto 0);
     read_word    : out std_logic_vector(31 downto 0)
   );

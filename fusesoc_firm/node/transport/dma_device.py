@@ -51,8 +51,8 @@ class DmaDevice(Registers, Protocol):
         """Wake all threads that wait, now and later."""
 
 
-class _MappedRegisters:
-    """The registers in the first map of a UIO device."""
+class MappedRegisters:
+    """The registers in the first map of a UIO device, open as `file`."""
 
     def __init__(self, file: int, size: int) -> None:
         self._words = memoryview(mmap.mmap(file, size)).cast("I")
@@ -88,7 +88,7 @@ class LinuxDmaDevice:
         if not about.is_dir():
             # The path that older releases of u-dma-buf use.
             about = root / "sys/class/udmabuf" / buffer
-        self._address, size = _number(about / "phys_addr"), _number(about / "size")
+        self._address, size = number_in(about / "phys_addr"), number_in(about / "size")
         if self._address + size > _REACH:
             raise TransportError(f"{buffer} ends beyond the 4 GiB that the DMA engine reaches")
         if self._address % DMA_ALIGNMENT:
@@ -98,7 +98,7 @@ class LinuxDmaDevice:
         try:
             (about / "sync_mode").write_text(_WRITE_COMBINE, encoding="ascii")
             self._interrupt = os.open(device, os.O_RDWR | os.O_SYNC)
-            self._registers = registers or _MappedRegisters(self._interrupt, _number(maps / "size"))
+            self._registers = registers or MappedRegisters(self._interrupt, number_in(maps / "size"))
             shared = os.open(root / "dev" / buffer, os.O_RDWR | os.O_SYNC)
             try:
                 self._memory = memoryview(mmap.mmap(shared, size))
@@ -144,7 +144,7 @@ class LinuxDmaDevice:
         os.close(self._woken)
 
 
-def _number(path: Path) -> int:
+def number_in(path: Path) -> int:
     """Return the number in a device's single-line file."""
     try:
         text = path.read_text(encoding="ascii").strip()

@@ -18,11 +18,13 @@
 
 namespace firm {
 
-// The state of a part of the system, by its name: whether some count of trouble has grown, and the counts.
+// The state of a part of the system, by its name: the counts, the number of troubles among them, and whether it has
+// grown.
 struct Report {
   std::string name;
-  bool is_warning = false;
   std::vector<std::pair<std::string, std::uint64_t>> counts{};
+  std::uint64_t troubles = 0;
+  bool is_warning = false;
 };
 
 class Diagnostics {
@@ -78,14 +80,14 @@ class Diagnostics {
 inline Report report_of(const std::string& name, const Node& node, std::uint64_t lost = 0) {
   const NodeStatistics counted = node.statistics();
   return {name,
-          false,
           {{"received", counted.received},
            {"dropped", counted.dropped},
            {"sent", counted.sent},
            {"published", counted.published},
            {"errors", counted.errors},
            {"restarts", counted.restarts},
-           {"lost", lost}}};
+           {"lost", lost}},
+          counted.dropped + counted.errors + counted.restarts + lost};
 }
 
 // Publishes reports each second, with a warning if a count of trouble has grown.
@@ -108,24 +110,15 @@ class Diagnosis {
     if (!publish_ || now < next_) return;
     next_ = now + std::chrono::seconds(1);
     for (Report& report : make_reports()) {
-      const std::uint64_t troubles = troubles_of(report);
       std::uint64_t& before = troubles_[report.name];
-      report.is_warning = troubles > before;
-      before = troubles;
+      report.is_warning = report.troubles > before;
+      before = report.troubles;
       const auto& message = writer_.message(report, std::chrono::system_clock::now());
       publish_(message.data(), message.size());
     }
   }
 
  private:
-  static std::uint64_t troubles_of(const Report& report) {
-    std::uint64_t sum = 0;
-    for (const auto& [key, count] : report.counts) {
-      if (key == "dropped" || key == "errors" || key == "restarts" || key == "lost") sum += count;
-    }
-    return sum;
-  }
-
   Diagnostics writer_;
   MessageHandler publish_;
   std::chrono::steady_clock::time_point next_{};

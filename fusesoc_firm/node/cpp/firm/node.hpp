@@ -31,6 +31,7 @@
 #include <firm/bursts.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/queues.hpp>
+#include <firm/status_exchange.hpp>
 #include <firm/trace.hpp>
 #include <firm/transport.hpp>
 
@@ -49,6 +50,7 @@ struct NodeConfiguration {
   std::chrono::nanoseconds restart_delay = std::chrono::milliseconds(500);
   // Hardware that cannot report that it is at rest counts as at rest after this time without output.
   std::chrono::nanoseconds settling_time = std::chrono::milliseconds(200);
+  bool has_status = false;        // the hardware has a status that is accessed by frames
   std::ostream* log = nullptr;    // one line per fault
   std::ostream* trace = nullptr;  // CSV, one line per step of a message (firm/trace.hpp)
 };
@@ -75,7 +77,8 @@ class Node {
         publish_(std::move(publish)),
         queues_(depths(configuration_),
                 configuration_.policy ? configuration_.policy() : nullptr, configuration_.overflow),
-        trace_(configuration_.trace) {}
+        trace_(configuration_.trace),
+        status_([this](const Bytes& request) { put_request(request); }) {}
 
   // Create the transport from its address (firm/open_transport.hpp).
   Node(NodeConfiguration configuration, const std::string& address, Publish publish)
@@ -148,6 +151,13 @@ class Node {
     changed_.wait(lock, [this] { return has_ended_ || !has_begun_; });
   }
 
+  // Return the answer of the hardware's status to a request (firm/status_exchange.hpp). Any thread except that of
+  // `publish` may call this function. Throws TransportError if there is no answer in time.
+  Bytes access_status(const Bytes& request, std::chrono::nanoseconds patience = std::chrono::seconds(5)) {
+    if (!configuration_.has_status) throw TransportError("the system has no 'status: frames'");
+    return status_.access(request, patience);
+  }
+
   NodeStatistics statistics() const {
     NodeStatistics statistics;
     statistics.received = received_;
@@ -171,6 +181,7 @@ class Node {
   struct Numbered {
     std::uint64_t number;
     Bytes frame;
+    bool is_request = false;  // of the status, instead of a payload
   };
   // The maximum time until the sender notices that the receiver has failed.
   static constexpr std::chrono::milliseconds kGlance{50};
@@ -188,7 +199,19 @@ class Node {
   static std::vector<std::size_t> depths(const NodeConfiguration& configuration) {
     std::vector<std::size_t> found(configuration.subscribers, configuration.queue_depth);
     for (const auto& [subscriber, depth] : configuration.queue_depths) found.at(subscriber) = depth;
+    // The last queue is that of the status.
+    if (configuration.has_status) found.push_back(1);
     return found;
+  }
+
+  void put_request(const Bytes& request) {
+    bool is_queued = false;
+    try {
+      is_queued = queues_.put(configuration_.subscribers, {0, request, true}, std::chrono::nanoseconds(0));
+    } catch (const ClosedError&) {
+      throw TransportError("the node is ending");
+    }
+    if (!is_queued) throw TransportError(kNoStatusAnswer);
   }
 
   // --- a session: one transport from start to end ---------------------------------------------------------------------
@@ -254,6 +277,12 @@ class Node {
         unsent_ = std::move(next->item);
       }
       const Bytes& frame = unsent_->frame;
+      if (unsent_->is_request) {
+        trace_.sending_other();
+        transport.send(frame.data(), frame.size());
+        unsent_.reset();
+        continue;
+      }
       const unsigned subscriber = frame[0];
       const std::size_t size = frame.size() - kFrameHeaderBytes;
       trace_.sending(subscriber, unsent_->number, size);
@@ -278,6 +307,7 @@ class Node {
     BurstJoiner joiner(configuration_.publishers, configuration_.width, configuration_.longest_payload);
     try {
       while (const auto burst = transport.receive()) {
+        if (configuration_.has_status && status_.take(burst->data)) continue;
         moved_ = steady_nanoseconds();
         take(joiner, *burst);
       }
@@ -351,6 +381,7 @@ class Node {
   const Publish publish_;
   SubscriberQueues<Numbered> queues_;
   Trace trace_;
+  StatusExchange status_;
   std::optional<Numbered> unsent_;  // used by the sender only
 
   std::atomic<std::uint64_t> received_{0}, sent_{0}, published_{0}, errors_{0};

@@ -29,6 +29,8 @@
 #include <firm/node.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/status.hpp>
+#include <firm/status_server.hpp>
+#include <firm/status_watch.hpp>
 #include <firm/topic.hpp>
 
 namespace firm {
@@ -57,6 +59,7 @@ struct System {
   std::vector<Topic> subscribers;
   std::vector<Topic> publishers;
   Topic diagnostics;
+  std::vector<std::string> channels{};  // of the status, the subscribers first
   Software software{};
 
   bool has_software() const { return !software.inputs.empty(); }
@@ -232,6 +235,7 @@ class Engines {
     }
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
+    configuration.has_status = !system.digest.empty();
     configuration.log = &std::cerr;
     configuration.trace = trace;
     hardware_ = std::make_unique<Node>(configuration, opener(system, arguments.transport), by_id(from_hardware_));
@@ -245,6 +249,7 @@ class Engines {
     configuration.subscribers = static_cast<unsigned>(inputs.size());
     configuration.publishers = static_cast<unsigned>(outputs.size());
     configuration.trace = nullptr;
+    configuration.has_status = false;
     configuration.queue_depths.clear();
     software_ = std::make_unique<Node>(configuration, "software:" + arguments.software, by_id(from_software_));
     for (unsigned id = 0; id < inputs.size(); ++id) {
@@ -317,6 +322,11 @@ class Engines {
   std::unique_ptr<Node> software_;
 };
 
+// Return the word of a register of an engine's hardware. Throws TransportError.
+inline std::uint32_t word_at(Node& node, std::uint32_t address) {
+  return little_endian(node.access_status(status_request(address, 0), std::chrono::seconds(1)), kFrameHeaderBytes + 4);
+}
+
 // Print an engine's counts.
 // `lost` messages were published, but ROS did not deliver them.
 inline void print_statistics(const std::string& name, const Node& node, std::uint64_t lost = 0) {
@@ -350,11 +360,19 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   RunningNode hardware(engines.hardware(), arguments.drain);
   std::optional<RunningNode> software;
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
+  std::optional<StatusWatch> watch;
+  std::optional<StatusServer> server;
+  if (!system.digest.empty()) {
+    const auto access = [&](const Bytes& request) { return engines.hardware().access_status(request); };
+    server.emplace(served_names(system.name, arguments.transport), access, std::cerr);
+    watch.emplace([&](std::uint32_t address) { return word_at(engines.hardware(), address); }, system.channels);
+  }
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
   Diagnosis diagnosis(ros, system.diagnostics);
   while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
     diagnosis.tell([&] {
       std::vector<Report> reports{report_of(system.name + ": node", engines.hardware(), ros.lost())};
+      if (watch) reports.push_back(watch->report(system.name + ": hardware"));
       if (engines.software()) reports.push_back(report_of(system.name + ": software", *engines.software()));
       return reports;
     });

@@ -6,7 +6,7 @@
 //     status.channels[0].faults[1];                 // frames of subscriber 0 that ended early (firm/faults.hpp)
 //
 // The hardware tells its dimensions, so no specification is needed. While a node uses the transport, nothing else may
-// read it. The counterpart in Python is fusesoc_firm/node/status.py. C++17, no dependencies except POSIX.
+// read it, and Node::access_status takes its place. The counterpart in Python is fusesoc_firm/node/status.py. C++17, no dependencies except POSIX.
 #pragma once
 
 #include <array>
@@ -17,11 +17,11 @@
 #include <string>
 #include <vector>
 
+#include <firm/status_exchange.hpp>
 #include <firm/transport.hpp>
 
 namespace firm {
 
-constexpr std::uint8_t kStatusId = 255;
 // The highest code of a fault; `ChannelStatus::faults` begins with the unused code 0.
 constexpr std::size_t kFaultCodes = 12;
 
@@ -65,7 +65,8 @@ struct Status {
 // Accesses registers one after the other.
 class StatusAccess {
  public:
-  explicit StatusAccess(Transport& transport, std::chrono::nanoseconds patience = std::chrono::seconds(5))
+  // A simulator may have to start first, on a busy machine.
+  explicit StatusAccess(Transport& transport, std::chrono::nanoseconds patience = std::chrono::seconds(20))
       : transport_(transport), patience_(patience) {}
 
   // Return the word of the register at an address. Throws TransportError if there is no answer.
@@ -76,37 +77,18 @@ class StatusAccess {
 
  private:
   static constexpr std::uint32_t kWrite = 1u << 31;
-  static constexpr std::size_t kPayloadBytes = 8;
 
   // Frames other than the answer are dropped.
   std::uint32_t access(std::uint32_t address, std::uint32_t word) {
-    Bytes request(kPayloadBytes);
-    put(request, 0, address);
-    put(request, 4, word);
-    request = pack_frame(kStatusId, request.data(), request.size());
+    const Bytes request = status_request(address, word);
     transport_.send(request.data(), request.size());
     const auto end = std::chrono::steady_clock::now() + patience_;
     for (auto left = patience_; left.count() > 0; left = end - std::chrono::steady_clock::now()) {
       const auto burst = transport_.receive(left);
       if (!burst) break;
-      if (is_answer(burst->data, address)) return word_of(burst->data, kFrameHeaderBytes + 4);
+      if (status_address(burst->data) == address) return little_endian(burst->data, kFrameHeaderBytes + 4);
     }
-    throw TransportError("the hardware did not answer: it has no status, or is stalled");
-  }
-
-  static bool is_answer(const Bytes& frame, std::uint32_t address) {
-    return frame.size() == kFrameHeaderBytes + kPayloadBytes && frame[0] == kStatusId &&
-           payload_length(frame.data()) == kPayloadBytes && word_of(frame, kFrameHeaderBytes) == address;
-  }
-
-  static void put(Bytes& bytes, std::size_t place, std::uint32_t word) {
-    for (unsigned shift = 0; shift < 32; shift += 8) bytes[place++] = static_cast<std::uint8_t>(word >> shift);
-  }
-
-  static std::uint32_t word_of(const Bytes& bytes, std::size_t place) {
-    std::uint32_t word = 0;
-    for (unsigned shift = 0; shift < 32; shift += 8) word |= static_cast<std::uint32_t>(bytes[place++]) << shift;
-    return word;
+    throw TransportError(kNoStatusAnswer);
   }
 
   Transport& transport_;

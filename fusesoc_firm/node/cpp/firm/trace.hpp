@@ -40,7 +40,14 @@ class Trace {
   void sending(unsigned converter, std::uint64_t message, std::size_t bytes) {
     if (!stream_) return;
     const std::lock_guard<std::mutex> lock(mutex_);
-    sent_.push_back({converter, message, bytes});
+    sent_.push_back(Message{converter, message, bytes});
+  }
+
+  // Record that a frame other than a message is being sent to the hardware.
+  void sending_other() {
+    if (!stream_) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    sent_.push_back(std::nullopt);
   }
 
   // Record that simulated hardware took the next sent message.
@@ -48,7 +55,7 @@ class Trace {
     if (!stream_) return;
     const std::lock_guard<std::mutex> lock(mutex_);
     if (sent_.empty()) return;
-    write_line("taken", sent_.front(), cycles);
+    if (sent_.front()) write_line("taken", *sent_.front(), cycles);
     sent_.pop_front();
   }
 
@@ -76,7 +83,7 @@ class Trace {
 
   std::ostream* stream_;
   std::mutex mutex_;
-  std::deque<Message> sent_;  // but not yet taken
+  std::deque<std::optional<Message>> sent_;  // but not yet taken; nothing for other frames
 };
 
 }  // namespace firm
