@@ -4,6 +4,7 @@
 sees programs that are linked statically and system calls without the C library, and needs no compiler. It does not see:
 
 * reads by the kernel: the dynamic linker and a script's interpreter; the interpreter in a script's first line is added
+* a path of which a program reads only where it links to: a compiler does this for each part of each header's path
 * files that were open before the step started, and shared memory
 * work that a server does for the step on a local socket
 """
@@ -26,8 +27,7 @@ from typing import IO
 _CALLS = (
     "open,openat,openat2,creat,execve,execveat,chdir,fchdir,clone,clone3,fork,vfork,connect,bind,sendto,sendmsg,"
     "unlink,unlinkat,rmdir,rename,renameat,renameat2,mkdir,mkdirat,link,linkat,symlink,symlinkat,truncate,chmod,"
-    "fchmodat,utime,utimes,futimesat,utimensat,mknod,mknodat,stat,lstat,newfstatat,statx,access,faccessat,faccessat2,"
-    "readlink,readlinkat"
+    "fchmodat,utime,utimes,futimesat,utimensat,mknod,mknodat,stat,lstat,newfstatat,statx,access,faccessat,faccessat2"
 )
 # From <sys/personality.h>.
 _ADDR_NO_RANDOMIZE = 0x0040000
@@ -35,12 +35,12 @@ _OPEN = frozenset("open openat openat2 creat".split())
 _EXEC = frozenset("execve execveat".split())
 _FORK = frozenset("clone clone3 fork vfork".split())
 _NETWORK = frozenset("connect bind sendto sendmsg".split())
-_ASK = frozenset("stat lstat newfstatat statx access faccessat faccessat2 readlink readlinkat".split())
+_ASK = frozenset("stat lstat newfstatat statx access faccessat faccessat2".split())
 _TO_WRITE = re.compile(r"O_(?:WRONLY|RDWR|CREAT|TRUNC)")
 
 _CALL = re.compile(r"(\w+)\((.*)\) += (-?\d+|\?)(?:<((?:[^>\\]|\\.)*)>)?(?: (E\w+))?")
 # The most frequent call, a question about an absolute path, which needs nothing else of the line.
-_QUESTION = re.compile(r'(?:newfstatat|stat|lstat|access|readlink)\((?:(?:AT_FDCWD|\d+)<[^>\\]*>, )?"(/[^"\\]*)".* = ')
+_QUESTION = re.compile(r'(?:newfstatat|stat|lstat|access)\((?:(?:AT_FDCWD|\d+)<[^>\\]*>, )?"(/[^"\\]*)".* = ')
 _UNFINISHED = re.compile(r"(.*?) <unfinished \.\.\.>$")
 _RESUMED = re.compile(r"<\.\.\. (\w+) resumed>(.*)")
 # A path, with the folder to which it is relative if the call names one.

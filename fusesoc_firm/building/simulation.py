@@ -27,18 +27,23 @@ _CYCLES = re.compile(r" +(\d+) cycles first beat in to last beat out, (-?\d+) la
 _VERDICT = re.compile(r"(PASS|FAIL) \d+/\d+")
 _FAULT = re.compile(r"fault in cycle \d+: |nothing moved |missing: |and \d+ more faults")
 # The first line of the host's report.
+_WRONG = re.compile(r"fault in cycle \d+: '(\S+) \S+ ?(.*)': byte ")
 _BEGIN = re.compile(r"seed \d+, ")
 
 
 @dataclass
 class Message:
-    """A sent message and its responses as texts; the cycles are unknown (-1) without a response."""
+    """A sent message and its responses as texts; the cycles are unknown (-1) without a response.
+
+    `is_wrong` is True if the hardware sent other bytes than one of these responses.
+    """
 
     number: int
     sent: str
     received: list[str] = field(default_factory=list)
     cycles: int = -1
     latency: int = -1
+    is_wrong: bool = False
 
 
 @dataclass
@@ -54,6 +59,7 @@ class Report:
     summary: list[str] = field(default_factory=list)
     verdict: str = ""
     status: int = 0
+    _wrong: list[str] = field(default_factory=list)
 
     @property
     def is_good(self) -> bool:
@@ -70,14 +76,23 @@ class Report:
             self.messages.append(Message(int(match[1]), f"{match[2]} {match[3]}".strip()))
         elif (match := _RESPONSE.fullmatch(line)) and self.messages:
             self.messages[-1].received.append(f"{match[1]} {match[2]}".strip())
+            self.messages[-1].is_wrong |= self._take_wrong(f"{match[1]} {match[2]}")
         elif (match := _CYCLES.fullmatch(line)) and self.messages:
             self.messages[-1].cycles, self.messages[-1].latency = int(match[1]), int(match[2])
         elif _VERDICT.fullmatch(line):
             self.verdict = line
         elif _FAULT.match(line) or "error" in line:
             self.faults.append(line)
+            if match := _WRONG.match(line):
+                self._wrong.append(f"{match[1]} {match[2]}")
         elif line.endswith("last beat out") or line.startswith("in: "):
             self.summary.append(line)
+
+    def _take_wrong(self, response: str) -> bool:
+        """Return whether a fault in a response with this text was reported, which comes before the response itself."""
+        if is_wrong := response in self._wrong:
+            self._wrong.remove(response)
+        return is_wrong
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def _copy_example(arguments: argparse.Namespace) -> None:
 
 def _start(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.library import libraries
-    from fusesoc_firm.system.scaffold.project import create
+    from fusesoc_firm.system.scaffold.project import LANGUAGES, create
     from fusesoc_firm.tools.library_path import library_root
 
     recording = _recording(arguments)
@@ -119,6 +119,8 @@ def _start(arguments: argparse.Namespace) -> None:
         project = replace(project, stimuli=recording.stimuli(project, known[recording.ros], arguments.limit))
     folder = Path(project.name)
     _print_files(folder, create(project, folder, known, library_root(), arguments.path))
+    source = LANGUAGES[project.language].source.format(project.name)
+    print(f"edit: {folder / source} (the computation), {folder / 'model.py'} (the responses that it must give)")
     print(f"next: cd {folder} && firm sim")
 
 

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _MOST_MESSAGES, _MOST_LINES = 10, 30
 _NARROWEST = 60
+# The mark before the number of a message with a wrong response.
+_WRONG = "!"
 # GHDL's errors begin with a place only.
 _ERROR = re.compile(r"(?:\b|:)error\b|\(assertion failure\)|^Traceback|^\S+:\d+:\d+: ", re.IGNORECASE)
 # The block's name, or a field with its value.
@@ -218,25 +220,29 @@ def _with_fields(chosen: Simulation, faults: Sequence[str], loaded: LoadedSystem
 
 
 def _print_messages(report: Report) -> None:
-    """Print a table of the first messages: cycles from the first beat in, latency, message and responses.
+    """Print a table of messages: cycles from the first beat in, latency, message and responses.
 
-    The host reports each response as the model expects it; a difference is one of the faults.
+    The table contains the first messages, and the first ones with a wrong response, which have a mark. The host reports
+    each response as the model expects it; a difference is one of the faults.
     """
     messages = report.messages
+    wrong = [item for item in messages[_MOST_MESSAGES:] if item.is_wrong][:_MOST_MESSAGES]
     width = max((terminal_width() - 26) // 2, _NARROWEST // 2)
     responses = "received" if report.is_good else "expected"
     print(f"{'message':>7}  {'cycles':>6}  {'latency':>7}  {'sent':{width}}  {responses}")
-    for item in messages[:_MOST_MESSAGES]:
+    for item in (*messages[:_MOST_MESSAGES], *wrong):
         cycles, latency = (
             "" if value < 0 and not item.received else str(value) for value in (item.cycles, item.latency)
         )
         texts = [item.sent, *(item.received or ["-"])]
         sent, *received = texts if max(map(len, texts)) <= width else _telling(texts)
-        print(f"{item.number:7}  {cycles:>6}  {latency:>7}  {_cut(sent, width):{width}}  {_cut(received[0], width)}")
+        number = f"{_WRONG if item.is_wrong else ''}{item.number}"
+        line = f"{number:>7}  {cycles:>6}  {latency:>7}  {_cut(sent, width):{width}}  {_cut(received[0], width)}"
+        print(coloured(line, is_good=False) if item.is_wrong else line)
         for further in received[1:]:
             print(f"{'':{26 + width}}{_cut(further, width)}")
-    if len(messages) > _MOST_MESSAGES:
-        print(f"    ... {len(messages) - _MOST_MESSAGES} more in the log")
+    if (more := len(messages) - _MOST_MESSAGES - len(wrong)) > 0:
+        print(f"    ... {more} more in the log")
 
 
 def _telling(messages: Sequence[str]) -> list[str]:

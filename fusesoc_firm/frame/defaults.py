@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
 from fusesoc_firm.frame.decoder import decode
 from fusesoc_firm.frame.encoder import encode
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node
-from fusesoc_firm.frame.values import MessageValue, leaf_of, part_of, put, put_leaf
+from fusesoc_firm.frame.values import CodecError, MessageValue, leaf_of, part_of, put, put_leaf
 from fusesoc_firm.message.model import Scalar
 
 
@@ -60,9 +60,35 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
 
 
 def completed(frame: Frame, message: MessageValue) -> MessageValue:
-    """Return the message with added values for missing unused fields: the default, zero or empty."""
-    filled: MessageValue = _filled(_as_sent(frame.nodes, message, 0), message)
+    """Return the message with added values for missing fields: the default, zero or empty."""
+    filled: MessageValue = _filled(_whole(frame.nodes, message, 0), message)
     return filled
+
+
+def _whole(nodes: Sequence[Node], value: Any, depth: int) -> dict[str, Any]:
+    """Return the values of all fields of a message, or of an element at the end of `depth` names.
+
+    Fields have their defaults, zero or empty, and variable parts the number of elements in `value`.
+    """
+    sent: dict[str, Any] = {}
+    for node in nodes:
+        if isinstance(node, Fixed):
+            for leaf in node.fields:
+                if leaf.count:
+                    put_leaf(sent, leaf.path[depth:], _defaults(leaf))
+        elif isinstance(node, Data | Loop):
+            put(sent, node.path[depth:], _whole_part(node, value, depth))
+    return sent
+
+
+def _whole_part(node: Data | Loop, value: Any, depth: int) -> Any:
+    try:
+        given = part_of(value, node, depth)
+    except CodecError:
+        return _part_as_sent(node, _whole)
+    if isinstance(node, Loop) and isinstance(given, list | tuple) and not _holds_texts(node):
+        return [_whole(node.body, item, len(node.path)) for item in given]
+    return given
 
 
 def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
@@ -75,7 +101,7 @@ def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
                     if not leaf.is_used and leaf.count:
                         put_leaf(sent, leaf.path[depth:], _defaults(leaf))
             case Data() | Loop() if not node.is_used:
-                put(sent, node.path[depth:], _part_as_sent(node))
+                put(sent, node.path[depth:], _part_as_sent(node, _as_sent))
             case Loop():
                 elements = part_of(value, node, depth)
                 if isinstance(elements, list | tuple) and not _holds_texts(node):
@@ -83,13 +109,13 @@ def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
     return sent
 
 
-def _part_as_sent(node: Data | Loop) -> Any:
-    """Return the value sent for an unused part."""
+def _part_as_sent(node: Data | Loop, element_of: Callable[[Sequence[Node], Any, int], Any]) -> Any:
+    """Return the value sent for a part without a value."""
     if node.default is not None:
         return node.default
     if isinstance(node, Data):
         return [] if node.kind is DataKind.ARRAY else ""
-    element = "" if _holds_texts(node) else _as_sent(node.body, {}, len(node.path))
+    element = "" if _holds_texts(node) else element_of(node.body, {}, len(node.path))
     return [element] * (node.count or 0)
 
 

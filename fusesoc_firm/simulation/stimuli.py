@@ -4,7 +4,7 @@ A YAML file is a list; each item consists of the name of a subscriber's block an
 
     - QuaternionToEuler_sub: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
 
-Fields for which the subscriber has no port may be omitted; they are sent with their defaults, or as zero or empty.
+Fields may be omitted; they are sent with their defaults, or as zero or empty, as `ros2 topic pub` does.
 """
 
 from __future__ import annotations

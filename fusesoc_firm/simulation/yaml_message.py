@@ -28,8 +28,7 @@ _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
 class _Branch:
     """A field, each element of which is a value of `type`, a `text`, or a message with `fields`.
 
-    An array of fixed size has `count` elements; `array` describes an array of variable size. A field is required if it
-    `is_used` or if one of its `fields` is required.
+    An array of fixed size has `count` elements; `array` describes an array of variable size.
     """
 
     count: int | None = None
@@ -37,7 +36,6 @@ class _Branch:
     type: WireType | None = None
     text: Data | None = None
     fields: dict[str, _Branch] = field(default_factory=dict)
-    is_used: bool = False
 
     def at(self, path: Path) -> _Branch:
         """Return the field at a path."""
@@ -46,18 +44,13 @@ class _Branch:
             branch = branch.fields.setdefault(step.name, _Branch(step.count))
         return branch
 
-    @property
-    def is_needed(self) -> bool:
-        """Return whether a port exists for the field or a part of it."""
-        return self.is_used or any(branch.is_needed for branch in self.fields.values())
-
 
 def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnostics) -> dict[str, Any]:
     """Return the message of `frame` in a node; note faults and omit the faulty values.
 
-    Unused fields may be missing.
+    Fields may be missing, and so may be all of them.
     """
-    if is_null(node) and not frame.names:
+    if is_null(node):
         return {}
     reader = _Reader(text, faults, str(frame.message))
     return reader.message(node, _tree(frame), "")
@@ -69,17 +62,15 @@ def _tree(frame: Frame) -> _Branch:
         match node:
             case Fixed(fields=fields):
                 for leaf in fields:
-                    branch = root.at(leaf.path)
-                    branch.type, branch.is_used = leaf.type, leaf.is_used
+                    root.at(leaf.path).type = leaf.type
             case Data(kind=DataKind.ARRAY):
                 branch = root.at(node.path)
-                branch.array, branch.type, branch.is_used = node, node.element, node.is_used
+                branch.array, branch.type = node, node.element
             case Data():
-                branch = root.at(node.path)
-                branch.text, branch.is_used = node, node.is_used
+                root.at(node.path).text = node
             case Loop():
                 branch = root.at(node.path)
-                branch.count, branch.array, branch.is_used = node.count, node, node.is_used
+                branch.count, branch.array = node.count, node
     return root
 
 
@@ -99,17 +90,11 @@ class _Reader:
             self._error(f"{what} must be a mapping of fields, not {kind(node)}", node, f"legal fields: {fields}")
             return {}
         found: dict[str, Any] = {}
-        hints = []
         for key, key_node, value in items(self.text, node, self.faults):
             if key in branch.fields:
                 found[str(key)] = self._field(value, branch.fields[key], f"{path}.{key}" if path else str(key))
             else:
-                hints.append(nearest(key, branch.fields))
-                self._error(f"{what} has no field '{key}'", key_node, hints[-1])
-        needed = [name for name, field in branch.fields.items() if field.is_needed]
-        missing = [name for name in needed if name not in found and f"did you mean '{name}'?" not in hints]
-        if missing:
-            self._error(f"{what} needs a value for {', '.join(missing)}", node)
+                self._error(f"{what} has no field '{key}'", key_node, nearest(key, branch.fields))
         return found
 
     def _field(self, node: yaml.Node, branch: _Branch, path: str) -> Any:

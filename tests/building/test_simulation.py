@@ -25,6 +25,10 @@ seed 3, stalls 25 %, 8 bits; to repeat: -gSEED=3 -gSTALL_PERCENT=25
     93 cycles first beat in to last beat out, -4 last beat in to first beat out
   1 > sub std_msgs/Empty
 fault in cycle 300: 'pub geometry_msgs/Vector3 x=1.0': byte 9: expected 00, got 12
+  2 > sub geometry_msgs/Point x=1.0 y=2.0
+    < pub geometry_msgs/Vector3 x=1.0
+  3 > sub geometry_msgs/Point x=1.0 y=2.0
+    < pub geometry_msgs/Vector3 x=1.0
 2 frames in, 1 frames out, 177 cycles from the first beat in to the last beat out
 in: 66 beats, 37 % of these cycles; out: 66 beats, 37 %
 FAIL 1/2
@@ -40,6 +44,9 @@ def test_a_report() -> None:
     assert report.messages == [
         Message(0, "sub x=1.0 y=2.0", ["pub x=1.0", "other x=2.0"], 93, -4),
         Message(1, "sub"),
+        Message(2, "sub x=1.0 y=2.0", ["pub x=1.0"], is_wrong=True),
+        # The same response, after which no fault was reported.
+        Message(3, "sub x=1.0 y=2.0", ["pub x=1.0"]),
     ]
     assert [fault[:20] for fault in report.faults] == ["fault in cycle 300: "]
     assert len(report.summary) == 2

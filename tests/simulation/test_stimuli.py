@@ -83,12 +83,32 @@ def test_what_the_subscriber_has_no_port_for_may_be_left_out(ros: Middleware, tm
         (8, "y", 0),
     ]
     path.write_text("- cloud: {height: 3, fields: [{name: y}]}\n", encoding="utf-8")
-    with pytest.raises(InputError) as raised:
-        read_stimuli(path, [Converter("cloud", used, 0)])
-    assert [fault.message for fault in raised.value.diagnostics] == [
-        "a sensor_msgs/PointCloud2 needs a value for width",
-        "'fields[0]' needs a value for offset",
-    ]
+    (stimulus,) = read_stimuli(path, [Converter("cloud", used, 0)])
+    assert (stimulus.message["width"], stimulus.message["height"]) == (0, 3)
+    assert [(part["offset"], part["name"]) for part in stimulus.message["fields"]] == [(0, "y")]
+
+
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_every_field_may_be_left_out(ros: Middleware, tmp_path: Path) -> None:
+    """Of messages of fixed and variable size, with ports for all fields; alone or together."""
+    path = tmp_path / "stimuli.yaml"
+    for message in (
+        "sensor_msgs/Imu",
+        "sensor_msgs/PointCloud2",
+        "diagnostic_msgs/DiagnosticArray",
+        "nav_msgs/Odometry",
+    ):
+        subscriber = Converter("sub", frame(message, ros), 0)
+        path.write_text("- sub:\n- sub: {}\n- sub: {header: {frame_id: map}}\n", encoding="utf-8")
+        nothing, empty, named = read_stimuli(path, [subscriber])
+        assert nothing == empty
+        assert not any(byte for byte in nothing.payload[len(subscriber.frame.prefix) :] if byte not in (0, 1))
+        assert named.message == {**empty.message, "header": {**empty.message["header"], "frame_id": "map"}}
+    path.write_text("- sub: {status: [{name: a, values: [{key: k}, {}]}, {level: 2}]}\n", encoding="utf-8")
+    (stimulus,) = read_stimuli(path, [Converter("sub", frame("diagnostic_msgs/DiagnosticArray", ros), 0)])
+    first, second = stimulus.message["status"]
+    assert first["values"] == [{"key": "k", "value": ""}, {"key": "", "value": ""}]
+    assert (first["name"], second["name"], second["level"], second["values"]) == ("a", "", 2, [])
 
 
 def test_what_is_left_out_of_a_fixed_message_is_its_default(tmp_path: Path) -> None:
@@ -231,7 +251,6 @@ def test_every_fault_of_a_file_is_shown_where_it_is(tmp_path: Path) -> None:
         "stimuli.yaml:2:17: error: a geometry_msgs/Point has no field 'Y'",
         "stimuli.yaml:2:29: error: 'z' must be of type float64, not 'one'",
         "stimuli.yaml:4:22: error: 'pose.position' must be a mapping of fields, not a list",
-        "stimuli.yaml:4:39: error: 'pose.orientation' needs a value for z, w",
         "stimuli.yaml:4:52: error: 'pose.orientation' has no field 'v'",
         "stimuli.yaml:5:17: error: 'covariance' must be a list of 36, not of 2",
         "stimuli.yaml:6:10: error: a geometry_msgs/Point must be a mapping of fields, not '5'",
@@ -318,7 +337,7 @@ def test_what_does_not_fit_a_message_of_variable_size(tmp_path: Path) -> None:
             "- status: {level: 1, name: a, message: a, hardware_id: b, values: {key: k}}\n"
             "- status: {level: 1, name: a, message: a, hardware_id: b, values: [{key: k, valeu: v}]}\n"
             "- solid: {type: 1, dimensions: [1, 2, 3, 4], polygon: {points: []}}\n"
-            "- text: {}\n",
+            "- text: [a]\n",
         )
     assert [(fault.source.line if fault.source else 0, fault.message) for fault in raised.value.diagnostics] == [
         (1, "'data' must be of type string, not nothing"),
@@ -326,7 +345,7 @@ def test_what_does_not_fit_a_message_of_variable_size(tmp_path: Path) -> None:
         (3, "'values' must be a list, not a mapping"),
         (4, "'values[0]' has no field 'valeu'"),
         (5, "the length of 'dimensions' must be at most 3, not 4"),
-        (6, "a std_msgs/String needs a value for data"),
+        (6, "a std_msgs/String must be a mapping of fields, not a list"),
     ]
 
 

@@ -89,7 +89,11 @@ def test_the_command_writes_a_whole_project(tmp_path: Path, monkeypatch: pytest.
     arguments = ["--in", "geometry_msgs/Point", "--out", "geometry_msgs/Vector3", "--ros", "1", "--width", "64"]
     assert main(["init", "turn", *arguments, "--language", "verilog"]) == 0
     names = ["fusesoc.conf", "model.py", "rtl/turn.v", "stimuli.yaml", "turn.core", "turn.yaml"]
-    assert capsys.readouterr().out.splitlines() == [*(f"turn/{name}" for name in names), "next: cd turn && firm sim"]
+    assert capsys.readouterr().out.splitlines() == [
+        *(f"turn/{name}" for name in names),
+        "edit: turn/rtl/turn.v (the computation), turn/model.py (the responses that it must give)",
+        "next: cd turn && firm sim",
+    ]
     specification: Any = yaml.safe_load((tmp_path / "turn" / "turn.yaml").read_text())
     assert specification["project"] == {"name": "turn", "width": 64}
     assert (tmp_path / "turn" / "build" / "FUSESOC_IGNORE").exists()
