@@ -77,7 +77,7 @@ class _Reports:
 
     def __init__(self, descriptor: int) -> None:
         # A file, since it can be closed twice; a number may belong to another file by then.
-        self._file = open(descriptor, "rb", buffering=0)  # noqa: PTH123, SIM115
+        self._file = open(descriptor, "rb", buffering=0)  # noqa: SIM115
         self._data = bytearray()
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
