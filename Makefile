@@ -41,7 +41,8 @@ EMULATION_TOOLS := qemu-system-arm arm-none-eabi-gcc:gcc-arm-none-eabi \
   qemu-arm:qemu-user $(foreach triple,arm-linux-gnueabihf aarch64-linux-gnu,$(triple)-g++:g++-$(triple))
 STUDIO_TOOLS := chromium
 NETWORK_TOOLS := ip:iproute2 tshark
-TEST_TOOLS := bwrap:bubblewrap ccache iverilog strace verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
+TEST_TOOLS := bwrap:bubblewrap ccache fdtoverlay:device-tree-compiler iverilog strace verilator yosys dot:graphviz \
+  tclsh:tcl rosbag:python3-rosbag
 
 SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET))) $(if $(SEED),--seed $(SEED)) \
   $(if $(WAVES),--waves) $(if $(SIM_OPTIONS),--options="$(SIM_OPTIONS)")

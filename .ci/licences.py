@@ -37,6 +37,7 @@ PROGRAMS: Mapping[str, str] = {
     "g++-aarch64-linux-gnu": "compiles nodes in C++ for emulated processors, in tests",
     "g++-arm-linux-gnueabihf": "compiles nodes in C++ for emulated processors, in tests",
     "gcc-arm-none-eabi": "compiles programs for emulated processors",
+    "device-tree-compiler": "compiles and merges device trees, in tests and on boards",
     "ghdl": "analyses, simulates and translates VHDL",
     "graphviz": "draws diagrams",
     "iproute2": "makes networks for tests",

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fusesoc_firm import __version__
+from fusesoc_firm.cli.bring_up import add_doctor
 from fusesoc_firm.cli.build import add_build
 from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
@@ -115,6 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     add_live(commands)
     add_ros(commands)
     add_status(commands)
+    add_doctor(commands)
     add_scheduler(commands)
     add_build(commands)
     add_test(commands)

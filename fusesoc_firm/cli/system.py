@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fusesoc_firm.cli.bring_up import add_bring_up
 from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load, print_warnings
 from fusesoc_firm.node.languages import LANGUAGES, Place
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
@@ -103,7 +104,8 @@ def add_system(commands: Any) -> None:
         _write_node,
     )
     _add_node_options(node)
-    for parser in (new, check, show, skeletons, draw, report, core, node):
+    bring_up = add_bring_up(actions)
+    for parser in (new, check, show, skeletons, draw, report, core, node, bring_up):
         parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
         add_sources(parser)
     command(

@@ -7,12 +7,13 @@ paths, a sourced ROS, a distribution.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.message.library import libraries
+from fusesoc_firm.message.library import MessageLibrary, libraries
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.request.core_reader import CoreFile, read_core
 from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
@@ -77,9 +78,16 @@ def load_beside(
 ) -> LoadedSystem:
     """Return the system of a specification; `paths` and `distro` are a command's arguments. May raise `InputError`."""
     path = spec.path if isinstance(spec, Draft) else spec
-    sources = sources_of(path, paths, distro, core_folders)
-    known = libraries(sources.paths, os.environ, sources.distro)
+    known = libraries_beside(path, paths, distro, core_folders=core_folders)
     return load_system(spec, known, needs_sources=needs_sources, core_folders=core_folders)
+
+
+def libraries_beside(
+    spec: Path, paths: Sequence[Path] = (), distro: str | None = None, *, core_folders: CoreFolders = no_core_folders
+) -> Mapping[Middleware, MessageLibrary]:
+    """Return the messages available to a specification; the arguments are those of `load_beside`."""
+    sources = sources_of(spec, paths, distro, core_folders)
+    return libraries(sources.paths, os.environ, sources.distro)
 
 
 def known_names(spec: Path, own: Sequence[str], sources: MessageSources, core_folders: CoreFolders) -> list[str]:

@@ -45,6 +45,7 @@ SAID = {
     ],
     "zynq7000": VIVADO,
     "zcu104": VIVADO,
+    "kr260": VIVADO,
     "quartus": ["'quartus_sh' is not installed", "Quartus Prime, from Altera's site"],
 }
 # Programs that a build needs besides tools.

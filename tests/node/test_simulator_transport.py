@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 import threading
@@ -107,6 +108,17 @@ def test_a_simulator_that_ends_unasked(model: list[str], frame: bytes, message: 
         with pytest.raises(TransportError) as caught:
             simulator.run(10)
         assert str(caught.value) == message
+
+
+def test_a_second_close_closes_no_other_file(model: list[str]) -> None:
+    with Simulator(model) as simulator:
+        simulator.request(b"garbage")
+        with pytest.raises(TransportError):
+            simulator.run(10)
+        # These get the numbers that the simulator's pipes had.
+        numbers = [number for _ in range(4) for number in os.pipe()]
+    for number in numbers:
+        os.close(number)
 
 
 def test_a_simulator_that_does_not_end_well_or_start(model: list[str], tmp_path: Path) -> None:

@@ -225,8 +225,9 @@ def test_a_peer_with_another_type_is_reported_once(place: Place, kind: str) -> N
             second.wait_until_connected()
             node.wait_until_said(told, 2)
         said = [line for line in node.said().splitlines() if told in line]
-        assert ["/image_in" in line for line in said] == [True, False]
-        assert ["/text_in" in line for line in said] == [False, True]
+        # A master may still know a peer of an earlier node, so the order is free.
+        assert [sum(name in line for line in said) for name in ("/image_in", "/text_in")] == [1, 1]
+        assert len(said) == 2
         assert node.stop() == 0
 
 

@@ -18,7 +18,7 @@ from fusesoc_firm.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = Path(__file__).resolve().parent
-ZYNQ = ("zynq7000", "zcu104")
+ZYNQ = ("zynq7000", "zcu104", "kr260")
 WITH_KERNELS = "quat2euler_hls"
 # Six applications (docs/reference/applications.md), and two of them with accelerators in C++ and in Verilog.
 CORES = (
@@ -126,7 +126,7 @@ class Project:
 def test_every_system_beside_a_processor(tmp_path: Path, core: str, board: str) -> None:
     lines = Project(tmp_path / "build", core, board).lines()
     cells = {line.split()[1]: line.split()[2] for line in lines if line.startswith("cell ")}
-    assert cells["processor"] == {"zynq7000": "processing_system7", "zcu104": "zynq_ultra_ps_e"}[board]
+    assert cells["processor"] == ("processing_system7" if board == "zynq7000" else "zynq_ultra_ps_e")
     assert cells["dma"] == "axi_dma"
     assert cells["system"].endswith("_system")
     assert [line for line in lines if line.startswith("kernel ")] == (

@@ -16,9 +16,10 @@ from fusesoc_firm.node.transport.transport import TransportError
 
 # Descriptors and buffers begin at multiples of the widest stream's beat.
 DMA_ALIGNMENT = 64
+# Bytes.
+DMA_REACH = 2**32
 _WORD_BYTES = 4
 _POLL_SECONDS = 50e-6
-_REACH = 2**32
 # The mode of u-dma-buf that is neither cached nor mapped as device memory; device memory allows only aligned accesses.
 _WRITE_COMBINE = "2"
 
@@ -89,7 +90,7 @@ class LinuxDmaDevice:
             # The path that older releases of u-dma-buf use.
             about = root / "sys/class/udmabuf" / buffer
         self._address, size = number_in(about / "phys_addr"), number_in(about / "size")
-        if self._address + size > _REACH:
+        if self._address + size > DMA_REACH:
             raise TransportError(f"{buffer} ends beyond the 4 GiB that the DMA engine reaches")
         if self._address % DMA_ALIGNMENT:
             raise TransportError(f"{buffer} begins at {self._address:#x}, which is not a multiple of {DMA_ALIGNMENT}")

@@ -76,14 +76,15 @@ class _Reports:
     """The reading end of a pipe, which can tell whether anything has arrived."""
 
     def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
+        # A file, since it can be closed twice; a number may belong to another file by then.
+        self._file = open(descriptor, "rb", buffering=0)  # noqa: SIM115
         self._data = bytearray()
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
 
     def read(self, size: int) -> bytes:
         """Return this many bytes, or fewer at the end of the stream."""
-        while len(self._data) < size and (piece := os.read(self._descriptor, _PIECE_BYTES)):
+        while len(self._data) < size and (piece := self._file.read(_PIECE_BYTES)):
             self._data += piece
         data = bytes(self._data[:size])
         del self._data[:size]
@@ -94,7 +95,7 @@ class _Reports:
         return bool(self._data or self._poll.poll(min(1000 * seconds, _MOST_POLLED)))
 
     def close(self) -> None:
-        os.close(self._descriptor)
+        self._file.close()
 
 
 class Simulator:

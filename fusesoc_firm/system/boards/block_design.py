@@ -27,7 +27,7 @@ PACKAGE_TEMPLATE = "hls/package.tcl"
 _LENGTH_BITS = 26
 _ADDRESS_BITS = 32
 # From the DMA engine's registers to those of the status; each have 64 KiB.
-_STATUS_OFFSET = 0x10000
+STATUS_OFFSET = 0x10000
 _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
 _STREAM_FROM_MANAGER = (*_STREAM, "tuser", "tid")
 # Parameters that Vivado infers from whole interface connections and from pins of known polarity.
@@ -71,7 +71,7 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
         ],
         "pins": _pins(system),
         "base": processor.base,
-        "status": {"base": f"0x{int(processor.base, 16) + _STATUS_OFFSET:X}"} if _has_bus(system) else None,
+        "status": {"base": f"0x{int(processor.base, 16) + STATUS_OFFSET:X}"} if _has_bus(system) else None,
     }
 
 
