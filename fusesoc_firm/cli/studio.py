@@ -139,7 +139,7 @@ def _require_aiohttp() -> None:
 
 def _show(studio: Studio, arguments: argparse.Namespace, to: TextIO) -> None:
     """Print the page's address, and open it."""
-    print(f"{studio.address}\nCtrl-C ends it", file=to, flush=True)
+    print(f"{studio.address}\nfor Foxglove: {studio.foxglove}\nCtrl-C ends it", file=to, flush=True)
     if not arguments.no_browser:
         webbrowser.open(studio.address)
 

@@ -112,7 +112,14 @@ class Watch:
         self._next = 0
         self._counts: dict[str, _Counting] = {}
         self._loads: Callable[[], Mapping[str, Load]] = dict
-        self.start_ns = time.monotonic_ns()
+        self.restart()
+
+    def restart(self) -> None:
+        """Count the time from now on: `start_ns` is its begin by the monotonic clock, `epoch_ns` as a date.
+
+        The times of a replay count from another `epoch_ns`.
+        """
+        self.start_ns, self.epoch_ns = time.monotonic_ns(), time.time_ns()
 
     def measure(self, loads: Callable[[], Mapping[str, Load]]) -> None:
         """Name the source of the inputs' loads, by block; readers call it."""

@@ -112,6 +112,8 @@ def replay(
         ):
             run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
             going = _Replay(bag, routes, run, topics, written, clock, settings)
+            if settings.watch:
+                settings.watch.epoch_ns = bag.start
             going.play(source)
         if settings.is_json:
             print(json.dumps(going.summary(target.path), indent=2, ensure_ascii=False))

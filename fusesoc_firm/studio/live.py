@@ -16,6 +16,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from fusesoc_firm.node.watch import Seen
+from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, picture_of
 from fusesoc_firm.studio.run import Run
 
@@ -50,6 +51,7 @@ class Live:
             web.get(f"{under}/message", self._message),
             web.get(f"{under}/picture", self._picture),
             web.post(f"{under}/control", self._control),
+            web.get(f"{under}/{FOXGLOVE}", self._foxglove),
         ]
 
     async def close(self) -> None:
@@ -78,6 +80,17 @@ class Live:
             sender.cancel()
             with suppress(asyncio.CancelledError, ConnectionError):
                 await sender
+        return socket
+
+    async def _foxglove(self, request: web.Request) -> web.WebSocketResponse:
+        """Serve a program that speaks Foxglove's protocol."""
+        socket = web.WebSocketResponse(heartbeat=20, max_msg_size=2**16, protocols=PROTOCOLS)
+        await socket.prepare(request)
+        self._sockets.add(socket)
+        try:
+            await serve_foxglove(socket, lambda: self.run)
+        finally:
+            self._sockets.discard(socket)
         return socket
 
     async def _send(self, socket: web.WebSocketResponse, asked: asyncio.Queue[int]) -> None:
@@ -133,7 +146,7 @@ class Live:
     async def _message(self, request: web.Request) -> web.Response:
         """Return the fields of a message."""
         run, seen = self._seen(request)
-        frame = run.frames[seen.block]
+        frame = run.topics[seen.block].frame
         found = await asyncio.to_thread(fields_of, frame, seen.payload)
         return web.json_response(
             {"row": _row(seen), "type": str(frame.message), "hasPicture": has_picture(frame), **found}
@@ -142,7 +155,7 @@ class Live:
     async def _picture(self, request: web.Request) -> web.Response:
         """Return the picture in a message."""
         run, seen = self._seen(request)
-        found = await asyncio.to_thread(picture_of, run.frames[seen.block], seen.payload)
+        found = await asyncio.to_thread(picture_of, run.topics[seen.block].frame, seen.payload)
         if not found:
             raise web.HTTPNotFound(reason="this message has no picture that a browser shows")
         return web.Response(body=found[0], content_type=found[1])

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.node.carrier import CarrierError
 from fusesoc_firm.node.description import NodeDescription, describe
 from fusesoc_firm.node.node import Node, NodeSettings
@@ -23,6 +21,7 @@ from fusesoc_firm.request.core_reader import CoreFile
 from fusesoc_firm.simulation.simulator import BuiltSimulator
 from fusesoc_firm.simulation.software_run import stimulated, taken_elsewhere
 from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
+from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError, fail
@@ -46,17 +45,17 @@ class Run:
     def __init__(self, loaded: LoadedSystem, spec: Path, title: str, control: Control | None = None) -> None:
         """Begin a record; the run itself is what another part of the program does."""
         self.spec, self.title, self.control = spec.resolve(), title, control
-        self.system = loaded.system
+        self.system, self.libraries = loaded.system, loaded.libraries
         self.watch = Watch()
         self.state, self.text = RUNNING, ""
 
     @property
-    def frames(self) -> Mapping[str, Frame]:
-        """The frames of all messages that the record may hold, by block."""
+    def topics(self) -> Mapping[str, Topic]:
+        """The topics of all messages that the record may hold, by block."""
         system = self.system
         topics = [*stimulated(system), *taken_elsewhere(system), *system.software.publishers]
         topics += [*system.subscribers, *system.publishers]
-        return {topic.block: topic.frame for topic in topics}
+        return {topic.block: topic for topic in topics}
 
     def end(self, text: str = "", state: str = ENDED) -> None:
         """Record the end of the run."""
@@ -137,7 +136,7 @@ class SimulatedRun(Run):
             self._node = node
             if self._is_over.is_set():
                 return ""
-            self.watch.start_ns = time.monotonic_ns()
+            self.watch.restart()
             self.state = RUNNING
             assert self.control
             rounds = None if wishes.is_endless else 1

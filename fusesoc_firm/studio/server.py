@@ -21,6 +21,7 @@ from aiohttp import WSMsgType, web
 
 from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.document import Document
+from fusesoc_firm.studio.foxglove import FOXGLOVE
 from fusesoc_firm.studio.live import Live
 from fusesoc_firm.studio.run import Build, SimulatedRun, Wishes
 from fusesoc_firm.studio.scene import content_of, grammar, scene
@@ -109,6 +110,7 @@ class Studio:
         number = runner.addresses[0][1]
         self._own_hosts = {f"{name}:{number}" for name in (HOST, "localhost")}
         self.address = f"http://{HOST}:{number}{under}/"
+        self.foxglove = f"ws://{HOST}:{number}{under}/api/{FOXGLOVE}"
         return runner
 
     # --- requests --------------------------------------------------------------------------------------------------
@@ -120,7 +122,9 @@ class Studio:
         """Refuse requests that our own page would not send, and turn faults into answers."""
         origin = request.headers.get("Origin")
         is_own = request.headers.get("Host", "") in self._own_hosts
-        is_own = is_own and (origin is None or origin.removeprefix("http://") in self._own_hosts)
+        # Foxglove's page comes from another server; like every program, it needs the secret.
+        is_foxglove = request.path.endswith(f"/api/{FOXGLOVE}")
+        is_own = is_own and (is_foxglove or origin is None or origin.removeprefix("http://") in self._own_hosts)
         secret = request.path.split("/")[1] if "/" in request.path else ""
         if not is_own or not hmac.compare_digest(secret.encode(), self.secret.encode()):
             return web.Response(status=403, text="open the address that firm studio printed\n", headers=_HEADERS)
