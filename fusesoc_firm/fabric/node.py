@@ -11,7 +11,6 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from ipaddress import IPv4Address
 
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.rtps import Durability, Parameter, Reliability, parameter
@@ -20,7 +19,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import ArrayType, MessageName
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.system.derived.model import DerivedSystem, Quality, Topic
+from fusesoc_firm.system.derived.model import DerivedSystem, Network, Quality, Topic
 
 # Seconds without a packet after which peers forget the node.
 LEASE_SECONDS = 20
@@ -51,31 +50,20 @@ class Endpoint:
 
 
 @dataclass(frozen=True)
-class Host:
-    """A node's place: MAC address (six bytes), IPv4 address, domain, name, and namespace, such as `/` or `/arm`."""
-
-    mac: bytes
-    address: IPv4Address
-    domain: int
-    name: str
-    namespace: str
-
-
-@dataclass(frozen=True)
 class Node:
     """A node: all its endpoints, the first of which is the writer of `ros_discovery_info`.
 
     In that message, a GUID is padded to `gid_bytes`, which differ between distributions of ROS 2.
     """
 
-    host: Host
+    network: Network
     endpoints: tuple[Endpoint, ...]
     gid_bytes: int
 
     @property
     def prefix(self) -> bytes:
         """The first twelve bytes of all its GUIDs, which do not change at a restart."""
-        return rtps.VENDOR + self.host.mac + bytes(4)
+        return rtps.VENDOR + self.network.mac + bytes(4)
 
     @property
     def writers(self) -> tuple[Endpoint, ...]:
@@ -90,7 +78,7 @@ class Node:
     @cached_property
     def participant_data(self) -> bytes:
         """The payload that announces the node (SPDP)."""
-        metatraffic, user = (port(self.host.domain) for port in (rtps.metatraffic_port, rtps.user_port))
+        metatraffic, user = (port(self.network.domain) for port in (rtps.metatraffic_port, rtps.user_port))
         return rtps.parameter_list(
             parameter(Parameter.PROTOCOL_VERSION, rtps.HEADER[4:]),
             parameter(Parameter.VENDOR_ID, rtps.VENDOR),
@@ -128,7 +116,7 @@ class Node:
     def graph(self) -> bytes:
         """The message on `ros_discovery_info`: the node with its readers and writers."""
         text = rtps.XCDR1 + self._gid(rtps.PARTICIPANT) + struct.pack("<I", 1)
-        for name in (self.host.namespace, self.host.name):
+        for name in (self.network.namespace, self.network.name):
             text += rtps.string(name)
             text += bytes(-len(text) % 4)
         for items in (self.readers, self.writers[1:]):
@@ -139,7 +127,7 @@ class Node:
         return (self.prefix + entity).ljust(self.gid_bytes, b"\0")
 
     def _locator(self, port: int) -> bytes:
-        return struct.pack("<iI", _LOCATOR_UDP, port) + bytes(12) + self.host.address.packed
+        return struct.pack("<iI", _LOCATOR_UDP, port) + bytes(12) + self.network.address.packed
 
 
 def dds_topic(topic: Topic, namespace: str) -> str:
@@ -153,20 +141,21 @@ def dds_type(message: MessageName) -> str:
     return f"{message.package}::msg::dds_::{message.name}_"
 
 
-def node_of(system: DerivedSystem, host: Host, libraries: Mapping[Middleware, MessageLibrary]) -> Node:
-    """Return the node of a system: a reader for each subscriber, and a writer for each publisher."""
-    library = libraries[ROS2]
+def node_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> Node:
+    """Return the node of a system with a network: a reader for each subscriber, and a writer for each publisher."""
+    library, network = libraries[ROS2], system.network
+    assert network is not None
 
     def endpoint(number: int, kind: int, name: str, message: MessageName, quality: Quality) -> Endpoint:
         entity = number.to_bytes(3, "big") + bytes([kind])
         return Endpoint(name, dds_type(message), signature(message, library.closure(message)), entity, quality)
 
     def of_topic(number: int, kind: int, topic: Topic) -> Endpoint:
-        return endpoint(number, kind, dds_topic(topic, host.namespace), topic.frame.message, topic.quality)
+        return endpoint(number, kind, dds_topic(topic, network.namespace), topic.frame.message, topic.quality)
 
     graph = endpoint(1, rtps.USER_WRITER, _GRAPH_TOPIC, _GRAPH_TYPE, Quality(is_transient_local=True, depth=1))
     readers = [of_topic(2 + item.id, rtps.USER_READER, item) for item in system.subscribers]
     writers = [of_topic(2 + len(readers) + item.id, rtps.USER_WRITER, item) for item in system.publishers]
     data = library.get(_GID).fields[0].type
     assert isinstance(data, ArrayType)
-    return Node(host, (graph, *readers, *writers), data.length)
+    return Node(network, (graph, *readers, *writers), data.length)

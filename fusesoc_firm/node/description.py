@@ -16,7 +16,7 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.node.services import NodeService, node_service
 from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere, way_to
 from fusesoc_firm.system.derived.model import Converter, Quality, StatusAccess, Topic
-from fusesoc_firm.system.system_core import LoadedSystem, identity
+from fusesoc_firm.system.system_core import LoadedSystem, identity, refuse_network
 from fusesoc_firm.text.diagnostics import fail
 
 _HEADER = MessageType(MessageName("std_msgs", "Header"))
@@ -101,7 +101,11 @@ class NodeDescription:
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:
-    """Describe the node of a system. Raise `InputError` for a middleware other than ROS and for ids of two bytes."""
+    """Describe the node of a system.
+
+    Raise `InputError` for a middleware other than ROS, for ids of two bytes, and for a system that is a node itself.
+    """
+    refuse_network(loaded)
     if loaded.system.id_bytes > 1:
         fail(
             f"nodes do not support 'idBytes: {loaded.system.id_bytes}'", hint="such a system is simulated with firm sim"

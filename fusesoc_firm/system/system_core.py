@@ -59,8 +59,16 @@ from fusesoc_firm.system.hardware.status import (
     status_description,
     status_entity,
 )
-from fusesoc_firm.system.written.specification import Accelerator, Draft, Specification, is_core, read_specification
-from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
+from fusesoc_firm.system.written.specification import (
+    AXI_STREAM,
+    ETHERNET,
+    Accelerator,
+    Draft,
+    Specification,
+    is_core,
+    read_specification,
+)
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.text.yaml_text import Text
@@ -186,7 +194,18 @@ def load_requested(request: Request) -> LoadedSystem:
         changed=lambda written: with_keys(on_board(written, board) if board else written, given),
         core_folders=request.message_folders.of,
     )
+    refuse_network(loaded)
     return replace(loaded, board=board)
+
+
+def refuse_network(loaded: LoadedSystem) -> None:
+    """Raise `InputError` for a system with Ethernet: its hardware is not complete, and it needs no node on a host."""
+    if loaded.system.network:
+        fail(
+            f"interconnect '{ETHERNET}' can be checked, but is not built yet",
+            loaded.specification.project.interconnect.source,
+            f"simulate with '{AXI_STREAM}': here, or as the parameter 'interconnect' of the core's generator",
+        )
 
 
 def with_keys(specification: Specification, values: Mapping[str, str]) -> Specification:

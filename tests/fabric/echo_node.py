@@ -1,6 +1,6 @@
 """The reference node as a program on sockets, which returns what it receives:
 
-    python -m tests.fabric.echo_node SPECIFICATION ADDRESS
+    python -m tests.fabric.echo_node SPECIFICATION
 
 The message of each subscriber is published by the publisher with the same id. Words as options: `--loss PERCENT` of the
 packets each way, seeded by `--seed`. A line on its input is a command: `stop` (with a farewell), `crash`. Prints JSON:
@@ -17,29 +17,25 @@ import select
 import socket
 import sys
 import time
-from ipaddress import IPv4Address
 from pathlib import Path
 
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.fabric.node import Endpoint, Host, Node, node_of
+from fusesoc_firm.fabric.node import Endpoint, Node, node_of
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.fabric.participant import DISCOVERY, Participant
 
-MAC = bytes.fromhex("020000000002")
 _PERIOD = 0.01
 _BUFFER = 1 << 22
 
 
-def node_at(specification: Path, address: str, name: str = "board", namespace: str = "/") -> Node:
+def node_in(specification: Path) -> Node:
     """The node of a specification."""
-    faults = Diagnostics()
-    known = libraries((), None, None)
+    faults, known = Diagnostics(), libraries((), None, None)
     written = read_specification(specification, str(specification), faults)
-    system = derive(written, specification.parent, known, faults)
-    return node_of(system, Host(MAC, IPv4Address(address), 0, name, namespace), known)
+    return node_of(derive(written, specification.parent, known, faults), known)
 
 
 class Program:
@@ -49,7 +45,7 @@ class Program:
         self._node, self._loss, self._chance = node, loss / 100, random.Random(seed)
         self._took = 0
         self._participant = Participant(node, self._echo)
-        domain, address = node.host.domain, str(node.host.address)
+        domain, address = node.network.domain, str(node.network.address)
         self._sockets = [
             _socket(address, rtps.metatraffic_port(domain)),
             _socket(address, rtps.user_port(domain)),
@@ -127,11 +123,10 @@ def main() -> None:
     """Read the options and run."""
     parser = argparse.ArgumentParser()
     parser.add_argument("specification", type=Path)
-    parser.add_argument("address")
     parser.add_argument("--loss", type=float, default=0)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    Program(node_at(options.specification, options.address), options.loss, options.seed).run()
+    Program(node_in(options.specification), options.loss, options.seed).run()
 
 
 if __name__ == "__main__":

@@ -206,7 +206,7 @@ class Participant:
             PUBLICATIONS_WRITER: [node.endpoint_data(item) for item in node.writers],
             SUBSCRIPTIONS_WRITER: [node.endpoint_data(item) for item in node.readers],
         }
-        self._group = Address(rtps.MULTICAST, rtps.multicast_port(node.host.domain))
+        self._group = Address(rtps.MULTICAST, rtps.multicast_port(node.network.domain))
         self._writer = Writer()
         self._announcements = 0
         self._next_announcement = 0

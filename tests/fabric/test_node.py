@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import struct
-from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.fabric.node import Host, Node, node_of
+from fusesoc_firm.fabric.node import Node, node_of
 from fusesoc_firm.fabric.rtps import Parameter
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary, libraries
@@ -25,7 +24,11 @@ from tests.ros.cpp_nodes import ROS2 as WHEELS
 
 MAC = bytes.fromhex("020000000002")
 SPECIFICATION = """\
-project: {name: turtle, width: 64}
+project:
+  name: turtle
+  width: 64
+  interconnect: ethernet
+  network: {mac: "02:00:00:00:00:02", address: 192.0.2.9, namespace: NAMESPACE, domain: 3}
 blocks:
   - {name: turn, middleware: ROS2, mode: subscriber, message: geometry_msgs/Quaternion, topic: arm/turn,
      qos: {profile: sensor_data}, outgoing: [{name: turned}]}
@@ -34,12 +37,12 @@ blocks:
 """
 
 
-def node(distribution: str | None = None, namespace: str = "/lab", domain: int = 3) -> Node:
+def node(distribution: str | None = None, namespace: str = "/lab") -> Node:
     """The node of the specification."""
     faults, known = Diagnostics(), libraries((), None, distribution)
-    written = read_specification(Draft(Path("turtle.yaml"), SPECIFICATION), "turtle.yaml", faults)
-    system = derive(written, Path(), known, faults)
-    return node_of(system, Host(MAC, IPv4Address("192.0.2.9"), domain, "turtle", namespace), known)
+    draft = Draft(Path("turtle.yaml"), SPECIFICATION.replace("NAMESPACE", namespace))
+    system = derive(read_specification(draft, "turtle.yaml", faults), Path(), known, faults)
+    return node_of(system, known)
 
 
 def test_relative_topics_are_in_the_namespace() -> None:

@@ -11,8 +11,8 @@ from ipaddress import IPv4Address
 import pytest
 
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.fabric.node import LEASE_SECONDS, Endpoint, Host, Node
-from fusesoc_firm.system.derived.model import Quality
+from fusesoc_firm.fabric.node import LEASE_SECONDS, Endpoint, Node
+from fusesoc_firm.system.derived.model import Network, Quality
 from tests.fabric.messages import AckNack, Address, Data, Heartbeat, Message, parse
 from tests.fabric.participant import FRAGMENT_BYTES, Limits, Participant
 from tests.fabric.test_messages import random_packets
@@ -27,13 +27,14 @@ DEFAULT = Limits()
 
 def a_node(number: int, writes: Topics, reads: Topics, type_: str = TYPE, hash_: str = HASH) -> Node:
     """A node with an address of its own."""
-    host = Host(bytes([2, 0, 0, 0, 0, number]), IPv4Address(f"192.0.2.{number}"), 0, f"node{number}", "/")
+    address, mask = IPv4Address(f"192.0.2.{number}"), IPv4Address("255.255.255.0")
+    network = Network(bytes([2, 0, 0, 0, 0, number]), address, mask, None, f"node{number}", "/", 0)
     graph = Endpoint("ros_discovery_info", "graph", HASH, b"\0\0\1\3", Quality(is_transient_local=True, depth=1))
     writers = [Endpoint(f"rt/{name}", type_, hash_, bytes([0, 0, 9, 3]), quality) for name, quality in writes.items()]
     readers = [Endpoint(f"rt/{name}", type_, hash_, bytes([0, 1, 0, 4]), quality) for name, quality in reads.items()]
     numbered = [replace(item, entity=bytes([0, 0, place, item.entity[3]])) for place, item in enumerate(writers, 2)]
     numbered += [replace(item, entity=bytes([0, 1, place, item.entity[3]])) for place, item in enumerate(readers, 2)]
-    return Node(host, (graph, *numbered), 16)
+    return Node(network, (graph, *numbered), 16)
 
 
 @dataclass
@@ -49,7 +50,7 @@ class Station:
 
 
 @dataclass
-class Network:
+class Ether:
     """A network with a clock: each packet is lost, comes twice, or comes late."""
 
     loss: float = 0
@@ -84,7 +85,7 @@ class Network:
         self.under_way = [item for item in self.under_way if item[0] > self.now]
         for _, address, packet in due:
             for station in self.stations:
-                if address.host in (rtps.MULTICAST, str(station.node.host.address)):
+                if address.host in (rtps.MULTICAST, str(station.node.network.address)):
                     station.participant.receive(packet, self.now)
         self._send()
 
@@ -93,7 +94,7 @@ class Network:
             for address, packet in station.participant.outbox:
                 message = parse(packet)
                 assert message is not None and message.is_whole and len(packet) <= 1472
-                self.sent.append((str(station.node.host.address), message))
+                self.sent.append((str(station.node.network.address), message))
                 for _ in range(1 + (self.loss > 0 and self.chance.random() < 0.05)):
                     if self.chance.random() >= self.loss:
                         late = self.chance.randrange(1, 9) if self.loss else 1
@@ -122,14 +123,14 @@ def samples(count: int, seed: int = SEED) -> list[bytes]:
     return [struct.pack(">I", number) + chance.randbytes(4 + size) for number, size in enumerate(sizes)]
 
 
-def pair(network: Network, quality: Quality = RELIABLE, other: Quality | None = None) -> tuple[Station, Station]:
+def pair(network: Ether, quality: Quality = RELIABLE, other: Quality | None = None) -> tuple[Station, Station]:
     """A node that writes topic `a` and one that reads it."""
     return network.add(a_node(1, {"a": quality}, {})), network.add(a_node(2, {}, {"a": other or quality}))
 
 
 @pytest.mark.parametrize("loss", [0, 0.2, 0.4])
 def test_every_sample_arrives_once_and_in_order(loss: float) -> None:
-    network = Network(loss)
+    network = Ether(loss)
     writer, reader = pair(network)
     network.run(is_matched(writer, reader))
     wanted = samples(100)
@@ -149,7 +150,7 @@ def test_every_sample_arrives_once_and_in_order(loss: float) -> None:
 
 
 def test_best_effort_keeps_the_order_and_asks_for_nothing() -> None:
-    network = Network(0.2)
+    network = Ether(0.2)
     writer, reader = pair(network, BEST_EFFORT)
     network.run(is_matched(writer, reader))
     wanted = samples(100)
@@ -175,7 +176,7 @@ def test_best_effort_keeps_the_order_and_asks_for_nothing() -> None:
     ],
 )
 def test_what_is_offered_has_to_be_enough(offered: Quality, wanted: Quality, does_match: bool) -> None:
-    network = Network()
+    network = Ether()
     writer, reader = pair(network, offered, wanted)
     network.wait(1000)
     assert is_matched(writer, reader, count=int(does_match))()
@@ -184,7 +185,7 @@ def test_what_is_offered_has_to_be_enough(offered: Quality, wanted: Quality, doe
 
 
 def test_a_late_reader_gets_the_history_of_a_transient_local_writer_alone() -> None:
-    network = Network(0.2)
+    network = Ether(0.2)
     writer = network.add(a_node(1, {"a": RELIABLE, "b": LATCHED}, {}))
     for number in range(5):
         network.publish(writer, bytes([number]), 1)
@@ -199,7 +200,7 @@ def test_a_late_reader_gets_the_history_of_a_transient_local_writer_alone() -> N
 
 
 def test_what_is_no_longer_in_the_history_is_passed_over() -> None:
-    network = Network(1.0)
+    network = Ether(1.0)
     writer, reader = pair(network, Quality(depth=10))
     network.loss = 0
     network.run(is_matched(writer, reader))
@@ -217,7 +218,7 @@ def test_what_is_no_longer_in_the_history_is_passed_over() -> None:
     ("type_", "hash_", "reason"), [("other", HASH, "other types"), (TYPE, "RIHS01_1", "other hashes")]
 )
 def test_another_type_does_not_match(type_: str, hash_: str, reason: str) -> None:
-    network = Network()
+    network = Ether()
     writer = network.add(a_node(1, {"a": RELIABLE}, {}))
     reader = network.add(a_node(2, {}, {"a": RELIABLE}, type_, hash_))
     network.wait(1000)
@@ -226,7 +227,7 @@ def test_another_type_does_not_match(type_: str, hash_: str, reason: str) -> Non
 
 
 def test_a_peer_without_room_is_counted_and_disturbs_nobody() -> None:
-    network = Network()
+    network = Ether()
     board = network.add(a_node(1, {"a": RELIABLE}, {}))
     peers = [network.add(a_node(number, {}, {"a": RELIABLE})) for number in range(2, 10)]
     network.run(is_matched(board, count=8))
@@ -245,7 +246,7 @@ def test_a_peer_without_room_is_counted_and_disturbs_nobody() -> None:
 
 
 def test_a_peer_that_is_silent_is_forgotten_after_its_lease() -> None:
-    network = Network()
+    network = Ether()
     board, peer = pair(network)
     network.run(is_matched(board, peer))
     network.stations.remove(peer)
@@ -256,7 +257,7 @@ def test_a_peer_that_is_silent_is_forgotten_after_its_lease() -> None:
 
 
 def test_a_node_that_restarts_has_the_same_name_and_is_found_at_once() -> None:
-    network = Network()
+    network = Ether()
     board, peer = pair(network)
     network.run(is_matched(board, peer))
     network.publish(board, b"before")
@@ -273,20 +274,20 @@ def test_a_node_that_restarts_has_the_same_name_and_is_found_at_once() -> None:
 
 def test_two_long_samples_at_once_need_two_places() -> None:
     """The second one waits for the place of the first, and then arrives as well."""
-    network = Network()
+    network = Ether()
     writers = [network.add(a_node(number, {"a": RELIABLE}, {})) for number in (1, 2, 3)]
     reader = network.add(a_node(4, {}, {"a": RELIABLE}), Limits(reassemblies=1))
     network.run(is_matched(reader, count=3))
     network.loss = 0.3
     for writer in writers:
-        network.publish(writer, bytes([writer.node.host.mac[5]]) * 20_000)
+        network.publish(writer, bytes([writer.node.network.mac[5]]) * 20_000)
     network.run(lambda: len(reader.took) == 3)
     assert reader.participant.counts["samples without room"] > 0
     assert sorted(payload[0] for _, payload in reader.took) == [1, 2, 3]
 
 
 def test_a_payload_that_is_too_long_is_passed_over() -> None:
-    network = Network()
+    network = Ether()
     writer = network.add(a_node(1, {"a": RELIABLE}, {}))
     reader = network.add(a_node(2, {}, {"a": RELIABLE}), Limits(longest=5000))
     network.run(is_matched(writer, reader))
@@ -310,7 +311,7 @@ def hostile_packets(known: bytes, reader: bytes, writer: bytes) -> Iterator[byte
 
 
 def test_good_messages_arrive_between_random_packets() -> None:
-    network = Network()
+    network = Ether()
     writer, reader = pair(network)
     network.run(is_matched(writer, reader))
     ours = reader.node.readers[0].entity, b"\0\0\2\3"

@@ -24,7 +24,11 @@ HERE = Path(__file__).parent
 SEED = 20261126
 TYPES = {"turn": "Quaternion", "text": "String"}
 ECHO = """\
-project: {name: echo, width: 64}
+project:
+  name: board
+  width: 64
+  interconnect: ethernet
+  network: {mac: "02:00:00:00:00:01", address: 192.0.2.1}
 blocks:
   - {name: turn_in, middleware: ROS2, mode: subscriber, message: geometry_msgs/Quaternion, qos: QUALITY,
      outgoing: [{name: turn_out}]}
@@ -111,7 +115,8 @@ class Place:
         """The node in fabric, which returns what it gets."""
         path = self.folder / "echo.yaml"
         path.write_text(ECHO.replace("QUALITY", quality), encoding="utf-8")
-        words = [sys.executable, "-m", "tests.fabric.echo_node", str(path), self._board.address, *options]
+        assert self._board.address == "192.0.2.1"
+        words = [sys.executable, "-m", "tests.fabric.echo_node", str(path), *options]
         started = self._started(Process(self._board, words))
         assert started.line() == {"ready": True}
         return started

@@ -40,6 +40,7 @@ from fusesoc_firm.system.derived.model import (
     PayloadLength,
     Topic,
 )
+from fusesoc_firm.system.derived.network import network_of
 from fusesoc_firm.system.derived.partition import Parting, Parts, message_names
 from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
@@ -114,6 +115,7 @@ def derive(
     publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
+    network = network_of(specification, scheduling, parts.software, faults)
     tree = tree_of(project, scheduling, link, publishers, faults)
     faults.raise_if_any()
     system = DerivedSystem(
@@ -134,6 +136,7 @@ def derive(
         has_time_stamps=has_time_stamps(project, faults),
         tree=tree,
         pipeline=None if project.pipeline is None else str(project.pipeline),
+        network=network,
         watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),
         services=services,
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Link, LinkKind, Scheduling
-from fusesoc_firm.system.written.specification import AXI_STREAM, Project
+from fusesoc_firm.system.written.specification import LINKS, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 # Bytes that ROS 2 may append to a payload.
@@ -28,7 +28,7 @@ def link_of(
 
     `clock` is the frequency of clk in Hz, if it is given.
     """
-    if project.interconnect == AXI_STREAM:
+    if project.interconnect not in LINKS:
         return None
     kind = LinkKind(project.interconnect)
     if scheduling.is_preemptive:

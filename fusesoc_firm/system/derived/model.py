@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property
+from ipaddress import IPv4Address
 from itertools import chain
 
 from fusesoc_firm.frame.model import Frame
@@ -298,6 +299,22 @@ class Link:
     longest: int
 
 
+@dataclass(frozen=True)
+class Network:
+    """The place of a system that is a node of ROS 2: its MAC address (six bytes), IPv4 addresses and names.
+
+    `namespace` is absolute, such as `/` or `/arm`.
+    """
+
+    mac: bytes
+    address: IPv4Address
+    netmask: IPv4Address
+    gateway: IPv4Address | None
+    name: str
+    namespace: str
+    domain: int
+
+
 class StatusAccess(Enum):
     """How the registers of a system's status are accessed."""
 
@@ -353,10 +370,10 @@ class DerivedSystem:
     `clock` is the frequency of clk in Hz, if it is given. A publisher that stops in the middle of a frame is cut off
     after `watchdog` cycles, if this is not 0.
 
-    Without a `link`, the streams are ports of the system. Converters, accelerators and connections in software are not
-    included. `names` maps each accelerator's message sides to their names outside the accelerator: `<block>_in`,
-    `<block>_out1` and so on. If ids have two bytes, `tree` is the Manager of Managers. `pipeline` is the key's value,
-    if it is given.
+    Without a `link` or a `network`, the streams are ports of the system. Converters, accelerators and connections in
+    software are not included. `names` maps each accelerator's message sides to their names outside the accelerator:
+    `<block>_in`, `<block>_out1` and so on. If ids have two bytes, `tree` is the Manager of Managers. `pipeline` is the
+    key's value, if it is given.
     """
 
     name: str
@@ -378,6 +395,7 @@ class DerivedSystem:
     tree: Tree | None = None
     pipeline: str | None = None
     services: tuple[Service, ...] = ()
+    network: Network | None = None
 
     @property
     def id_bytes(self) -> int:

@@ -16,6 +16,7 @@ from fusesoc_firm.system.derived.model import (
     DerivedSystem,
     End,
     MessageSide,
+    Network,
     PayloadLength,
     PublisherTimes,
     Queue,
@@ -26,7 +27,7 @@ from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.derived.timing import bounds_of
 from fusesoc_firm.system.hardware.configuration import top_level_pins
 from fusesoc_firm.system.hardware.crossings import all_crossings
-from fusesoc_firm.system.written.specification import AXI_STREAM
+from fusesoc_firm.system.written.specification import AXI_STREAM, ETHERNET
 
 if TYPE_CHECKING:
     from fusesoc_firm.scheduling.analysis import Bound
@@ -41,7 +42,8 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "top": system.entity,
             "fpgaPart": system.fpga_part,
             "width": system.width,
-            "interconnect": system.link.kind.value if system.link else AXI_STREAM,
+            "interconnect": system.link.kind.value if system.link else ETHERNET if system.network else AXI_STREAM,
+            **_network(system.network),
             **_scheduling(system.scheduling),
             **_clocks(system),
         },
@@ -71,6 +73,21 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
         "Connections": list(_connections(system.connections, system.width)),
         **_software(system),
         **_crossings(system),
+    }
+
+
+def _network(network: Network | None) -> dict[str, Any]:
+    if network is None:
+        return {}
+    addresses = {"address": network.address, "netmask": network.netmask, "gateway": network.gateway}
+    return {
+        "network": {
+            "mac": network.mac.hex(":"),
+            **{name: str(value) for name, value in addresses.items() if value},
+            "name": network.name,
+            "namespace": network.namespace,
+            "domain": network.domain,
+        }
     }
 
 

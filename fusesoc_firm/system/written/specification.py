@@ -46,6 +46,8 @@ AUTO_SCHEDULER = "auto"
 # The routes of frames between the host and the system: streams of the top level, or a byte link (cores/board).
 AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
+# The system is a node of ROS 2 itself.
+ETHERNET = "ethernet"
 # The accesses to the registers of a system's status, if it has one.
 NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
@@ -107,6 +109,19 @@ class PublisherGroup(Section):
 
 
 @dataclass(frozen=True)
+class NodeNetwork(Section):
+    """The place of a system with Ethernet in its network, and its name in ROS 2."""
+
+    mac: Text = key("the board's MAC address, such as 02:00:00:00:00:01", is_required=True)
+    address: Text = key("the board's IPv4 address, such as 192.168.1.20", is_required=True)
+    netmask: Text = key("the mask of the network's addresses", default=Text("255.255.255.0"))
+    gateway: Text | None = key("the router to other networks (default: none)")
+    name: Text | None = key("the node's name (default: the system's name)")
+    namespace: Text = key("the node's namespace, such as /arm", default=Text("/"))
+    domain: int = key("the domain of ROS 2 (ROS_DOMAIN_ID)", form="integer", default=0)
+
+
+@dataclass(frozen=True)
 class Project(Section):
     """The settings of the whole system."""
 
@@ -162,9 +177,15 @@ class Project(Section):
         is_asked=False,
     )
     interconnect: Text = key(
-        "connection between host and system: streams for a DMA engine, or a serial link",
-        choices=(AXI_STREAM, *LINKS),
+        "connection between host and system: streams for a DMA engine, a serial link, or a network without a host",
+        choices=(AXI_STREAM, *LINKS, ETHERNET),
         default=Text(AXI_STREAM),
+    )
+    network: NodeNetwork | None = key(
+        "addresses and names of a system with interconnect ethernet",
+        form="section",
+        section=NodeNetwork,
+        is_asked=False,
     )
     status: Text = key(
         "access to the status registers, if the system has any: frames of the id 255, or a port for AXI4-Lite",
@@ -316,7 +337,7 @@ class Block(Section):
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     max_length: int | None = key(
-        "bytes of the longest payload, if the message has no bounds (default: 65536, with a link 2000)",
+        "bytes of the longest payload, if the message has no bounds (default: 65536, with a link or a network 2000)",
         name="maxLength",
         form="integer",
         only_of=CONVERTER,

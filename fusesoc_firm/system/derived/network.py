@@ -1,0 +1,167 @@
+"""The network of a system that is a node of ROS 2 itself: the specification's `network`."""
+
+from __future__ import annotations
+
+import re
+from ipaddress import AddressValueError, IPv4Address, IPv4Network
+
+from fusesoc_firm.message.middleware import MIDDLEWARES
+from fusesoc_firm.system.derived.ids import ONE_BYTE
+from fusesoc_firm.system.derived.model import Network, Scheduling, Software
+from fusesoc_firm.system.written.specification import (
+    AXI_STREAM,
+    ETHERNET,
+    STATUS_AXI_LITE,
+    STATUS_FRAMES,
+    NodeNetwork,
+    Project,
+    Specification,
+)
+from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.yaml_text import Text
+
+# The ports of higher domains overlap with those that Linux gives to clients by default.
+_LAST_DOMAIN = 101
+_VERSION = 2
+_MAC = re.compile(r"[0-9A-Fa-f]{2}(:[0-9A-Fa-f]{2}){5}")
+_GROUP_BIT = 1
+# The limit of rmw (RMW_NODE_NAME_MAX_NAME_LENGTH).
+_LONGEST_NAME = 255
+_WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
+_NAME = re.compile(_WORD)
+_NAMESPACE = re.compile(rf"/|(/{_WORD})+")
+# Networks of one address or of two have no room for hosts beside their own addresses.
+_LONGEST_PREFIX = 30
+_UNUSED_ADDRESS = IPv4Address(0)
+
+
+def network_of(
+    specification: Specification, scheduling: Scheduling, software: Software, faults: Diagnostics
+) -> Network | None:
+    """Return the network of a system with Ethernet, or None; note faults, also those of a `network` that is not used.
+
+    The key is legal with each interconnect, since a board or a generator call may replace the interconnect.
+    """
+    project = specification.project
+    section = project.network
+    network = _network(section, project, faults) if section else None
+    if project.interconnect != ETHERNET:
+        return None
+    if section is None:
+        faults.error(
+            f"interconnect '{ETHERNET}' needs the key 'network'",
+            project.interconnect.source,
+            "add 'network' with 'mac' and 'address' to 'project'",
+        )
+    _check_system(specification, scheduling, software, faults)
+    return network
+
+
+def _check_system(written: Specification, scheduling: Scheduling, software: Software, faults: Diagnostics) -> None:
+    """Note what a node in fabric cannot do."""
+    project = written.project
+    message, source = f"interconnect '{ETHERNET}' ", project.interconnect.source
+    if scheduling.is_preemptive:
+        hint = "a message is sent whole; use a non-preemptive scheduler"
+        faults.error(f"{message}cannot carry the bursts of scheduler '{scheduling.policy}'", source, hint)
+    if project.id_bytes != ONE_BYTE:
+        faults.error(f"{message}is not possible with 'idBytes: {project.id_bytes}'", source, f"use '{AXI_STREAM}'")
+    if project.status == STATUS_AXI_LITE:
+        faults.error(f"{message}has no port for AXI4-Lite", project.status.source, f"use 'status: {STATUS_FRAMES}'")
+    for item in software.blocks:
+        if item.type.accelerator.sources:
+            hint = "without 'sources', the software is another node, on a host"
+            faults.error(f"{message}has no host for '{item.block}'", source, hint)
+    for block in written.blocks:
+        if block.middleware is not None and MIDDLEWARES[block.middleware].number != _VERSION:
+            faults.error(f"{message}is not possible with ROS 1", block.middleware.source, "legal here: ROS2")
+
+
+def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Network | None:
+    """Return the network of a section, or None if it has a fault."""
+    mac = _mac(section.mac, faults)
+    network = _addresses(section, faults)
+    name = _name(section, project, faults)
+    if not _NAMESPACE.fullmatch(section.namespace) or len(section.namespace) > _LONGEST_NAME:
+        hint = "legal here: / or an absolute name, such as /arm/left, of up to 255 letters, digits and single '_'"
+        faults.error(f"'{section.namespace}' is not a legal namespace", section.namespace.source, hint)
+    if not 0 <= section.domain <= _LAST_DOMAIN:
+        hint = f"legal here: 0 to {_LAST_DOMAIN}"
+        faults.error(f"'domain: {section.domain}' is not possible", section.place("domain"), hint)
+    if not section.is_sound or mac is None or network is None:
+        return None
+    address, netmask, gateway = network
+    return Network(mac, address, netmask, gateway, name, str(section.namespace), section.domain)
+
+
+def _mac(text: Text, faults: Diagnostics) -> bytes | None:
+    if not text:
+        return None
+    if not _MAC.fullmatch(text):
+        hint = "legal here: six bytes in hexadecimal, such as 02:00:00:00:00:01"
+        faults.error(f"'{text}' is not a MAC address", text.source, hint)
+        return None
+    mac = bytes.fromhex(text.replace(":", ""))
+    if mac[0] & _GROUP_BIT or not any(mac):
+        hint = "the first byte of a board's address is even, and not all bytes are 0"
+        faults.error(f"'{text}' is not the MAC address of a single board", text.source, hint)
+        return None
+    return mac
+
+
+def _addresses(section: NodeNetwork, faults: Diagnostics) -> tuple[IPv4Address, IPv4Address, IPv4Address | None] | None:
+    """Return address, mask and gateway, or None if one has a fault."""
+    address, netmask = _address(section.address, faults), _netmask(section.netmask, faults)
+    gateway = None if section.gateway is None else _address(section.gateway, faults)
+    if address is None or netmask is None or (section.gateway is not None and gateway is None):
+        return None
+    network = IPv4Network((address, str(netmask)), strict=False)
+    _check_host(section.address, address, network, faults)
+    if section.gateway is not None and gateway is not None:
+        _check_host(section.gateway, gateway, network, faults)
+        if gateway not in network or gateway == address:
+            hint = f"legal here: another address of {network}"
+            faults.error(f"the gateway {gateway} is not a neighbour of {address}", section.gateway.source, hint)
+    return address, netmask, gateway
+
+
+def _address(text: Text, faults: Diagnostics) -> IPv4Address | None:
+    if not text:
+        return None
+    try:
+        return IPv4Address(text)
+    except AddressValueError:
+        hint = "legal here: four numbers from 0 to 255, such as 192.168.1.20"
+        faults.error(f"'{text}' is not an IPv4 address", text.source, hint)
+        return None
+
+
+def _netmask(text: Text, faults: Diagnostics) -> IPv4Address | None:
+    netmask = _address(text, faults)
+    if netmask is None:
+        return None
+    bits = f"{int(netmask):032b}"
+    if "01" in bits or not 0 < bits.count("1") <= _LONGEST_PREFIX:
+        hint = "legal here: ones followed by at least two zeros, such as 255.255.255.0"
+        faults.error(f"'{text}' is not the mask of a network", text.source, hint)
+        return None
+    return netmask
+
+
+def _check_host(text: Text, address: IPv4Address, network: IPv4Network, faults: Diagnostics) -> None:
+    is_special = address.is_multicast or address.is_loopback or address.is_reserved or address == _UNUSED_ADDRESS
+    is_of_all = address in network and address in (network.network_address, network.broadcast_address)
+    if is_special or is_of_all:
+        other = f"an address of {network} other than its first and last"
+        hint = f"legal here: {other if is_of_all else 'addresses of single hosts, neither loopback nor multicast'}"
+        faults.error(f"'{text}' is not the address of a host", text.source, hint)
+
+
+def _name(section: NodeNetwork, project: Project, faults: Diagnostics) -> str:
+    if section.name is None:
+        return identifier(project.name).lower()
+    if not _NAME.fullmatch(section.name) or len(section.name) > _LONGEST_NAME:
+        hint = f"legal here: up to {_LONGEST_NAME} letters, digits and single '_', beginning with a letter"
+        faults.error(f"'{section.name}' is not a legal name of a node", section.name.source, hint)
+    return str(section.name)
