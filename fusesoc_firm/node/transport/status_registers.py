@@ -36,6 +36,10 @@ class StatusRegisters:
         """Return the next answer, or None without one."""
         return Burst(self._answers.popleft()) if self._answers else None
 
+    def is_ready(self) -> bool:
+        """Return True, since registers answer at once."""
+        return True
+
     def is_at_rest(self) -> bool:
         """Return True, since registers answer at once."""
         return True
