@@ -97,9 +97,9 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
     """Return the overheads of the core of a policy (cores/sched).
 
     A scheduler that chooses among all requests at once needs one cycle, or two if it compares times. A scheduler with a
-    queue needs three, and accepts one request in each cycle. Each request may cause three operations of the queue: the request is
-    inserted, the interrupted task is inserted, and the next task is removed. In a heap, each operation takes two
-    cycles.
+    queue needs three, and accepts one request in each cycle. Each request may cause three operations of the queue: the
+    request is inserted, the interrupted task is inserted, and the next task is removed. In a heap, each operation takes
+    two cycles.
     """
     row = POLICIES[policy]
     # A single task is never interrupted.

@@ -96,6 +96,10 @@ architecture rtl of firm_sched_engine is
   signal keyed_r        : std_logic;  -- and the task has a key
   signal key_r          : key_t;
   signal sent_key       : key_t;      -- the current task's key after this cycle
+  signal key_after_beat : key_t;      -- the same after a beat
+  signal gets_key       : std_logic;  -- the current task gets its key
+  signal key_if_sent    : key_t;      -- the next key after a beat that is not the last
+  signal key_if_paused  : key_t;      -- and after a cycle without a beat
 
   signal finished    : std_logic;
   signal choose      : std_logic;  -- no task is entitled to the grant in the next cycle
@@ -364,7 +368,7 @@ begin
   enters_if_chosen <= a_valid and key_ready and b_is_free_if_chosen and not may_take_a;
   enters_if_kept   <= a_valid and key_ready and b_is_free_if_kept and not (may_preempt or a_is_own);
   leaves_if_chosen <= may_take_a or enters_if_chosen;
-  leaves_if_kept   <= (a_valid and a_is_own) or enters_if_kept;
+  leaves_if_kept   <= gets_key or enters_if_kept;
 
   a_leaves   <= leaves_if_chosen when choose = '1' else leaves_if_kept;
   a_enters_b <= enters_if_chosen and not (finished and a_is_own) when choose = '1' else enters_if_kept;
@@ -391,12 +395,21 @@ begin
   sends_own_time : if POLICY = LST generate
     signal one_later : key_t;
   begin
-    one_later <= std_logic_vector(unsigned(key_r) + 1);
-    sent_key  <= one_later when beat = '1' and advance = '1' else key_r;
+    one_later      <= std_logic_vector(unsigned(key_r) + 1);
+    key_after_beat <= one_later when advance = '1' else key_r;
   end generate sends_own_time;
   keeps_key : if POLICY /= LST generate
-    sent_key <= key_r;
+    key_after_beat <= key_r;
   end generate keeps_key;
+  sent_key <= key_after_beat when beat = '1' else key_r;
+
+  gets_key      <= a_valid and a_is_own;
+  key_if_paused <= next_key when running_r = '0' or may_preempt = '1' else
+                   a_key when gets_key = '1' else
+                   key_r;
+  key_if_sent   <= next_key when may_preempt = '1' else
+                   a_key when gets_key = '1' else
+                   key_after_beat;
 
   grant : process (clk)
   begin
@@ -417,15 +430,15 @@ begin
           grant_valid_r <= '0';
         end if;
         running_r <= given or not choose;
-        keyed_r   <= given or (not choose and (keyed_r or (a_valid and a_is_own)));
+        keyed_r   <= given or (not choose and (keyed_r or gets_key));
       end if;
       -- Without a task that has a key, its content does not matter.
-      if moves = '1' then
+      if finished = '1' then
         key_r <= next_key;
-      elsif a_valid = '1' and a_is_own = '1' then
-        key_r <= a_key;
+      elsif beat = '1' then
+        key_r <= key_if_sent;
       else
-        key_r <= sent_key;
+        key_r <= key_if_paused;
       end if;
     end if;
   end process grant;
