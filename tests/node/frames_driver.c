@@ -16,7 +16,7 @@ TickType_t stand_in_ticks;
 #endif
 
 static const char *const names[] = {"more",    "frame",   "bad_id",      "too_long", "empty",
-                                    "bad_tid", "only_id", "within_beat", "longer"};
+                                    "bad_tid", "only_id", "within_beat", "longer",   "aborted"};
 static char line[1 << 16];
 static uint8_t bytes[1 << 15];
 static uint8_t buffer[1 << 15];

@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.frame import faults
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import BurstError, BurstJoiner
 from fusesoc_firm.node.queues import ClosedError, EmptyError, SubscriberQueues
+from fusesoc_firm.node.transport.abort_record import burst_of
 from tests.links import coded
 from tests.node.dma_engine import ERRORS, HALTED, MM2S, S2MM, Built, Engine, Fault, Loop, board
 from tests.node.drivers import C_FOLDER, HERE, Driver, compile_c_driver
@@ -34,6 +36,7 @@ WORDS = {
     "ends within a beat": "within_beat",
     "longer than its header announces": "longer",
     "the longest payload has": "too_long",
+    "was aborted": "aborted",
 }
 
 
@@ -104,7 +107,8 @@ def _python_pushes(width: int, pushes: list[tuple[int | None, bytes]]) -> Iterat
     joiner = BurstJoiner(IDS, width, LONGEST)
     for tid, burst in pushes:
         try:
-            frame = joiner.push(burst, tid)
+            sent = burst_of(burst)
+            frame = joiner.push(sent.data, tid, is_aborted=sent.is_aborted)
             yield f"frame {pack_frame(frame.id, frame.payload).hex()}" if frame else "more"
         except BurstError as error:
             yield next(word for text, word in WORDS.items() if text in str(error))
@@ -127,6 +131,24 @@ def test_bursts_are_joined_alike(drivers: dict[int, Driver], width: int) -> None
 
 
 @pytest.mark.parametrize("width", WIDTHS)
+def test_a_record_aborts_a_frame_alike(drivers: dict[int, Driver], width: int) -> None:
+    """The next frame with the id is whole; without the record, it would continue the aborted one."""
+    print(f"seed {SEED}")
+    source = random.Random(SEED + width)
+    pushes: list[tuple[int | None, bytes]] = []
+    for _ in range(100):
+        # Beats of an aborted frame are full, and its last one is missing.
+        frame = pack_frame(source.randrange(IDS), source.randbytes(LONGEST))
+        whole = pack_frame(frame[0], source.randbytes(source.randint(0, LONGEST)))
+        record = b"\xff" * 5 + bytes([source.choice([frame[0], frame[0], IDS]), faults.Fault.ABORTED])
+        begun = frame[: width // 8 * source.randint(1, (len(frame) - 1) * 8 // width)]
+        pushes += [(None, item) for item in (begun, record, whole)]
+    answers = drivers[width].answers(_lines(pushes))[1:]
+    assert answers == [*_python_pushes(width, pushes)]
+    assert "aborted" in answers and "bad_id" in answers
+
+
+@pytest.mark.parametrize("width", WIDTHS)
 def test_garbage_is_told_alike(drivers: dict[int, Driver], width: int) -> None:
     print(f"seed {SEED}")
     source = random.Random(SEED + width)
@@ -141,8 +163,9 @@ def test_garbage_is_told_alike(drivers: dict[int, Driver], width: int) -> None:
         answers = drivers[width].answers(_lines(pushes))[1:]
         assert answers == [*_python_pushes(width, pushes)]
         found |= {answer.split()[0] for answer in answers}
-    # At 8 bits, every burst ends with a beat.
-    assert found == {"frame", "more", "closed", *WORDS.values()} - ({"within_beat"} if width == 8 else set())
+    # At 8 bits, every burst ends with a beat; records are not garbage.
+    left_out = {"aborted", "within_beat"} if width == 8 else {"aborted"}
+    assert found == {"frame", "more", "closed", *WORDS.values()} - left_out
 
 
 def test_queues_serve_alike(drivers: dict[int, Driver]) -> None:

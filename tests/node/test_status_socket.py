@@ -180,6 +180,7 @@ def test_a_device_has_one_name(tmp_path: Path) -> None:
     assert served_names("robot", "pipe:run it") == ("node:robot",)
 
 
+@pytest.mark.check
 def test_the_status_is_part_of_the_diagnostics(served: Served) -> None:
     name = f"{served.name.removeprefix('node:')}: hardware"
     reports = served.run.carrier.reports

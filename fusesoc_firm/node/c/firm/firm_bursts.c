@@ -4,6 +4,9 @@
 #include <string.h>
 
 #define BEAT_BYTES ((size_t)(FIRM_WIDTH / 8))
+#define RECORD_BYTES ((size_t)FIRM_HEADER_BYTES + 2u)
+#define RECORD_ID 255u
+#define RECORD_LENGTH 0xFFFFFFFFu
 #define ROOM ((size_t)FIRM_HEADER_BYTES + FIRM_LONGEST_PAYLOAD)
 
 void firm_joiner_init(firm_joiner_t *joiner) { memset(joiner->filled, 0, sizeof joiner->filled); }
@@ -24,6 +27,19 @@ static firm_status_t judged(const uint8_t *frame, size_t size) {
     return size - FIRM_HEADER_BYTES == length ? FIRM_FRAME : FIRM_MORE;
 }
 
+/* A record of an aborted frame: the status id, a length that no frame has, the aborted id, and a code. */
+static int is_record(const uint8_t *burst, size_t size) {
+    return size == RECORD_BYTES && burst[0] == RECORD_ID && firm_frame_length(burst) == RECORD_LENGTH;
+}
+
+static firm_status_t aborted(firm_joiner_t *joiner, uint8_t id) {
+    if (id >= FIRM_PUBLISHERS) {
+        return FIRM_BAD_ID;
+    }
+    joiner->filled[id] = 0;
+    return FIRM_ABORTED;
+}
+
 firm_status_t firm_joiner_push(firm_joiner_t *joiner, const uint8_t *burst, size_t size, int tid, const uint8_t **frame,
                                size_t *frame_bytes) {
     firm_status_t status;
@@ -31,6 +47,9 @@ firm_status_t firm_joiner_push(firm_joiner_t *joiner, const uint8_t *burst, size
     size_t begun, inserted, count, room;
     if (size == 0) {
         return FIRM_EMPTY;
+    }
+    if (is_record(burst, size)) {
+        return aborted(joiner, burst[FIRM_HEADER_BYTES]);
     }
     if (burst[0] >= FIRM_PUBLISHERS) {
         return FIRM_BAD_ID;

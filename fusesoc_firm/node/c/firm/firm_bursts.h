@@ -16,7 +16,8 @@ void firm_joiner_init(firm_joiner_t *joiner);
 
 /* Add a burst. After FIRM_FRAME, `frame` holds a whole frame of `frame_bytes` until the next push of its id. `tid` is
  * the stream's, or negative if the transport has none. After an error, the part of the frame received so far is
- * dropped. */
+ * dropped. A record of AXI DMA that the hardware aborted a frame (cores/axis, firm_axis_abort_record) is an error of that
+ * frame. */
 firm_status_t firm_joiner_push(firm_joiner_t *joiner, const uint8_t *burst, size_t size, int tid, const uint8_t **frame,
                                size_t *frame_bytes);
 

@@ -18,7 +18,8 @@ typedef enum {
     FIRM_BAD_TID,      /* the stream's tid differs from the id */
     FIRM_ONLY_ID,      /* a burst that resumes a frame but adds nothing */
     FIRM_WITHIN_BEAT,  /* a burst that ends in the middle of a beat although its frame is incomplete */
-    FIRM_LONGER        /* more bytes than the frame announces */
+    FIRM_LONGER,       /* more bytes than the frame announces */
+    FIRM_ABORTED       /* the hardware aborted the frame */
 } firm_status_t;
 
 /* Write the header of a frame. */
