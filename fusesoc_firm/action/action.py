@@ -17,13 +17,13 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from fusesoc_firm.action import environment as variables
 from fusesoc_firm.action.contents import Contents
@@ -210,23 +210,32 @@ def _run(action: Action, log: Path) -> tuple[int, Trace | None]:
     fix_addresses()
     try:
         with log.open("ab") as output:
-            if can_trace():
-                found = traced(command, action.folder, environment, output, within)
-            else:
-                done = subprocess.run(
-                    [*within(), *command],
-                    cwd=action.folder,
-                    env=environment,
-                    stdin=subprocess.DEVNULL,
-                    stdout=output,
-                    stderr=subprocess.STDOUT,
-                    check=False,
-                )
-                found = done.returncode, None
+            status, trace = _started(command, action, environment, output, within)
         note_launched(temporary, action.folder)
-        return found
+        return status, trace
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _started(
+    command: list[str],
+    action: Action,
+    environment: Mapping[str, str],
+    output: IO[bytes],
+    within: Callable[..., list[str]],
+) -> tuple[int, Trace | None]:
+    if can_trace():
+        return traced(command, action.folder, environment, output, within)
+    done = subprocess.run(
+        [*within(), *command],
+        cwd=action.folder,
+        env=dict(environment),
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=subprocess.STDOUT,
+        check=False,
+    )
+    return done.returncode, None
 
 
 def _fault(action: Action, outside: Trace | None) -> str:

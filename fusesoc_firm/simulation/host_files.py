@@ -16,6 +16,7 @@ from fusesoc_firm.system.derived.model import Converter, Topic
 
 _BYTES_A_LINE = 32
 _LABEL_WIDTH = 160
+_ZEROS = ("0", "0.0", "False", '""', "[]")
 _WRONG_BYTE = re.compile(r"fault in cycle \d+: '(?P<label>.*)': byte (?P<byte>\d+)")
 
 
@@ -73,10 +74,20 @@ def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:
 
 
 def _label(topic: Topic, message: dict[str, Any]) -> str:
-    """Return the block, type and values on one line of plain ASCII, which is truncated if it is long."""
-    values = " ".join(f"{name}={value}" for name, value in _values(message))
-    label = f"{topic.block} {topic.frame.message} {values}".encode("ascii", "replace").decode()
+    """Return the block, type and values on one line of plain ASCII.
+
+    A long line has no zeros and nothing empty; if it is still long, it is truncated.
+    """
+    values = [*_values(message)]
+    label = _line(topic, values)
+    if len(label) > _LABEL_WIDTH:
+        label = _line(topic, [item for item in values if item[1] not in _ZEROS])
     return label if len(label) <= _LABEL_WIDTH else label[: _LABEL_WIDTH - 3] + "..."
+
+
+def _line(topic: Topic, values: Iterable[tuple[str, str]]) -> str:
+    words = (f"{name}={value}" for name, value in values)
+    return " ".join((topic.block, str(topic.frame.message), *words)).encode("ascii", "replace").decode()
 
 
 def _values(value: Any, name: str = "") -> Iterator[tuple[str, str]]:

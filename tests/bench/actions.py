@@ -27,6 +27,7 @@ from fusesoc_firm.store.server import Server
 from fusesoc_firm.store.store import Store
 from fusesoc_firm.tools.library_path import demos_root, library_root
 from tests.bench import beside_fusesoc as beside
+from tests.bench import robustness
 from tests.bench.store import APPLICATIONS
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
@@ -93,6 +94,8 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         SANDBOX_TITLE: [_SANDBOX_KEY],
         beside.LAUNCHER_TITLE: [beside.LAUNCHER_KEY],
         beside.FOREIGN_TITLE: [*beside.foreign_keys()],
+        beside.BENCH_TITLE: [*beside.bench_keys()],
+        robustness.TITLE: [*robustness.row_keys()],
     }
 
 
@@ -116,7 +119,13 @@ def measure(tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
             sandbox[_SANDBOX_KEY] = (*_SANDBOX_KEY, *_sandbox_cells(Path(place), tell))
     row = sandbox.get(_SANDBOX_KEY, (*_SANDBOX_KEY, *[""] * 4, NOT_MEASURED))
     tables.append(Table(SANDBOX_TITLE, _SANDBOX_COLUMNS, (row,), _SANDBOX_NOTE))
-    return [*tables, _launcher_table(tell, written, pattern), _foreign_table(tell, written, pattern)]
+    return [
+        *tables,
+        _launcher_table(tell, written, pattern),
+        _foreign_table(tell, written, pattern),
+        _bench_table(tell, written, pattern),
+        _robustness_table(tell, written, pattern),
+    ]
 
 
 def _launcher_table(tell: Tell, written: str, pattern: str) -> Table:
@@ -134,6 +143,22 @@ def _foreign_table(tell: Tell, written: str, pattern: str) -> Table:
         known |= beside.foreign_rows(tell)
     rows = tuple(known.get(key, (*key, *[""] * 5, NOT_MEASURED)) for key in beside.foreign_keys())
     return Table(title, columns, rows, beside.FOREIGN_NOTE)
+
+
+def _bench_table(tell: Tell, written: str, pattern: str) -> Table:
+    title, columns = beside.BENCH_TITLE, beside.BENCH_COLUMNS
+    known = known_rows(written, title, columns)
+    if re.search(pattern, title):
+        known |= beside.bench_rows(tell)
+    rows = tuple(known.get(key, (*key, *[""] * 4, NOT_MEASURED)) for key in beside.bench_keys())
+    return Table(title, columns, rows, beside.BENCH_NOTE)
+
+
+def _robustness_table(tell: Tell, written: str, pattern: str) -> Table:
+    title, columns = robustness.TITLE, robustness.COLUMNS
+    known = known_rows(written, title, columns) | robustness.rows(tell, pattern)
+    rows = tuple(known.get(key, (*key, "", "", NOT_MEASURED)) for key in robustness.row_keys())
+    return Table(title, columns, rows, robustness.NOTE)
 
 
 def _sandbox_cells(folder: Path, tell: Tell) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -47,6 +48,76 @@ FOREIGN_NOTE = f"""
     without it, the rows are those of the last measurement.
     """
 _FOREIGN_BAR = 0.05
+
+
+BENCH_TITLE = "A test bench that is not ours"
+BENCH_COLUMNS = ("what", "by", "steps run", "processor, s", "of FuseSoC", "bar", "result")
+BENCH_NOTE = """
+    SERV's system with `hello_uart` in Verilator, 100 ms of simulated time: built and simulated by `fusesoc run`, and by
+    `firm test` with an empty store and again. All must print the same lines. The first run should take as long as
+    FuseSoC's, within 10 %, the unchanged one at most 5 % of it.
+    """
+_BENCH = "SERV: hello_uart"
+_BENCH_CORE, _BENCH_TARGET = "award-winning:serv:servant", "verilator_tb"
+_BENCH_OPTIONS = ("--uart_baudrate=57600", "--firmware=serv/sw/hello_uart.hex", "--timeout=100000000")
+_BENCH_PRINTS = "Hi, I'm Servant!"
+_TESTED = "firm test"
+_FIRM_TEST = (sys.executable, "-m", "fusesoc_firm.cli", "test")
+_FIRST_BAR = 1.1
+
+
+def bench_keys() -> list[tuple[str, str]]:
+    """The first cells of the rows of the test bench."""
+    return [(_BENCH, by) for by in ("fusesoc run", _TESTED, _UNCHANGED)]
+
+
+def bench_rows(tell: Tell) -> dict[tuple[str, ...], tuple[str, ...]]:
+    """Return the rows of SERV's test bench by their keys; nothing, and a line, if no folder of clones is named."""
+    if FOREIGN not in os.environ:
+        tell(f"{BENCH_TITLE}: {FOREIGN} does not name a folder with clones of SERV and open-logic")
+        return {}
+    with tempfile.TemporaryDirectory() as place:
+        folder = serv(Path(place)).folder
+        arguments = ["run", "--build-root", "plain", f"--target={_BENCH_TARGET}", _BENCH_CORE, *_BENCH_OPTIONS]
+        plain = min(_fusesoc(folder, [*arguments[:1], "--clean", *arguments[1:]], "") for _ in range(2))
+        first, ran = _tested(folder)
+        unchanged, ran_again = _tested(folder)
+        (log,) = (folder / "build").glob(f"*/{_BENCH_TARGET}.log")
+        is_same = _BENCH_PRINTS in log.read_text(encoding="utf-8")
+    is_met = first <= _FIRST_BAR * plain and unchanged <= _FOREIGN_BAR * plain and not ran_again
+    result = FAILED if not is_same else MET if is_met else MISSED
+    keys = bench_keys()
+    rows = [
+        (*keys[0], "", f"{plain:.1f}", "", "", ""),
+        (*keys[1], str(ran), f"{first:.1f}", f"{first / plain:.2f}", f"{_FIRST_BAR:g}", ""),
+        (*keys[2], str(ran_again), f"{unchanged:.1f}", f"{unchanged / plain:.3f}", f"{_FOREIGN_BAR:g}", result),
+    ]
+    for row in rows:
+        tell(" ".join(row))
+    return {row[:2]: row for row in rows}
+
+
+def _tested(folder: Path) -> tuple[float, int]:
+    """Run the test bench with `firm test`; return the processor time in seconds and the number of steps that ran."""
+    variables = {
+        "PYTHONPATH": str(REPOSITORY),
+        "FUSESOC_FIRM_CACHE": str(folder / "store"),
+        "FUSESOC_FIRM_ACTIONS_TWICE": "0",
+    }
+    options = [f"--backend={option}" for option in _BENCH_OPTIONS]
+    before = processor_time()
+    subprocess.run(
+        [*_FIRM_TEST, f"{_BENCH_CORE}@{_BENCH_TARGET}", "--events", "events", *options],
+        cwd=folder,
+        env={**os.environ, **variables},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    seconds = processor_time() - before
+    lines = [json.loads(line) for line in (folder / "events").read_text(encoding="utf-8").splitlines()]
+    steps = [step for line in lines if line["event"] == "end" for step in line["steps"]]
+    return seconds, sum(step["state"] != "cached" for step in steps)
 
 
 def foreign_keys() -> list[tuple[str, str]]:

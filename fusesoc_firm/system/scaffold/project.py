@@ -38,6 +38,7 @@ from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.text.yaml_text import yaml_dump
 
 _SUBSCRIBER, _PUBLISHER, _FORWARDER = "sub", "pub", "pass_through"
+_ARITHMETIC = "robot:acc:firm_float"
 _STIMULI = "stimuli.yaml"
 _MESSAGES = 3
 # Bytes; block RAM of a small FPGA. The author of a specification chooses the size that the messages need.
@@ -211,7 +212,8 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
     spec = folder / f"{project.name}.yaml"
     write(spec, render("project/specification.yaml", _specification(project, ros, taken, given)))
     loaded = load_system(spec, known, needs_sources=False)
-    for path, text in missing_sources(loaded.system, folder).items():
+    has_arithmetic = project.language == "vhdl"
+    for path, text in missing_sources(loaded.system, folder, has_arithmetic=has_arithmetic).items():
         write(path, text)
     if stimuli:
         stimuli.write(folder / stimuli.name)
@@ -221,7 +223,12 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
     write(folder / "model.py", render("project/model.py", _model(project, loaded, given)))
     core = spec.with_suffix(".core")
     description = f"{project.input} to {project.output}"
-    options = CoreOptions(description=description, paths=paths, stimuli=stimuli.name if stimuli else _STIMULI)
+    options = CoreOptions(
+        description=description,
+        depend=[_ARITHMETIC] if has_arithmetic else (),
+        paths=paths,
+        stimuli=stimuli.name if stimuli else _STIMULI,
+    )
     write(core, new_core(loaded.system, spec.name, options))
 
 

@@ -64,21 +64,25 @@ _LANGUAGES = {
 }
 
 
-def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
-    """Return the path and text of a first source for each accelerator whose source file is missing in `folder`."""
+def missing_sources(system: DerivedSystem, folder: Path, *, has_arithmetic: bool = False) -> dict[Path, str]:
+    """Return the path and text of a first source for each accelerator whose source file is missing in `folder`.
+
+    With `has_arithmetic`, the system's core depends on the arithmetic in the VHDL library `firm`.
+    """
     texts = {}
     for type_ in (*system.accelerator_types, *system.software.types):
         paths = [folder / source for source in type_.accelerator.sources]
         # Software in another program has no sources.
         if paths and not any(path.exists() for path in paths):
-            texts[paths[0]] = skeleton(type_.own)
+            texts[paths[0]] = skeleton(type_.own, has_arithmetic=has_arithmetic)
     return texts
 
 
-def skeleton(type_: AcceleratorType) -> str:
+def skeleton(type_: AcceleratorType, *, has_arithmetic: bool = False) -> str:
     """Return the text of an accelerator's source."""
     if language := _LANGUAGES.get(type_.accelerator.type):
-        template, configuration = language.template, _entity(type_, language)
+        template = language.template
+        configuration = {**_entity(type_, language), "has_arithmetic": has_arithmetic}
     elif type_.accelerator.type == SOFTWARE:
         template, configuration = _SOFTWARE_TEMPLATE, python_skeleton(type_)
     elif is_streamed(type_):
