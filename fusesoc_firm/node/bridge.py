@@ -49,6 +49,9 @@ _HEADER = struct.Struct("<cHqI")
 _CALL, _ANSWER = struct.Struct("<Q"), struct.Struct("<Q?")
 # The maximum time in s to wait until published messages have been sent.
 _FLUSH_SECONDS = 2.0
+# The capacity of the queues of services, in messages. Each client of ROS 2 receives the responses to all clients, so the
+# default of 10 is too few on a busy machine.
+_SERVICE_DEPTH = 1000
 # The interval in s at which the types of other nodes' topics are compared.
 _LOOK_SECONDS = 1.0
 
@@ -524,7 +527,10 @@ class Ros2(Ros):
         def kept(request: Any, _: Any) -> Any:
             return request
 
-        made = self._node.create_service(_service_class(service), service["name"], kept)
+        from rclpy.qos import QoSProfile
+
+        quality = QoSProfile(depth=_SERVICE_DEPTH)
+        made = self._node.create_service(_service_class(service), service["name"], kept, qos_profile=quality)
         self._senders[number] = made.send_response
         # The executor sends what the callback returns: the request, with the header for its response.
         made.send_response = functools.partial(self._asked_for, number)
@@ -548,7 +554,10 @@ class Ros2(Ros):
             self.report(f"a response of {self._services[service].service_name} is not sent: {error}")
 
     def _caller(self, service: dict[str, Any]) -> Any:
-        return self._node.create_client(_service_class(service), service["name"])
+        from rclpy.qos import QoSProfile
+
+        quality = QoSProfile(depth=_SERVICE_DEPTH)
+        return self._node.create_client(_service_class(service), service["name"], qos_profile=quality)
 
     def call(self, service: int, number: int, payload: bytes) -> None:
         """Call a service; it fails at once without a server."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +33,11 @@ _PACKAGE_TEMPLATE = "node/package.xml"
 class _Dialect:
     """The parts of a package that depend on the version of ROS.
 
-    `header` and `middleware` name the C++ class that carries bytes; `build_tool`, `library` and `cmake` describe the
-    package's build. Only ROS 2 looks up a message's type in an installed package.
+    The first of `headers` and `middleware` name the C++ class that carries bytes; `build_tool`, `library` and `cmake`
+    describe the package's build. Only ROS 2 looks up a message's type in an installed package.
     """
 
-    header: str
+    headers: tuple[str, ...]
     middleware: str
     signature: str
     build_tool: str
@@ -46,8 +47,24 @@ class _Dialect:
 
 
 _DIALECTS = {
-    1: _Dialect("ros1.hpp", "Ros1", "MD5 sum", "catkin", "roscpp", "node/catkin.cmake", needs_messages=False),
-    2: _Dialect("ros2.hpp", "Ros2", "hash", "ament_cmake", "rcl", "node/ament.cmake", needs_messages=True),
+    1: _Dialect(
+        ("ros1.hpp", "ros1_services.hpp"),
+        "Ros1",
+        "MD5 sum",
+        "catkin",
+        "roscpp",
+        "node/catkin.cmake",
+        needs_messages=False,
+    ),
+    2: _Dialect(
+        ("ros2.hpp", "rcl.hpp", "ros2_services.hpp"),
+        "Ros2",
+        "hash",
+        "ament_cmake",
+        "rcl",
+        "node/ament.cmake",
+        needs_messages=True,
+    ),
 }
 
 
@@ -63,14 +80,12 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
     not belong to it.
     """
     description = describe(loaded)
-    if description.services:
-        fail(f"'{description.name}' has services, which nodes in C++ do not support")
     version = _only_version(description, ros)
     dialect = _DIALECTS[version]
     package = f"{description.name}_node"
-    packages = {"diagnostic_msgs"} | {
-        topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)
-    }
+    types = [topic.type for topic in (*description.subscribers, *description.publishers)]
+    types += [service.type for service in description.services]
+    packages = {"diagnostic_msgs"} | {name.partition("/")[0] for name in types}
     build = {
         "package": package,
         "name": description.name,
@@ -94,8 +109,6 @@ def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
     """
     system = loaded.system
     topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
-    if system.services:
-        return {}
     spoken = {item.frame.ros.number for item in topics}
     if len(spoken) != 1 or not spoken <= {*_DIALECTS}:
         return {}
@@ -117,7 +130,7 @@ def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
 
 def _headers(dialect: _Dialect) -> dict[str, str]:
     """Return all headers except headers for other versions of ROS."""
-    others = {item.header for item in _DIALECTS.values()} - {dialect.header}
+    others = {name for item in _DIALECTS.values() if item is not dialect for name in item.headers}
     return {
         f"include/{path.relative_to(HEADERS)}": path.read_text(encoding="utf-8")
         for path in headers()
@@ -130,7 +143,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
     return {
         "name": description.name,
         "ros": middleware_of(description.versions[0]).title,
-        "header": dialect.header,
+        "header": dialect.headers[0],
         "middleware": dialect.middleware,
         "signature": dialect.signature,
         "width": description.width,
@@ -144,6 +157,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "diagnostics": _row(diagnostics_topic(description.versions[0])),
         "channels": channel_names(description) if description.digest else [],
         "software": _software(loaded, description),
+        "services": [*_services(description)],
     }
 
 
@@ -151,7 +165,8 @@ def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, A
     """Return the ends of messages to and from blocks in software, or None if no such block runs on this host."""
     ports = software_ports(loaded.system)
     if not ports.inputs:
-        return None
+        # The services of the table are after the software.
+        return {"inputs": [], "outputs": []} if description.services else None
     topics = {topic.block: topic.name for topic in (*description.subscribers, *description.publishers)}
     leaving = {crossing.block: crossing.id for crossing in description.leaving}
     entering = {crossing.block: crossing.id for crossing in description.entering}
@@ -159,6 +174,24 @@ def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, A
         "inputs": [_port(topic.block, leaving, topics) for topic in ports.inputs],
         "outputs": [_port(topic.block, entering, topics) for topic in ports.outputs],
     }
+
+
+def _services(description: NodeDescription) -> Iterator[dict[str, Any]]:
+    """Yield the rows of services; a failure is a list of bytes."""
+    ids = {item.block: item.id for item in (*description.entering, *description.leaving)}
+    for item in description.services:
+        yield {
+            "is_server": _word(item.is_server),
+            "request": ids[item.request],
+            "response": ids[item.response],
+            "name": item.name,
+            "type": item.type,
+            "signature": item.signature,
+            "request_type": item.request_type,
+            "response_type": item.response_type,
+            "milliseconds": ceil(item.time_limit * 1000),
+            "failure": ", ".join(map(str, item.failure)),
+        }
 
 
 def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) -> dict[str, str]:

@@ -45,13 +45,15 @@ class Ros1Client:
 class Ros2Client:
     def __init__(self, service: str) -> None:
         import rclpy
+        from rclpy.qos import QoSProfile
         from sensor_msgs.srv import SetCameraInfo
 
         self.rclpy = rclpy
         rclpy.init()
         self.node = rclpy.create_node(f"client_{os.getpid()}")
         self.make = SetCameraInfo.Request
-        self.client = self.node.create_client(SetCameraInfo, service)
+        # Responses to all clients reach each client; the 10 of the default are too few for one that has to wait.
+        self.client = self.node.create_client(SetCameraInfo, service, qos_profile=QoSProfile(depth=1000))
         while not self.client.wait_for_service(timeout_sec=1):
             pass
         # Who is seen may not see us yet.

@@ -1,9 +1,13 @@
-"""Services in hardware, called by real clients of rospy and rclpy at once: each call gets its own answer."""
+"""Services in hardware, called by real clients of rospy, roscpp and rclpy at once: each call gets its own answer.
+
+`pytest -m thorough tests/ros/test_services.py` makes 1,000 calls of each kind of client and node.
+"""
 
 from __future__ import annotations
 
 import json
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -14,7 +18,9 @@ from typing import Any
 
 import pytest
 
-from tests.ros.cpp_nodes import NodeProcess, Ros, missing_ros, running_ros
+from fusesoc_firm.cli import main
+from fusesoc_firm.simulation.simulator import build_simulator
+from tests.ros.cpp_nodes import Node, NodeProcess, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import REPOSITORY, LiveNode
 
 HERE = Path(__file__).resolve().parent
@@ -22,7 +28,7 @@ CLIENTS = 4
 REASONS = {
     "refused": "the hardware rejected the request",
     "aborted": "the hardware aborted the response",
-    "silent": "no answer within 3 s",
+    "silent": "no answer within 5",
 }
 # Each silence takes the time limit.
 TEXTS = [*["refused", "aborted"] * 4, "silent"]
@@ -30,7 +36,7 @@ TEXTS = [*["refused", "aborted"] * 4, "silent"]
 
 @dataclass
 class Place:
-    """A version of ROS that runs, and a folder with the system."""
+    """A version of ROS that runs, and a folder with the system, which are made once."""
 
     ros: Ros
     folder: Path
@@ -39,20 +45,51 @@ class Place:
     def version(self) -> int:
         return self.ros.version
 
-    def specification(self, time_limit: str = "30 s") -> Path:
+    def specification(self) -> Path:
         spec = self.folder / "camera/camera.yaml"
         if not spec.exists():
             shutil.copytree(HERE / "camera", spec.parent)
-        text = (HERE / "camera/camera.yaml").read_text(encoding="utf-8").replace("10 s", time_limit)
+        text = (HERE / "camera/camera.yaml").read_text(encoding="utf-8")
         if self.version == 2:
             text = text.replace("middleware: ROS", "middleware: ROS2").replace("SetCameraInfoRe", "SetCameraInfo_Re")
         spec.write_text(text, encoding="utf-8")
         return spec
 
-    def live(self, *arguments: str | Path, time_limit: str = "30 s") -> LiveNode:
+    def node(self, language: str, transport: str = "") -> NodeProcess:
+        """A node in Python or C++, by default before the VHDL in GHDL."""
+        if language == "python":
+            return self._live(*(["--transport", transport] if transport else []))
+        return self._cpp(transport or f"pipe:{self._simulator()}")
+
+    def _simulator(self) -> Path:
+        return build_simulator(self.specification(), "ghdl", build_root=self.folder / "simulators").script()
+
+    def _cpp(self, transport: str) -> Node:
+        package, program = self.folder / "package", self.folder / "node"
+        if not program.exists():
+            command = ["system", "node", str(self.specification()), "--language", "cpp", "--ros", str(self.version)]
+            assert main([*command, "-o", str(package)]) == 0
+            self.ros.compile(package, program)
+        return Node(self.ros, program, transport, "--drain", "100")
+
+    def _live(self, *arguments: str) -> LiveNode:
         build = ["--build-root", str(self.folder / "simulators")]
-        spec = str(self.specification(time_limit))
-        return LiveNode(self.ros, self.folder / "node.log", ["live", spec, *map(str, arguments), *build])
+        spec = str(self.specification())
+        return LiveNode(self.ros, self.folder / "node.log", ["live", spec, *arguments, *build])
+
+    def client(self, kind: str, calls: int, seed: int, texts: Sequence[str] = ()) -> Client:
+        """A client of rospy or rclpy, or of roscpp."""
+        words = ["/set_camera_info", str(calls), str(seed)]
+        if kind == "python":
+            script = [self.ros.python, str(HERE / "service_peer.py"), str(self.version)]
+            return Client(self.ros, [*script, *words, *(["--texts", *texts] if texts else [])])
+        program = self.folder / "client"
+        if not program.exists():
+            options = ["-std=c++17", "-O1", "-pthread", str(HERE / "service_client.cpp"), "-o", str(program)]
+            subprocess.run(["g++", *options, *self.ros.libraries], check=True)
+        code = "from sensor_msgs.srv import SetCameraInfo as s; print(s._md5sum)"
+        done = subprocess.run([self.ros.python, "-c", code], capture_output=True, text=True, check=True)
+        return Client(self.ros, [str(program), *words, done.stdout.strip()])
 
     @property
     def model(self) -> str:
@@ -75,11 +112,9 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 
 class Client:
-    """A client of rospy or rclpy (service_peer.py) in a process of its own."""
+    """A client (service_peer.py, service_client.cpp) in a process of its own."""
 
-    def __init__(self, ros: Ros, calls: int, seed: int, texts: Sequence[str] = ()) -> None:
-        words = ["/set_camera_info", str(calls), str(seed), *(["--texts", *texts] if texts else [])]
-        command = [ros.python, str(HERE / "service_peer.py"), str(ros.version), *words]
+    def __init__(self, ros: Ros, command: Sequence[str]) -> None:
         self.process = subprocess.Popen(
             command, env=dict(ros.environment), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -94,11 +129,13 @@ class Client:
         self.process.stdin.flush()
 
 
-def call_at_once(place: Place, node: NodeProcess, calls: int, texts: Sequence[str] = ()) -> list[dict[str, Any]]:
+def call_at_once(
+    place: Place, node: NodeProcess, kinds: Sequence[str], calls: int, texts: Sequence[str] = ()
+) -> list[dict[str, Any]]:
     """What came to all clients that was wrong or failed; each call has a text of its own."""
-    seeds = [random.randrange(2**32) for _ in range(CLIENTS)]
+    seeds = [random.randrange(2**32) for _ in kinds]
     print(f"seeds {seeds}")
-    clients = [Client(place.ros, calls, seed, texts) for seed in seeds]
+    clients = [place.client(kind, calls, seed, texts) for kind, seed in zip(kinds, seeds, strict=True)]
     try:
         assert [client.line() for client in clients] == ["ready\n"] * CLIENTS, node.said()
         for client in clients:
@@ -113,45 +150,48 @@ def call_at_once(place: Place, node: NodeProcess, calls: int, texts: Sequence[st
 def check_counts(node: NodeProcess, answered: int, failed: int) -> None:
     """Stop the node; it has counted each call."""
     assert node.stop() == 0, node.said()
-    row = next(line for line in node.said().splitlines() if line.startswith("set_camera_info  "))
-    assert row.split()[1:] == [str(answered + failed), str(answered), str(failed), "0"], node.said()
+    counts = (answered + failed, answered, failed, 0)
+    python = r"^set_camera_info +{} +{} +{} +{}$".format(*counts)
+    cpp = "^its services: {} called, {} answered, {} failed, {} unasked$".format(*counts)
+    assert re.search(f"{python}|{cpp}", node.said(), re.MULTILINE), node.said()
 
 
+@pytest.mark.parametrize("language", ["python", "cpp"])
 @pytest.mark.parametrize(
     "calls", [pytest.param(20, marks=pytest.mark.check), pytest.param(250, marks=pytest.mark.thorough)]
 )
-def test_four_clients_at_once_get_their_own_answers(place: Place, calls: int) -> None:
-    """The whole way: clients of ROS, the node, the VHDL in GHDL."""
-    with place.live() as node:
-        node.wait_until_ready()
-        assert call_at_once(place, node, calls) == [{"wrong": [], "failed": []}] * CLIENTS
+def test_four_clients_at_once_get_their_own_answers(place: Place, calls: int, language: str) -> None:
+    """The whole way: clients of ROS, two of them of roscpp in ROS 1, the node, the VHDL in GHDL."""
+    kinds = ["python", "python", *["cpp" if place.version == 1 else "python"] * 2]
+    with place.node(language) as node:
+        assert call_at_once(place, node, kinds, calls) == [{"wrong": [], "failed": []}] * CLIENTS
         check_counts(node, CLIENTS * calls, 0)
 
 
 @pytest.mark.check
-def test_what_hardware_refuses_fails_at_its_client_only(place: Place) -> None:
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_what_hardware_refuses_fails_at_its_client_only(place: Place, language: str) -> None:
     """ROS 1 tells the reason; in ROS 2, `success` is false."""
-    with place.live("--transport", place.model, time_limit="3 s") as node:
-        node.wait_until_ready()
-        results = call_at_once(place, node, 15, TEXTS)
+    with place.node(language, place.model) as node:
+        results = call_at_once(place, node, ["python"] * CLIENTS, 15, TEXTS)
         failed = [item for result in results for item in result["failed"]]
         assert [item for result in results for item in result["wrong"]] == []
         for text, reason in failed:
-            expected = REASONS[text.partition(" ")[0]] if place.version == 1 else "the hardware did not answer"
-            assert expected in reason, (text, reason)
+            told = REASONS[text.partition(" ")[0]]
+            assert (told if place.version == 1 else "the hardware did not answer") in reason, (text, reason)
         check_counts(node, CLIENTS * 15 - len(failed), len(failed))
 
 
 @pytest.mark.check
-def test_a_client_that_dies_harms_nobody(place: Place) -> None:
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_a_client_that_dies_harms_nobody(place: Place, language: str) -> None:
     """One of two clients is killed during calls that the hardware does not answer; the other one gets all answers."""
-    with place.live("--transport", place.model, time_limit="3 s") as node:
-        node.wait_until_ready()
-        dying, other = Client(place.ros, 1_000_000, 1, ["silent"]), Client(place.ros, 30, 2)
+    with place.node(language, place.model) as node:
+        dying, other = place.client("python", 1_000_000, 1, ["silent"]), place.client("python", 30, 2)
         try:
             assert dying.line() == other.line() == "ready\n"
             dying.begin()
-            node.wait_until_said("no answer within 3 s")
+            node.wait_until_said("no answer within 5")
             other.begin()
             dying.process.kill()
             assert json.loads(other.line()) == {"wrong": [], "failed": []}

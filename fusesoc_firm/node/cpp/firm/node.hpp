@@ -50,7 +50,13 @@ struct NodeConfiguration {
   std::chrono::nanoseconds restart_delay = std::chrono::milliseconds(500);
   // Hardware that cannot report that it is at rest counts as at rest after this time without output.
   std::chrono::nanoseconds settling_time = std::chrono::milliseconds(200);
-  bool has_status = false;        // the hardware has a status that is accessed by frames
+  bool has_status = false;  // the hardware has a status that is accessed by frames
+  // The hardware rejected a frame of a subscriber, or ended one of a publisher in its middle; it was restarted; it has no
+  // work. Called by threads of the node and of the transport.
+  std::function<void(unsigned subscriber)> on_rejected = nullptr;
+  std::function<void(unsigned publisher)> on_aborted = nullptr;
+  std::function<void()> on_restart = nullptr;
+  std::function<void()> on_rest = nullptr;
   std::ostream* log = nullptr;    // one line per fault
   std::ostream* trace = nullptr;  // CSV, one line per step of a message (firm/trace.hpp)
 };
@@ -124,6 +130,7 @@ class Node {
     while (fault && may_restart()) {
       log(*fault + "; the transport is opened again");
       ++restarts_;
+      if (configuration_.on_restart) configuration_.on_restart();
       wait_before_restart();
       fault = session();
     }
@@ -185,6 +192,8 @@ class Node {
   };
   // The maximum time until the sender notices that the receiver has failed.
   static constexpr std::chrono::milliseconds kGlance{50};
+  // How often a receiver without bursts looks whether the hardware is at rest.
+  static constexpr std::chrono::milliseconds kRestInterval{100};
 
   static NodeConfiguration checked(NodeConfiguration configuration) {
     if (configuration.subscribers < 1 || configuration.subscribers > 256) {
@@ -229,6 +238,7 @@ class Node {
       } catch (const std::exception& error) {
         fault = error.what();
       }
+      is_session_over_ = true;
       transport->close();
       receiver.join();
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -251,6 +261,7 @@ class Node {
     auto transport = open_(options);
     const std::lock_guard<std::mutex> lock(mutex_);
     receiver_fault_.reset();
+    is_session_over_ = false;
     moved_ = steady_nanoseconds();
     transport_ = transport.get();
     if (is_abandoned_) transport->close();
@@ -306,7 +317,7 @@ class Node {
   void receive_all(Transport& transport) {
     BurstJoiner joiner(configuration_.publishers, configuration_.width, configuration_.longest_payload);
     try {
-      while (const auto burst = transport.receive()) {
+      while (const auto burst = next_burst(transport)) {
         if (configuration_.has_status && status_.take(burst->data)) continue;
         moved_ = steady_nanoseconds();
         take(joiner, *burst);
@@ -321,6 +332,18 @@ class Node {
     }
   }
 
+  // Return the next burst, or nothing at the end of the session. Only this thread knows that all bursts are published.
+  std::optional<Burst> next_burst(Transport& transport) {
+    if (!configuration_.on_rest) return transport.receive();
+    while (true) {
+      auto burst = transport.receive(kRestInterval);
+      if (burst || is_session_over_) return burst;
+      const NodeStatistics counted = statistics();
+      const bool is_sent = counted.sent + counted.dropped >= counted.received;
+      if (is_sent && transport.is_at_rest().value_or(false)) configuration_.on_rest();
+    }
+  }
+
   void take(BurstJoiner& joiner, const Burst& burst) {
     const std::uint64_t number = published_;
     if (!burst.data.empty()) trace_.write("burst", burst.data[0], number, burst.data.size(), burst.cycles);
@@ -329,6 +352,7 @@ class Node {
       frame = joiner.push(burst.data, burst.tid, burst.is_aborted);
     } catch (const BurstError& error) {
       note(error);
+      if (configuration_.on_aborted && !burst.data.empty()) configuration_.on_aborted(burst.data[0]);
     }
     if (!frame) return;
     publish_(frame->id, frame->payload.data(), frame->payload.size());
@@ -368,6 +392,8 @@ class Node {
     const std::string where = error.cycle ? " in cycle " + std::to_string(*error.cycle) : "";
     const std::string who = error.converter ? "converter " + std::to_string(*error.converter) : "the link or the Manager";
     log(who + " reports an error" + where);
+    const bool is_subscriber = error.converter && *error.converter < configuration_.subscribers;
+    if (is_subscriber && configuration_.on_rejected) configuration_.on_rejected(*error.converter);
   }
 
   void log(const std::string& line) {
@@ -386,6 +412,7 @@ class Node {
 
   std::atomic<std::uint64_t> received_{0}, sent_{0}, published_{0}, errors_{0};
   std::atomic<unsigned> restarts_{0};
+  std::atomic<bool> is_session_over_{false};
   std::atomic<std::int64_t> moved_{0};  // time of the last frame sent or burst received, ns
 
   std::mutex log_mutex_;

@@ -29,6 +29,7 @@
 #include <utility>
 #include <vector>
 
+#include <firm/ros1_services.hpp>
 #include <firm/topic.hpp>
 
 namespace firm {
@@ -78,6 +79,8 @@ class Ros1 {
   // Only messages with a Header have numbers.
   static constexpr bool kCountsDrops = false;
   static constexpr std::size_t kUnlimited = 0;
+  // A call that fails has an answer with the reason.
+  static constexpr bool kTellsFailures = true;
   static constexpr const char* kArguments = "ROS arguments: NAME:=VALUE remaps a topic, __name:=, __ns:=, __log:=";
 
   // Remove ROS's own arguments from `argv`. The node is called `name` unless `__name:=` is given.
@@ -87,7 +90,10 @@ class Ros1 {
 
   ~Ros1() {
     subscribers_.clear();
+    servers_.clear();
+    // It ends calls of servers that do not answer.
     ros::shutdown();
+    clients_.clear();
   }
 
   Ros1(const Ros1&) = delete;
@@ -128,6 +134,25 @@ class Ros1 {
     return [publisher = node_->advertise(options)](const std::uint8_t* data, std::size_t size) {
       publisher.publish(RawMessage{data, size});
     };
+  }
+
+  // Pass every call of a service to `handler`, in a thread of the service.
+  void serve(const Service& service, CallHandler handler) {
+    servers_.push_back(std::make_unique<RawServer>(*node_, service, std::move(handler)));
+  }
+
+  // Return a function that calls a service.
+  CallHandler caller(const Service& service) {
+    clients_.push_back(std::make_unique<RawClient>(*node_, service));
+    return [client = clients_.back().get()](Bytes payload, AnswerHandler answer) {
+      client->put(std::move(payload), std::move(answer));
+    };
+  }
+
+  // Serve no more, after `drain`, which waits until all calls are answered.
+  void finish_calls(const std::function<void()>& drain) {
+    drain();
+    servers_.clear();
   }
 
   // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end.
@@ -179,6 +204,8 @@ class Ros1 {
   ros::CallbackQueue callbacks_;
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Subscriber> subscribers_;
+  std::vector<std::unique_ptr<RawServer>> servers_;
+  std::vector<std::unique_ptr<RawClient>> clients_;
 };
 
 }  // namespace firm

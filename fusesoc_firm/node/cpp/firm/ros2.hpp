@@ -11,7 +11,6 @@
 // C++17; rcl is part of every ROS 2.
 #pragma once
 
-#include <dlfcn.h>
 #include <rcl/arguments.h>
 #include <rcl/error_handling.h>
 #include <rcl/graph.h>
@@ -23,13 +22,9 @@
 #include <rcl/subscription.h>
 #include <rcl/wait.h>
 #include <rcutils/logging_macros.h>
-#if __has_include(<rosidl_runtime_c/type_hash.h>)  // since Iron
-#include <rosidl_runtime_c/type_hash.h>
-#define FIRM_HAS_TYPE_HASH
-#endif
 
+#include <atomic>
 #include <chrono>
-#include <cstring>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -39,54 +34,11 @@
 #include <utility>
 #include <vector>
 
+#include <firm/rcl.hpp>
+#include <firm/ros2_services.hpp>
 #include <firm/topic.hpp>
 
 namespace firm {
-
-// Throw MiddlewareError for any result except RCL_RET_OK; `what` names the attempted action.
-inline void check_rcl(rcl_ret_t result, const std::string& what) {
-  if (result == RCL_RET_OK) return;
-  const std::string reason = rcl_get_error_string().str;
-  rcl_reset_error();
-  throw MiddlewareError("cannot " + what + ": " + reason);
-}
-
-// For cleanup calls, whose failure cannot be handled.
-inline void ignore(rcl_ret_t) { rcl_reset_error(); }
-
-// Return the type support of a type such as `geometry_msgs/msg/Quaternion`, from the library of its package. Throws
-// MiddlewareError if the package is not installed, or if its definition differs from that of `topic`.
-inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
-  const std::string package = topic.type.substr(0, topic.type.find('/'));
-  const std::string library = "lib" + package + "__rosidl_typesupport_c.so";
-  std::string symbol = "rosidl_typesupport_c__get_message_type_support_handle__";
-  for (const char letter : topic.type) symbol += letter == '/' ? "__" : std::string(1, letter);
-  // Never closed: publishers and subscriptions point into the library as long as the process runs.
-  void* handle = dlopen(library.c_str(), RTLD_LAZY | RTLD_LOCAL);
-  if (handle == nullptr) {
-    throw MiddlewareError("the message " + topic.type + " of " + topic.name + " is not installed: " + dlerror() +
-                          "; source ROS and the workspace with " + package);
-  }
-  using Get = const rosidl_message_type_support_t* (*)();
-  const auto get = reinterpret_cast<Get>(dlsym(handle, symbol.c_str()));
-  if (get == nullptr) {
-    throw MiddlewareError(library + " does not contain the message " + topic.type + ", which " + topic.name + " needs");
-  }
-  const rosidl_message_type_support_t* support = get();
-#ifdef FIRM_HAS_TYPE_HASH
-  rosidl_type_hash_t expected;
-  if (rosidl_parse_type_hash_string(topic.signature.c_str(), &expected) != RCUTILS_RET_OK) {
-    rcl_reset_error();
-    throw MiddlewareError("'" + topic.signature + "', the signature of " + topic.name + ", is not a type hash");
-  }
-  const rosidl_type_hash_t* installed = support->get_type_hash_func(support);
-  if (installed->version != expected.version || std::memcmp(installed->value, expected.value, sizeof expected.value) != 0) {
-    throw MiddlewareError("the message " + topic.type + " is installed in a version that differs from the hardware's (" +
-                          topic.signature + ")");
-  }
-#endif
-  return support;
-}
 
 // A node of ROS 2.
 class Ros2 {
@@ -96,6 +48,8 @@ class Ros2 {
   // All messages have numbers.
   static constexpr bool kCountsDrops = true;
   static constexpr std::size_t kUnlimited = 0;
+  // A call that fails has no answer.
+  static constexpr bool kTellsFailures = false;
   static constexpr const char* kArguments =
       "ROS arguments, after --ros-args: -r NAME:=VALUE remaps a topic, -r __node:=, -r __ns:=, --log-level";
 
@@ -112,6 +66,8 @@ class Ros2 {
 
   ~Ros2() {
     unsubscribe();
+    servers_.clear();
+    clients_.clear();
     for (auto& publisher : publishers_) ignore(rcl_publisher_fini(&publisher->rcl, &node_));
     if (is_started_) {
       ignore(rcl_wait_set_fini(&waiting_));
@@ -144,7 +100,32 @@ class Ros2 {
     check_rcl(rcl_subscription_init(&made->rcl, &node_, type_support(topic), topic.name.c_str(), &options),
               "subscribe to " + topic.name);
     subscriptions_.push_back(std::move(made));
-    check_rcl(rcl_wait_set_resize(&waiting_, subscriptions_.size(), 0, 0, 0, 0, 0), "wait for messages");
+  }
+
+  // Pass every call of a service to `handler`, in the thread that calls spin(). Throws MiddlewareError.
+  void serve(const Service& service, CallHandler handler) {
+    servers_.push_back(std::make_unique<RawServer>(node_, service, std::move(handler)));
+  }
+
+  // Return a function that calls a service. Throws MiddlewareError.
+  CallHandler caller(const Service& service) {
+    clients_.push_back(std::make_unique<RawClient>(node_, service));
+    return [client = clients_.back().get()](Bytes payload, AnswerHandler answer) {
+      client->call(payload, std::move(answer));
+    };
+  }
+
+  // Serve no more, and take responses during `drain`, which waits until all calls are answered.
+  void finish_calls(const std::function<void()>& drain) {
+    if (servers_.empty() && clients_.empty()) return;
+    std::atomic<bool> is_done{false};
+    std::thread draining([&] {
+      drain();
+      is_done = true;
+    });
+    is_serving_ = false;
+    while (!is_done) spin(std::chrono::milliseconds(10));
+    draining.join();
   }
 
   // Return a function that publishes messages of a topic. Both this call and the function throw MiddlewareError.
@@ -168,12 +149,21 @@ class Ros2 {
   // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end. Throws MiddlewareError.
   bool spin(std::chrono::milliseconds duration) {
     look_at_peers();
-    if (subscriptions_.empty()) {
+    const std::size_t servers = is_serving_ ? servers_.size() : 0;
+    if (subscriptions_.empty() && servers == 0 && clients_.empty()) {
       // rcl does not wait on an empty set.
       std::this_thread::sleep_for(duration);
       return rcl_context_is_valid(&context_);
     }
+    check_rcl(rcl_wait_set_resize(&waiting_, subscriptions_.size(), 0, 0, clients_.size(), servers, 0),
+              "wait for messages");
     check_rcl(rcl_wait_set_clear(&waiting_), "wait for messages");
+    for (std::size_t index = 0; index < servers; ++index) {
+      check_rcl(rcl_wait_set_add_service(&waiting_, servers_[index]->rcl(), nullptr), "wait for calls");
+    }
+    for (const auto& client : clients_) {
+      check_rcl(rcl_wait_set_add_client(&waiting_, client->rcl(), nullptr), "wait for responses");
+    }
     for (const auto& subscription : subscriptions_) {
       check_rcl(rcl_wait_set_add_subscription(&waiting_, &subscription->rcl, nullptr), "wait for messages");
     }
@@ -185,6 +175,12 @@ class Ros2 {
     check_rcl(result, "wait for messages");
     for (std::size_t index = 0; index < subscriptions_.size(); ++index) {
       if (waiting_.subscriptions[index] != nullptr) subscriptions_[index]->take_all();
+    }
+    for (std::size_t index = 0; index < servers; ++index) {
+      if (waiting_.services[index] != nullptr) servers_[index]->take();
+    }
+    for (std::size_t index = 0; index < clients_.size(); ++index) {
+      if (waiting_.clients[index] != nullptr) clients_[index]->take();
     }
     return rcl_context_is_valid(&context_);
   }
@@ -316,6 +312,9 @@ class Ros2 {
   rcl_wait_set_t waiting_ = rcl_get_zero_initialized_wait_set();
   std::vector<std::unique_ptr<Publisher>> publishers_;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
+  bool is_serving_ = true;
+  std::vector<std::unique_ptr<RawServer>> servers_;
+  std::vector<std::unique_ptr<RawClient>> clients_;
 };
 
 }  // namespace firm

@@ -28,6 +28,7 @@
 #include <firm/diagnostics.hpp>
 #include <firm/node.hpp>
 #include <firm/open_transport.hpp>
+#include <firm/services.hpp>
 #include <firm/status.hpp>
 #include <firm/status_server.hpp>
 #include <firm/status_watch.hpp>
@@ -61,6 +62,7 @@ struct System {
   Topic diagnostics;
   std::vector<std::string> channels{};  // of the status, the subscribers first
   Software software{};
+  std::vector<Service> services{};
 
   bool has_software() const { return !software.inputs.empty(); }
 };
@@ -172,6 +174,10 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
   for (const auto& topic : system.subscribers) out << "  " << topic.name << "  " << topic.type << "\n";
   out << "topics from the hardware:\n";
   for (const auto& topic : system.publishers) out << "  " << topic.name << "  " << topic.type << "\n";
+  for (const auto& service : system.services) {
+    out << (service.is_server ? "service of" : "service called by") << " the hardware:\n  " << service.name << "  "
+        << service.type << "\n";
+  }
   out << "\nSIGINT and SIGTERM end the node after all pending messages; a second signal ends the node at once.\n"
       << "exit status: 0, 1 if the hardware or ROS failed, 2 for an invalid command line\n";
 }
@@ -223,8 +229,13 @@ class Engines {
  public:
   // `publish` maps the names of the system's topics to their publishers. Throws std::invalid_argument.
   Engines(const System& system, const NodeArguments& arguments, std::map<std::string, MessageHandler> publish,
-          std::ostream* trace)
-      : system_(system), publish_(std::move(publish)), from_hardware_(system.publisher_count) {
+          std::ostream* trace, bool tells_failures)
+      : system_(system),
+        publish_(std::move(publish)),
+        from_hardware_(system.publisher_count),
+        calls_(system.services, tells_failures, [this](unsigned id, const std::uint8_t* payload, std::size_t size) {
+          return hardware_->put(id, payload, size);
+        }) {
     NodeConfiguration configuration;
     configuration.width = system.width;
     configuration.subscribers = system.subscriber_count;
@@ -238,9 +249,16 @@ class Engines {
     configuration.has_status = !system.digest.empty();
     configuration.log = &std::cerr;
     configuration.trace = trace;
+    if (!system.services.empty()) watch_calls(configuration);
     hardware_ = std::make_unique<Node>(configuration, opener(system, arguments.transport), by_id(from_hardware_));
     for (const auto& topic : system.publishers) {
       if (topic.id) from_hardware_.at(*topic.id) = publish_.at(topic.name);
+    }
+    for (const auto& service : system.services) {
+      const unsigned publisher = service.is_server ? service.response : service.request;
+      from_hardware_.at(publisher) = [this, publisher](const std::uint8_t* payload, std::size_t size) {
+        calls_.take(publisher, payload, size);
+      };
     }
     if (!system.has_software()) return;
 
@@ -250,6 +268,8 @@ class Engines {
     configuration.publishers = static_cast<unsigned>(outputs.size());
     configuration.trace = nullptr;
     configuration.has_status = false;
+    configuration.on_rejected = configuration.on_aborted = nullptr;
+    configuration.on_restart = configuration.on_rest = nullptr;
     configuration.queue_depths.clear();
     software_ = std::make_unique<Node>(configuration, "software:" + arguments.software, by_id(from_software_));
     for (unsigned id = 0; id < inputs.size(); ++id) {
@@ -276,6 +296,7 @@ class Engines {
     };
   }
 
+  NodeCalls& calls() { return calls_; }
   Node& hardware() { return *hardware_; }
   Node* software() { return software_.get(); }
 
@@ -291,6 +312,14 @@ class Engines {
 
  private:
   static constexpr std::chrono::seconds kSilence{1};
+
+  // Tell the calls of services what happens in the hardware.
+  void watch_calls(NodeConfiguration& configuration) {
+    configuration.on_rejected = [this](unsigned subscriber) { calls_.refuse_request(subscriber); };
+    configuration.on_aborted = [this](unsigned publisher) { calls_.refuse_response(publisher); };
+    configuration.on_restart = [this] { calls_.forget(); };
+    configuration.on_rest = [this] { calls_.rest(); };
+  }
 
   // Return a function that opens the hardware, and refuses that of another system.
   static Node::Open opener(const System& system, const std::string& address) {
@@ -320,6 +349,7 @@ class Engines {
   std::vector<MessageHandler> from_software_;
   std::unique_ptr<Node> hardware_;
   std::unique_ptr<Node> software_;
+  NodeCalls calls_;  // after the nodes, as its threads use them
 };
 
 // Return the word of a register of an engine's hardware. Throws TransportError.
@@ -336,6 +366,11 @@ inline void print_statistics(const std::string& name, const Node& node, std::uin
             << " restarts, " << lost << " lost by ROS" << std::endl;
 }
 
+inline void print_calls(const CallStatistics& counted) {
+  std::cerr << "its services: " << counted.called << " called, " << counted.answered << " answered, " << counted.failed
+            << " failed, " << counted.unasked << " unasked" << std::endl;
+}
+
 // Run the node until a signal, ROS, or the hardware ends it. Return the exit status.
 template <typename Ros>
 int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
@@ -349,7 +384,8 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   for (const auto& topic : system.publishers) {
     publish[topic.name] = ros.advertise(topic, arguments.quality_of(topic));
   }
-  Engines engines(system, arguments, std::move(publish), arguments.trace.empty() ? nullptr : &trace);
+  Engines engines(system, arguments, std::move(publish), arguments.trace.empty() ? nullptr : &trace,
+                  Ros::kTellsFailures);
   for (const auto& topic : system.subscribers) {
     Quality quality = arguments.quality_of(topic);
     // Only the node's queue then drops messages, which it counts. If it blocks, the one of ROS must have a limit.
@@ -358,6 +394,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   }
 
   RunningNode hardware(engines.hardware(), arguments.drain);
+  engines.calls().connect(ros);
   std::optional<RunningNode> software;
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
   std::optional<StatusWatch> watch;
@@ -380,12 +417,14 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   // Handle messages that ROS has already received.
   ros.spin(std::chrono::milliseconds(0));
   ros.unsubscribe();
+  ros.finish_calls([&] { engines.calls().drain(arguments.drain); });
   if (software && is_running()) engines.settle(arguments.drain);
   int status = software ? software->stop() : 0;
   status = std::max(status, hardware.stop());
   ros.flush();
   print_statistics(system.name + "_node", engines.hardware(), ros.lost());
   if (software) print_statistics("its software", *engines.software());
+  if (!system.services.empty()) print_calls(engines.calls().statistics());
   return status;
 }
 

@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: Apache-2.0
+// The calls of services: each service has one call under way, and further calls wait in the order of their arrival. A
+// frame does not tell who asked. With one call of a service in the hardware, its response, its errors and its time-out
+// belong to that call. The same holds for the calls that hardware makes. C++17, no dependencies.
+//
+// The behaviour equals that of fusesoc_firm/node/calls.py.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <firm/transport.hpp>
+
+namespace firm {
+
+// A service that the hardware serves, or calls: the ids of the converters of its messages, its name in ROS, its type and
+// signature, and the types of its messages. A call is answered within `limit`. `failure` is the response to a call that
+// fails, if the response has a field `success`; otherwise, it is empty.
+struct Service {
+  bool is_server;
+  unsigned request;
+  unsigned response;
+  std::string name;
+  std::string type;
+  std::string signature;
+  std::string request_type;
+  std::string response_type;
+  std::chrono::milliseconds limit;
+  Bytes failure;
+};
+
+// The answer to a call: the payload of the response, or nothing if the call failed, for a reason.
+struct Answer {
+  std::optional<Bytes> payload;
+  std::string reason{};
+};
+
+// Takes the answer to a call; any thread may call it.
+using AnswerHandler = std::function<void(const Answer&)>;
+// Takes a call; it answers each call once.
+using CallHandler = std::function<void(Bytes payload, AnswerHandler answer)>;
+
+// The calls of one service. Any thread may call the functions; a thread of the line's own hands calls over.
+//
+// An answer that does not tell its call and comes late would be taken for that of the next call. Therefore, if a call is
+// not answered in time, or if more may follow its answer, the next call waits until something follows or until rest(),
+// but for another `limit` at most, or for `kLeastWait` if this is longer.
+class CallLine {
+ public:
+  using HandOver = std::function<void(const Bytes& payload, std::uint64_t number)>;
+
+  static constexpr std::size_t kMostWaiting = 1000;
+  static constexpr std::chrono::seconds kLeastWait{2};
+
+  // With `has_numbers`, each answer tells its call.
+  CallLine(std::chrono::nanoseconds limit, bool has_numbers, HandOver hand_over)
+      : limit_(limit), has_numbers_(has_numbers), hand_over_(std::move(hand_over)), thread_([this] { run(); }) {}
+
+  ~CallLine() {
+    close();
+    thread_.join();
+  }
+
+  CallLine(const CallLine&) = delete;
+  CallLine& operator=(const CallLine&) = delete;
+
+  // Add a call; it fails if too many calls wait, or if the node ends.
+  void put(Bytes payload, AnswerHandler answer) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!is_ending_ && waiting_.size() < kMostWaiting) {
+        waiting_.push_back({std::move(payload), std::move(answer)});
+        changed_.notify_all();
+        return;
+      }
+    }
+    answer({std::nullopt, "too many calls wait, or the node ends"});
+  }
+
+  // Answer the call that is under way, if it has this number; return whether there is such a call. Unless `is_final`,
+  // more may follow from the hardware for this call.
+  bool settle(Answer answer, std::optional<std::uint64_t> number = std::nullopt, bool is_final = true) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!is_held_ || answer_ || (number && *number != number_)) return false;
+    answer_ = std::move(answer);
+    is_final_ = is_final;
+    changed_.notify_all();
+    return true;
+  }
+
+  // Take note that nothing more follows from the hardware for a call that was given up.
+  void rest() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!is_late_) return;
+    answer_ = Answer{};
+    changed_.notify_all();
+  }
+
+  // Take no more calls, and wait until all are answered, or until this time.
+  void drain(std::chrono::steady_clock::time_point latest) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    is_ending_ = true;
+    changed_.wait_until(lock, latest, [this] { return !is_held_ && waiting_.empty(); });
+  }
+
+  // Let all calls fail that are not answered yet.
+  void close() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    is_ending_ = is_closed_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  struct Call {
+    Bytes payload;
+    AnswerHandler answer;
+  };
+
+  void run() {
+    const Answer ended{std::nullopt, "the node ends"};
+    while (const auto call = next()) {
+      hand_over_(call->payload, number_);
+      const auto answer = wait();
+      call->answer(answer ? *answer : is_closed() ? ended : Answer{std::nullopt, no_answer()});
+      wait_for_late();
+    }
+    for (const auto& call : rest_of_calls()) call.answer(ended);
+  }
+
+  // Return the next call, or nothing if the line is closed.
+  std::optional<Call> next() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    answer_.reset();
+    is_held_ = is_late_ = false;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return is_closed_ || !waiting_.empty(); });
+    if (is_closed_) return std::nullopt;
+    std::optional<Call> call(std::move(waiting_.front()));
+    waiting_.pop_front();
+    is_held_ = true;
+    ++number_;
+    return call;
+  }
+
+  // Return the answer to the call under way, or nothing if it does not come in time or the line is closed.
+  std::optional<Answer> wait() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait_for(lock, limit_, [this] { return is_closed_ || answer_; });
+    return answer_;
+  }
+
+  // Wait for what may follow from the hardware for the call under way.
+  void wait_for_late() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (has_numbers_ || (answer_ && is_final_)) return;
+    answer_.reset();
+    is_late_ = true;
+    changed_.wait_for(lock, std::max<std::chrono::nanoseconds>(limit_, kLeastWait),
+                      [this] { return is_closed_ || answer_; });
+  }
+
+  bool is_closed() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return is_closed_;
+  }
+
+  std::string no_answer() const {
+    const auto milliseconds = std::chrono::duration_cast<std::chrono::milliseconds>(limit_).count();
+    return "no answer within " + std::to_string(milliseconds) + " ms";
+  }
+
+  std::deque<Call> rest_of_calls() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::exchange(waiting_, {});
+  }
+
+  const std::chrono::nanoseconds limit_;
+  const bool has_numbers_;
+  const HandOver hand_over_;
+  mutable std::mutex mutex_;  // protects the members below
+  std::condition_variable changed_;
+  std::deque<Call> waiting_;
+  bool is_held_ = false;
+  std::uint64_t number_ = 0;  // of the call that is held; written by the line's thread only
+  std::optional<Answer> answer_;
+  bool is_final_ = false;
+  bool is_late_ = false;
+  bool is_ending_ = false;
+  bool is_closed_ = false;
+  std::thread thread_;  // the last member, as it uses the others
+};
+
+struct CallStatistics {
+  std::uint64_t called = 0;
+  std::uint64_t answered = 0;
+  std::uint64_t failed = 0;
+  std::uint64_t unasked = 0;  // responses of the hardware to no call
+};
+
+// The calls of all services of a node, between the middleware and the hardware. Any thread may call the functions.
+class NodeCalls {
+ public:
+  // Sends a payload to a subscriber of the hardware; returns whether it will be sent, and may throw.
+  using Put = std::function<bool(unsigned subscriber, const std::uint8_t* payload, std::size_t size)>;
+
+  // `tells_failures`: the middleware has an answer for a call that fails.
+  NodeCalls(std::vector<Service> services, bool tells_failures, Put put)
+      : services_(std::move(services)), tells_failures_(tells_failures), put_(std::move(put)) {
+    for (const auto& service : services_) {
+      (service.is_server ? responses_ : requests_)[service.is_server ? service.response : service.request] =
+          lines_.size();
+      lines_.push_back(std::make_unique<CallLine>(
+          service.limit, !service.is_server,
+          [this, index = lines_.size()](const Bytes& payload, std::uint64_t number) { hand_over(index, payload, number); }));
+    }
+    callers_.resize(services_.size());
+  }
+
+  // Serve all servers with a middleware, and call its services for all clients.
+  template <typename Ros>
+  void connect(Ros& ros) {
+    for (std::size_t index = 0; index < services_.size(); ++index) {
+      if (services_[index].is_server) {
+        ros.serve(services_[index], [this, index](Bytes payload, AnswerHandler answer) {
+          put(index, std::move(payload),
+              [this, index, answer](const Answer& found) { answer(to_client(index, found)); });
+        });
+      } else {
+        CallHandler caller = ros.caller(services_[index]);
+        const std::lock_guard<std::mutex> lock(mutex_);
+        callers_[index] = std::move(caller);
+      }
+    }
+  }
+
+  // Take a message of the hardware's publisher, if it belongs to a service; return whether it does.
+  bool take(unsigned publisher, const std::uint8_t* payload, std::size_t size) {
+    if (const auto found = responses_.find(publisher); found != responses_.end()) {
+      if (lines_[found->second]->settle({Bytes(payload, payload + size)})) return true;
+      count(&CallStatistics::unasked);
+      report("the hardware sent a response of " + services_[found->second].name + " to no call");
+      return true;
+    }
+    const auto found = requests_.find(publisher);
+    if (found == requests_.end()) return false;
+    put(found->second, Bytes(payload, payload + size),
+        [this, index = found->second](const Answer& answer) { to_hardware(index, answer); });
+    return true;
+  }
+
+  // The hardware rejected a frame of this subscriber; an aborted response may follow.
+  void refuse_request(unsigned subscriber) {
+    for (std::size_t index = 0; index < services_.size(); ++index) {
+      if (!services_[index].is_server || services_[index].request != subscriber) continue;
+      lines_[index]->settle({std::nullopt, "the hardware rejected the request"}, std::nullopt, false);
+    }
+  }
+
+  // The hardware ended a frame of this publisher in its middle.
+  void refuse_response(unsigned publisher) {
+    const auto found = responses_.find(publisher);
+    if (found != responses_.end()) lines_[found->second]->settle({std::nullopt, "the hardware aborted the response"});
+  }
+
+  // The hardware was restarted, and has forgotten its calls.
+  void forget() {
+    for (const auto& [publisher, index] : responses_) {
+      lines_[index]->settle({std::nullopt, "the hardware was restarted"});
+    }
+  }
+
+  // The hardware has no work.
+  void rest() {
+    for (const auto& line : lines_) line->rest();
+  }
+
+  // Take no more calls, and wait until all are answered, or for `longest`; then let the others fail.
+  void drain(std::chrono::nanoseconds longest) {
+    const auto latest = std::chrono::steady_clock::now() + longest;
+    for (const auto& line : lines_) line->drain(latest);
+    for (const auto& line : lines_) line->close();
+  }
+
+  CallStatistics statistics() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return statistics_;
+  }
+
+ private:
+  static constexpr unsigned kMostReports = 20;
+
+  void put(std::size_t index, Bytes payload, AnswerHandler answer) {
+    count(&CallStatistics::called);
+    lines_[index]->put(std::move(payload), std::move(answer));
+  }
+
+  void hand_over(std::size_t index, const Bytes& payload, std::uint64_t number) {
+    if (services_[index].is_server) {
+      const std::string fault = sent(services_[index].request, payload);
+      if (!fault.empty()) lines_[index]->settle({std::nullopt, fault});
+      return;
+    }
+    CallHandler call;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      call = callers_[index];
+    }
+    const auto settle = [this, index, number](const Answer& answer) { lines_[index]->settle(answer, number); };
+    if (call) {
+      call(payload, settle);
+    } else {
+      settle({std::nullopt, "the node is not connected yet"});
+    }
+  }
+
+  // Return the answer that a client receives: ROS 2 has none for a call that fails.
+  Answer to_client(std::size_t index, const Answer& answer) {
+    if (!counted(index, answer) || tells_failures_ || services_[index].failure.empty()) return answer;
+    return {services_[index].failure};
+  }
+
+  void to_hardware(std::size_t index, const Answer& answer) {
+    const Bytes& failure = services_[index].failure;
+    const bool has_failed = counted(index, answer);
+    if (has_failed && failure.empty()) return;
+    const std::string fault = sent(services_[index].response, has_failed ? failure : *answer.payload);
+    if (!fault.empty()) report("a response of " + services_[index].name + " is not sent: " + fault);
+  }
+
+  // Send a payload to the hardware; return the reason if it is not sent.
+  std::string sent(unsigned subscriber, const Bytes& payload) {
+    try {
+      return put_(subscriber, payload.data(), payload.size()) ? "" : "the node ends";
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+  }
+
+  // Count an answer, and report a failure; return whether the call failed.
+  bool counted(std::size_t index, const Answer& answer) {
+    count(answer.payload ? &CallStatistics::answered : &CallStatistics::failed);
+    if (answer.payload) return false;
+    const auto& service = services_[index];
+    const bool is_told = !service.failure.empty() || (service.is_server && tells_failures_);
+    report("a call of " + service.name + " failed" + (is_told ? "" : ", and gets no response") + ": " + answer.reason);
+    return true;
+  }
+
+  void count(std::uint64_t CallStatistics::*what) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++(statistics_.*what);
+  }
+
+  void report(const std::string& text) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (reported_++ < kMostReports) std::cerr << text << std::endl;
+  }
+
+  const std::vector<Service> services_;
+  const bool tells_failures_;
+  const Put put_;
+  std::map<unsigned, std::size_t> responses_;  // the service of each publisher with responses
+  std::map<unsigned, std::size_t> requests_;   // the service of each publisher with requests
+  mutable std::mutex mutex_;                   // protects the members below
+  CallStatistics statistics_;
+  unsigned reported_ = 0;
+  std::vector<CallHandler> callers_;
+  std::vector<std::unique_ptr<CallLine>> lines_;  // the last member, as their threads use the others
+};
+
+}  // namespace firm
