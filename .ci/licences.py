@@ -56,6 +56,7 @@ PROGRAMS: Mapping[str, str] = {
     "libroscpp-dev": "nodes in C++ for ROS 1",
     "python3-geometry-msgs": "ROS 1, in tests",
     "python3-rosbag": "ROS 1, in tests",
+    "python3-roslaunch": "ROS 1, in tests",
     "python3-rosmaster": "ROS 1, in tests",
     "python3-rospy": "nodes in Python for ROS 1",
     "python3-sensor-msgs": "ROS 1, in tests",

@@ -274,6 +274,8 @@ def _write_node(arguments: argparse.Namespace) -> None:
     ros = middleware_of(arguments.ros) if arguments.ros else None
     for path, text in LANGUAGES[arguments.language](loaded, ros, place).items():
         write(folder / path, text)
+        if text.startswith("#!"):
+            (folder / path).chmod(0o755)
     print(folder)
 
 

@@ -54,6 +54,8 @@ _FLUSH_SECONDS = 2.0
 _SERVICE_DEPTH = 1000
 # The interval in s at which the types of other nodes' topics are compared.
 _LOOK_SECONDS = 1.0
+# The name of a node of which ROS 2 has found only the topics so far.
+_UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 
 
 def pack_call(number: int, payload: bytes) -> bytes:
@@ -159,6 +161,23 @@ class Gaps:
     def forget(self) -> None:
         """Begin with the next message."""
         self._last.clear()
+
+
+class Ends:
+    """The ends of topics, each of which is reported once, and not before the name of its node may be known."""
+
+    def __init__(self) -> None:
+        self._told: set[bytes] = set()
+        self._nameless: set[bytes] = set()
+
+    def is_due(self, end: bytes, node: str) -> bool:
+        """Return whether to report an end now."""
+        is_new_and_nameless = node == _UNKNOWN_NODE and end not in self._nameless
+        if end in self._told or is_new_and_nameless:
+            self._nameless.add(end)
+            return False
+        self._told.add(end)
+        return True
 
 
 class Ros(ABC):
@@ -500,6 +519,7 @@ class Ros2(Ros):
         self._called: dict[int, tuple[Any, ...]] = {}
         self._stops_at: float | None = None
         self._looks_at = 0.0
+        self._ends = Ends()
         self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"]}
         self._publishers = {
             topic["number"]: self._node.create_publisher(types[topic["type"]], topic["name"], _quality(topic))
@@ -631,7 +651,7 @@ class Ros2(Ros):
             for topic in self._config[kind]:
                 name = names[kind][topic["number"]]
                 for end in ends_of(name):
-                    if end.topic_type != topic["type"]:
+                    if end.topic_type != topic["type"] and self._ends.is_due(bytes(end.endpoint_gid), end.node_name):
                         self.report(_type_report(end.node_name, verb, name, end.topic_type, topic["type"]))
 
     def _check_hashes(self) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 from fusesoc_firm.message.middleware import Middleware, middleware_of
 from fusesoc_firm.node.description import DEFAULT_DEPTH, NodeDescription, NodeTopic, channel_names, describe
 from fusesoc_firm.node.diagnostics import diagnostics_topic
+from fusesoc_firm.node.launch import LAUNCHERS, launch_file, package_name
 from fusesoc_firm.node.software_process import software_ports
 from fusesoc_firm.request.request import GeneratedFile
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -82,7 +83,7 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
     description = describe(loaded)
     version = _only_version(description, ros)
     dialect = _DIALECTS[version]
-    package = f"{description.name}_node"
+    package = package_name(description)
     types = [topic.type for topic in (*description.subscribers, *description.publishers)]
     types += [service.type for service in description.services]
     packages = {"diagnostic_msgs"} | {name.partition("/")[0] for name in types}
@@ -91,12 +92,14 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
         "name": description.name,
         "build_tool": dialect.build_tool,
         "library": dialect.library,
+        "launcher": LAUNCHERS[version],
         "message_packages": sorted(packages) if dialect.needs_messages else [],
         "has_build_type": dialect.needs_messages,
     }
     return {
         "package.xml": render(_PACKAGE_TEMPLATE, build),
         "CMakeLists.txt": render(dialect.cmake, {"package": package}),
+        **launch_file(description, version, package),
         f"src/{package}.cpp": render(_SOURCE_TEMPLATE, _source(loaded, description, dialect)),
         **_headers(dialect),
     }

@@ -1,4 +1,4 @@
-"""Write the node of a system as a Python file: a table, and a call of the package's node."""
+"""The software node of a system in Python: a ROS package with one file, a table and a call of fusesoc-firm's node."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.launch import LAUNCHERS, launch_file, package_name
 from fusesoc_firm.node.services import NodeService
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
@@ -19,14 +20,20 @@ from fusesoc_firm.text.quoting import lines_of, python_string
 from fusesoc_firm.text.render import render
 
 _TEMPLATE = "node/node.py"
+# For each version of ROS: the tool that builds the package, the library of the node, and the template of the build.
+_BUILDS = {
+    1: ("catkin", "rospy", "node/script_catkin.cmake"),
+    2: ("ament_cmake", "rclpy", "node/script_ament.cmake"),
+}
 
 
 def python_node(
     loaded: LoadedSystem, ros: Middleware | None, specification: Path, folder: Path, paths: Sequence[Path] = ()
 ) -> dict[str, str]:
-    """Return the text of the node's file by the file's name in `folder`.
+    """Return the files of the node's package by path within `folder`.
 
-    If the system has software, the node finds the functions through the specification, and the messages in `paths`. All
+    If the topics use both versions of ROS, only the node itself is returned, since a package belongs to one version. If
+    the system has software, the node finds the functions through the specification, and the messages in `paths`. All
     paths are relative to the folder. Raise `InputError` if the system has no topic of `ros`.
     """
     description = describe(loaded)
@@ -39,7 +46,33 @@ def python_node(
         others = [os.path.relpath(path, folder) for path in paths]
         call = f"main(NODE, __file__, {python_string(os.path.relpath(specification, folder))}, {others!r})"
     configuration = {"file": name, "specification": shlex.quote(specification.name), "call": call}
-    return {name: render(_TEMPLATE, {**_table(description), **configuration})}
+    files = {name: render(_TEMPLATE, {**_table(description), **configuration})}
+    versions = description.versions if ros is None else (ros.number,)
+    return (
+        {**files, **_package(description, versions[0], name, is_linked=has_software)} if len(versions) == 1 else files
+    )
+
+
+def _package(description: NodeDescription, ros: int, script: str, *, is_linked: bool) -> dict[str, str]:
+    """Return the files that make the node a package; `is_linked` if the node must stay beside other files."""
+    build_tool, library, cmake = _BUILDS[ros]
+    package = package_name(description)
+    topics = [topic for topic in (*description.subscribers, *description.publishers) if topic.ros == ros]
+    messages = {"diagnostic_msgs", *(topic.type.partition("/")[0] for topic in topics)} if ros == 2 else set()
+    build = {
+        "package": package,
+        "name": description.name,
+        "build_tool": build_tool,
+        "library": library,
+        "launcher": LAUNCHERS[ros],
+        "message_packages": sorted(messages),
+        "has_build_type": ros == 2,
+    }
+    return {
+        "package.xml": render("node/package.xml", build),
+        "CMakeLists.txt": render(cmake, {"package": package, "script": script, "is_linked": is_linked}),
+        **launch_file(description, ros, script),
+    }
 
 
 def _table(description: NodeDescription) -> dict[str, Any]:

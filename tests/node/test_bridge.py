@@ -9,9 +9,23 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.node.bridge import MESSAGE, Channel
+from fusesoc_firm.node.bridge import MESSAGE, Channel, Ends
 from fusesoc_firm.node.carrier import CarrierError, RosCarrier, RosOptions
 from fusesoc_firm.node.description import NodeDescription
+
+
+def test_an_end_is_reported_once_with_the_name_of_its_node() -> None:
+    """ROS 2 may find a topic of a node before the node; some ends never have a node."""
+    ends = Ends()
+    looks = [
+        (b"1", "_NODE_NAME_UNKNOWN_"),
+        (b"1", "peer"),
+        (b"1", "peer"),
+        (b"2", "peer"),
+        (b"2", "_NODE_NAME_UNKNOWN_"),
+    ]
+    assert [ends.is_due(*look) for look in looks] == [False, True, False, True, False]
+    assert [ends.is_due(b"3", "_NODE_NAME_UNKNOWN_") for _ in range(3)] == [False, True, False]
 
 
 def test_a_channel_that_is_closed_holds_no_file() -> None:

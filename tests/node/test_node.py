@@ -575,7 +575,7 @@ def test_what_cannot_be_drawn_is_told(tmp_path: Path, table: str, picture: str, 
 def test_the_generated_file_has_the_table(tmp_path: Path, kinds: tuple[str, ...]) -> None:
     system = with_software(tmp_path, *kinds)
     spec = tmp_path / "spec.yaml"
-    (source,) = python_node(system, ROS1, spec, tmp_path / "nodes" / "robot").values()
+    source = python_node(system, ROS1, spec, tmp_path / "nodes" / "robot")["robot_node.py"]
     names: dict[str, object] = {"__name__": "generated"}
     exec(compile(source, "robot_node.py", "exec"), names)
     assert names["NODE"] == describe(system)

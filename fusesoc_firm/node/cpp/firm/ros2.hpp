@@ -283,12 +283,21 @@ class Ros2 {
     if (ends_of(&node_, &allocator, topic.c_str(), false, &ends) != RCL_RET_OK) return rcl_reset_error();
     for (std::size_t index = 0; index < ends.size; ++index) {
       const auto& end = ends.info_array[index];
-      if (end.topic_type == type) continue;
+      if (end.topic_type == type || !is_due(end)) continue;
       const std::string report = std::string(end.node_name) + " " + verb + " " + topic + " with the type " +
                                  end.topic_type + ", which is " + type + " here; no messages are exchanged";
       if (reported_.insert(report).second) std::cerr << report << std::endl;
     }
     ignore(rmw_topic_endpoint_info_array_fini(&ends, &allocator));
+  }
+
+  // Return whether an end of a topic is to be reported: once, and not before its node's name may be known.
+  bool is_due(const rmw_topic_endpoint_info_t& end) {
+    const std::string gid(reinterpret_cast<const char*>(end.endpoint_gid), sizeof end.endpoint_gid);
+    const bool is_nameless = std::string(end.node_name) == "_NODE_NAME_UNKNOWN_";
+    if (told_.count(gid) || (is_nameless && nameless_.insert(gid).second)) return false;
+    told_.insert(gid);
+    return true;
   }
 
   void remove_ros_arguments(int& argc, char** argv) {
@@ -307,6 +316,9 @@ class Ros2 {
   std::uint64_t lost_ = 0;
   std::chrono::steady_clock::time_point looks_at_{};
   std::set<std::string> reported_;
+  // The ends of topics that were reported, and those whose node was unknown at a look.
+  std::set<std::string> told_;
+  std::set<std::string> nameless_;
   rcl_context_t context_ = rcl_get_zero_initialized_context();
   rcl_node_t node_ = rcl_get_zero_initialized_node();
   rcl_wait_set_t waiting_ = rcl_get_zero_initialized_wait_set();
