@@ -145,7 +145,9 @@ class Studio:
             text = (_PAGE / "index.html").read_text(encoding="utf-8")
         except OSError:
             text = "The page is not built; 'make studio' builds it.\n"
-        return web.Response(text=text, content_type="text/html")
+        # The browser requests the first picture's data at once, not when the page's program has begun.
+        headers = {"Link": "<api/scene>; rel=preload; as=fetch; crossorigin"}
+        return web.Response(text=text, content_type="text/html", headers=headers)
 
     async def _files(self, _: web.Request) -> web.Response:
         return _json({"files": await asyncio.to_thread(lambda: [*islice(self._specifications(), _MOST_FILES)])})
@@ -154,7 +156,13 @@ class Studio:
         return _json(grammar())
 
     async def _scene(self, request: web.Request) -> web.Response:
-        document = self._document(request.query.get("file", ""))
+        """Return the scene of a file, or of the first one if none is named."""
+        name = request.query.get("file")
+        if name is None:
+            name = await asyncio.to_thread(lambda: next(self._specifications(), None))
+            if name is None:
+                return _json(None)
+        document = self._document(name)
         document.follow()
         return await self._answer(document)
 

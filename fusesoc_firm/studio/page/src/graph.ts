@@ -1,6 +1,8 @@
 // From a specification to nodes and edges in their places.
 
 import type { Edge, Node } from "@xyflow/svelte";
+import ELK from "elkjs/lib/elk-api";
+import worker from "elkjs/lib/elk-worker.min.js?url";
 import type { Fault, Path, Scene, Section } from "./api";
 
 export type Kind = "subscriber" | "publisher" | "accelerator" | "software" | "manager";
@@ -11,8 +13,31 @@ export type BlockData = BlockWords & { errors: number; warnings: number };
 export type BlockNode = Node<BlockData, "block">;
 
 const LINE = 17;
-// The layout engine is most of the page, so it loads while the server derives the system.
-const engine = import("elkjs/lib/elk.bundled.js").then((module) => new module.default());
+const OPTIONS = {
+  "elk.algorithm": "layered",
+  "elk.direction": "RIGHT",
+  "elk.spacing.nodeNode": "24",
+  "elk.layered.spacing.nodeNodeBetweenLayers": "110",
+  "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
+};
+// The layout engine is most of the page, so it loads and warms up beside it while the server derives the system: a browser
+// translates what has run several times to faster code.
+const engine = new ELK({ workerFactory: () => new Worker(worker) });
+const WARM_UPS = 5;
+let isAwaited = false;
+
+async function warmUp() {
+  const ids = ["a", "b", "c", "d", "e", "f"];
+  const ways = ["ab", "ac", "bd", "cd", "de", "bf"];
+  for (let turn = 0; turn < WARM_UPS && !isAwaited; turn++) {
+    await engine.layout({
+      id: "root",
+      layoutOptions: OPTIONS,
+      children: ids.map((id) => ({ id, width: 100, height: 40 })),
+      edges: ways.map((way) => ({ id: way, sources: [way[0]], targets: [way[1]] })),
+    });
+  }
+}
 
 const list = (value: unknown): any[] => (Array.isArray(value) ? value : []);
 const isAt = (path: Path | null | undefined, place: Path) =>
@@ -119,18 +144,15 @@ function fixed(id: string, source: string, target: string, file: string, block: 
 
 /** Place the nodes, from left to right along the data. */
 export async function placed(nodes: BlockNode[], edges: Edge[]): Promise<BlockNode[]> {
-  const graph = await (await engine).layout({
+  isAwaited = true;
+  const graph = await engine.layout({
     id: "root",
-    layoutOptions: {
-      "elk.algorithm": "layered",
-      "elk.direction": "RIGHT",
-      "elk.spacing.nodeNode": "24",
-      "elk.layered.spacing.nodeNodeBetweenLayers": "110",
-      "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
-    },
+    layoutOptions: OPTIONS,
     children: nodes.map(({ id, width, height }) => ({ id, width, height })),
     edges: edges.map(({ id, source, target }) => ({ id, sources: [source], targets: [target] })),
   });
   const places = new Map(graph.children!.map((item) => [item.id, { x: item.x!, y: item.y! }]));
   return nodes.map((node) => ({ ...node, position: places.get(node.id)! }));
 }
+
+warmUp();
