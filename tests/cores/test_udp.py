@@ -15,7 +15,7 @@ from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
 SEED = 20261126
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "net/udp")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/udp")
 
 
 @pytest.fixture(scope="module")
