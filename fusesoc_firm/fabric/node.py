@@ -26,7 +26,7 @@ LEASE_SECONDS = 20
 _GRAPH_TOPIC = "ros_discovery_info"
 _GRAPH_TYPE = MessageName("rmw_dds_common", "ParticipantEntitiesInfo")
 _GID = MessageName("rmw_dds_common", "Gid")
-_RELIABLE_FOREVER = struct.pack("<iI", 0, 0x19999999)  # 0.1 s to block, which no reader compares
+_BLOCKING_TIME = struct.pack("<iI", 0, 0x19999999)  # 0.1 s, which no reader compares
 _LOCATOR_UDP = 1
 
 
@@ -91,13 +91,12 @@ class Node:
         )
 
     @cached_property
-    def farewell(self) -> tuple[bytes, bytes]:
+    def farewell(self) -> tuple[dict[Parameter, bytes], bytes]:
         """The inline parameters and the payload that dispose the node: its key, and nothing else."""
         guid = self.prefix + rtps.PARTICIPANT
         status = bytes([0, 0, 0, rtps.DISPOSED | rtps.UNREGISTERED])
-        inline = parameter(Parameter.STATUS_INFO, status) + parameter(Parameter.KEY_HASH, guid)
         key = rtps.parameter_list(parameter(Parameter.PARTICIPANT_GUID, guid))
-        return inline + parameter(Parameter.SENTINEL, b""), key
+        return {Parameter.STATUS_INFO: status, Parameter.KEY_HASH: guid}, key
 
     def endpoint_data(self, endpoint: Endpoint) -> bytes:
         """Return the payload that announces an endpoint (SEDP)."""
@@ -107,7 +106,7 @@ class Node:
             parameter(Parameter.ENDPOINT_GUID, self.prefix + endpoint.entity),
             parameter(Parameter.TOPIC_NAME, rtps.string(endpoint.topic)),
             parameter(Parameter.TYPE_NAME, rtps.string(endpoint.type)),
-            parameter(Parameter.RELIABILITY, struct.pack("<I", reliability) + _RELIABLE_FOREVER),
+            parameter(Parameter.RELIABILITY, struct.pack("<I", reliability) + _BLOCKING_TIME),
             parameter(Parameter.DURABILITY, struct.pack("<I", durability)),
             parameter(Parameter.USER_DATA, rtps.octets(f"typehash={endpoint.hash};".encode())),
         )

@@ -10,8 +10,6 @@ HEADER = b"RTPS\x02\x02"
 VENDOR = bytes(2)
 # The group of all participants, on the multicast port of their domain.
 MULTICAST = "239.255.0.1"
-# The last domain whose ports are below those that systems give to clients, with Linux's default range.
-LAST_DOMAIN = 101
 
 PARTICIPANT = bytes.fromhex("000001c1")
 NO_ENTITY = bytes(4)

@@ -27,7 +27,7 @@ from tests.hdl.verilog import loops, netlist
 SEED = 20261125
 HERE = Path(__file__).parent
 HARDWARE = core_files("axis/package", "axis/axis", "net/mac", "net/responder")
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "net/mac", "net/responder")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/responder")
 
 
 @pytest.fixture(scope="module")

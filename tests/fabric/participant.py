@@ -226,8 +226,7 @@ class Participant:
     def leave(self) -> None:
         """Tell all that the node ends."""
         inline, key = self.node.farewell
-        items = ((Parameter.STATUS_INFO, inline[4:8]), (Parameter.KEY_HASH, inline[12:28]))
-        ending = Data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 2, key, items, is_key=True)
+        ending = Data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 2, key, tuple(inline.items()), is_key=True)
         for address in (self._group, *(peer.metatraffic for peer in self.peers.values())):
             self._send(address, ending)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +95,7 @@ def test_the_graph_lists_readers_and_writers(distribution: str, size: int) -> No
 def test_the_farewell_names_the_node_twice() -> None:
     inline, key = node().farewell
     guid = node().prefix + rtps.PARTICIPANT
-    assert inline == struct.pack("<HH4BHH", 0x71, 4, 0, 0, 0, 3, 0x70, 16) + guid + struct.pack("<HH", 1, 0)
+    assert inline == {0x71: bytes([0, 0, 0, 3]), 0x70: guid}
     assert ParameterList.of(key).items == ((Parameter.PARTICIPANT_GUID, guid),)
 
 

@@ -55,7 +55,7 @@ def test_no_node_on_a_host_serves_it(path: Path, capsys: pytest.CaptureFixture[s
 
 
 def _request(folder: Path, **parameters: str) -> Request:
-    known: dict[str, str | None] = {"spec": "turtle.yaml", "product": "system", "board": None, "paths": None, "distro": None}
+    known = {"spec": "turtle.yaml", "product": "system", **dict.fromkeys(("board", "paths", "distro"))}
     return Request("far", "test:sys:turtle-system:0", folder, {**known, **parameters})
 
 

@@ -25,19 +25,17 @@ end entity firm_net_responder_tb;
 
 architecture simulation of firm_net_responder_tb is
 
-  -- Between two frames of the receiver, at least.
-  constant GAP_CYCLES  : positive := 6;
   -- After the last frame, for the reader.
   constant LAST_CYCLES : positive := 4 * DEPTH;
 
   signal clk   : std_logic := '0';
-  signal rst_n : std_logic := '0';
-  signal over  : boolean   := false;
+  signal rst_n : std_logic;
+  signal over  : boolean;
 
-  signal s_tdata  : std_logic_vector(7 downto 0) := (others => '0');
-  signal s_tuser  : std_logic_vector(0 downto 0) := "0";
-  signal s_tvalid : std_logic                    := '0';
-  signal s_tlast  : std_logic                    := '0';
+  signal s_tdata  : std_logic_vector(7 downto 0);
+  signal s_tuser  : std_logic_vector(0 downto 0);
+  signal s_tvalid : std_logic;
+  signal s_tlast  : std_logic;
 
   signal m_tdata  : std_logic_vector(7 downto 0);
   signal m_tvalid : std_logic;
@@ -69,59 +67,22 @@ begin
       is_lost       => is_lost
     );
 
-  send : process
-    file frames       : text open read_mode is FRAME_FILE;
-    variable row      : line;
-    variable before   : integer;
-    variable abort    : integer;
-    variable size     : integer;
-    variable byte     : integer;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
-
-    procedure wait_for(cycles : in natural) is
-    begin
-      for cycle in 1 to cycles loop
-        wait until rising_edge(clk);
-      end loop;
-    end procedure wait_for;
-
-  begin
-    wait_for(4);
-    rst_n <= '1';
-    while not endfile(frames) loop
-      readline(frames, row);
-      read(row, before);
-      read(row, abort);
-      read(row, size);
-      wait_for(before + GAP_CYCLES);
-      for place in 0 to size-1 loop
-        read(row, byte);
-        loop
-          uniform(random_1, random_2, draw);
-          exit when 100.0 * draw >= real(SLOW_PERCENT);
-          wait until rising_edge(clk);
-        end loop;
-        s_tvalid <= '1';
-        s_tdata  <= std_logic_vector(to_unsigned(byte, 8));
-        s_tlast  <= '0';
-        s_tuser  <= "0";
-        if place = size-1 then
-          s_tlast <= '1';
-          if abort = 1 then
-            s_tuser <= "1";
-          end if;
-        end if;
-        wait until rising_edge(clk);
-        s_tvalid <= '0';
-        s_tdata  <= (others => 'X');
-      end loop;
-    end loop;
-    wait_for(LAST_CYCLES);
-    over <= true;
-    wait;
-  end process send;
+  u_rows : entity firm.firm_sim_rows
+    generic map (
+      FRAME_FILE   => FRAME_FILE,
+      SEED         => SEED,
+      SLOW_PERCENT => SLOW_PERCENT,
+      LAST_CYCLES  => LAST_CYCLES
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      m_axis_tdata  => s_tdata,
+      m_axis_tuser  => s_tuser,
+      m_axis_tvalid => s_tvalid,
+      m_axis_tlast  => s_tlast,
+      over          => over
+    );
 
   take : process (clk)
     variable random_1 : positive := SEED;
