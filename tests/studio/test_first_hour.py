@@ -61,7 +61,7 @@ async def measured(page: Page) -> int:
             break
         assert not await page.evaluate(f"{STATE}.endsWith('failed')"), await page.evaluate("document.body.innerText")
         await asyncio.sleep(0.5)
-    found = await page.evaluate(_LATENCIES)
+    found: list[int] = await page.evaluate(_LATENCIES)
     await press(page, "stop")
     await page.until(f"{STATE}.endsWith('ended')")
     return min(found)
