@@ -173,10 +173,11 @@ architecture rtl of firm_image_header is
   signal multiplicand   : unsigned(31 downto 0);
   signal out_step_bytes : unsigned(31 downto 0);
   signal in_row_bytes   : unsigned(17 downto 0);
-  signal gap            : unsigned(32 downto 0);  -- the row's padding, or negative
 
   signal row_bytes_r       : unsigned(17 downto 0) := (others => '0');
   signal padding_r         : unsigned(31 downto 0) := (others => '0');
+  signal overlaps_r        : std_logic;  -- rows are longer than their step: the padding is negative
+  signal is_legal_r        : std_logic;  -- they are not, and the image is not too large
   signal rows_to_work_on_r : std_logic_vector(15 downto 0) := (others => '0');
   signal is_empty_r        : std_logic;
 
@@ -256,11 +257,11 @@ begin
   in_encoding_axis_tready <= '1' when state_r = ENCODING and in_segment_valid(1) = '1' else '0';
 
   in_row_bytes   <= resize(unsigned(in_width(SIZE_BITS-1 downto 0)) * to_unsigned(IN_BYTES, 3), 18);
-  gap            <= unsigned('0' & in_step) - in_row_bytes;
   out_step_bytes <= resize(out_columns_r * to_unsigned(OUT_BYTES, 3), 32);
   multiplicand   <= out_step_bytes when state_r = MULTIPLY_OUT else unsigned(in_step);
 
   proceed : process (clk)
+    variable gap : unsigned(32 downto 0);
   begin
     if rising_edge(clk) then
       if state_r = IDLE then
@@ -320,6 +321,18 @@ begin
         end if;
 
       elsif state_r = MULTIPLY or state_r = MULTIPLY_OUT then
+        -- One after the other, since there are enough cycles.
+        if state_r = MULTIPLY then
+          gap         := unsigned('0' & in_step) - row_bytes_r;
+          row_bytes_r <= in_row_bytes;
+          padding_r   <= gap(31 downto 0);
+          overlaps_r  <= gap(32);
+          is_legal_r  <= '0';
+          if overlaps_r = '0' and unsigned(in_height(31 downto SIZE_BITS)) = 0
+             and unsigned(in_width) <= MAX_COLUMNS then
+            is_legal_r <= '1';
+          end if;
+        end if;
         scale(rows_r, ROWS_OUT, ROWS_IN);
         scale(columns_r, COLUMNS_OUT, COLUMNS_IN);
         factor_r  <= factor_r(SIZE_BITS-2 downto 0) & '0';
@@ -344,14 +357,11 @@ begin
         factor_r      <= (others => '0');
         product_r     <= (others => '0');
         rows_to_work_on_r <= (others => '0');
-        row_bytes_r       <= in_row_bytes;
-        padding_r         <= gap(31 downto 0);
         is_empty_r        <= '0';
         if unsigned(in_data_length) = 0 then
           is_empty_r <= '1';
         end if;
-        if matches_r = '1' and product_r = unsigned(in_data_length) and gap(32) = '0'
-           and unsigned(in_height(31 downto SIZE_BITS)) = 0 and unsigned(in_width) <= MAX_COLUMNS then
+        if matches_r = '1' and is_legal_r = '1' and product_r = unsigned(in_data_length) then
           out_columns_r <= rounded_up(columns_r);
           out_rows_r    <= rounded_up(rows_r);
           factor_r      <= rounded_up(rows_r);
