@@ -23,6 +23,9 @@ import yaml
 
 from tests.processes import limited
 
+# GHDL 2.0 writes some constants of more than 32 bits to Verilog as in VHDL, where they would be texts of ASCII.
+_LONG_CONSTANT = re.compile(r'"([01xzXZ]{33,})"')
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 CORES = REPOSITORY / "cores"
 
@@ -89,7 +92,8 @@ class Library:
 
     def synthesise(self, entity: str, generics: Mapping[str, Generic] | None = None, language: str = "vhdl") -> str:
         """The netlist of `entity` as `vhdl` or `verilog`; raise `GhdlError` on a fault, a latch GHDL sees included."""
-        return self._ghdl("--synth", f"--out={language}", *_generic_options(generics), entity)
+        netlist = self._ghdl("--synth", f"--out={language}", *_generic_options(generics), entity)
+        return _LONG_CONSTANT.sub(_constant, netlist) if language == "verilog" else netlist
 
     def latches(self, entity: str, generics: Mapping[str, Generic] | None = None) -> list[str]:
         """What would become a latch in `entity`, empty if all is well.
@@ -178,6 +182,10 @@ def core_files(*cores: str, fileset: str = "rtl") -> list[Path]:
 def core_description(path: Path) -> Any:
     """What a .core file says; nobody may change it."""
     return yaml.load(path.read_text(encoding="utf-8").removeprefix("CAPI=2:"), Loader=yaml.CSafeLoader)
+
+
+def _constant(found: re.Match[str]) -> str:
+    return f"{len(found[1])}'b{found[1]}"
 
 
 def _generic_options(generics: Mapping[str, Generic] | None) -> list[str]:
