@@ -57,7 +57,15 @@ def page(system: DerivedSystem, picture: str, reports: Iterable[Path], stimuli: 
 def _converters(system: DerivedSystem) -> Table:
     converters = derived_description(system)["Converters"]
     rows = [
-        (way, item["block"], item.get("topic", item.get("service", "")), item["nameMW"], item["ROS"], item["id"], item["payloadBytes"])
+        (
+            way,
+            item["block"],
+            item.get("topic", item.get("service", "")),
+            item["nameMW"],
+            item["ROS"],
+            item["id"],
+            item["payloadBytes"],
+        )
         for way, items in (("in", converters["AXIS_to_msg"]), ("out", converters["msg_to_AXIS"]))
         for item in items
     ]
