@@ -49,8 +49,8 @@ _HEADER = struct.Struct("<cHqI")
 _CALL, _ANSWER = struct.Struct("<Q"), struct.Struct("<Q?")
 # The maximum time in s to wait until published messages have been sent.
 _FLUSH_SECONDS = 2.0
-# The capacity of the queues of services, in messages. Each client of ROS 2 receives the responses to all clients, so the
-# default of 10 is too few on a busy machine.
+# The capacity of the queues of services, in messages. Each client of ROS 2 receives the responses to all clients, so
+# the default of 10 is too few on a busy machine.
 _SERVICE_DEPTH = 1000
 # The interval in s at which the types of other nodes' topics are compared.
 _LOOK_SECONDS = 1.0

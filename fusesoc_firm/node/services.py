@@ -12,8 +12,8 @@ from fusesoc_firm.message.model import FieldType, InterfaceKind, MessageName, Pr
 from fusesoc_firm.system.derived.model import Service, ServiceEnd
 from fusesoc_firm.system.system_core import LoadedSystem
 
-# The text of a response that reports a failure, and the fields for it, as in std_srvs and sensor_msgs.
-FAILURE = "the hardware did not answer"
+# The texts of responses that report a failure, and the fields for them, as in std_srvs and sensor_msgs.
+_FAILURES = {ServiceEnd.SERVER: "the hardware did not answer", ServiceEnd.CLIENT: "the service did not answer"}
 _TEXTS = ("message", "status_message")
 _SUCCESS = "success"
 
@@ -62,7 +62,7 @@ def node_service(service: Service, loaded: LoadedSystem) -> NodeService:
         _full_name(request, service),
         _full_name(response, service),
         service.time_limit,
-        _failure(frames[service.response], types),
+        _failure(frames[service.response], types, _FAILURES[service.end]),
     )
 
 
@@ -70,10 +70,10 @@ def _full_name(name: MessageName, service: Service) -> str:
     return str(name) if service.ros is ROS1 else f"{name.package}/{InterfaceKind.SERVICE}/{name.name}"
 
 
-def _failure(frame: Frame, types: dict[str, FieldType]) -> bytes:
+def _failure(frame: Frame, types: dict[str, FieldType], reason: str) -> bytes:
     """Return a response with `success: false` and the reason, or nothing if the response has no such field."""
     if types.get(_SUCCESS) != PrimitiveType("bool"):
         return b""
-    texts = {name: FAILURE for name in _TEXTS if types.get(name) == StringType()}
+    texts = {name: reason for name in _TEXTS if types.get(name) == StringType()}
     used = with_names_in_use(frame, {(name,) for name in (_SUCCESS, *texts)})
     return encode_used(used, {_SUCCESS: False, **texts})

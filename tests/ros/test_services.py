@@ -1,4 +1,4 @@
-"""Services in hardware, called by real clients of rospy, roscpp and rclpy at once: each call gets its own answer.
+"""Services of hardware with real rospy, roscpp and rclpy: each call of clients at once gets its own answer.
 
 `pytest -m thorough tests/ros/test_services.py` makes 1,000 calls of each kind of client and node.
 """
@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
-from tests.ros.cpp_nodes import Node, NodeProcess, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import REPOSITORY, LiveNode
 
 HERE = Path(__file__).resolve().parent
@@ -36,20 +36,23 @@ TEXTS = [*["refused", "aborted"] * 4, "silent"]
 
 @dataclass
 class Place:
-    """A version of ROS that runs, and a folder with the system, which are made once."""
+    """A version of ROS that runs, and a folder with the systems of tests/ros/camera, of which one is meant."""
 
     ros: Ros
     folder: Path
+    system: str = "camera"
 
     @property
     def version(self) -> int:
         return self.ros.version
 
     def specification(self) -> Path:
-        spec = self.folder / "camera/camera.yaml"
-        if not spec.exists():
+        spec = self.folder / f"camera/{self.system}.yaml"
+        if not spec.parent.exists():
             shutil.copytree(HERE / "camera", spec.parent)
-        text = (HERE / "camera/camera.yaml").read_text(encoding="utf-8")
+            # The source of hardware that only a model stands for.
+            (spec.parent / "ask.vhd").touch()
+        text = (HERE / f"camera/{self.system}.yaml").read_text(encoding="utf-8")
         if self.version == 2:
             text = text.replace("middleware: ROS", "middleware: ROS2").replace("SetCameraInfoRe", "SetCameraInfo_Re")
         spec.write_text(text, encoding="utf-8")
@@ -65,12 +68,17 @@ class Place:
         return build_simulator(self.specification(), "ghdl", build_root=self.folder / "simulators").script()
 
     def _cpp(self, transport: str) -> Node:
-        package, program = self.folder / "package", self.folder / "node"
+        package, program = self.folder / f"{self.system}_package", self.folder / f"{self.system}_node"
         if not program.exists():
             command = ["system", "node", str(self.specification()), "--language", "cpp", "--ros", str(self.version)]
             assert main([*command, "-o", str(package)]) == 0
-            self.ros.compile(package, program)
+            self.ros.compile(package, program, self._header(package))
         return Node(self.ros, program, transport, "--drain", "100")
+
+    def _header(self, package: Path) -> Path:
+        """What both nodes include, compiled once."""
+        header = self.folder / f"ros{self.version}_nodes.hpp"
+        return header if header.exists() else self.ros.precompile(package, self.folder)
 
     def _live(self, *arguments: str) -> LiveNode:
         build = ["--build-root", str(self.folder / "simulators")]
@@ -95,7 +103,7 @@ class Place:
     def model(self) -> str:
         """The address of the model of the hardware."""
         script = HERE / "service_simulator.py"
-        return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {script} {self.version} --width 32"
+        return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {script} {self.system} {self.version} --width 32"
 
 
 @pytest.fixture(
@@ -200,3 +208,34 @@ def test_a_client_that_dies_harms_nobody(place: Place, language: str) -> None:
                 client.process.kill()
                 client.process.wait()
         assert node.stop() == 0
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_hardware_calls_a_service(place: Place, language: str) -> None:
+    """Each call gets its answer, in order; a call that fails is not successful."""
+    asking = replace(place, system="asking")
+    names = [f"{'no' if number % 5 == 3 else 'yes'} {number}" for number in range(15)]
+    with asking.node(language, asking.model) as node:
+        command = [place.ros.python, str(HERE / "asking_peer.py"), str(place.version), *names]
+        done = subprocess.run(command, env=dict(place.ros.environment), capture_output=True, text=True, check=True)
+        failure = "the service did not answer" if place.version == 1 else "it is refused"
+        assert json.loads(done.stdout) == [failure if name.startswith("no") else name[::-1] for name in names]
+        check_counts(node, *((12, 3) if place.version == 1 else (15, 0)))
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_a_call_without_a_server_fails_at_once(place: Place, language: str) -> None:
+    asking = replace(place, system="asking")
+    topics = {"/name_out": "std_msgs/String"}, {"/name_in": "std_msgs/String"}
+    if place.version == 2:
+        topics = {"/name_out": "std_msgs/msg/String"}, {"/name_in": "std_msgs/msg/String"}
+    head = b"" if place.version == 1 else b"\0\1\0\0"
+    end = b"" if place.version == 1 else b"\0"
+    with asking.node(language, asking.model) as node, Peer(place.ros, *topics) as peer:
+        peer.wait_until_connected()
+        peer.publish("/name_in", head + len(b"a" + end).to_bytes(4, "little") + b"a" + end)
+        _, payload = peer.take()
+        assert b"the service did not answer" in payload
+        check_counts(node, 0, 1)

@@ -57,11 +57,19 @@ def page(system: DerivedSystem, picture: str, reports: Iterable[Path], stimuli: 
 def _converters(system: DerivedSystem) -> Table:
     converters = derived_description(system)["Converters"]
     rows = [
-        (way, item["block"], item.get("topic", ""), item["nameMW"], item["ROS"], item["id"], item["payloadBytes"])
+        (
+            way,
+            item["block"],
+            item.get("topic", item.get("service", "")),
+            item["nameMW"],
+            item["ROS"],
+            item["id"],
+            item["payloadBytes"],
+        )
         for way, items in (("in", converters["AXIS_to_msg"]), ("out", converters["msg_to_AXIS"]))
         for item in items
     ]
-    return Table("Topics", ("", "block", "topic", "message", "ROS", "id", "bytes of payload"), rows)
+    return Table("Topics", ("", "block", "topic or service", "message", "ROS", "id", "bytes of payload"), rows)
 
 
 def _ports(system: DerivedSystem) -> Table:

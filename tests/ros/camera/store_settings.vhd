@@ -10,10 +10,10 @@ entity store_settings is
     rst_n : in  std_logic;
 
     -- sensor_msgs/SetCameraInfoRequest
-    in_payload_length                           : in  std_logic_vector(31 downto 0);  -- bytes of the payload
-    in_camera_info_width                        : in  std_logic_vector(31 downto 0);  -- camera_info.width: uint32
-    in_camera_info_distortion_model_length      : in  std_logic_vector(31 downto 0);  -- camera_info.distortion_model: string, its length
-    in_camera_info_distortion_model_axis_tdata  : in  std_logic_vector(31 downto 0);  -- camera_info.distortion_model: string
+    in_payload_length                           : in  std_logic_vector(31 downto 0);
+    in_camera_info_width                        : in  std_logic_vector(31 downto 0);
+    in_camera_info_distortion_model_length      : in  std_logic_vector(31 downto 0);
+    in_camera_info_distortion_model_axis_tdata  : in  std_logic_vector(31 downto 0);
     in_camera_info_distortion_model_axis_tkeep  : in  std_logic_vector(3 downto 0);
     in_camera_info_distortion_model_axis_tvalid : in  std_logic;
     in_camera_info_distortion_model_axis_tlast  : in  std_logic;
@@ -23,9 +23,9 @@ entity store_settings is
     in_msg_ready                                : out std_logic;
 
     -- sensor_msgs/SetCameraInfoResponse
-    out_success                                 : out std_logic;  -- success: bool
-    out_status_message_length                   : out std_logic_vector(31 downto 0);  -- status_message: string, its length
-    out_status_message_axis_tdata               : out std_logic_vector(31 downto 0);  -- status_message: string
+    out_success                                 : out std_logic;
+    out_status_message_length                   : out std_logic_vector(31 downto 0);
+    out_status_message_axis_tdata               : out std_logic_vector(31 downto 0);
     out_status_message_axis_tkeep               : out std_logic_vector(3 downto 0);
     out_status_message_axis_tvalid              : out std_logic;
     out_status_message_axis_tlast               : out std_logic;
@@ -34,7 +34,7 @@ entity store_settings is
     out_msg_valid                               : out std_logic;
     out_msg_ready                               : in  std_logic
   );
-end entity;
+end entity store_settings;
 
 architecture rtl of store_settings is
 begin

@@ -149,10 +149,13 @@ class Ros1 {
     };
   }
 
-  // Serve no more, after `drain`, which waits until all calls are answered.
-  void finish_calls(const std::function<void()>& drain) {
-    drain();
+  // Handle messages during `drain`, which waits until all calls are answered.
+  void spin_during(const std::function<void()>& drain) { drain(); }
+
+  // Serve no more, and give no more answers: their handlers may end.
+  void stop_calls() {
     servers_.clear();
+    for (const auto& client : clients_) client->stop();
   }
 
   // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end.

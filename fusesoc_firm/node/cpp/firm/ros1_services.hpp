@@ -100,16 +100,19 @@ class RawClient {
         thread_([this] { run(); }) {}
 
   ~RawClient() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      is_over_ = true;
-      changed_.notify_all();
-    }
+    stop();
     thread_.join();
   }
 
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
+
+  // Give no more answers; the thread may still wait for a server.
+  void stop() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    is_over_ = true;
+    changed_.notify_all();
+  }
 
   void put(Bytes payload, AnswerHandler answer) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -136,6 +139,8 @@ class RawClient {
       ros::SerializedMessage response;
       const bool is_done =
           client_.call(counted_bytes(call->payload.data(), call->payload.size(), std::nullopt), response, signature_);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (is_over_) return;
       if (is_done) {
         const auto* begin = response.message_start;
         call->answer({Bytes(begin, begin + response.num_bytes - (begin - response.buf.get()))});

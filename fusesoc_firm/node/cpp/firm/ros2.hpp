@@ -115,8 +115,8 @@ class Ros2 {
     };
   }
 
-  // Serve no more, and take responses during `drain`, which waits until all calls are answered.
-  void finish_calls(const std::function<void()>& drain) {
+  // Take responses, but no more calls, during `drain`, which waits until all calls are answered.
+  void spin_during(const std::function<void()>& drain) {
     if (servers_.empty() && clients_.empty()) return;
     std::atomic<bool> is_done{false};
     std::thread draining([&] {
@@ -126,6 +126,12 @@ class Ros2 {
     is_serving_ = false;
     while (!is_done) spin(std::chrono::milliseconds(10));
     draining.join();
+  }
+
+  // Serve no more, and give no more answers: their handlers may end.
+  void stop_calls() {
+    is_serving_ = false;
+    for (const auto& client : clients_) client->stop();
   }
 
   // Return a function that publishes messages of a topic. Both this call and the function throw MiddlewareError.

@@ -175,6 +175,12 @@ class RawClient {
     }
   }
 
+  // Give no more answers.
+  void stop() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    answer_ = nullptr;
+  }
+
   // Take a response. Throws MiddlewareError.
   void take() {
     TypedMessage response(service_.response_type, service_.name);

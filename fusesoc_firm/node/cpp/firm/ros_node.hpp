@@ -371,6 +371,26 @@ inline void print_calls(const CallStatistics& counted) {
             << " failed, " << counted.unasked << " unasked" << std::endl;
 }
 
+// The calls of services while they are connected to a middleware, which outlives them.
+template <typename Ros>
+class ConnectedCalls {
+ public:
+  ConnectedCalls(Ros& ros, NodeCalls& calls) : ros_(ros) {
+    try {
+      calls.connect(ros);
+    } catch (...) {
+      ros_.stop_calls();
+      throw;
+    }
+  }
+  ~ConnectedCalls() { ros_.stop_calls(); }
+  ConnectedCalls(const ConnectedCalls&) = delete;
+  ConnectedCalls& operator=(const ConnectedCalls&) = delete;
+
+ private:
+  Ros& ros_;
+};
+
 // Run the node until a signal, ROS, or the hardware ends it. Return the exit status.
 template <typename Ros>
 int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
@@ -394,7 +414,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   }
 
   RunningNode hardware(engines.hardware(), arguments.drain);
-  engines.calls().connect(ros);
+  const ConnectedCalls<Ros> calls(ros, engines.calls());
   std::optional<RunningNode> software;
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
   std::optional<StatusWatch> watch;
@@ -417,7 +437,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   // Handle messages that ROS has already received.
   ros.spin(std::chrono::milliseconds(0));
   ros.unsubscribe();
-  ros.finish_calls([&] { engines.calls().drain(arguments.drain); });
+  ros.spin_during([&] { engines.calls().drain(arguments.drain); });
   if (software && is_running()) engines.settle(arguments.drain);
   int status = software ? software->stop() : 0;
   status = std::max(status, hardware.stop());
