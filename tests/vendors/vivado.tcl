@@ -40,7 +40,10 @@ set project_properties {
   .bd {synth_checkpoint_mode}
   .xdc {used_in_synthesis}
 }
-set board_parts {tul.com.tw:pynq-z2:part0:1.0 xc7z020clg400-1 xilinx.com:zcu104:part0:1.1 xczu7ev-ffvc1156-2-e}
+set board_parts {
+  tul.com.tw:pynq-z2:part0:1.0 xc7z020clg400-1 xilinx.com:zcu104:part0:1.1 xczu7ev-ffvc1156-2-e
+  xilinx.com:kr260_som:part0:1.1 xck26-sfvc784-2LV-c
+}
 
 proc create_project {name args} { options {-force} {} $args; dict set ::project name $name }
 proc current_project {} { return current_project }

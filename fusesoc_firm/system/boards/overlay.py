@@ -126,7 +126,7 @@ def _devices(system: DerivedSystem, linux: _Linux, base: int) -> Iterator[Contex
             "node": node,
             "meaning": meaning,
             "address": f"{address:x}",
-            "reg": f"{_numbers(address, linux.cells)} {_numbers(REGISTER_BYTES, linux.cells)}",
+            "registers": f"{_numbers(address, linux.cells)} {_numbers(REGISTER_BYTES, linux.cells)}",
             "controller": linux.interrupts,
             "interrupt": f"0 {linux.first_interrupt + interrupt} {_LEVEL_HIGH}",
         }
