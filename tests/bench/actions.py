@@ -14,7 +14,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,21 +137,32 @@ def _launcher_table(tell: Tell, written: str, pattern: str) -> Table:
 
 
 def _foreign_table(tell: Tell, written: str, pattern: str) -> Table:
-    title, columns = beside.FOREIGN_TITLE, beside.FOREIGN_COLUMNS
-    known = known_rows(written, title, columns)
-    if re.search(pattern, title):
-        known |= beside.foreign_rows(tell)
-    rows = tuple(known.get(key, (*key, *[""] * 5, NOT_MEASURED)) for key in beside.foreign_keys())
-    return Table(title, columns, rows, beside.FOREIGN_NOTE)
+    empty = ("", "", "", "", "")
+    parts = (beside.FOREIGN_TITLE, beside.FOREIGN_COLUMNS, beside.FOREIGN_NOTE)
+    return _optional_table(parts, beside.foreign_keys(), empty, beside.foreign_rows, tell, written, pattern)
 
 
 def _bench_table(tell: Tell, written: str, pattern: str) -> Table:
-    title, columns = beside.BENCH_TITLE, beside.BENCH_COLUMNS
+    empty = ("", "", "", "")
+    parts = (beside.BENCH_TITLE, beside.BENCH_COLUMNS, beside.BENCH_NOTE)
+    return _optional_table(parts, beside.bench_keys(), empty, beside.bench_rows, tell, written, pattern)
+
+
+def _optional_table(
+    parts: tuple[str, tuple[str, ...], str],
+    keys: Sequence[tuple[str, str]],
+    empty: tuple[str, ...],
+    measured: Callable[[Tell], dict[tuple[str, ...], tuple[str, ...]]],
+    tell: Tell,
+    written: str,
+    pattern: str,
+) -> Table:
+    """Return a table whose rows are measured if its title matches; the others are those of the written page."""
+    title, columns, note = parts
     known = known_rows(written, title, columns)
     if re.search(pattern, title):
-        known |= beside.bench_rows(tell)
-    rows = tuple(known.get(key, (*key, *[""] * 4, NOT_MEASURED)) for key in beside.bench_keys())
-    return Table(title, columns, rows, beside.BENCH_NOTE)
+        known |= measured(tell)
+    return Table(title, columns, tuple(known.get(key, (*key, *empty, NOT_MEASURED)) for key in keys), note)
 
 
 def _robustness_table(tell: Tell, written: str, pattern: str) -> Table:
