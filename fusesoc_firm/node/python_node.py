@@ -58,7 +58,8 @@ def _package(description: NodeDescription, ros: int, script: str, *, is_linked: 
     build_tool, library, cmake = _BUILDS[ros]
     package = package_name(description)
     topics = [topic for topic in (*description.subscribers, *description.publishers) if topic.ros == ros]
-    messages = {"diagnostic_msgs", *(topic.type.partition("/")[0] for topic in topics)} if ros == 2 else set()
+    types = [item.type for item in (*topics, *description.services) if item.ros == ros]
+    messages = {"diagnostic_msgs", *(name.partition("/")[0] for name in types)} if ros == 2 else set()
     build = {
         "package": package,
         "name": description.name,

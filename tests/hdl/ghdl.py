@@ -92,8 +92,12 @@ class Library:
 
     def synthesise(self, entity: str, generics: Mapping[str, Generic] | None = None, language: str = "vhdl") -> str:
         """The netlist of `entity` as `vhdl` or `verilog`; raise `GhdlError` on a fault, a latch GHDL sees included."""
-        netlist = self._ghdl("--synth", f"--out={language}", *_generic_options(generics), entity)
+        netlist = self.netlist_of_ghdl(entity, generics, language)
         return _LONG_CONSTANT.sub(_constant, netlist) if language == "verilog" else netlist
+
+    def netlist_of_ghdl(self, entity: str, generics: Mapping[str, Generic] | None, language: str) -> str:
+        """The same netlist, with the faults of GHDL's text."""
+        return self._ghdl("--synth", f"--out={language}", *_generic_options(generics), entity)
 
     def latches(self, entity: str, generics: Mapping[str, Generic] | None = None) -> list[str]:
         """What would become a latch in `entity`, empty if all is well.

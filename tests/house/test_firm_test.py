@@ -600,10 +600,11 @@ def test_two_machines_with_one_lock_give_the_same_bytes(library: Path, tmp_path:
     first = outputs(library)
     assert any(path.suffix == ".v" for path in first)
     shutil.rmtree(library / "build")
-    # At the same path, since GHDL's libraries contain it.
-    places = ("--ro-bind", "/", "/", "--dev", "/dev", "--proc", "/proc", "--tmpfs", "/tmp", "--bind")
+    # At the same path, since GHDL's libraries contain it. The checkout may be a temporary folder, too.
+    places = ("--ro-bind", "/", "/", "--dev", "/dev", "--proc", "/proc", "--tmpfs", "/tmp")
+    checkout = ("--ro-bind", str(REPOSITORY), str(REPOSITORY), "--bind")
     done = subprocess.run(
-        ["bwrap", *places, str(second), str(library), "--unshare-net", *command(*arguments, name="build")],
+        ["bwrap", *places, *checkout, str(second), str(library), "--unshare-net", *command(*arguments, name="build")],
         cwd=library,
         env=environment(library, FUSESOC_FIRM_CACHE=str(library / "store")),
         capture_output=True,

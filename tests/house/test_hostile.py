@@ -328,6 +328,7 @@ struct System {
   std::string digest;
   std::vector<Topic> subscribers, publishers;
   Topic diagnostics;
+  std::vector<std::string> channels{};
   Software software{};
 };
 template <class T>

@@ -110,7 +110,7 @@ def test_ghdl_alone_does_not(tmp_path: Path) -> None:
     """Where this fails, GHDL has become better, and the repair can go."""
     work = Library("work", tmp_path)
     work.analyse([ARITHMETIC])
-    text = work.synthesise("arithmetic", {"OFFSET": OFFSET}, "verilog")
+    text = work.netlist_of_ghdl("arithmetic", {"OFFSET": OFFSET}, "verilog")
     assert "abs $signed" in text
     assert re.search(r'"[01]{80}"', text)
     # What is no Verilog at all is put right, and the rest is left as it is.

@@ -244,7 +244,7 @@ def test_hardware_calls_a_service() -> None:
 
 def test_the_generated_file_has_the_services() -> None:
     system = load_system(CAMERA, LIBRARIES)
-    (source,) = python_node(system, ROS1, CAMERA, CAMERA.parent).values()
+    source = python_node(system, ROS1, CAMERA, CAMERA.parent)[f"{DESCRIPTION.name}_node.py"]
     names: dict[str, object] = {"__name__": "generated"}
     exec(compile(source, "camera_node.py", "exec"), names)
     assert names["NODE"] == DESCRIPTION
