@@ -57,8 +57,8 @@ def _package(description: NodeDescription, ros: int, script: str, *, is_linked: 
     """Return the files that make the node a package; `is_linked` if the node must stay beside other files."""
     build_tool, library, cmake = _BUILDS[ros]
     package = package_name(description)
-    topics = [topic for topic in (*description.subscribers, *description.publishers) if topic.ros == ros]
-    types = [item.type for item in (*topics, *description.services) if item.ros == ros]
+    types = [topic.type for topic in (*description.subscribers, *description.publishers) if topic.ros == ros]
+    types += [service.type for service in description.services if service.ros == ros]
     messages = {"diagnostic_msgs", *(name.partition("/")[0] for name in types)} if ros == 2 else set()
     build = {
         "package": package,
