@@ -8,9 +8,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from queue import Empty, Queue
 from typing import Any, TypeVar
 
 import pytest
@@ -37,6 +39,8 @@ blocks:
   - {name: turn_out, middleware: ROS2, mode: publisher, message: geometry_msgs/Quaternion, qos: QUALITY}
   - {name: text_out, middleware: ROS2, mode: publisher, message: std_msgs/String, qos: QUALITY}
 """
+# Programs of DDS are never idle, so that a test which waits for them ends by itself.
+MOST_SECONDS = 120
 # A payload has 9 bytes besides the text, and at most 65536.
 SIZES = (0, 1, 2, 3, 100, 1335, 1336, 1471, 1473, 5000, 20_000, 65_527)
 
@@ -61,6 +65,14 @@ class Process:
         self._process = subprocess.Popen(
             host.command(*words), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
         )
+        self._lines: Queue[str] = Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self._process.stdout
+        for line in self._process.stdout:
+            self._lines.put(line)
+        self._lines.put("")
 
     def tell(self, value: object) -> None:
         assert self._process.stdin
@@ -68,20 +80,20 @@ class Process:
         self._process.stdin.flush()
 
     def line(self) -> Any:
-        assert self._process.stdout
-        line = self._process.stdout.readline()
+        try:
+            line = self._lines.get(timeout=MOST_SECONDS)
+        except Empty:
+            pytest.fail(f"no line for {MOST_SECONDS} s from {self._process.args!r}")
         assert line, self._process.args
         return json.loads(line)
 
     def wait(self) -> int:
         """Wait for its end, whatever it prints till then."""
-        assert self._process.stdout
-        self._process.stdout.read()
         return self._process.wait()
 
     def kill(self) -> None:
         self._process.send_signal(signal.SIGKILL)
-        self._process.communicate()
+        self._process.wait()
 
 
 AnyProcess = TypeVar("AnyProcess", bound=Process)
@@ -209,6 +221,7 @@ def test_both_see_the_node_and_get_every_message_in_order(place: Place, is_board
     assert all(end[:2] == ["board", "/"] and end[3].startswith("RIHS01_") for end in graph["ends"])
 
 
+@pytest.mark.thorough
 def test_lost_packets_are_sent_again(place: Place) -> None:
     board = place.board("{depth: 1000}", "--loss", "20", "--seed", str(SEED))
     print(f"seed {SEED}")
@@ -251,6 +264,7 @@ def test_a_node_that_crashes_and_restarts_is_found_again(place: Place) -> None:
     check_echoes(peers, sent)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_reads_all_their_packets_as_the_reference_does(place: Place) -> None:
     capture = place.folder / "switch.pcapng"
