@@ -74,7 +74,9 @@ class Simulator:
             out += self.beats(burst)
             heapq.heappush(self.events, (out, number, burst))
         self.out_free = out
-        report = b"T" + (now - self.beats(frame) + 1).to_bytes(8, "little") + now.to_bytes(8, "little")
+        # What is answered may be longer than what was taken.
+        begin = max(now - self.beats(frame) + 1, 0)
+        report = b"T" + begin.to_bytes(8, "little") + now.to_bytes(8, "little")
         if self.taken == self.at:
             report += self.misbehave()
         self.taken += 1

@@ -235,7 +235,7 @@ def test_two_words_move_an_accelerator_of_the_application(tmp_path: Path) -> Non
     """The type and the source: nothing else differs but name and comments. The last publisher's frames are the same."""
     folder = SPECS / "image_pipeline"
     lines = [
-        [line for line in (folder / name).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        [line for line in (folder / name).read_text(encoding="utf-8").splitlines() if not line.lstrip().startswith("#")]
         for name in ("image_pipeline.yaml", "image_pipeline_software.yaml")
     ]
     changes = [pair for pair in zip(*lines, strict=True) if pair[0] != pair[1]]
