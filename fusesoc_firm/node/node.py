@@ -325,7 +325,8 @@ class Node:
 
     def _waiting(self) -> int:
         """Return the number of messages that are in queues or being sent."""
-        dropped = self._queues.dropped_in_all
+        # Requests of the status, which have the last queue, are not messages.
+        dropped = self._queues.dropped_by_first(len(self._inputs))
         with self._lock:
             return self._offered - self._declined - self._handled - dropped
 

@@ -211,11 +211,10 @@ class SubscriberQueues(Generic[Item]):
         with self._changed:
             self._policy.served(subscriber)
 
-    @property
-    def dropped_in_all(self) -> int:
-        """The number of items that all queues have dropped."""
+    def dropped_by_first(self, queues: int) -> int:
+        """Return the number of items that the first queues have dropped together."""
         with self._changed:
-            return sum(self._dropped)
+            return sum(self._dropped[:queues])
 
     def waiting(self, subscriber: int) -> int:
         """Return the number of items in a subscriber's queue."""

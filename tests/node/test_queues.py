@@ -255,3 +255,11 @@ def test_illegal_numbers_are_named() -> None:
         queues.put(2, 0)
     with pytest.raises(ValueError, match="zip"):
         LeastSlackTime([1, 2], [1])
+
+
+def test_drops_of_the_first_queues_are_counted_without_those_of_others() -> None:
+    """A node's last queue is that of the status, whose requests are not messages."""
+    queues: SubscriberQueues[int] = SubscriberQueues(3, 1)
+    for subscriber in (0, 0, 1, 2, 2, 2):
+        queues.put(subscriber, 0)
+    assert [queues.dropped_by_first(count) for count in (1, 2, 3)] == [1, 1, 3]

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tests.wiznet.chip import Chip
+from tests.wiznet.chip import Chip, Status
 from tests.wiznet.peers import echo, free_port
 from tests.wiznet.spi import exchange
 from tests.wiznet.w5200 import W5200
@@ -127,7 +127,7 @@ def test_a_server_takes_a_connection(driven: Driven) -> None:
     assert driver.listen(5) == 1
     with socket.create_connection(("127.0.0.1", port)) as peer:
         peer.sendall(b"to the chip")
-        while driven.chip.sockets[5].status != 0x17:
+        while driven.chip.sockets[5].status != Status.ESTABLISHED:
             driven.chip.poll(0.01)
         assert _received(driver, 5, 11) == b"to the chip"
         assert driver.send(5, (ctypes.c_uint8 * 13)(*b"from the chip"), 13) == 13
