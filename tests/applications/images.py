@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import random
 import re
 import shutil
@@ -159,6 +160,8 @@ def yaml_of(value: Any) -> str:
         return "{" + ", ".join(f"{key}: {yaml_of(item)}" for key, item in value.items()) + "}"
     if isinstance(value, bytes | list):
         return "[" + ", ".join(map(yaml_of, value)) + "]"
+    if isinstance(value, float) and math.isinf(value):
+        return ".inf" if value > 0 else "-.inf"
     return f"'{value}'" if isinstance(value, str) else repr(value)
 
 
@@ -178,7 +181,7 @@ def break_frames(
         elif number % 3 < 2:
             # Not among the beats that all blocks take before the last one has announced its image.
             data = data[: source.randrange(pixels + 100 * lanes, len(data) - lanes)]
-            id_ = bytes.fromhex(answer)[0]
+            id_ = int(answer.split()[0], 16)
             shown, errors = f"{id_:02x}\n! aborted {id_} 10", errors + 2
         sent += f"> {number}\n  {data.hex()}\n"
         wanted += f"< @{number} {number}\n  {shown}\n" if shown else ""

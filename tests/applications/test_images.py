@@ -161,11 +161,15 @@ def test_many_types_side_by_side(tmp_path: Path, width: int) -> None:
 @pytest.mark.parametrize(
     ("generics", "text"),
     [
-        ({"MAX_COLUMNS": 65536}, "MAX_COLUMNS is 65536; legal: 1 to 65535/OUT_BYTES"),
+        (
+            {"MAX_COLUMNS": 65536},
+            "MAX_COLUMNS is 65536; legal: 1 to 65535, as OUT_BYTES, ",
+        ),
         ({"MAX_COLUMNS": 40000, "OUT_BYTES": 2}, "MAX_COLUMNS is 40000; legal"),
         ({"FRAME_ID_BYTES": 1}, "FRAME_ID_BYTES is 1; legal: two full beats or more"),
-        ({"COLUMNS_OUT": 2}, "COLUMNS_OUT is 2; legal: 1 to COLUMNS_IN"),
-        ({"ROWS_OUT": 0}, "ROWS_OUT is 0; legal: 1 to ROWS_IN"),
+        ({"MAX_COLUMNS": 32768, "COLUMNS_OUT": 2}, "MAX_COLUMNS is 32768; legal: 1 to 32767"),
+        ({"COLUMNS_OUT": 3}, "COLUMNS_OUT is 3; legal: 1 to 2*COLUMNS_IN"),
+        ({"ROWS_OUT": 0}, "ROWS_OUT is 0; legal: 1 to 2*ROWS_IN"),
     ],
 )
 def test_illegal_generics(tmp_path: Path, generics: dict[str, int], text: str) -> None:

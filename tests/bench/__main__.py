@@ -27,6 +27,7 @@ from tests.bench import (
     loops,
     manager,
     replay,
+    resize,
     simulators,
     store,
     studio,
@@ -96,6 +97,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "simulators": lambda: simulators.measure(_tell),
         "replay": lambda: replay.measure(seed, _tell),
         "live": lambda: live.measure(_tell),
+        "resize": lambda: resize.measure(seed, _tell),
         "store": lambda: store.measure(_tell),
         "studio": lambda: studio.measure(seed, _tell),
     }

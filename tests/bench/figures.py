@@ -25,6 +25,7 @@ from tests.bench import (
     manager,
     nextpnr,
     replay,
+    resize,
     simulators,
     store,
     systems,
@@ -68,7 +69,7 @@ PAGES = (
         "build and simulation times",
         ("systems", "builds", "actions", "simulators", "store"),
     ),
-    Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live")),
+    Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live", "resize")),
     Page("studio", "Figures of firm studio", "how fast the page is", ("studio",)),
 )
 _HEADINGS = {
@@ -89,6 +90,7 @@ _HEADINGS = {
     "store": "Store",
     "replay": "Replay",
     "live": "Live nodes",
+    "resize": "Resize, a replica",
     "studio": "The page",
 }
 _METHODS = {
@@ -125,6 +127,7 @@ _METHODS = {
     "store": "The tables list the number of cores that a second run of FuseSoC generates, and the time of this run.",
     "replay": "`firm replay` replays bags that rosbags has written. rosbags also reads the recorded bags.",
     "live": "[`firm live`](../how-to/run-live.md) runs as a node of a running ROS.",
+    "resize": "[specs/resize](../../specs/resize/README.md) is a replica of RobotPerf's benchmark a5, resize.",
     "studio": "A browser opens [the page](../how-to/studio.md) and edits a system.",
 }
 _INTRODUCTION = """# {title}
@@ -163,6 +166,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         store,
         replay,
         live,
+        resize,
     )
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
@@ -211,7 +215,7 @@ def _versions(part: str) -> str:
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
-    elif part == "live":
+    elif part in ("live", "resize"):
         tools += [_first_line("verilator"), *live.versions()]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]

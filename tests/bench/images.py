@@ -28,8 +28,8 @@ _NOTE = """
     The input is a noise image without stalls; every byte of the result equals the model's. 'cycles' is the number of
     cycles of the whole message, from its first segment to its end. 'first to last' is the number of cycles from the
     first to the last beat of data, both included, at the slower side of the accelerator. 'pixels a cycle' is the number
-    of pixels divided by 'first to last'. The sums of the integral image have 32 bits, so a 64-bit stream carries at
-    most two pixels per cycle.
+    of pixels of the input divided by 'first to last'. The sums of the integral image have 32 bits, so a 64-bit stream
+    carries at most two pixels per cycle. resize_image makes four pixels of each, two in a cycle.
     """
 
 
@@ -40,10 +40,11 @@ class Accelerator:
     system: str
     entity: str
     channels: int
+    widths: tuple[int, ...] = WIDTHS
 
     @property
     def encoding(self) -> str:
-        """Its resources."""
+        """The encoding of its images."""
         return "rgb8" if self.channels == 3 else "mono8"
 
 
@@ -52,6 +53,7 @@ ACCELERATORS = (
     Accelerator("image_pipeline", "scale_down", 1),
     Accelerator("image_pipeline", "integral_image", 1),
     Accelerator("sobel", "sobel", 1),
+    Accelerator("resize", "resize_image", 3, (64, 128)),
 )
 _GRAY_AT_MOST = 1.05
 _PIXELS_AT_LEAST = 2.0
@@ -69,7 +71,7 @@ class Run:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
-    return {TITLE: [(item.entity, str(width)) for item in ACCELERATORS for width in WIDTHS]}
+    return {TITLE: [(item.entity, str(width)) for item in ACCELERATORS for width in item.widths]}
 
 
 def measure(yosys: Yosys, seed: int, tell: Tell) -> list[Table]:
@@ -77,7 +79,7 @@ def measure(yosys: Yosys, seed: int, tell: Tell) -> list[Table]:
     yosys.prepare()
     rows = []
     for item in ACCELERATORS:
-        for width in WIDTHS:
+        for width in item.widths:
             with tempfile.TemporaryDirectory() as folder:
                 row = _row(item, width, seed, Path(folder), yosys, tell)
             tell(" ".join(row))
@@ -107,7 +109,7 @@ def _row(item: Accelerator, width: int, seed: int, folder: Path, yosys: Yosys, t
 
 def _bar(item: Accelerator, width: int, cycles: int, rate: float, size: int) -> tuple[str, bool]:
     """Return the limit and whether it is met; empty without a limit."""
-    if item.channels == 3 and width == 128:
+    if item.entity == "rgb_to_gray" and width == 128:
         most = int(_GRAY_AT_MOST * size * 8 / width)
         return f"{most} cycles", cycles <= most
     if item.channels == 1 and width == 64:

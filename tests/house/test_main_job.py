@@ -67,6 +67,7 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
         ("image_pipeline", 7),
         ("image_pipeline_software", 14),
         ("sobel", 7),
+        ("resize", 13),
         ("multi_type", 19),
         ("robotic_arm_franka", 3),
     ],

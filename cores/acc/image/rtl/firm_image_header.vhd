@@ -18,12 +18,12 @@ entity firm_image_header is
     OUT_ENCODING : string  := "mono8";
     IN_BYTES     : integer := 1;
     OUT_BYTES    : integer := 1;
-    -- OUT columns (rows) result from IN columns (rows); a remainder counts as a whole group.
+    -- OUT columns (rows) result from IN columns (rows), twice as many at most; a remainder counts as a whole group.
     COLUMNS_IN  : integer := 1;
     COLUMNS_OUT : integer := 1;
     ROWS_IN     : integer := 1;
     ROWS_OUT    : integer := 1;
-    -- The widest image; 65535/OUT_BYTES at most.
+    -- The widest image: 65535/OUT_BYTES at most, 32767/OUT_BYTES if it becomes wider.
     MAX_COLUMNS : integer := 65535;
     -- A longer frame_id is truncated.
     FRAME_ID_BYTES : integer := 256
@@ -113,6 +113,18 @@ architecture rtl of firm_image_header is
     return result;
   end function beat_of;
 
+  -- The most columns or rows of which no more than 65,535 can result.
+  function most(size_in, size_out : integer) return positive is
+  begin
+    if size_out > size_in then
+      return 32767;
+    end if;
+    return 65535;
+  end function most;
+
+  constant WIDEST_COLUMNS : positive := most(COLUMNS_IN, COLUMNS_OUT)/OUT_BYTES;
+  constant MAX_ROWS       : positive := most(ROWS_IN, ROWS_OUT);
+
   constant IN_BEATS       : positive := beats_of(IN_ENCODING);
   constant OUT_BEATS      : positive := beats_of(OUT_ENCODING);
   constant FRAME_ID_BEATS : positive := max(2, FRAME_ID_BYTES/LANES);
@@ -137,7 +149,10 @@ architecture rtl of firm_image_header is
       sum := sum + numerator;
     end if;
     digit := "00";
-    if sum >= 2*denominator then
+    if numerator > denominator and sum >= 3*denominator then
+      digit := "11";
+      sum   := sum - 3*denominator;
+    elsif sum >= 2*denominator then
       digit := "10";
       sum   := sum - 2*denominator;
     elsif sum >= denominator then
@@ -201,17 +216,18 @@ architecture rtl of firm_image_header is
 
 begin
 
-  assert MAX_COLUMNS >= 1 and MAX_COLUMNS <= 65535/OUT_BYTES
-    report "firm_image_header: MAX_COLUMNS is " & integer'image(MAX_COLUMNS) & "; legal: 1 to 65535/OUT_BYTES"
-    severity failure;
   assert FRAME_ID_BYTES >= 2*LANES and FRAME_ID_BYTES mod LANES = 0
     report "firm_image_header: FRAME_ID_BYTES is " & integer'image(FRAME_ID_BYTES) & "; legal: two full beats or more"
     severity failure;
-  assert COLUMNS_OUT >= 1 and COLUMNS_OUT <= COLUMNS_IN and COLUMNS_IN <= 65535
-    report "firm_image_header: COLUMNS_OUT is " & integer'image(COLUMNS_OUT) & "; legal: 1 to COLUMNS_IN, 65535 at most"
+  assert COLUMNS_IN >= 1 and COLUMNS_IN <= 65535 and COLUMNS_OUT >= 1 and (COLUMNS_OUT+1)/2 <= COLUMNS_IN
+    report "firm_image_header: COLUMNS_OUT is " & integer'image(COLUMNS_OUT) & "; legal: 1 to 2*COLUMNS_IN"
     severity failure;
-  assert ROWS_OUT >= 1 and ROWS_OUT <= ROWS_IN and ROWS_IN <= 65535
-    report "firm_image_header: ROWS_OUT is " & integer'image(ROWS_OUT) & "; legal: 1 to ROWS_IN, 65535 at most"
+  assert ROWS_IN >= 1 and ROWS_IN <= 65535 and ROWS_OUT >= 1 and (ROWS_OUT+1)/2 <= ROWS_IN
+    report "firm_image_header: ROWS_OUT is " & integer'image(ROWS_OUT) & "; legal: 1 to 2*ROWS_IN"
+    severity failure;
+  assert MAX_COLUMNS >= 1 and MAX_COLUMNS <= WIDEST_COLUMNS
+    report "firm_image_header: MAX_COLUMNS is " & integer'image(MAX_COLUMNS) & "; legal: 1 to "
+           & integer'image(WIDEST_COLUMNS) & ", as OUT_BYTES, COLUMNS_IN and COLUMNS_OUT are"
     severity failure;
 
   is_there   <= in_segment_valid(0);
@@ -328,8 +344,7 @@ begin
           padding_r   <= gap(31 downto 0);
           overlaps_r  <= gap(32);
           is_legal_r  <= '0';
-          if overlaps_r = '0' and unsigned(in_height(31 downto SIZE_BITS)) = 0
-             and unsigned(in_width) <= MAX_COLUMNS then
+          if overlaps_r = '0' and unsigned(in_height) <= MAX_ROWS and unsigned(in_width) <= MAX_COLUMNS then
             is_legal_r <= '1';
           end if;
         end if;
