@@ -1,8 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A memory with one port and an asynchronous read, for which FPGAs use LUTs as RAM. Reset does not clear it.
+-- If the address is a register, synthesis may use a block RAM for many bits, which is slower. The words are therefore
+-- divided among memories of at most 1024 bits.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_sched_ram is
   generic (
@@ -21,20 +25,27 @@ end entity firm_sched_ram;
 
 architecture rtl of firm_sched_ram is
 
-  type memory_t is array (natural range 0 to 2**ADDRESS_BITS-1) of std_logic_vector(WORD_BITS-1 downto 0);
-  signal memory : memory_t := (others => (others => '0'));
+  constant SLICE_BITS : positive := max(1, 1024 / 2**ADDRESS_BITS);
+  constant SLICES     : positive := (WORD_BITS + SLICE_BITS - 1) / SLICE_BITS;
 
 begin
 
-  write_memory : process (clk)
+  slices_of_words : for slice in 0 to SLICES-1 generate
+    constant LOW    : natural  := slice * SLICE_BITS;
+    constant BITS   : positive := SLICE_BITS - max(0, LOW + SLICE_BITS - WORD_BITS);
+    type     memory_t is array (natural range 0 to 2**ADDRESS_BITS-1) of std_logic_vector(BITS-1 downto 0);
+    signal   memory : memory_t := (others => (others => '0'));
   begin
-    if rising_edge(clk) then
-      if write_enable = '1' then
-        memory(to_integer(unsigned(address))) <= write_word;
+    write_memory : process (clk)
+    begin
+      if rising_edge(clk) then
+        if write_enable = '1' then
+          memory(to_integer(unsigned(address))) <= write_word(LOW+BITS-1 downto LOW);
+        end if;
       end if;
-    end if;
-  end process write_memory;
+    end process write_memory;
 
-  read_word <= memory(to_integer(unsigned(address)));
+    read_word(LOW+BITS-1 downto LOW) <= memory(to_integer(unsigned(address)));
+  end generate slices_of_words;
 
 end architecture rtl;

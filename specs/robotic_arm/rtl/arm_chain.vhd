@@ -147,6 +147,8 @@ architecture rtl of arm_chain is
   signal unfit_r          : std_logic;
   signal given_unfit_r    : std_logic;
 
+  -- The own element, whose difference to the given one is squared.
+  signal own_r            : number_t;
   -- Two operands, their product, and what becomes of it: the slot and row that it was asked for in.
   signal left_r           : operand_t;
   signal right_r          : operand_t;
@@ -172,6 +174,8 @@ architecture rtl of arm_chain is
 
   signal emit             : std_logic;
   signal emitted          : number_t;
+  signal emit_r           : std_logic;
+  signal emitted_r        : number_t;  -- zero where nothing leaves
   signal float_in_valid   : std_logic;
   signal float_in         : std_logic_vector(63 downto 0);
   signal float_valid      : std_logic;
@@ -401,15 +405,34 @@ begin
 
   -- Products --------------------------------------------------------------------------------------------------------
 
+  -- The element that was asked for CONVERSION cycles ago, in the next cycle.
+  hold_own : process (clk)
+    variable element : natural range 0 to 15;
+  begin
+    if rising_edge(clk) then
+      element := (turn_r + 16 + 1 - CONVERSION) mod 16;
+      own_r   <= (others => '0');
+      if element mod 4 /= 3 then
+        if element / 4 = 0 then
+          own_r <= row_of(x_r, element mod 4);
+        elsif element / 4 = 1 then
+          own_r <= row_of(y_r, element mod 4);
+        elsif element / 4 = 2 then
+          own_r <= row_of(z_r, element mod 4);
+        else
+          own_r <= row_of(p_r, element mod 4);
+        end if;
+      elsif element = 15 then
+        own_r <= to_signed(ONE, number_t'length);
+      end if;
+    end if;
+  end process hold_own;
+
   operands : process (clk)
-    variable x         : number_t;
-    variable y         : number_t;
-    variable z         : number_t;
-    variable along     : number_t;
-    variable own       : number_t;
-    variable element   : natural range 0 to 15;
-    variable far       : boolean;
-    variable is_square : boolean;
+    variable x     : number_t;
+    variable y     : number_t;
+    variable z     : number_t;
+    variable along : number_t;
   begin
     if rising_edge(clk) then
       x := row_of(x_r, row_r);
@@ -444,24 +467,9 @@ begin
       if phase_r = TURN and row_r /= LAST_ROW then
         operands_valid_r <= '1';
       elsif phase_r = COMPARE and fixed_valid = '1' then
-        -- The difference to be squared: the element that was asked for CONVERSION cycles ago.
-        element := (turn_r + 16 - CONVERSION) mod 16;
-        own     := (others => '0');
-        if element mod 4 /= 3 then
-          if element / 4 = 0 then
-            own := row_of(x_r, element mod 4);
-          elsif element / 4 = 1 then
-            own := row_of(y_r, element mod 4);
-          elsif element / 4 = 2 then
-            own := row_of(z_r, element mod 4);
-          else
-            own := row_of(p_r, element mod 4);
-          end if;
-        elsif element = 15 then
-          own := to_signed(ONE, number_t'length);
-        end if;
-        left_r           <= resize(own, operand_t'length) - signed(fixed(FRACTION+3 downto 0));
-        right_r          <= resize(own, operand_t'length) - signed(fixed(FRACTION+3 downto 0));
+        -- The difference to be squared.
+        left_r           <= resize(own_r, operand_t'length) - signed(fixed(FRACTION+3 downto 0));
+        right_r          <= resize(own_r, operand_t'length) - signed(fixed(FRACTION+3 downto 0));
         operands_valid_r <= '1';
       end if;
 
@@ -601,17 +609,29 @@ begin
     end if;
   end process select_number;
 
-  float_in_valid <= '1' when emit = '1' or (phase_r = COMPARE and turn_r = LAST_TURN) else '0';
-
-  -- The mean is a sixteenth of the sum.
-  gather : process (emitted, sum_r, phase_r)
+  hold_number : process (clk)
   begin
-    float_in <= (others => '0');
-    if phase_r = COMPARE then
-      float_in(63 downto 4) <= std_logic_vector(sum_r(59 downto 0));
-    else
-      float_in(63 downto ZEROS) <= std_logic_vector(resize(emitted, 64-ZEROS));
+    if rising_edge(clk) then
+      emit_r    <= emit and rst_n;
+      emitted_r <= (others => '0');
+      if emit = '1' then
+        emitted_r <= emitted;
+      end if;
     end if;
+  end process hold_number;
+
+  float_in_valid <= '1' when emit_r = '1' or (phase_r = COMPARE and turn_r = LAST_TURN) else '0';
+
+  -- The mean is a sixteenth of the sum. Of the sum and a number that leaves, one is zero.
+  gather : process (emitted_r, sum_r)
+    variable number : std_logic_vector(63 downto 0);
+    variable mean   : std_logic_vector(63 downto 0);
+  begin
+    number                  := (others => '0');
+    number(63 downto ZEROS) := std_logic_vector(resize(emitted_r, 64-ZEROS));
+    mean                    := (others => '0');
+    mean(63 downto 4)       := std_logic_vector(sum_r(59 downto 0));
+    float_in                <= number or mean;
   end process gather;
 
   u_float : entity firm.firm_fixed_to_float64
