@@ -106,7 +106,7 @@ else
 	done; exit $$status
 endif
 
-bench: TOOLS = iverilog verilator $(STUDIO_TOOLS)
+bench: TOOLS = iverilog verilator yosys $(STUDIO_TOOLS)
 bench: setup ros studio $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 

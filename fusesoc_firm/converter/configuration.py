@@ -80,6 +80,7 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
     start = _first_position(stream)
     return {
         **_common(frame, stream, entity or publisher_entity(frame), "in"),
+        "is_one_beat": beats == 1,
         "first_position": start,
         # The number of bytes before the frame.
         "start_bits": start * width,

@@ -111,7 +111,8 @@ _METHODS = {
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
         not be delivered. Whole systems are fuzzed in the same way.
         `make bench BENCH="fuzz --row 'system of 64 bits'"` measures one of them.""",
-    "loops": """GHDL's netlist is searched bit by bit, as [`lint`](../reference/netlist.md) does.""",
+    "loops": """GHDL's netlist is searched bit by bit, as [`lint`](../reference/netlist.md) does, and by two other
+        programs. `make bench BENCH="loops --row 'noetic.* 64 bits'"` measures some rows.""",
     "images": """The accelerators of specs/image_pipeline and specs/sobel are measured on their own: LUT/FF as in
         [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
     "links": "LUT and FF are counted as in [Area](converters.md#area).",

@@ -1,6 +1,6 @@
 """Combinational loops: of every message that is passed through, with each `pipeline`, and of random systems.
 
-None is allowed.
+None is allowed. Our own search, Yosys and Verilator look for them.
 """
 
 from __future__ import annotations
@@ -24,23 +24,31 @@ from fusesoc_firm.system.system_core import load_system
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.converter.simulated.pass_through import PassThrough, systems_of_all
 from tests.hdl.ghdl import core_files
-from tests.hdl.verilog import loops
+from tests.hdl.loop_tools import found_by_others
+from tests.hdl.verilog import loops, netlist
 from tests.random_systems import random_system
 from tests.system.simulated.systems import HARDWARE, generate_system
 
 TITLE = "Combinational loops"
 DISTRIBUTIONS, WIDTHS = ("noetic", "humble"), (8, 64)
 RANDOM_SYSTEMS = 500
+# How many random systems a row has at most.
+_SYSTEMS_A_ROW = 100
 BAR = 0
 
 _COLUMNS = ("design", "bits", "number", "loops", "bar", "result")
 _NOTE = """
-    Each message of a distribution has a subscriber that is connected to a publisher, with each
-    [`pipeline`](../reference/variable-converters.md#register-stages). Random systems have widths and pipelines of
+    Each design is searched three times, and 'loops' counts what any of them found: by our own search, by Yosys' `scc`
+    and by Verilator's UNOPTFLAT. Each message of a distribution has a subscriber that is connected to a publisher, with
+    each [`pipeline`](../reference/variable-converters.md#register-stages). Random systems have widths and pipelines of
     their own, and first versions of accelerators, in which an input's ready depends on the outputs'.
     """
 # A random system has so many blocks at least and at most.
 _FEWEST, _MOST = 3, 12
+_FIRST_SYSTEMS = range(0, RANDOM_SYSTEMS, _SYSTEMS_A_ROW)
+
+# Searches a system's files in an empty folder; returns a sentence for each loop.
+Search = Callable[[Sequence[Path], Path], list[str]]
 
 
 @dataclass(frozen=True)
@@ -71,18 +79,24 @@ def rows(seed: int, random_systems: int = RANDOM_SYSTEMS) -> Iterator[Row]:
         for pipeline, width in product(PIPELINES, WIDTHS):
             parts = [_passed(distribution, system.names, width, pipeline) for system in systems]
             yield Row(_label(distribution, pipeline), str(width), number, parts)
-    yield Row("random systems", "", random_systems, [_random(seed + number) for number in range(random_systems)])
+    for first in range(0, random_systems, _SYSTEMS_A_ROW):
+        number = min(_SYSTEMS_A_ROW, random_systems - first)
+        yield Row(_random_label(first), "", number, [_random(seed + first + place) for place in range(number)])
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
     messages = product(DISTRIBUTIONS, PIPELINES, WIDTHS)
     rows_of_messages = [(_label(distribution, pipeline), str(width)) for distribution, pipeline, width in messages]
-    return {TITLE: [*rows_of_messages, ("random systems", "")]}
+    return {TITLE: [*rows_of_messages, *((_random_label(first), "") for first in _FIRST_SYSTEMS)]}
 
 
 def _label(distribution: str, pipeline: str) -> str:
     return f"messages of {distribution}, pipeline {pipeline}"
+
+
+def _random_label(first: int) -> str:
+    return f"random systems from number {first + 1}"
 
 
 def measure(seed: int, tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
@@ -120,19 +134,33 @@ def _searched(part: Callable[[Path], list[str]]) -> list[str]:
 
 def _passed(distribution: str, names: Sequence[str], width: int, pipeline: str) -> Callable[[Path], list[str]]:
     system = PassThrough(distribution, names, count=0, seed=0, width=width, pipeline=pipeline)
-    return lambda folder: loops_of_messages(system, folder)
+    return lambda folder: loops_of_messages(system, folder, _found_by_all)
 
 
 def _random(seed: int) -> Callable[[Path], list[str]]:
-    return lambda folder: loops_of_random_system(seed, folder)
+    return lambda folder: loops_of_random_system(seed, folder, _found_by_all)
 
 
-def loops_of_messages(system: PassThrough, folder: Path) -> list[str]:
+def found_by_us(work: Sequence[Path], folder: Path) -> list[str]:
+    """The loops that our own search finds in a system; its top level is the last file."""
+    found = loops(work[-1].stem, folder, work, core_files(*HARDWARE))
+    return [sentence.replace(f"{folder}/", "") for sentence in found]
+
+
+def _found_by_all(work: Sequence[Path], folder: Path) -> list[str]:
+    top = work[-1].stem
+    return [
+        *found_by_us(work, folder),
+        *found_by_others(top, netlist(top, folder, work, core_files(*HARDWARE))),
+    ]
+
+
+def loops_of_messages(system: PassThrough, folder: Path, search: Search = found_by_us) -> list[str]:
     """The loops of messages that are passed through."""
-    return _loops(generate_system(system.specification(folder), folder / "system"), folder)
+    return search(generate_system(system.specification(folder), folder / "system"), folder)
 
 
-def loops_of_random_system(seed: int, folder: Path) -> list[str]:
+def loops_of_random_system(seed: int, folder: Path, search: Search = found_by_us) -> list[str]:
     """The loops of a random system, whose accelerators are first versions."""
     chance = random.Random(seed)
     blocks = chance.randint(_FEWEST, _MOST)
@@ -142,9 +170,4 @@ def loops_of_random_system(seed: int, folder: Path) -> list[str]:
     system = load_system(specification, libraries, needs_sources=False).system
     for path, text in missing_sources(system, folder).items():
         path.write_text(text, encoding="utf-8")
-    return [f"seed {seed}: {sentence}" for sentence in _loops(generate_system(specification, folder / "core"), folder)]
-
-
-def _loops(work: Sequence[Path], folder: Path) -> list[str]:
-    found = loops(work[-1].stem, folder, work, core_files(*HARDWARE))
-    return [sentence.replace(f"{folder}/", "") for sentence in found]
+    return [f"seed {seed}: {sentence}" for sentence in search(generate_system(specification, folder / "core"), folder)]

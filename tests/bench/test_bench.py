@@ -185,7 +185,10 @@ def test_loops_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_names_of_loops_rows() -> None:
-    assert [row.key for row in loops.rows(SEED, 1)] == loops.keys()[loops.TITLE]
+    found = list(loops.rows(SEED))
+    assert [row.key for row in found] == loops.keys()[loops.TITLE]
+    random_systems = [row for row in found if "random" in row.name]
+    assert sum(row.number for row in random_systems) == sum(len(row.parts) for row in random_systems) == 500
 
 
 class _CalledError(Exception):

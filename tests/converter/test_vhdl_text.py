@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
+from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
@@ -50,6 +51,21 @@ def test_golden_files(ros: Middleware, name: str, file: str) -> None:
 @pytest.mark.parametrize("file", ["axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"])
 def test_golden_files_of_a_wide_stream(file: str) -> None:
     check_expected(GOLDEN / f"ros2_64_{file}", texts(ORACLES[ROS2].frame("geometry_msgs/Quaternion"), 64)[file])
+
+
+def test_a_publisher_of_one_beat_has_no_branch() -> None:
+    file = "std_msgs_uint16_to_axis.vhd"
+    check_expected(GOLDEN / f"ros1_64_{file}", texts(ORACLES[ROS1].frame("std_msgs/UInt16"), 64)[file])
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_a_publisher_has_a_position_if_it_has_beats_to_tell_apart(ros: Middleware, width: int) -> None:
+    for name in ORACLES[ros].fixed_size_messages():
+        frame = ORACLES[ros].frame(name)
+        (text,) = (str(file.content) for file in publisher_files([frame], width).values())
+        has_position = frame.frame_bytes > width // 8
+        assert all((word in text) is has_position for word in ("position_r", "withdrawn", "process")), name
 
 
 @pytest.mark.parametrize("width", [8, 64])

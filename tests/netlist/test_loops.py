@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import random
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 
 from fusesoc_firm.netlist.model import NetlistError
+from tests.hdl.loop_tools import found_by_others
 from tests.hdl.verilog import loops, netlist
 from tests.netlist.test_ghdlsynth import Build
 
@@ -97,6 +99,22 @@ def found(folder: Path, **texts: str) -> list[str]:
         files.append(folder / f"{name}.vhd")
         files[-1].write_text(text, encoding="ascii")
     return loops(files[-1].stem, folder, files)
+
+
+@pytest.mark.skipif(not (shutil.which("yosys") and shutil.which("verilator")), reason="no yosys or no verilator")
+@pytest.mark.parametrize("has_loop", [True, False])
+def test_yosys_and_verilator_find_a_loop_through_instances(tmp_path: Path, has_loop: bool) -> None:
+    """The first stage's ready waits for the second's, which waits for a valid."""
+    valid = "in_valid and out_ready" if has_loop else "in_valid"
+    first = STAGE.format("first", "first", f"  out_valid <= {valid};\n  in_ready <= out_ready;")
+    stages = {"first": first, "second": STAGE.format("second", "second", WAITS)}
+    top = TOP.replace("out_ready => last", "out_ready => clk")
+    files = []
+    for name, text in {**stages, "top": top}.items():
+        files.append(tmp_path / f"{name}.vhd")
+        files[-1].write_text(text, encoding="ascii")
+    said = found_by_others("top", netlist("top", tmp_path, files))
+    assert [sentence.partition(":")[0] for sentence in said] == (["Yosys", "Verilator"] if has_loop else []), said
 
 
 @pytest.mark.parametrize("statements", DESIGNS)

@@ -1,0 +1,56 @@
+"""Combinational loops that other programs find in a netlist in Verilog: Yosys and Verilator.
+
+Yosys flattens the netlist, but keeps the cells of whole words. Each bit of such a cell's output depends on all bits of
+its inputs, so Yosys may find more than there is, and misses nothing. Verilator does the same with signals.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from fusesoc_firm.netlist.model import NetlistError
+
+# A memory becomes registers and multiplexers, so that its address is seen.
+_CELLS = "proc -noopt; flatten; memory_map"
+_LOOPS = re.compile(r"ERROR: (Found \d+ SCCs) but expected 0")
+_WAIVER = "// verilator lint_off UNOPTFLAT"
+_UNOPTFLAT = re.compile(r"^%Warning-UNOPTFLAT: \S+ (.*)", re.MULTILINE)
+
+
+def found_by_others(top: str, netlist: Path) -> list[str]:
+    """The loops of the module `top`: a sentence for those of Yosys, and one for each of Verilator.
+
+    Raises `NetlistError`.
+    """
+    return [*_in_yosys(top, netlist), *_in_verilator(top, netlist)]
+
+
+def _in_yosys(top: str, netlist: Path) -> list[str]:
+    script = f"read_verilog {netlist.name}; hierarchy -check -top {top}; {_CELLS}; scc -expect 0"
+    status, said = _run(["yosys", "-q", "-p", script], netlist.parent)
+    found = _LOOPS.search(said)
+    if status and not found:
+        raise NetlistError(said)
+    return [f"Yosys: {found[1]}"] if found else []
+
+
+def _in_verilator(top: str, netlist: Path) -> list[str]:
+    text = netlist.read_text(encoding="utf-8")
+    assert _WAIVER in text, f"{netlist} does not waive the warning"
+    unwaived = netlist.with_name(f"{netlist.stem}_unwaived.v")
+    unwaived.write_text(text.replace(_WAIVER, ""), encoding="utf-8")
+    options = ["--lint-only", "-Wno-lint", "-Wno-style", "-Wno-fatal", "-Wwarn-UNOPTFLAT", "--top-module", top]
+    status, said = _run(["verilator", *options, unwaived.name], netlist.parent)
+    if status:
+        raise NetlistError(said)
+    return [f"Verilator: {sentence}" for sentence in _UNOPTFLAT.findall(said)]
+
+
+def _run(command: Sequence[str], folder: Path) -> tuple[int, str]:
+    done = subprocess.run(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False
+    )
+    return done.returncode, done.stdout
