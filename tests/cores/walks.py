@@ -60,8 +60,7 @@ def _heads(packet: bytes) -> Iterator[tuple[int, int]]:
 
 def _row(item: Submessage, flags: int, source: Record) -> str:
     record = sorted({**source, **_record(item)}.items())
-    is_data = isinstance(item, Data)
-    key = item.key if is_data else _first(item, Parameter.KEY_HASH, 16)
+    key = _first(item, Parameter.KEY_HASH, 16)
     status = _first(item, Parameter.STATUS_INFO, 4)
     payload = getattr(item, "payload", None) or b""
     numbers = [item.kind, flags, int(key is not None), int(status is not None), len(record)]
@@ -193,11 +192,11 @@ def _edges() -> Iterator[bytes]:
                 middle = b"frag" if kind == Kind.NACK_FRAG else b"12345678" if kind == Kind.GAP else b""
                 body = ends + middle + tail + more
                 yield header + struct.pack(order + "BBH", kind, flag, len(body)) + body
-        for kind in range(0x18):
-            yield header + struct.pack(order + "BBH", kind, flag, 0)
-            yield header + struct.pack(order + "BBH", kind, flag, 1) + b"x"
-            yield header + struct.pack(order + "BBH", kind, flag, 3) + b"xy"
-            yield header + struct.pack(order + "BBHBBH", kind, flag, 0, Kind.INFO_DESTINATION, flag, 12) + bytes(12)
+        for any_kind in range(0x18):
+            yield header + struct.pack(order + "BBH", any_kind, flag, 0)
+            yield header + struct.pack(order + "BBH", any_kind, flag, 1) + b"x"
+            yield header + struct.pack(order + "BBH", any_kind, flag, 3) + b"xy"
+            yield header + struct.pack(order + "BBHBBH", any_kind, flag, 0, Kind.INFO_DESTINATION, flag, 12) + bytes(12)
     yield from (header[:size] for size in range(1, 24))
     yield b"RTPX" + header[4:]
     yield b"RTPS\1" + header[5:]
