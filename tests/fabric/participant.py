@@ -171,7 +171,11 @@ class History:
 
 @dataclass
 class Sink:
-    """A peer's reader that matches a writer of the node: it gets samples from `start` on, and has those below."""
+    """A peer's reader that matches a writer of the node: it gets samples from `start` on, and has those below.
+
+    Until a reader has heard a heartbeat, it may drop all samples, and then skip those that its first heartbeat tells
+    of. Cyclone DDS does so. Thus heartbeats tell of no sample until the reader has answered one.
+    """
 
     peer: Peer
     entity: bytes
@@ -179,6 +183,7 @@ class Sink:
     address: Address
     is_reliable: bool
     start: int
+    is_heard: bool = False
     acknowledged: int = 0
     next_heartbeat: int = 0
 
@@ -186,6 +191,23 @@ class Sink:
     def first(self) -> int:
         """The first number that it can get."""
         return max(self.start, next(iter(self.history.samples), self.history.number + 1))
+
+    @property
+    def told(self) -> tuple[int, int]:
+        """The first and the last number in a heartbeat."""
+        return (self.first, self.history.number) if self.is_heard else (self.start, self.start - 1)
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether it has not acknowledged all samples."""
+        return not self.is_heard or self.acknowledged <= self.history.number
+
+    def answer(self, item: AckNack) -> None:
+        """Note what it has. A request for a heartbeat alone, which comes before the first one, acknowledges nothing."""
+        is_request = not item.is_final and not item.missing.size and item.missing.base <= max(1, self.start - 1)
+        self.is_heard = self.is_heard or not is_request
+        if self.is_heard:
+            self.acknowledged = item.missing.base
 
 
 class Participant:
@@ -253,7 +275,7 @@ class Participant:
             else:
                 self._tick_peer(peer)
         for sink in self.sinks:
-            if sink.is_reliable and sink.acknowledged <= sink.history.number and now >= sink.next_heartbeat:
+            if sink.is_reliable and sink.is_behind and now >= sink.next_heartbeat:
                 self._send_heartbeat(sink)
         for source in self.sources:
             self._tick_source(source)
@@ -305,7 +327,7 @@ class Participant:
     def _heartbeat(self, sink: Sink) -> Heartbeat:
         sink.next_heartbeat = self._now + USER_HEARTBEAT
         writer = sink.history.endpoint.entity
-        return Heartbeat(sink.entity, writer, sink.first, sink.history.number, self._next_count())
+        return Heartbeat(sink.entity, writer, *sink.told, self._next_count())
 
     def _send_heartbeat(self, sink: Sink) -> None:
         self._send_to(sink.peer, sink.address, self._heartbeat(sink))
@@ -579,7 +601,8 @@ class Participant:
                     self._asked_for_fragments(sink, item)
 
     def _asked(self, sink: Sink, item: AckNack) -> None:
-        sink.acknowledged = item.missing.base
+        was_heard = sink.is_heard
+        sink.answer(item)
         wanted = [number for number in item.missing if number <= sink.history.number]
         if gone := [number for number in wanted if number < sink.first]:
             self._send_to(
@@ -590,7 +613,8 @@ class Participant:
         for number in wanted:
             if number >= sink.first:
                 self._send_sample(sink, number, is_last=number == wanted[-1])
-        if not wanted and not item.is_final:
+        has_news = not was_heard and sink.is_heard and sink.is_behind
+        if not wanted and (has_news or not item.is_final):
             self._send_heartbeat(sink)
 
     def _asked_for_fragments(self, sink: Sink, item: NackFrag) -> None:

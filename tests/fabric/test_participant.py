@@ -14,7 +14,7 @@ from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import LEASE_SECONDS, Endpoint, Node
 from fusesoc_firm.system.derived.model import Network, Quality
 from tests.fabric.messages import AckNack, Address, Data, Heartbeat, Message, parse
-from tests.fabric.participant import FRAGMENT_BYTES, Limits, Participant
+from tests.fabric.participant import FRAGMENT_BYTES, Limits, Participant, Source
 from tests.fabric.test_messages import random_packets
 
 SEED = 20261126
@@ -64,9 +64,9 @@ class Ether:
         self.chance = random.Random(self.seed)
         self.under_way: list[tuple[int, Address, bytes]] = []
 
-    def add(self, node: Node, limits: Limits = DEFAULT) -> Station:
+    def add(self, node: Node, limits: Limits = DEFAULT, kind: type[Participant] = Participant) -> Station:
         took: list[tuple[str, bytes]] = []
-        participant = Participant(node, lambda endpoint, payload: took.append((endpoint.topic, payload)), limits)
+        participant = kind(node, lambda endpoint, payload: took.append((endpoint.topic, payload)), limits)
         station = Station(participant, took)
         self.stations.append(station)
         participant.start(self.now)
@@ -147,6 +147,33 @@ def test_every_sample_arrives_once_and_in_order(loss: float) -> None:
     others = [item for _, message in network.sent[before:] for item in message.submessages]
     # When all is told, only the announcements go on.
     assert [item for item in others if isinstance(item, Heartbeat | AckNack)] == []
+
+
+class SkippingReader(Participant):
+    """A reader that takes no sample before its first heartbeat, and skips what that tells of, as Cyclone DDS does."""
+
+    def _sample(self, source: Source, item: Data) -> None:
+        if source.is_heard:
+            super()._sample(source, item)
+
+    def _told(self, source: Source, item: Heartbeat) -> None:
+        if not source.is_heard:
+            source.advance(item.last + 1)
+        super()._told(source, item)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_reader_that_skips_to_its_first_heartbeat_misses_nothing(seed: int) -> None:
+    """Its request for a heartbeat is not an acknowledgement, although the heartbeat may get lost."""
+    network = Ether(0.3, seed)
+    writer = network.add(a_node(1, {"a": RELIABLE}, {}))
+    reader = network.add(a_node(2, {}, {"a": RELIABLE}), kind=SkippingReader)
+    network.run(is_matched(writer, reader))
+    for payload in (b"1", b"2"):
+        network.publish(writer, payload)
+        network.wait(300)
+    network.run(lambda: not any(sink.is_behind for sink in writer.participant.sinks))
+    assert reader.took == [("rt/a", b"1"), ("rt/a", b"2")]
 
 
 def test_best_effort_keeps_the_order_and_asks_for_nothing() -> None:

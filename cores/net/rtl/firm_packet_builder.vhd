@@ -1,0 +1,250 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Builds Ethernet frames with UDP datagrams from programs in a memory: constant bytes, bytes of fields that its user
+-- wrote before, and one payload from a stream. Lengths and the checksum of IPv4 are computed; datagrams have no
+-- checksum of their own (RFC 768 allows that). One byte leaves in every cycle.
+--
+-- A word of a program is one byte of the frame, or the payload: bit 10 marks the last one, bits 9 to 8 are the source,
+-- and bits 7 to 0 the argument. A program begins with nine words that are not sent: the sum of the header's constant
+-- words, the length of the packet without the payload, and the length of the submessage before it, all with the high
+-- byte first, and the destination's address.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+entity firm_packet_builder is
+  generic (
+    ADDRESS_BITS : integer := 12  -- of the programs' memory
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of
+    -- four bytes; its size is 0 if the program has no payload.
+    start         : in  std_logic;
+    entry         : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
+    payload_bytes : in  std_logic_vector(15 downto 0);
+    is_busy       : out std_logic;
+
+    -- Fields, written while `is_busy` is low.
+    field_valid   : in std_logic;
+    field_address : in std_logic_vector(6 downto 0);
+    field_data    : in std_logic_vector(7 downto 0);
+
+    -- The programs: a memory that shows the word one cycle after `program_enable`, and keeps it.
+    program_enable  : out std_logic;
+    program_address : out std_logic_vector(ADDRESS_BITS-1 downto 0);
+    program_word    : in  std_logic_vector(10 downto 0);
+
+    s_axis_tdata  : in  std_logic_vector(7 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- To firm_mac_transmitter; without a pause unless the payload pauses.
+    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic
+  );
+end entity firm_packet_builder;
+
+architecture rtl of firm_packet_builder is
+
+  constant FIELD_BITS     : positive := 7;
+  constant HEADER_BYTES   : positive := 20;  -- of IPv4
+  constant PRELUDE_WORDS  : positive := 9;   -- that are not sent
+  constant DATA_WORD      : positive := 4;   -- the one with the length of the submessage
+
+  subtype source_t is std_logic_vector(1 downto 0);
+  constant FROM_WORD    : source_t := "00";  -- the argument itself
+  constant FROM_FIELD   : source_t := "01";  -- its address
+  constant FROM_PAYLOAD : source_t := "10";
+  constant FROM_RESULT  : source_t := "11";  -- bits 2 to 1: which number; bit 0: which byte
+
+  subtype number_t is unsigned(15 downto 0);
+
+  type fields_t is array (natural range 0 to 2**FIELD_BITS-1) of std_logic_vector(7 downto 0);
+  signal fields : fields_t;
+
+  signal busy_r    : std_logic;
+  signal address_r : unsigned(ADDRESS_BITS-1 downto 0) := (others => '0');
+  signal begins    : std_logic;
+
+  -- The first stage: the word of the program.
+  signal fetched_r  : std_logic;
+  signal source     : source_t;
+  signal argument   : std_logic_vector(7 downto 0);
+  signal payload    : std_logic;  -- it is the payload
+  signal real_r     : number_t := (others => '0');  -- bytes of the payload to come
+  signal padded_r   : number_t := (others => '0');  -- the same, with its padding
+  signal is_padding : std_logic;
+  signal has_byte   : std_logic;
+  signal moves      : std_logic;  -- a byte goes to the second stage
+  signal is_final   : std_logic;  -- it is the word's last one
+  signal result     : std_logic_vector(7 downto 0);
+
+  -- The second stage: the byte.
+  signal valid_r   : std_logic;
+  signal final_r   : std_logic;  -- the last one of the frame
+  signal chosen_r  : std_logic;  -- it is a field
+  signal field_r   : std_logic_vector(7 downto 0);
+  signal value_r   : std_logic_vector(7 downto 0);
+  signal byte      : std_logic_vector(7 downto 0);
+  signal prelude_r : natural range 0 to PRELUDE_WORDS;
+  signal is_sent   : std_logic;  -- the prelude is over
+  signal advance   : std_logic;
+
+  -- Numbers of the packet.
+  signal extra_r  : number_t := (others => '0');  -- bytes of the payload, with padding
+  signal total_r  : number_t := (others => '0');  -- of the packet
+  signal udp_r    : number_t := (others => '0');  -- of the datagram
+  signal data_r   : number_t := (others => '0');  -- of the submessage
+  signal sum_r    : unsigned(17 downto 0) := (others => '0');
+
+begin
+
+  assert ADDRESS_BITS >= 4 and ADDRESS_BITS <= 16
+    report "firm_packet_builder: ADDRESS_BITS is " & integer'image(ADDRESS_BITS) & "; legal: 4 to 16"
+    severity failure;
+
+  is_busy <= busy_r;
+  begins  <= start and not busy_r;
+
+  -- ------------------------------------------------------------------ the word
+
+  source   <= program_word(9 downto 8);
+  argument <= program_word(7 downto 0);
+
+  program_address <= entry when begins = '1' else std_logic_vector(address_r);
+  program_enable  <= begins or (moves and is_final);
+
+  payload    <= fetched_r when source = FROM_PAYLOAD else '0';
+  is_padding <= '1' when real_r = 0 else '0';
+  has_byte   <= s_axis_tvalid or is_padding or not payload;
+  is_final   <= '1' when payload = '0' or padded_r = 1 else '0';
+  advance    <= m_axis_tready or not (valid_r and is_sent);
+  moves      <= advance and fetched_r and has_byte;
+
+  s_axis_tready <= advance and payload and not is_padding;
+
+  fetch : process (clk)
+  begin
+    if rising_edge(clk) then
+      if begins = '1' then
+        busy_r    <= '1';
+        fetched_r <= '1';
+        address_r <= unsigned(entry) + 1;
+        real_r    <= unsigned(payload_bytes);
+        padded_r  <= unsigned(payload_bytes) + 3;
+        padded_r(1 downto 0) <= "00";
+        extra_r   <= unsigned(payload_bytes) + 3;
+        extra_r(1 downto 0) <= "00";
+      elsif moves = '1' then
+        if is_final = '1' then
+          address_r <= address_r + 1;
+          fetched_r <= not program_word(10);
+        end if;
+        if payload = '1' then
+          padded_r <= padded_r - 1;
+          if is_padding = '0' then
+            real_r <= real_r - 1;
+          end if;
+        end if;
+      end if;
+      if valid_r = '1' and final_r = '1' and advance = '1' then
+        busy_r <= '0';
+      end if;
+      if rst_n = '0' then
+        busy_r    <= '0';
+        fetched_r <= '0';
+      end if;
+    end if;
+  end process fetch;
+
+  result <= std_logic_vector(total_r(15 downto 8)) when argument(2 downto 0) = "000" else
+            std_logic_vector(total_r(7 downto 0)) when argument(2 downto 0) = "001" else
+            std_logic_vector(udp_r(15 downto 8)) when argument(2 downto 0) = "010" else
+            std_logic_vector(udp_r(7 downto 0)) when argument(2 downto 0) = "011" else
+            not std_logic_vector(sum_r(15 downto 8)) when argument(2 downto 0) = "100" else
+            not std_logic_vector(sum_r(7 downto 0)) when argument(2 downto 0) = "101" else
+            std_logic_vector(data_r(7 downto 0)) when argument(2 downto 0) = "110" else
+            std_logic_vector(data_r(15 downto 8));
+
+  -- ------------------------------------------------------------------ the byte
+
+  access_fields : process (clk)
+  begin
+    if rising_edge(clk) then
+      if field_valid = '1' then
+        fields(to_integer(unsigned(field_address))) <= field_data;
+      end if;
+      if advance = '1' then
+        field_r <= fields(to_integer(unsigned(argument(FIELD_BITS-1 downto 0))));
+      end if;
+    end if;
+  end process access_fields;
+
+  choose : process (clk)
+  begin
+    if rising_edge(clk) then
+      if advance = '1' then
+        valid_r  <= moves;
+        final_r  <= program_word(10) and is_final;
+        chosen_r <= '0';
+        value_r  <= argument;
+        if source = FROM_FIELD then
+          chosen_r <= '1';
+        elsif source = FROM_RESULT then
+          value_r <= result;
+        elsif source = FROM_PAYLOAD then
+          value_r <= s_axis_tdata;
+          if is_padding = '1' then
+            value_r <= (others => '0');
+          end if;
+        end if;
+      end if;
+      if rst_n = '0' then
+        valid_r <= '0';
+      end if;
+    end if;
+  end process choose;
+
+  byte    <= field_r when chosen_r = '1' else value_r;
+  is_sent <= '1' when prelude_r = PRELUDE_WORDS else '0';
+
+  m_axis_tdata  <= byte;
+  m_axis_tvalid <= valid_r and is_sent;
+  m_axis_tlast  <= final_r;
+
+  -- ------------------------------------------------------------------ the numbers
+
+  compute : process (clk)
+    variable word : number_t;
+  begin
+    if rising_edge(clk) then
+      word := (others => '0');
+      if valid_r = '1' and is_sent = '0' then
+        prelude_r <= prelude_r + 1;
+        if prelude_r = 0 or prelude_r = 2 or prelude_r = 5 or prelude_r = 7 then
+          word(15 downto 8) := unsigned(byte);
+        elsif prelude_r = DATA_WORD then
+          data_r  <= extra_r + unsigned(byte);
+          total_r <= total_r + extra_r;
+          word    := extra_r;
+        else
+          word(7 downto 0) := unsigned(byte);
+        end if;
+        if prelude_r = 2 or prelude_r = 3 then
+          total_r <= total_r(7 downto 0) & unsigned(byte);
+        end if;
+      end if;
+      udp_r <= total_r - HEADER_BYTES;
+      sum_r <= resize(sum_r(15 downto 0), 18) + sum_r(17 downto 16) + word;
+      if begins = '1' then
+        prelude_r <= 0;
+        sum_r     <= (others => '0');
+      end if;
+    end if;
+  end process compute;
+
+end architecture rtl;

@@ -1,0 +1,54 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- The numbers of RTPS that firm_rtps_walker and its users share (OMG DDSI-RTPS 2.5, chapter 9), and the places of a
+-- submessage's fields in the record that the walker writes.
+library ieee;
+use ieee.std_logic_1164.all;
+
+package firm_rtps_pkg is
+
+  subtype rtps_byte_t is std_logic_vector(7 downto 0);
+
+  -- Kinds of submessages.
+  constant RTPS_PAD              : rtps_byte_t := x"01";
+  constant RTPS_ACKNACK          : rtps_byte_t := x"06";
+  constant RTPS_HEARTBEAT        : rtps_byte_t := x"07";
+  constant RTPS_GAP              : rtps_byte_t := x"08";
+  constant RTPS_INFO_TIMESTAMP   : rtps_byte_t := x"09";
+  constant RTPS_INFO_DESTINATION : rtps_byte_t := x"0e";
+  constant RTPS_NACK_FRAG        : rtps_byte_t := x"12";
+  constant RTPS_HEARTBEAT_FRAG   : rtps_byte_t := x"13";
+  constant RTPS_DATA             : rtps_byte_t := x"15";
+  constant RTPS_DATA_FRAG        : rtps_byte_t := x"16";
+
+  -- Bits of a submessage's flags.
+  constant RTPS_LITTLE       : natural := 0;
+  constant RTPS_FINAL        : natural := 1;  -- of ACKNACK and HEARTBEAT
+  constant RTPS_INLINE       : natural := 1;  -- of DATA and DATA_FRAG
+  constant RTPS_PAYLOAD      : natural := 2;  -- of DATA
+  constant RTPS_KEY          : natural := 3;  -- of DATA
+  constant RTPS_FRAGMENT_KEY : natural := 2;  -- of DATA_FRAG
+
+  constant RTPS_SENTINEL    : std_logic_vector(15 downto 0) := x"0001";
+  constant RTPS_KEY_HASH    : std_logic_vector(15 downto 0) := x"0070";
+  constant RTPS_STATUS_INFO : std_logic_vector(15 downto 0) := x"0071";
+
+  -- The record. Numbers are little-endian, and entities and prefixes as on the line. A sequence number has 8 bytes. The
+  -- first number of a set is the highest bit of its first byte.
+  constant RECORD_BITS        : positive := 7;   -- of an address
+  constant RECORD_READER      : natural  := 0;   -- 4 bytes
+  constant RECORD_WRITER      : natural  := 4;   -- 4 bytes
+  constant RECORD_NUMBER      : natural  := 8;   -- of the sample; a heartbeat's first; a set's base; a gap's start
+  constant RECORD_SECOND      : natural  := 16;  -- a heartbeat's last; a gap's base
+  constant RECORD_FRAGMENT    : natural  := 24;  -- 4 bytes: the last fragment; the base of a set of fragments
+  constant RECORD_COUNT       : natural  := 28;  -- 4 bytes
+  constant RECORD_FRAGMENTS   : natural  := 32;  -- first (4 bytes), count (2), size of each (2), size of the sample (4)
+  constant RECORD_SET_SIZE    : natural  := 44;  -- 4 bytes: bits of the set
+  constant RECORD_DESTINATION : natural  := 48;  -- 12 bytes
+  constant RECORD_STATUS      : natural  := 60;  -- 4 bytes
+  constant RECORD_SET         : natural  := 64;  -- up to 32 bytes
+  constant RECORD_KEY_HASH    : natural  := 96;  -- 16 bytes
+  constant RECORD_SOURCE      : natural  := 112; -- 12 bytes: the sender's prefix, from the packet's header
+
+  constant MOST_SET_BITS : positive := 256;
+
+end package firm_rtps_pkg;

@@ -1,0 +1,499 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Takes RTPS packets apart while they arrive (OMG DDSI-RTPS 2.5, sections 8.3 and 9.4): writes the fields of each
+-- submessage to a record, and forwards the payloads of samples. Both byte orders give the same record.
+--
+-- A submessage of another kind is skipped. A wrong length or number ends the packet there, and what came before counts.
+-- Whether the packet counts at all is known at its end.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_rtps_pkg.all;
+
+entity firm_rtps_walker is
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- Payloads of firm_udp_receiver.
+    s_axis_tdata  : in std_logic_vector(7 downto 0);
+    s_axis_tuser  : in std_logic_vector(0 downto 0);
+    s_axis_tvalid : in std_logic;
+    s_axis_tlast  : in std_logic;
+
+    -- A byte of the record, at an address of firm_rtps_pkg.
+    field_valid   : out std_logic;
+    field_address : out std_logic_vector(RECORD_BITS-1 downto 0);
+    field_data    : out std_logic_vector(7 downto 0);
+
+    -- A byte of a sample's payload. Inline parameters are not a part of it.
+    payload_valid : out std_logic;
+    payload_data  : out std_logic_vector(7 downto 0);
+
+    -- Of the submessage, from its first field to its end.
+    kind       : out std_logic_vector(7 downto 0);
+    flags      : out std_logic_vector(7 downto 0);
+    has_key    : out std_logic;  -- its inline parameters have a key hash
+    has_status : out std_logic;  -- its inline parameters have a status
+
+    -- A pulse after the last byte of a submessage.
+    is_submessage : out std_logic;
+
+    -- One pulse at the end of each packet.
+    is_whole   : out std_logic;
+    is_faulty  : out std_logic;  -- the submessages before the fault count
+    is_foreign : out std_logic;  -- not RTPS 2
+    is_aborted : out std_logic   -- nothing of it counts
+  );
+end entity firm_rtps_walker;
+
+architecture rtl of firm_rtps_walker is
+
+  -- A step is a field or several ones. SKIP, SET, PARAMETER and VALUE may be missing.
+  type step_t is (
+    PROTOCOL, SOURCE, HEAD,
+    EXTRA, ENDS, NUMBER, SECOND, FRAGMENT, FRAGMENTS, SET_SIZE, SET, COUNT, DESTINATION,
+    SKIP, PARAMETER, VALUE,
+    PAYLOAD, REST, FOREIGN, FAULTY
+  );
+
+  constant SET_WORDS      : positive := MOST_SET_BITS/32;
+  constant PROTOCOL_BYTES : positive := 8;
+  constant PREFIX_BYTES   : positive := 12;
+  constant HEAD_BYTES     : positive := 4;
+  constant WORD_BYTES     : positive := 4;
+  constant NUMBER_BYTES   : positive := 8;
+  constant ENDS_BYTES     : positive := 8;
+  constant HASH_BYTES     : positive := 16;
+  constant STATUS_BYTES   : positive := 4;
+  -- Bytes from the field that says where inline parameters begin to those without a further field.
+  constant DATA_BYTES      : positive := 16;
+  constant DATA_FRAG_BYTES : positive := 28;
+  constant FRAGMENTS_BYTES : positive := 12;
+
+  subtype size_t is unsigned(15 downto 0);
+
+  type protocol_t is array (0 to PROTOCOL_BYTES-1) of std_logic_vector(7 downto 0);
+  constant RTPS_2        : protocol_t := (x"52", x"54", x"50", x"53", x"02", others => x"00");
+  constant CHECKED_BYTES : positive   := 5;  -- the minor version and the vendor are any
+
+  signal step_r  : step_t;
+  signal place_r : unsigned(4 downto 0) := (others => '0');  -- in the step; it stays at 31
+  signal left_r  : size_t := (others => '0');                -- bytes of the step after this one
+  signal last_r  : std_logic;                                -- this byte is the last one of its step
+
+  -- Of the submessage.
+  signal kind_r       : std_logic_vector(7 downto 0) := (others => '0');
+  signal flags_r      : std_logic_vector(7 downto 0) := (others => '0');
+  signal body_r       : size_t := (others => '0');  -- bytes of it, this one included
+  signal final_r      : std_logic;                  -- this byte is its last one
+  signal open_r       : std_logic;                  -- it ends with the packet
+  signal known_r      : std_logic;                  -- its kind is one of those that are read
+  signal further_r    : size_t := (others => '0');  -- bytes before the inline parameters
+  signal few_r        : std_logic;                  -- there is no such byte
+  signal has_key_r    : std_logic;
+  signal has_status_r : std_logic;
+  signal hash_r       : std_logic;  -- the parameter is the first key hash
+  signal status_r     : std_logic;  -- the parameter is the first status
+
+  -- The bytes before this one, the last one lowest.
+  signal recent_r : std_logic_vector(23 downto 0) := (others => '0');
+
+  signal is_little        : std_logic;
+  signal half             : std_logic_vector(15 downto 0);  -- this byte and the one before
+  signal word             : std_logic_vector(31 downto 0);  -- this byte and the three before
+  signal id               : std_logic_vector(15 downto 0);  -- of a parameter, if this byte is the last one of its step
+  signal after_parameters : step_t;
+
+  signal next_step  : step_t;                         -- if this byte is the last one of its step
+  signal next_bytes : size_t;                         -- of a step of variable size
+  signal wrong      : std_logic;                      -- if this byte is the last one of its step
+  signal in_body    : std_logic;
+  signal ends_body  : std_logic;
+  signal is_done    : std_logic;                      -- the submessage needs no byte after this one
+
+  -- The first step of a submessage.
+  function first_of(name : std_logic_vector(7 downto 0)) return step_t is
+  begin
+    if name = RTPS_DATA or name = RTPS_DATA_FRAG then
+      return EXTRA;
+    elsif name = RTPS_ACKNACK or name = RTPS_NACK_FRAG or name = RTPS_HEARTBEAT or name = RTPS_HEARTBEAT_FRAG
+          or name = RTPS_GAP then
+      return ENDS;
+    elsif name = RTPS_INFO_DESTINATION then
+      return DESTINATION;
+    end if;
+    return REST;
+  end function first_of;
+
+  function after_number(name : std_logic_vector(7 downto 0)) return step_t is
+  begin
+    if name = RTPS_DATA_FRAG then
+      return FRAGMENTS;
+    elsif name = RTPS_HEARTBEAT or name = RTPS_GAP then
+      return SECOND;
+    elsif name = RTPS_ACKNACK then
+      return SET_SIZE;
+    end if;
+    return FRAGMENT;
+  end function after_number;
+
+  -- What follows a step whose successor depends on the kind alone.
+  function next_of(step : step_t; name : std_logic_vector(7 downto 0)) return step_t is
+  begin
+    if step = PROTOCOL then
+      return SOURCE;
+    elsif step = SOURCE then
+      return HEAD;
+    elsif step = HEAD then
+      return first_of(name);
+    elsif step = EXTRA then
+      return ENDS;
+    elsif step = ENDS then
+      return NUMBER;
+    elsif step = NUMBER then
+      return after_number(name);
+    elsif (step = SECOND and name = RTPS_GAP) or (step = FRAGMENT and name = RTPS_NACK_FRAG) then
+      return SET_SIZE;
+    elsif step = SECOND or step = FRAGMENT or ((step = SET_SIZE or step = SET) and name /= RTPS_GAP) then
+      return COUNT;
+    elsif step = VALUE then
+      return PARAMETER;
+    elsif step = PAYLOAD then
+      return PAYLOAD;
+    end if;
+    return REST;
+  end function next_of;
+
+  -- Of a step with a fixed size.
+  function bytes_of(step : step_t) return size_t is
+  begin
+    if step = ENDS or step = NUMBER or step = SECOND then
+      return to_unsigned(NUMBER_BYTES, 16);
+    elsif step = SOURCE or step = DESTINATION or step = FRAGMENTS then
+      return to_unsigned(PREFIX_BYTES, 16);
+    end if;
+    return to_unsigned(WORD_BYTES, 16);
+  end function bytes_of;
+
+begin
+
+  is_little <= flags_r(RTPS_LITTLE);
+  half      <= s_axis_tdata & recent_r(7 downto 0) when is_little = '1' else recent_r(7 downto 0) & s_axis_tdata;
+  word      <= s_axis_tdata & recent_r(7 downto 0) & recent_r(15 downto 8) & recent_r(23 downto 16)
+               when is_little = '1' else
+               recent_r & s_axis_tdata;
+
+  id        <= recent_r(15 downto 8) & recent_r(23 downto 16) when is_little = '1' else recent_r(23 downto 8);
+
+  -- ------------------------------------------------------------------ the order of the steps
+
+  after_parameters <= REST when kind_r = RTPS_DATA and flags_r(RTPS_PAYLOAD) = '0' and flags_r(RTPS_KEY) = '0' else
+                      PAYLOAD;
+
+  choose : process (step_r, kind_r, flags_r, half, word, id, after_parameters, further_r, few_r)
+    variable words : size_t;
+  begin
+    next_step  <= next_of(step_r, kind_r);
+    next_bytes <= further_r;
+    wrong      <= '0';
+    words      := resize(unsigned(word(8 downto 5)), 16);
+    if word(4 downto 0) /= "00000" then
+      words := words + 1;
+    end if;
+    if step_r = HEAD then
+      if half = x"0000" and (kind_r = RTPS_PAD or kind_r = RTPS_INFO_TIMESTAMP) then
+        next_step <= HEAD;
+      elsif kind_r = RTPS_DATA and flags_r(RTPS_PAYLOAD) = '1' and flags_r(RTPS_KEY) = '1' then
+        wrong <= '1';
+      end if;
+    elsif step_r = EXTRA then
+      if unsigned(half) < DATA_BYTES or (kind_r = RTPS_DATA_FRAG and unsigned(half) < DATA_FRAG_BYTES) then
+        wrong <= '1';
+      end if;
+    elsif step_r = SKIP or step_r = FRAGMENTS or (step_r = NUMBER and kind_r = RTPS_DATA) then
+      next_step <= after_parameters;
+      if step_r /= SKIP and few_r = '0' then
+        next_step <= SKIP;
+      elsif flags_r(RTPS_INLINE) = '1' then
+        next_step <= PARAMETER;
+      end if;
+    elsif step_r = SET_SIZE then
+      next_bytes <= words(13 downto 0) & "00";
+      if words /= 0 then
+        next_step <= SET;
+      end if;
+      if unsigned(word) > MOST_SET_BITS then
+        wrong <= '1';
+      end if;
+    elsif step_r = PARAMETER then
+      next_bytes <= unsigned(half);
+      if id = RTPS_SENTINEL then
+        next_step <= after_parameters;
+      elsif half = x"0000" then
+        next_step <= PARAMETER;
+      else
+        next_step <= VALUE;
+      end if;
+    end if;
+  end process choose;
+
+  in_body   <= '0' when step_r = PROTOCOL or step_r = SOURCE or step_r = HEAD else
+               '0' when step_r = FOREIGN or step_r = FAULTY else
+               '1';
+  ends_body <= final_r or (open_r and s_axis_tlast);
+  is_done   <= '1' when step_r = PAYLOAD or step_r = REST else
+               last_r and not wrong when next_step = PAYLOAD or next_step = REST else
+               '0';
+
+  walk : process (clk)
+
+    procedure enter(step : step_t; bytes : size_t) is
+    begin
+      step_r  <= step;
+      place_r <= (others => '0');
+      left_r  <= bytes - 1;
+      last_r  <= '0';
+      if bytes = 1 then
+        last_r <= '1';
+      end if;
+    end procedure enter;
+
+    procedure enter_next is
+    begin
+      if next_step = SKIP or next_step = SET or next_step = VALUE then
+        enter(next_step, next_bytes);
+      else
+        enter(next_step, bytes_of(next_step));
+      end if;
+    end procedure enter_next;
+
+    procedure take_body is
+    begin
+      body_r  <= body_r - 1;
+      final_r <= '0';
+      if body_r = 2 then
+        final_r <= not open_r;
+      end if;
+      if ends_body = '1' then
+        if is_done = '1' then
+          enter(HEAD, to_unsigned(HEAD_BYTES, 16));
+        else
+          step_r <= FAULTY;
+        end if;
+      elsif last_r = '1' then
+        enter_next;
+        if wrong = '1' then
+          step_r <= FAULTY;
+        end if;
+      end if;
+    end procedure take_body;
+
+  begin
+    if rising_edge(clk) then
+      if s_axis_tvalid = '1' then
+        recent_r <= recent_r(15 downto 0) & s_axis_tdata;
+        left_r   <= left_r - 1;
+        last_r   <= '0';
+        if left_r = 1 then
+          last_r <= '1';
+        end if;
+        if place_r /= 31 then
+          place_r <= place_r + 1;
+        end if;
+        if in_body = '1' then
+          take_body;
+        elsif last_r = '1' and step_r /= FOREIGN and step_r /= FAULTY then
+          enter_next;
+          if wrong = '1' then
+            step_r <= FAULTY;
+          end if;
+        end if;
+        if step_r = PROTOCOL and s_axis_tdata /= RTPS_2(to_integer(place_r(2 downto 0)))
+           and place_r < CHECKED_BYTES then
+          step_r <= FOREIGN;
+        end if;
+        if step_r = HEAD then
+          body_r  <= unsigned(half);
+          final_r <= '0';
+          if unsigned(half) = 1 then
+            final_r <= '1';
+          end if;
+          open_r <= '0';
+          if half = x"0000" then
+            open_r <= '1';
+          end if;
+        end if;
+        if s_axis_tlast = '1' then
+          enter(PROTOCOL, to_unsigned(PROTOCOL_BYTES, 16));
+        end if;
+      end if;
+      if rst_n = '0' then
+        enter(PROTOCOL, to_unsigned(PROTOCOL_BYTES, 16));
+      end if;
+    end if;
+  end process walk;
+
+  -- ------------------------------------------------------------------ the submessage
+
+  read_head : process (clk)
+    constant LEAST_FURTHER : size_t := to_unsigned(DATA_BYTES, 16);
+    constant LEAST_OF_FRAG : size_t := to_unsigned(DATA_FRAG_BYTES, 16);
+    variable further       : size_t;
+  begin
+    if rising_edge(clk) and s_axis_tvalid = '1' then
+      if step_r = HEAD then
+        has_key_r    <= '0';
+        has_status_r <= '0';
+        if place_r = 0 then
+          kind_r <= s_axis_tdata;
+        elsif place_r = 1 then
+          flags_r <= s_axis_tdata;
+        end if;
+        known_r <= '1';
+        if first_of(kind_r) = REST then
+          known_r <= '0';
+        end if;
+      elsif step_r = EXTRA then
+        further := unsigned(half) - LEAST_FURTHER;
+        if kind_r = RTPS_DATA_FRAG then
+          further := unsigned(half) - LEAST_OF_FRAG;
+        end if;
+        further_r <= further;
+      elsif step_r = ENDS then
+        few_r <= '0';
+        if further_r = 0 then
+          few_r <= '1';
+        end if;
+      elsif step_r = PARAMETER then
+        hash_r   <= '0';
+        status_r <= '0';
+        if id = RTPS_KEY_HASH and unsigned(half) >= HASH_BYTES then
+          hash_r <= not has_key_r;
+        end if;
+        if id = RTPS_STATUS_INFO and unsigned(half) >= STATUS_BYTES then
+          status_r <= not has_status_r;
+        end if;
+      elsif step_r = VALUE and last_r = '1' then
+        has_key_r    <= has_key_r or hash_r;
+        has_status_r <= has_status_r or status_r;
+      end if;
+    end if;
+  end process read_head;
+
+  write_record : process (clk)
+
+    subtype address_t is unsigned(RECORD_BITS-1 downto 0);
+
+    variable written : std_logic;
+    variable base    : natural range 0 to 2**RECORD_BITS-1;
+    variable big     : address_t;  -- bits of the place that differ from those in the record, if it is big-endian
+    variable little  : address_t;
+
+  begin
+    if rising_edge(clk) then
+      written := '1';
+      base    := 0;
+      big     := to_unsigned(WORD_BYTES-1, RECORD_BITS);
+      little  := (others => '0');
+      if step_r = SOURCE then
+        base := RECORD_SOURCE;
+        big  := (others => '0');
+      elsif step_r = ENDS then
+        base := RECORD_READER;
+        big  := (others => '0');
+      elsif step_r = DESTINATION then
+        base := RECORD_DESTINATION;
+        big  := (others => '0');
+      elsif step_r = NUMBER or step_r = SECOND then
+        base := RECORD_NUMBER;
+        if step_r = SECOND then
+          base := RECORD_SECOND;
+        end if;
+        big    := to_unsigned(NUMBER_BYTES-1, RECORD_BITS);
+        little := to_unsigned(WORD_BYTES, RECORD_BITS);
+      elsif step_r = FRAGMENT then
+        base := RECORD_FRAGMENT;
+      elsif step_r = COUNT then
+        base := RECORD_COUNT;
+      elsif step_r = FRAGMENTS then
+        base := RECORD_FRAGMENTS;
+        if place_r(2) = '1' then
+          -- Two numbers of two bytes.
+          big := to_unsigned(1, RECORD_BITS);
+        end if;
+      elsif step_r = SET_SIZE then
+        base := RECORD_SET_SIZE;
+      elsif step_r = SET then
+        base   := RECORD_SET;
+        big    := (others => '0');
+        little := to_unsigned(WORD_BYTES-1, RECORD_BITS);
+      elsif step_r = VALUE and hash_r = '1' and place_r < HASH_BYTES then
+        base := RECORD_KEY_HASH;
+        big  := (others => '0');
+      elsif step_r = VALUE and status_r = '1' and place_r < STATUS_BYTES then
+        base := RECORD_STATUS;
+        big  := (others => '0');
+      else
+        written := '0';
+      end if;
+      if is_little = '1' then
+        big := little;
+      end if;
+      field_valid   <= written and s_axis_tvalid and rst_n;
+      field_address <= std_logic_vector(to_unsigned(base, RECORD_BITS) or (resize(place_r, RECORD_BITS) xor big));
+      field_data    <= s_axis_tdata;
+    end if;
+  end process write_record;
+
+  forward : process (clk)
+  begin
+    if rising_edge(clk) then
+      payload_valid <= '0';
+      payload_data  <= s_axis_tdata;
+      is_submessage <= '0';
+      if step_r = PAYLOAD then
+        payload_valid <= s_axis_tvalid and rst_n;
+      end if;
+      if in_body = '1' then
+        is_submessage <= s_axis_tvalid and ends_body and is_done and known_r and rst_n;
+      end if;
+    end if;
+  end process forward;
+
+  kind       <= kind_r;
+  flags      <= flags_r;
+  has_key    <= has_key_r;
+  has_status <= has_status_r;
+
+  -- ------------------------------------------------------------------ the end of the packet
+
+  judge : process (clk)
+    variable whole   : std_logic;
+    variable strange : std_logic;
+  begin
+    if rising_edge(clk) then
+      whole   := in_body and ends_body and is_done;
+      strange := '0';
+      if step_r = SOURCE then
+        whole   := last_r;
+        strange := not last_r;
+      elsif step_r = PROTOCOL or step_r = FOREIGN then
+        strange := '1';
+      elsif step_r = HEAD and half = x"0000" and (next_step = HEAD or next_step = REST) then
+        whole := last_r;
+      end if;
+      is_whole   <= '0';
+      is_faulty  <= '0';
+      is_foreign <= '0';
+      is_aborted <= '0';
+      if s_axis_tvalid = '1' and s_axis_tlast = '1' and rst_n = '1' then
+        is_aborted <= s_axis_tuser(0);
+        is_whole   <= whole and not s_axis_tuser(0);
+        is_foreign <= strange and not s_axis_tuser(0);
+        is_faulty  <= not (whole or strange or s_axis_tuser(0));
+      end if;
+    end if;
+  end process judge;
+
+end architecture rtl;

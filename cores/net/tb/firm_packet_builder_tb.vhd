@@ -1,0 +1,221 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Runs programs in the builder. A row of the file with programs is a word, from address 0 on. A row of the file with
+-- jobs is a packet: the program's entry, the 128 bytes of the fields, the number of the payload's bytes, and these. A
+-- row of the result is a frame: its number of bytes, and the bytes. If STALL_PERCENT is 0, a pause in a frame is a
+-- fault, and so are more cycles from the start to the first byte than MOST_CYCLES.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use ieee.math_real.all;
+use std.textio.all;
+library firm;
+use firm.firm_sim_pkg.all;
+
+entity firm_packet_builder_tb is
+  generic (
+    PROGRAM_FILE  : string  := "programs.txt";
+    JOB_FILE      : string  := "jobs.txt";
+    RESULT_FILE   : string  := "built.txt";
+    EXPECTED_FILE : string  := "";
+    ADDRESS_BITS  : integer := 12;
+    SEED          : integer := 1;
+    STALL_PERCENT : integer := 0;  -- the chance, each cycle, that the frame's reader waits
+    SLOW_PERCENT  : integer := 0   -- the chance, each cycle, that no byte of the payload comes
+  );
+end entity firm_packet_builder_tb;
+
+architecture simulation of firm_packet_builder_tb is
+
+  constant FIELD_BYTES : positive := 128;
+  constant MOST_CYCLES : positive := 12;
+
+  type memory_t is array (natural range 0 to 2**ADDRESS_BITS-1) of std_logic_vector(10 downto 0);
+
+  signal clk   : std_logic := '0';
+  signal rst_n : std_logic := '0';
+  signal over  : boolean   := false;
+
+  signal start         : std_logic := '0';
+  signal entry         : std_logic_vector(ADDRESS_BITS-1 downto 0) := (others => '0');
+  signal payload_bytes : std_logic_vector(15 downto 0) := (others => '0');
+  signal is_busy       : std_logic;
+
+  signal field_valid   : std_logic := '0';
+  signal field_address : std_logic_vector(6 downto 0) := (others => '0');
+  signal field_data    : std_logic_vector(7 downto 0) := (others => '0');
+
+  signal program_enable  : std_logic;
+  signal program_address : std_logic_vector(ADDRESS_BITS-1 downto 0);
+  signal program_word    : std_logic_vector(10 downto 0) := (others => '0');
+
+  signal s_tdata  : std_logic_vector(7 downto 0) := (others => '0');
+  signal s_tvalid : std_logic := '0';
+  signal s_tready : std_logic;
+  signal m_tdata  : std_logic_vector(7 downto 0);
+  signal m_tvalid : std_logic;
+  signal m_tlast  : std_logic;
+  signal m_tready : std_logic := '0';
+
+begin
+
+  clk <= not clk after 4 ns when not over else '0';
+
+  u_builder : entity firm.firm_packet_builder
+    generic map (
+      ADDRESS_BITS => ADDRESS_BITS
+    )
+    port map (
+      clk             => clk,
+      rst_n           => rst_n,
+      start           => start,
+      entry           => entry,
+      payload_bytes   => payload_bytes,
+      is_busy         => is_busy,
+      field_valid     => field_valid,
+      field_address   => field_address,
+      field_data      => field_data,
+      program_enable  => program_enable,
+      program_address => program_address,
+      program_word    => program_word,
+      s_axis_tdata    => s_tdata,
+      s_axis_tvalid   => s_tvalid,
+      s_axis_tready   => s_tready,
+      m_axis_tdata    => m_tdata,
+      m_axis_tvalid   => m_tvalid,
+      m_axis_tlast    => m_tlast,
+      m_axis_tready   => m_tready
+    );
+
+  show_program : process
+    file words      : text open read_mode is PROGRAM_FILE;
+    variable row    : line;
+    variable word   : integer;
+    variable memory : memory_t := (others => (others => '0'));
+    variable place  : natural := 0;
+  begin
+    while not endfile(words) loop
+      readline(words, row);
+      read(row, word);
+      memory(place) := std_logic_vector(to_unsigned(word, 11));
+      place         := place + 1;
+    end loop;
+    loop
+      wait until rising_edge(clk);
+      if program_enable = '1' then
+        program_word <= memory(to_integer(unsigned(program_address)));
+      end if;
+    end loop;
+  end process show_program;
+
+  send : process
+    file jobs         : text open read_mode is JOB_FILE;
+    variable row      : line;
+    variable number   : integer;
+    variable size     : integer;
+    variable random_1 : positive := SEED;
+    variable random_2 : positive := 3;
+    variable draw     : real;
+  begin
+    for cycle in 1 to 4 loop
+      wait until rising_edge(clk);
+    end loop;
+    rst_n <= '1';
+    while not endfile(jobs) loop
+      readline(jobs, row);
+      read(row, number);
+      entry <= std_logic_vector(to_unsigned(number, ADDRESS_BITS));
+      for address in 0 to FIELD_BYTES-1 loop
+        read(row, number);
+        field_valid   <= '1';
+        field_address <= std_logic_vector(to_unsigned(address, 7));
+        field_data    <= std_logic_vector(to_unsigned(number, 8));
+        wait until rising_edge(clk);
+      end loop;
+      field_valid <= '0';
+      read(row, size);
+      payload_bytes <= std_logic_vector(to_unsigned(size, 16));
+      start         <= '1';
+      wait until rising_edge(clk);
+      start <= '0';
+      for place in 1 to size loop
+        read(row, number);
+        loop
+          uniform(random_1, random_2, draw);
+          exit when 100.0 * draw >= real(SLOW_PERCENT);
+          wait until rising_edge(clk);
+        end loop;
+        s_tvalid <= '1';
+        s_tdata  <= std_logic_vector(to_unsigned(number, 8));
+        loop
+          wait until rising_edge(clk);
+          exit when s_tready = '1';
+        end loop;
+        s_tvalid <= '0';
+      end loop;
+      loop
+        wait until rising_edge(clk);
+        exit when is_busy = '0';
+      end loop;
+    end loop;
+    for cycle in 1 to 8 loop
+      wait until rising_edge(clk);
+    end loop;
+    over <= true;
+    wait;
+  end process send;
+
+  stall : process (clk)
+    variable random_1 : positive := SEED;
+    variable random_2 : positive := 5;
+    variable draw     : real;
+  begin
+    if rising_edge(clk) then
+      uniform(random_1, random_2, draw);
+      m_tready <= '1';
+      if 100.0 * draw < real(STALL_PERCENT) then
+        m_tready <= '0';
+      end if;
+    end if;
+  end process stall;
+
+  record_frames : process
+    file results     : text open write_mode is RESULT_FILE;
+    file expected    : text open read_mode is existing(EXPECTED_FILE);
+    variable row     : line;
+    variable content : line;
+    variable size    : natural := 0;
+    variable cycles  : natural := 0;  -- since the start
+  begin
+    while not over loop
+      wait until rising_edge(clk) or over;
+      next when over or rst_n = '0';
+      cycles := cycles + 1;
+      if start = '1' then
+        cycles := 0;
+      end if;
+      if STALL_PERCENT = 0 and SLOW_PERCENT = 0 then
+        assert m_tvalid = '1' or size = 0
+          report "a pause in a frame" severity failure;
+        assert m_tvalid = '0' or size /= 0 or cycles <= MOST_CYCLES
+          report integer'image(cycles) & " cycles before the first byte" severity failure;
+      end if;
+      if m_tvalid = '1' and m_tready = '1' then
+        size := size + 1;
+        write(content, ' ' & integer'image(to_integer(unsigned(m_tdata))));
+        if m_tlast = '1' then
+          write(row, integer'image(size) & content.all);
+          write_result(results, expected, EXPECTED_FILE, row);
+          deallocate(content);
+          size := 0;
+        end if;
+      end if;
+    end loop;
+    assert size = 0
+      report "a frame without an end" severity failure;
+    assert endfile(expected)
+      report EXPECTED_FILE & " has more lines than there are frames" severity failure;
+    print("PASS");
+    wait;
+  end process record_frames;
+
+end architecture simulation;

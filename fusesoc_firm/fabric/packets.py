@@ -1,0 +1,290 @@
+"""The programs from which the hardware builds a node's packets (`firm_packet_builder`), made from constant payloads.
+
+A program is a list of words, one for each byte of the frame: a constant, a byte of a field that the hardware fills in,
+a length or checksum that it computes, or the payload of a sample. RTPS is little-endian here.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from ipaddress import IPv4Address
+from itertools import chain
+
+from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.node import Endpoint, Node
+from fusesoc_firm.fabric.rtps import Kind, Parameter
+
+# Bytes of a sample in each fragment but the last.
+FRAGMENT_BYTES = 1344
+
+_LAST = 1 << 10
+_FROM_FIELD, _FROM_PAYLOAD, _FROM_RESULT = 1 << 8, 2 << 8, 3 << 8
+_LITTLE, _INLINE, _DATA, _KEY = 1, 2, 4, 8
+_IP_BYTES, _UDP_BYTES = 20, 8
+# A header of IPv4 without options; its protocol.
+_IPV4, _TIME_TO_LIVE, _UDP, _DO_NOT_FRAGMENT = 0x45, 64, 17, 0x4000
+_TYPE_IPV4, _NO_CHECKSUM = b"\x08\x00", bytes(2)
+# The group of Ethernet for the group of all participants (RFC 1112).
+_GROUP_MAC = bytes.fromhex("01005e7f0001")
+# Bytes between the field that says it and the inline parameters.
+_TO_INLINE, _TO_INLINE_OF_FRAGMENT = 16, 28
+
+Words = list[int]
+
+
+class Field(Enum):
+    """What the hardware fills in: address and bytes. Multi-byte values are as on the line."""
+
+    MAC = 0, 6
+    FLAGS = 6, 1
+    ADDRESS = 8, 4
+    PORT = 12, 2
+    PREFIX = 16, 12
+    READER = 28, 4
+    WRITER = 32, 4
+    COUNT = 36, 4
+    NUMBER = 40, 8
+    FIRST = 48, 8
+    LAST = 56, 8
+    SET_SIZE = 64, 4
+    SET = 68, 4
+    FRAGMENT = 72, 4
+    FRAGMENT_SET_SIZE = 76, 4
+    FRAGMENT_SET = 80, 4
+    SAMPLE_BYTES = 84, 4
+    SECOND_COUNT = 88, 4
+
+    @property
+    def address(self) -> int:
+        """The address of its first byte."""
+        return int(self.value[0])
+
+    @property
+    def size(self) -> int:
+        """Its bytes."""
+        return int(self.value[1])
+
+
+class Result(Enum):
+    """What the hardware computes: the argument of each byte, in the order of the line."""
+
+    PACKET_BYTES = 0, 1
+    DATAGRAM_BYTES = 2, 3
+    HEADER_CHECKSUM = 4, 5
+    DATA_BYTES = 6, 7
+
+
+class Payload(Enum):
+    """The payload of a sample, padded to a multiple of four bytes."""
+
+    SAMPLE = 0
+
+
+Part = bytes | Field | Result | Payload
+
+
+@dataclass(frozen=True)
+class Packet:
+    """A datagram: `parts` after the header of UDP, to the group of all participants or to a peer."""
+
+    parts: tuple[Part, ...]
+    to_group: bool = False
+
+
+@dataclass(frozen=True)
+class Programs:
+    """All programs of a node in one memory, and where each begins."""
+
+    words: tuple[int, ...]
+    entries: Mapping[str, int]
+
+    @property
+    def address_bits(self) -> int:
+        """The bits of an address."""
+        return max(4, (len(self.words) - 1).bit_length())
+
+
+def programs_of(node: Node) -> Programs:
+    """Return the programs of a node, in the order of `packets_of`."""
+    words: Words = []
+    entries = {}
+    for name, packet in packets_of(node).items():
+        entries[name] = len(words)
+        words += program(node, packet)
+    return Programs(tuple(words), entries)
+
+
+def packets_of(node: Node) -> dict[str, Packet]:
+    """Return the packets that a node sends: what announces it, its endpoints, and the kinds of all others."""
+    announcement = _constant_data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 1, node.participant_data)
+    graph = _constant_data(Field.READER, node.writers[0].entity, 1, node.graph)
+    publications = rtps.PUBLICATIONS_READER, rtps.PUBLICATIONS_WRITER
+    subscriptions = rtps.SUBSCRIPTIONS_READER, rtps.SUBSCRIPTIONS_WRITER
+    return {
+        "announce_to_group": _to_group(node, announcement),
+        "announce": _to_all(node, announcement),
+        "leave_group": _to_group(node, _farewell(node)),
+        "leave": _to_all(node, _farewell(node)),
+        **_endpoints(node, "writer", node.writers, publications),
+        **_endpoints(node, "reader", node.readers, subscriptions),
+        "graph": _to_peer(node, graph),
+        "sample": _to_peer(node, _sample()),
+        "sample_told": _to_peer(node, _sample(), _heartbeat()),
+        "fragment": _to_peer(node, _fragment()),
+        "fragment_told": _to_peer(node, _fragment(), _heartbeat()),
+        "heartbeat": _to_peer(node, _heartbeat()),
+        "acknowledge": _to_peer(node, _acknack(has_set=False)),
+        "request": _to_peer(node, _acknack(has_set=True)),
+        "request_fragments": _to_peer(node, _acknack(has_set=False), _nack_frag()),
+        "gap": _to_peer(node, _gap()),
+    }
+
+
+def program(node: Node, packet: Packet) -> Words:
+    """Return the words of a packet's program: the prelude, which is not sent, the headers, and the packet's parts."""
+    target: Part = IPv4Address(rtps.MULTICAST).packed if packet.to_group else Field.ADDRESS
+    header = struct.pack(">BBH", _IPV4, 0, 0), struct.pack(">HHBB", 0, _DO_NOT_FRAGMENT, _TIME_TO_LIVE, _UDP)
+    sum_ = _sum(b"".join(header) + node.network.address.packed)
+    length = _IP_BYTES + _UDP_BYTES + sum(map(_size, packet.parts))
+    prelude = struct.pack(">HHB", sum_, length, _before_payload(packet)), target
+    ethernet = _GROUP_MAC if packet.to_group else Field.MAC, node.network.mac, _TYPE_IPV4
+    ip = header[0][:2], Result.PACKET_BYTES, header[1], Result.HEADER_CHECKSUM, node.network.address.packed, target
+    domain = node.network.domain
+    port: Part = struct.pack(">H", rtps.multicast_port(domain)) if packet.to_group else Field.PORT
+    udp = struct.pack(">H", rtps.metatraffic_port(domain)), port, Result.DATAGRAM_BYTES, _NO_CHECKSUM
+    words = list(chain.from_iterable(map(_words, (*prelude, *ethernet, *ip, *udp, *packet.parts))))
+    words[-1] |= _LAST
+    return words
+
+
+def _words(part: Part) -> Iterable[int]:
+    match part:
+        case bytes():
+            return part
+        case Field():
+            return (_FROM_FIELD | part.address + place for place in range(part.size))
+        case Result():
+            return (_FROM_RESULT | argument for argument in part.value)
+        case Payload():
+            return (_FROM_PAYLOAD,)
+
+
+def _size(part: Part) -> int:
+    """The bytes of a part, without those of the payload."""
+    match part:
+        case bytes():
+            return len(part)
+        case Field():
+            return part.size
+        case Result():
+            return len(part.value)
+        case Payload():
+            return 0
+
+
+def _before_payload(packet: Packet) -> int:
+    """The bytes of the submessage with the payload, without the payload."""
+    if Payload.SAMPLE not in packet.parts:
+        return 0
+    start = packet.parts.index(Result.DATA_BYTES)
+    return sum(map(_size, packet.parts[start + 1 : packet.parts.index(Payload.SAMPLE)]))
+
+
+def _sum(header: bytes) -> int:
+    """The sum of words as in a checksum of the Internet (RFC 1071), before it is inverted."""
+    total: int = sum(struct.unpack(f">{len(header) // 2}H", header))
+    return (total & 0xFFFF) + (total >> 16)
+
+
+# --- submessages -----------------------------------------------------------------------------------------------------
+
+Submessage = tuple[Part, ...]
+
+
+def _header(node: Node) -> bytes:
+    return rtps.HEADER + rtps.VENDOR + node.prefix
+
+
+def _to_group(node: Node, *submessages: Submessage) -> Packet:
+    return Packet((_header(node), *chain.from_iterable(submessages)), to_group=True)
+
+
+def _to_all(node: Node, *submessages: Submessage) -> Packet:
+    """A packet to the address of a peer that names no receiver."""
+    return Packet((_header(node), *chain.from_iterable(submessages)))
+
+
+def _to_peer(node: Node, *submessages: Submessage) -> Packet:
+    destination = _submessage(Kind.INFO_DESTINATION, _LITTLE, Field.PREFIX)
+    return Packet((_header(node), *destination, *chain.from_iterable(submessages)))
+
+
+def _submessage(kind: Kind, flags: int | Field, *parts: Part) -> Submessage:
+    """A submessage of a constant size."""
+    shown: Part = flags if isinstance(flags, Field) else bytes([flags])
+    return bytes([kind]), shown, struct.pack("<H", sum(map(_size, parts))), *parts
+
+
+def _number(number: int) -> bytes:
+    return struct.pack("<iI", number >> 32, number & 0xFFFFFFFF)
+
+
+def _constant_data(reader: bytes | Field, writer: bytes, number: int, payload: bytes) -> Submessage:
+    padded = payload + bytes(-len(payload) % 4)
+    head = struct.pack("<HH", 0, _TO_INLINE)
+    return _submessage(Kind.DATA, _LITTLE | _DATA, head, reader, writer, _number(number), padded)
+
+
+def _farewell(node: Node) -> Submessage:
+    inline, key = node.farewell
+    listed = b"".join(rtps.parameter(number, value) for number, value in inline.items())
+    listed += rtps.parameter(Parameter.SENTINEL, b"")
+    head = struct.pack("<HH", 0, _TO_INLINE)
+    ends = rtps.NO_ENTITY + rtps.PARTICIPANT_WRITER + _number(2)
+    return _submessage(Kind.DATA, _LITTLE | _INLINE | _KEY, head, ends, listed, key)
+
+
+def _endpoints(node: Node, name: str, items: Sequence[Endpoint], ends: tuple[bytes, bytes]) -> dict[str, Packet]:
+    """The packets that announce writers or readers, numbered from 1, and the heartbeat about them."""
+    told = _number(1), _number(len(items)), Field.COUNT
+    packets = {
+        f"{name}_{number}": _to_peer(node, _constant_data(*ends, number, node.endpoint_data(item)))
+        for number, item in enumerate(items, 1)
+    }
+    return {**packets, f"{name}s_told": _to_peer(node, _submessage(Kind.HEARTBEAT, _LITTLE, *ends, *told))}
+
+
+def _sample() -> Submessage:
+    head = struct.pack("<HH", 0, _TO_INLINE)
+    kind = bytes([Kind.DATA, _LITTLE | _DATA])
+    return kind, Result.DATA_BYTES, head, Field.READER, Field.WRITER, Field.NUMBER, Payload.SAMPLE
+
+
+def _fragment() -> Submessage:
+    head = struct.pack("<HH", 0, _TO_INLINE_OF_FRAGMENT)
+    kind = bytes([Kind.DATA_FRAG, _LITTLE])
+    one = struct.pack("<HH", 1, FRAGMENT_BYTES)
+    fields = Field.READER, Field.WRITER, Field.NUMBER, Field.FRAGMENT, one, Field.SAMPLE_BYTES
+    return kind, Result.DATA_BYTES, head, *fields, Payload.SAMPLE
+
+
+def _heartbeat() -> Submessage:
+    return _submessage(Kind.HEARTBEAT, _LITTLE, Field.READER, Field.WRITER, Field.FIRST, Field.LAST, Field.COUNT)
+
+
+def _acknack(*, has_set: bool) -> Submessage:
+    """A request; the flags are a field, since they tell whether an answer is wanted."""
+    listed: Sequence[Part] = (Field.SET_SIZE, Field.SET) if has_set else (bytes(4),)
+    return _submessage(Kind.ACKNACK, Field.FLAGS, Field.READER, Field.WRITER, Field.NUMBER, *listed, Field.COUNT)
+
+
+def _nack_frag() -> Submessage:
+    listed = Field.FRAGMENT, Field.FRAGMENT_SET_SIZE, Field.FRAGMENT_SET, Field.SECOND_COUNT
+    return _submessage(Kind.NACK_FRAG, _LITTLE, Field.READER, Field.WRITER, Field.NUMBER, *listed)
+
+
+def _gap() -> Submessage:
+    return _submessage(Kind.GAP, _LITTLE, Field.READER, Field.WRITER, Field.FIRST, Field.LAST, bytes(4))
