@@ -96,7 +96,7 @@ def _pins(folder: Path, number: int, line: Line) -> Iterator[tuple[Pins, W5200 |
     }
     verilog = netlist("firm_wiznet_access", folder, HARDWARE[-1:], HARDWARE[:-1], (), **generics)
     bench = (HERE / "access.cpp").read_text(encoding="ascii")
-    program = compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_access", bench, folder)
+    program = compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_access", bench, folder, (HERE,))
     chip = CHIPS[number]()
     words = [str(program), *map(str, (line.mode, line.half_bit, line.miso_delay, line.stall, SEED))]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
