@@ -22,12 +22,16 @@ from fusesoc_firm.system.derived.model import Network
 from tests.bench.model import compiled
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
+from tests.wiznet.chip import Status
 from tests.wiznet.chips import CHIPS
 from tests.wiznet.sequencer import ACCESSES, Sequencer
+from tests.wiznet.w5200 import W5200
+from tests.wiznet.w5500 import W5500
 
 HERE = Path(__file__).parent
 _HARDWARE = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
+_LONGEST_SECONDS = 60
 # The bench plays milliseconds while the header of an SPI frame is sent.
 _MOST_MS = 32
 
@@ -78,9 +82,8 @@ def framed(number: int, payload: bytes) -> bytes:
 class Board:
     """A running board in a thread. `send` offers a frame of the Manager."""
 
-    def __init__(self, run: Callable[[Board], None], manager: Manager) -> None:
-        self.manager = manager
-        self.misuses: list[str] = []
+    def __init__(self, run: Callable[[Board], None], chip: W5200 | W5500) -> None:
+        self.chip = chip
         self.is_running = True
         self.to_offer: SimpleQueue[bytes] = SimpleQueue()
         self._error: list[BaseException] = []
@@ -90,6 +93,14 @@ class Board:
     def send(self, number: int, payload: bytes) -> None:
         """Offer a frame."""
         self.to_offer.put(framed(number, payload))
+
+    def wait_until_listening(self) -> None:
+        """Wait until all sockets but the first listen."""
+        latest = time.monotonic() + _LONGEST_SECONDS
+        while [item.status for item in self.chip.sockets[1:]] != [Status.LISTEN] * 7:
+            assert self._thread.is_alive(), self._error
+            assert time.monotonic() < latest, [item.status.name for item in self.chip.sockets]
+            time.sleep(0.01)
 
     def offered(self) -> bytes:
         """What has been offered since the last call."""
@@ -106,7 +117,9 @@ class Board:
         self._thread.join()
         if self._error:
             raise self._error[0]
-        assert not self.misuses
+        misuses = self.chip.misuses
+        self.chip.close()
+        assert not misuses
 
     def _run(self, run: Callable[[Board], None]) -> None:
         try:
@@ -118,8 +131,9 @@ class Board:
 def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
     """A board whose program the interpreter runs."""
 
+    chip = CHIPS[chip_number]()
+
     def run(running: Board) -> None:
-        chip = CHIPS[chip_number]()
         access = ACCESSES[chip_number](chip)
         sequencer = Sequencer(
             image(board, chip_number), access, lambda: time.monotonic_ns() // (1_000_000 * _MS_PER_UNIT)
@@ -132,10 +146,8 @@ def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
             while sequencer.given:
                 sequencer.offered.extend(manager.take(*sequencer.given.popleft()))
             sequencer.offered.extend(running.offered())
-        running.misuses = chip.misuses
-        chip.close()
 
-    return Board(run, manager)
+    return Board(run, chip)
 
 
 @dataclass(frozen=True)
@@ -163,8 +175,9 @@ def clocked(
     rom.write_bytes(image(board, chip_number))
     words = [str(program), str(rom), "0", "1", "0", str(stall_percent), str(seed)]
 
+    chip = CHIPS[chip_number]()
+
     def run(running: Board) -> None:
-        chip = CHIPS[chip_number]()
         begin, told, answers = time.monotonic_ns(), 0, b""
         with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
             assert process.stdin
@@ -193,7 +206,5 @@ def clocked(
                     case other:
                         raise AssertionError(f"the bench says {other!r}")
             process.kill()
-        running.misuses = chip.misuses
-        chip.close()
 
-    return Board(run, manager)
+    return Board(run, chip)
