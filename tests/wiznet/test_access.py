@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ import pytest
 from tests.bench.model import compiled
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops, netlist
+from tests.wiznet.chips import CHIPS
 from tests.wiznet.spi import Slave
 from tests.wiznet.w5200 import W5200
 from tests.wiznet.w5500 import W5500
@@ -22,7 +23,6 @@ from tests.wiznet.w5500 import W5500
 SEED = 20261126
 HERE = Path(__file__).parent
 HARDWARE = core_files("cdc/sync", "net/wiznet")
-CHIPS: dict[int, Callable[[], W5200 | W5500]] = {5200: W5200, 5500: W5500}
 BUFFER = 2048  # bytes of each buffer
 COMMON, REGISTERS, TRANSMIT, RECEIVE = range(4)
 # Registers that keep what is written.
@@ -96,7 +96,7 @@ def _pins(folder: Path, number: int, line: Line) -> Iterator[tuple[Pins, W5200 |
     }
     verilog = netlist("firm_wiznet_access", folder, HARDWARE[-1:], HARDWARE[:-1], (), **generics)
     bench = (HERE / "access.cpp").read_text(encoding="ascii")
-    program = compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_access", bench, folder)
+    program = compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_access", bench, folder, (HERE,))
     chip = CHIPS[number]()
     words = [str(program), *map(str, (line.mode, line.half_bit, line.miso_delay, line.stall, SEED))]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:

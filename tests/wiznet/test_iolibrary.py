@@ -10,7 +10,7 @@ import os
 import random
 import socket
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,14 +18,12 @@ from typing import Any, NamedTuple
 import pytest
 
 from tests.wiznet.chip import Chip, Status
+from tests.wiznet.chips import CHIPS
 from tests.wiznet.peers import echo, free_port
 from tests.wiznet.spi import exchange
-from tests.wiznet.w5200 import W5200
-from tests.wiznet.w5500 import W5500
 
 SEED = 20261126
 FOLDER = os.environ.get("IOLIBRARY", "")
-CHIPS: dict[int, Callable[[], W5200 | W5500]] = {5200: W5200, 5500: W5500}
 TCP, NO_FLAG = 1, 0
 SOCKERR_SOCKCLOSED, SOCKERR_TIMEOUT = -4, -13
 

@@ -1,0 +1,210 @@
+"""Boards with a node of ROS 1 in a chip's sockets: the interpreter, and the hardware at the chip's pins."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from ipaddress import IPv4Address
+from pathlib import Path
+from queue import Empty, SimpleQueue
+
+from fusesoc_firm.fabric.ros1 import Endpoint, Node, image
+from fusesoc_firm.message import ROS1
+from fusesoc_firm.message.library import libraries
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.printer import closure_text
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.system.derived.model import Network
+from tests.bench.model import compiled
+from tests.hdl.ghdl import core_files
+from tests.hdl.verilog import netlist
+from tests.wiznet.chip import Status
+from tests.wiznet.chips import CHIPS
+from tests.wiznet.sequencer import ACCESSES, Sequencer
+from tests.wiznet.w5200 import W5200
+from tests.wiznet.w5500 import W5500
+
+HERE = Path(__file__).parent
+_HARDWARE = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
+_MS_PER_UNIT = 64
+_LONGEST_SECONDS = 60
+# The bench plays milliseconds while the header of an SPI frame is sent.
+_MOST_MS = 32
+
+
+def endpoint(topic: str, package: str, name: str) -> Endpoint:
+    """A topic of a type of ROS 1."""
+    message = MessageName(package, name)
+    definitions = libraries((), None, None)[ROS1].closure(message)
+    return Endpoint(topic, str(message), signature(message, definitions), closure_text(message, definitions))
+
+
+def node(master: tuple[str, int], subscribers: tuple[Endpoint, ...], publishers: tuple[Endpoint, ...]) -> Node:
+    """A node `/fabric` at an address on loopback that only this process uses."""
+    number = os.getpid() % 0x3FFFFF
+    address = IPv4Address((127 << 24) + (0x400000 | number) + 1)
+    network = Network(bytes.fromhex("020000000001"), address, IPv4Address("255.0.0.0"), None, "fabric", "/", 0)
+    return Node("/fabric", network, (IPv4Address(master[0]), master[1]), subscribers, publishers)
+
+
+Accelerator = Callable[[int, bytes], Iterator[tuple[int, bytes]]]
+
+
+@dataclass
+class Manager:
+    """Takes whole frames and answers with those of an accelerator: from ids and payloads to ids and payloads."""
+
+    accelerator: Accelerator
+    taken: list[tuple[int, bytes]] = field(default_factory=list)
+    _frame: bytearray = field(default_factory=bytearray)
+
+    def take(self, byte: int, is_last: bool) -> bytes:
+        """Take a byte; return the frames that answer."""
+        self._frame.append(byte)
+        if not is_last:
+            return b""
+        frame, self._frame = bytes(self._frame), bytearray()
+        payload = frame[5:]
+        assert len(payload) == int.from_bytes(frame[1:5], "little")
+        self.taken.append((frame[0], payload))
+        return b"".join(framed(*answer) for answer in self.accelerator(frame[0], payload))
+
+
+def framed(number: int, payload: bytes) -> bytes:
+    """A frame of the Manager."""
+    return bytes([number]) + len(payload).to_bytes(4, "little") + payload
+
+
+class Board:
+    """A running board in a thread. `send` offers a frame of the Manager."""
+
+    def __init__(self, run: Callable[[Board], None], chip: W5200 | W5500) -> None:
+        self.chip = chip
+        self.is_running = True
+        self.to_offer: SimpleQueue[bytes] = SimpleQueue()
+        self._error: list[BaseException] = []
+        self._thread = threading.Thread(target=self._run, args=(run,), daemon=True)
+        self._thread.start()
+
+    def send(self, number: int, payload: bytes) -> None:
+        """Offer a frame."""
+        self.to_offer.put(framed(number, payload))
+
+    def wait_until_listening(self) -> None:
+        """Wait until all sockets but the first listen."""
+        latest = time.monotonic() + _LONGEST_SECONDS
+        while [item.status for item in self.chip.sockets[1:]] != [Status.LISTEN] * 7:
+            assert self._thread.is_alive(), self._error
+            assert time.monotonic() < latest, [item.status.name for item in self.chip.sockets]
+            time.sleep(0.01)
+
+    def offered(self) -> bytes:
+        """What has been offered since the last call."""
+        data = b""
+        while True:
+            try:
+                data += self.to_offer.get_nowait()
+            except Empty:
+                return data
+
+    def close(self) -> None:
+        """Stop the board. It must not have misused its chip."""
+        self.is_running = False
+        self._thread.join()
+        if self._error:
+            raise self._error[0]
+        misuses = self.chip.misuses
+        self.chip.close()
+        assert not misuses
+
+    def _run(self, run: Callable[[Board], None]) -> None:
+        try:
+            run(self)
+        except BaseException as error:  # for the test's thread
+            self._error.append(error)
+
+
+def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
+    """A board whose program the interpreter runs."""
+
+    chip = CHIPS[chip_number]()
+
+    def run(running: Board) -> None:
+        access = ACCESSES[chip_number](chip)
+        sequencer = Sequencer(
+            image(board, chip_number), access, lambda: time.monotonic_ns() // (1_000_000 * _MS_PER_UNIT)
+        )
+        while running.is_running:
+            before = access.frames
+            sequencer.turn()
+            if access.frames == before + 1:
+                chip.poll(0.002)
+            while sequencer.given:
+                sequencer.offered.extend(manager.take(*sequencer.given.popleft()))
+            sequencer.offered.extend(running.offered())
+
+    return Board(run, chip)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of SPI with what the board got before it: milliseconds and bytes of the Manager."""
+
+    milliseconds: int
+    offered: bytes
+    sent: bytearray = field(default_factory=bytearray)
+    answered: bytearray = field(default_factory=bytearray)
+
+
+def hardware(chip_number: int, folder: Path, half_bit: int = 1) -> Path:
+    """The program of firm_wiznet_node's netlist, and its bench."""
+    verilog = netlist("firm_wiznet_node", folder, _HARDWARE[-1:], _HARDWARE[:-1], (), CHIP=chip_number, HALF_BIT=half_bit)
+    bench = (HERE / "node.cpp").read_text(encoding="ascii")
+    return compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_node", bench, folder, (HERE,))
+
+
+def clocked(
+    board: Node, chip_number: int, manager: Manager, program: Path, stall_percent: int, seed: int, log: list[Frame]
+) -> Board:
+    """A board whose program the hardware runs; each of its SPI frames is logged."""
+    rom = program.parent / "rom"
+    rom.write_bytes(image(board, chip_number))
+    words = [str(program), str(rom), "0", "1", "0", str(stall_percent), str(seed)]
+
+    chip = CHIPS[chip_number]()
+
+    def run(running: Board) -> None:
+        begin, told, answers = time.monotonic_ns(), 0, b""
+        with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+            assert process.stdin
+            assert process.stdout
+            while running.is_running:
+                match process.stdout.read(1):
+                    case b"s":
+                        chip.select()
+                        passed = (time.monotonic_ns() - begin) // 1_000_000 - told
+                        offered, answers = answers + running.offered(), b""
+                        log.append(Frame(min(passed, _MOST_MS), offered))
+                        told += log[-1].milliseconds
+                        process.stdin.write(bytes([log[-1].milliseconds]) + len(offered).to_bytes(2, "big") + offered)
+                        process.stdin.flush()
+                    case b"a":
+                        log[-1].answered.append(chip.answer())
+                        process.stdin.write(log[-1].answered[-1:])
+                        process.stdin.flush()
+                    case b"t":
+                        log[-1].sent.extend(process.stdout.read(1))
+                        chip.take(log[-1].sent[-1])
+                    case b"d":
+                        chip.deselect()
+                    case b"g" | b"l" as mark:
+                        answers += manager.take(process.stdout.read(1)[0], mark == b"l")
+                    case other:
+                        raise AssertionError(f"the bench says {other!r}")
+            process.kill()
+
+    return Board(run, chip)

@@ -1,0 +1,227 @@
+"""The node of ROS 1 and its peers' dialects of XML-RPC and TCPROS, as the interpreter runs it on both chips."""
+
+from __future__ import annotations
+
+import random
+import socket
+import struct
+import time
+import xmlrpc.client
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from fusesoc_firm.fabric.ros1 import Node
+from tests.wiznet.chips import CHIPS
+from tests.wiznet.peers import free_port
+from tests.wiznet.ros1 import Board, Manager, endpoint, framed, interpreted, node
+
+SEED = 20261126
+SECONDS = 20  # for a connection; a busy machine is slow
+QUATERNION = "a779879fadf0160734f906b8c19c7004"
+POINT = "4a842b65f413084dc2b10fb484ea7f17"
+
+
+@dataclass
+class Running:
+    """A board without a master."""
+
+    node: Node
+    board: Board
+
+    def connect(self) -> socket.socket:
+        """A connection to it."""
+        return socket.create_connection((str(self.node.network.address), self.node.port), SECONDS)
+
+
+@pytest.fixture(params=CHIPS, ids="w{}".format)
+def running(request: pytest.FixtureRequest) -> Iterator[Running]:
+    made = node(
+        ("127.0.0.1", free_port()),
+        (endpoint("/turn", "geometry_msgs", "Quaternion"), endpoint("/turn/2", "geometry_msgs", "Point")),
+        (endpoint("/place", "geometry_msgs", "Point"), endpoint("/turn", "geometry_msgs", "Quaternion")),
+    )
+    board = interpreted(made, request.param, Manager(lambda number, payload: iter([(number, payload)])))
+    board.wait_until_listening()
+    yield Running(made, board)
+    board.close()
+
+
+def _rospy(method: str, *parameters: Any) -> bytes:
+    body = xmlrpc.client.dumps(parameters, method).encode()
+    return b"POST /RPC2 HTTP/1.1\r\nHost: x:1\r\nAccept-Encoding: gzip\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
+
+
+def _roscpp(method: str, *parameters: Any) -> bytes:
+    def value(item: Any) -> str:
+        if isinstance(item, list):
+            return f"<value><array><data>{''.join(map(value, item))}</data></array></value>"
+        return f"<value><i4>{item}</i4></value>" if isinstance(item, int) else f"<value>{item}</value>"
+
+    inside = "".join(f"<param>{value(item)}</param>" for item in parameters)
+    text = f'<?xml version="1.0"?>\r\n<methodCall><methodName>{method}</methodName>\r\n<params>{inside}</params></methodCall>\r\n'
+    return f"POST / HTTP/1.1\r\nUser-Agent: XMLRPC++ 0.7\r\nContent-length: {len(text)}\r\n\r\n{text}".encode()
+
+
+PROTOCOLS = [["TCPROS"]]
+CALLS: list[tuple[str, tuple[Any, ...]]] = [
+    ("getPid", ("/me",)),
+    ("getBusInfo", ("/me",)),
+    ("getBusStats", ("/me",)),
+    ("getMasterUri", ("/me",)),
+    ("getSubscriptions", ("/me",)),
+    ("getPublications", ("/me",)),
+    ("paramUpdate", ("/master", "/a", 3)),
+    ("requestTopic", ("/me", "/place", PROTOCOLS)),
+    ("requestTopic", ("/me", "/turn", PROTOCOLS)),
+    ("requestTopic", ("/me", "/turn/2", PROTOCOLS)),  # a topic that it only reads
+    ("requestTopic", ("/me", "/nowhere", PROTOCOLS)),
+    ("requestTopic", ("", "/place", PROTOCOLS)),
+    ("publisherUpdate", ("/master", "/turn", [])),
+    ("publisherUpdate", ("/master", "/nowhere", ["http://127.0.0.1:1/"])),
+    ("publisherUpdate", ("/master", "/turn", ["http://a.name.of.a.host:1/", ""])),
+    ("getNothing", ("/me",)),
+]
+
+
+def _expected(running: Running, method: str, parameters: tuple[Any, ...]) -> Any:
+    own = running.node
+    address = str(own.network.address)
+    match method:
+        case "getMasterUri":
+            return f"http://127.0.0.1:{own.master[1]}/"
+        case "getSubscriptions" | "getPublications":
+            items = own.subscribers if method == "getSubscriptions" else own.publishers
+            return [[item.topic, item.type] for item in items]
+        case "requestTopic" if parameters[1] in {"/place", "/turn"}:
+            return ["TCPROS", address, own.port]
+        case "getPid":
+            return 1
+        case "getBusInfo":
+            return []
+        case "getBusStats":
+            return [[], [], []]
+    return 0
+
+
+def _answer(running: Running, request: bytes, rng: random.Random) -> bytes:
+    """Send a request in parts, cut at random; return what comes until the node ends the connection."""
+    with running.connect() as peer:
+        peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        while request:
+            size = rng.choice((1, 3, 20, 200, 2000))
+            peer.sendall(request[:size])
+            request = request[size:]
+            if rng.random() < 0.1:
+                time.sleep(0.002)
+        received = b""
+        while data := peer.recv(4096):
+            received += data
+        return received
+
+
+def _check_call(running: Running, dialect: Any, call: tuple[str, tuple[Any, ...]], rng: random.Random) -> None:
+    method, parameters = call
+    head, _, body = _answer(running, dialect(method, *parameters), rng).partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.0 200 OK\r\n")
+    assert f"Content-Length: {len(body)}" in head.decode()
+    if method == "getNothing":
+        with pytest.raises(xmlrpc.client.Fault, match="no such method"):
+            xmlrpc.client.loads(body)
+        return
+    ((code, _, value),), _ = xmlrpc.client.loads(body)
+    refused = method == "requestTopic" and parameters[1] not in {"/place", "/turn"}
+    assert (code, value) == (0 if refused else 1, _expected(running, method, parameters)), (call, body)
+
+
+def test_calls_of_both_dialects_are_answered_however_they_are_cut(running: Running) -> None:
+    print(f"seed {SEED}")
+    rng = random.Random(SEED)
+    for call in CALLS:
+        _check_call(running, rng.choice((_rospy, _roscpp)), call, rng)
+
+
+@pytest.mark.thorough
+def test_a_thousand_calls_are_answered(running: Running) -> None:
+    print(f"seed {SEED}")
+    rng = random.Random(SEED)
+    for _ in range(1000):
+        _check_call(running, rng.choice((_rospy, _roscpp)), rng.choice(CALLS), rng)
+
+
+def _fields(*fields: str) -> bytes:
+    body = b"".join(struct.pack("<I", len(field)) + field.encode() for field in fields)
+    return struct.pack("<I", len(body)) + body
+
+
+def _read(peer: socket.socket, length: int) -> bytes:
+    data = b""
+    while len(data) < length and (more := peer.recv(length - len(data))):
+        data += more
+    return data
+
+
+def _header_of(peer: socket.socket) -> dict[str, str]:
+    body = _read(peer, int.from_bytes(_read(peer, 4), "little"))
+    found = {}
+    while body:
+        size = int.from_bytes(body[:4], "little")
+        name, _, value = body[4 : 4 + size].decode().partition("=")
+        found[name], body = value, body[4 + size :]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("fields", "accepted"),
+    [
+        ((f"md5sum={POINT}", "topic=/place", "type=geometry_msgs/Point"), True),
+        (("tcp_nodelay=1", "type=*", "topic=/place", "message_definition=" + 300 * "x", "md5sum=*"), True),
+        ((f"md5sum={POINT}", "topic=/place"), True),
+        ((f"md5sum={QUATERNION}", "topic=/place"), False),
+        ((f"md5sum={POINT}", "topic=/place", "type=geometry_msgs/Quaternion"), False),
+        ((f"md5sum={POINT}", "topic=/turn/2"), False),
+        ((f"md5sum={POINT}", "topic=/plac"), False),
+        (("topic=/place",), False),
+        ((), False),
+    ],
+)
+def test_a_header_is_accepted_or_refused(running: Running, fields: tuple[str, ...], accepted: bool) -> None:
+    with running.connect() as peer:
+        peer.sendall(_fields("callerid=/me", *fields))
+        header = _header_of(peer)
+        if not accepted:
+            assert [*header] == ["error"]
+            assert peer.recv(1) == b""
+            return
+        assert header["md5sum"] == POINT
+        assert header["message_definition"] == running.node.publishers[0].definition
+        payload = bytes(range(24))
+        running.board.send(0, payload)
+        assert _read(peer, 28) == framed(0, payload)[1:]
+
+
+def test_sockets_listen_again_after_garbage(running: Running) -> None:
+    _garbage(running, 10)
+
+
+@pytest.mark.thorough
+def test_sockets_listen_again_after_a_thousand_connections_of_garbage(running: Running) -> None:
+    _garbage(running, 1000)
+
+
+def _garbage(running: Running, count: int) -> None:
+    print(f"seed {SEED}")
+    rng = random.Random(SEED)
+    valid = [_rospy("getPid", "/me"), _fields("callerid=/me", "md5sum=*", "topic=/place")]
+    for _ in range(count):
+        with running.connect() as peer:
+            data = bytearray(rng.choice([*valid, rng.randbytes(40), b"POST" + rng.randbytes(60)]))
+            for _ in range(rng.randrange(4)):
+                data[rng.randrange(len(data))] = rng.randrange(256)
+            peer.sendall(data[: rng.randrange(len(data) + 1)])
+            if rng.random() < 0.5:  # a reset instead of an end
+                peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    running.board.wait_until_listening()
+    _check_call(running, _roscpp, CALLS[0], rng)
