@@ -148,6 +148,7 @@ def _studio(arguments: argparse.Namespace, place: Path) -> Studio:
     """Return the server of a place with the command's message sources."""
     from fusesoc_firm.simulation.simulator import BuiltSimulator, CoreSources, build_simulator
     from fusesoc_firm.studio.server import Studio
+    from fusesoc_firm.studio.workspace import Tools
     from fusesoc_firm.system.message_sources import known_names, load_beside, sources_of
     from fusesoc_firm.system.written.specification import Draft
 
@@ -162,4 +163,4 @@ def _studio(arguments: argparse.Namespace, place: Path) -> Studio:
     def build(spec: Path, tool: str) -> BuiltSimulator:
         return build_simulator(spec, tool, sources=CoreSources(paths, distro or "", core_folders=core_folders))
 
-    return Studio(place, load, check_sources, names, build)
+    return Studio(place, Tools(load, check_sources, names, build))

@@ -7,31 +7,36 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from aiohttp import WSMsgType, web
 
 from fusesoc_firm.node.watch import Seen
+from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, picture_of
-from fusesoc_firm.studio.run import Run
+from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
+from fusesoc_firm.studio.run import Run, SimulatedRun, Wishes
+from fusesoc_firm.studio.workspace import Workspace
+from fusesoc_firm.tools.simulators import fitting
 
 # The least time between two news, and the number of messages in one and in an answer about the record.
 _SECONDS = 0.05
 _MOST_NEW, _MOST_ROWS = 50, 200
+# The highest rate of messages a second that the page may ask for.
+_MOST_RATE = 100_000
 _CONTROLS = ("pause", "resume", "step", "stop")
 
 
 class Live:
-    """The current run, and the requests about it; `name` names a specification for the page."""
+    """The current run, and the requests about it."""
 
-    def __init__(self, name: Callable[[Path], str]) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         """Begin without a run."""
-        self._name = name
+        self._workspace = workspace
         self._count = 0
         self._sockets: set[web.WebSocketResponse] = set()
         self.run: Run | None = None
@@ -43,16 +48,17 @@ class Live:
         self.run = run
         self._count += 1
 
-    def routes(self, under: str) -> list[web.RouteDef]:
-        """Return the requests, whose addresses begin with `under`."""
-        return [
-            web.get(f"{under}/watch", self._watch),
-            web.get(f"{under}/record", self._record),
-            web.get(f"{under}/message", self._message),
-            web.get(f"{under}/picture", self._picture),
-            web.post(f"{under}/control", self._control),
-            web.get(f"{under}/{FOXGLOVE}", self._foxglove),
-        ]
+    def requests(self) -> Requests:
+        """Return the requests."""
+        return {
+            "GET watch": self._watch,
+            "GET record": self._record,
+            "GET message": self._message,
+            "GET picture": self._picture,
+            "POST run": self._run,
+            "POST control": self._control,
+            f"GET {FOXGLOVE}": self._foxglove,
+        }
 
     async def close(self) -> None:
         """End the run that was started here, and all connections."""
@@ -121,7 +127,7 @@ class Live:
         return {
             "run": {
                 "number": self._count,
-                "file": self._name(run.spec),
+                "file": self._workspace.name(run.spec),
                 "title": run.title,
                 "state": run.state,
                 "text": run.text,
@@ -140,17 +146,15 @@ class Live:
 
     async def _record(self, request: web.Request) -> web.Response:
         """Return the rows of the record before a message."""
-        rows = self._current().watch.before(_number(request, "before"), _MOST_ROWS)
-        return web.json_response({"messages": [*map(_row, rows)]})
+        rows = self._current().watch.before(number_of(request, "before"), _MOST_ROWS)
+        return in_json({"messages": [*map(_row, rows)]})
 
     async def _message(self, request: web.Request) -> web.Response:
         """Return the fields of a message."""
         run, seen = self._seen(request)
         frame = run.topics[seen.block].frame
         found = await asyncio.to_thread(fields_of, frame, seen.payload)
-        return web.json_response(
-            {"row": _row(seen), "type": str(frame.message), "hasPicture": has_picture(frame), **found}
-        )
+        return in_json({"row": _row(seen), "type": str(frame.message), "hasPicture": has_picture(frame), **found})
 
     async def _picture(self, request: web.Request) -> web.Response:
         """Return the picture in a message."""
@@ -160,17 +164,28 @@ class Live:
             raise web.HTTPNotFound(reason="this message has no picture that a browser shows")
         return web.Response(body=found[0], content_type=found[1])
 
+    async def _run(self, request: web.Request) -> web.Response:
+        """Simulate the system of a file with the stimuli of its core; the run before ends."""
+        body, workspace = await body_of(request), self._workspace
+        document, wishes = workspace.document(body.get("file")), _wishes(body)
+
+        def begun() -> SimulatedRun:
+            return SimulatedRun(workspace.loaded(document), document.path, wishes, workspace.tools.build)
+
+        self.take(await workspace.in_turn(begun))
+        return in_json({})
+
     async def _control(self, request: web.Request) -> web.Response:
         """Pause the run, continue it, let one message pass, or end it."""
-        run, body = self._current(), await request.json()
-        wish = body.get("do") if isinstance(body, Mapping) else None
+        run, body = self._current(), await body_of(request)
+        wish = body.get("do")
         if wish not in _CONTROLS or not run.control:
             raise web.HTTPBadRequest(reason=f"legal for a run that the page controls: {', '.join(_CONTROLS)}")
         if wish == "stop":
             run.stop()
         else:
             getattr(run.control, wish)()
-        return web.json_response({})
+        return in_json({})
 
     # --- the run ---------------------------------------------------------------------------------------------------
 
@@ -181,7 +196,7 @@ class Live:
 
     def _seen(self, request: web.Request) -> tuple[Run, Seen]:
         run = self._current()
-        seen = run.watch.find(_number(request, "number"))
+        seen = run.watch.find(number_of(request, "number"))
         if not seen:
             raise web.HTTPNotFound(reason="this message is not in the record any more")
         return run, seen
@@ -194,8 +209,17 @@ def _row(seen: Seen) -> tuple[object, ...]:
     return *row, latency.cause, latency.cycles, latency.wall_ns
 
 
-def _number(request: web.Request, name: str) -> int:
-    text = request.query.get(name, "")
-    if not (text.isascii() and text.isdecimal()) or len(text) > 15:
-        raise web.HTTPBadRequest(reason=f"'{name}' is the number of a message")
-    return int(text)
+def _wishes(body: Mapping[str, Any]) -> Wishes:
+    """Return what a request asks of a simulation; raise 400 for anything else."""
+    tools = [*fitting(is_live=True)]
+    tool, rate = body.get("tool", tools[0]), body.get("rate", 0)
+    is_endless, is_paused = body.get("isEndless", False), body.get("isPaused", False)
+    seed, stall_percent = body.get("seed", 1), body.get("stallPercent", 0)
+    bounds = {"rate": (rate, 0, _MOST_RATE), "seed": (seed, 1, MOST_SEED)}
+    bounds["stallPercent"] = (stall_percent, 0, MOST_STALL_PERCENT)
+    for name, (value, least, most) in bounds.items():
+        if not isinstance(value, int) or not least <= value <= most:
+            raise web.HTTPBadRequest(reason=f"'{name}' is a whole number of {least} to {most}")
+    if tool not in tools or not isinstance(is_endless, bool) or not isinstance(is_paused, bool):
+        raise web.HTTPBadRequest(reason=f"the simulators are {', '.join(tools)}")
+    return Wishes(tool, rate, is_endless, is_paused, seed, stall_percent)

@@ -40,11 +40,12 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
     except InputError as error:
         diagnostics = error.diagnostics
     root = _root(text)
-    return {
-        "specification": content_of(text),
-        "faults": [_fault(root, file, item) for item in diagnostics],
-        "derived": derived,
-    }
+    return outline(text) | {"faults": [_fault(root, file, item) for item in diagnostics], "derived": derived}
+
+
+def outline(text: str) -> dict[str, Any]:
+    """Return the part of a scene that needs no derivation."""
+    return {"specification": content_of(text), "faults": [], "derived": None}
 
 
 def grammar() -> dict[str, Any]:

@@ -54,27 +54,32 @@ class Page:
         return found["result"].get("value")
 
     async def until(self, script: str) -> None:
-        """Wait until an expression is true."""
+        """Wait until an expression is true; as long as it throws, for lack of an element, it is not."""
         end = time.monotonic() + _SECONDS
+        attempt = f"(() => {{ try {{ return Boolean({script}) }} catch (error) {{ return String(error) }} }})()"
+        found: Any = None
         while time.monotonic() < end:
-            if await self.evaluate(f"Boolean({script})"):
+            found = await self.evaluate(attempt)
+            if found is True:
                 return
             await asyncio.sleep(0.05)
         text = await self.evaluate("document.body.innerText")
-        raise AssertionError(f"it did not become true: {script}; {self.trouble}; {text}")
+        raise AssertionError(f"it did not become true: {script}; {found}; {self.trouble}; {text}")
 
     async def place(self, selector: str) -> tuple[float, float]:
         """Return the middle of an element, once it is there and at rest."""
         find = f"document.querySelector({json.dumps(selector)})"
-        await self.until(f"{find} !== null")
+        middle = f"(b => b && [b.x + b.width / 2, b.y + b.height / 2])({find}?.getBoundingClientRect())"
+        end = time.monotonic() + _SECONDS
         before: Any = None
-        while True:
-            await self.evaluate(f"{find}.scrollIntoView({{block: 'nearest'}})")
-            box = await self.evaluate(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({find}.getBoundingClientRect())")
-            if box == before:
-                return box[0], box[1]
-            before = box
+        while time.monotonic() < end:
+            await self.evaluate(f"{find}?.scrollIntoView({{block: 'nearest'}})")
+            place = await self.evaluate(middle)
+            if place and place == before:
+                return place[0], place[1]
+            before = place
             await asyncio.sleep(0.1)
+        raise AssertionError(f"it does not come to rest: {selector}; {self.trouble}")
 
     async def click(self, selector: str) -> None:
         """Click on the middle of an element."""

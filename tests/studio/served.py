@@ -12,6 +12,7 @@ from fusesoc_firm.request.request import no_core_folders
 from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.studio.run import Build
 from fusesoc_firm.studio.server import Studio
+from fusesoc_firm.studio.workspace import Tools
 from fusesoc_firm.system.message_sources import MessageSources, known_names, load_beside
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.written.specification import Draft
@@ -33,7 +34,7 @@ def names(spec: Path, own: Sequence[str]) -> Sequence[str]:
 @contextmanager
 def served(place: Path, build: Build = build_simulator) -> Iterator[Studio]:
     """The studio, with its address."""
-    studio = Studio(place, load, no_check, names, build)
+    studio = Studio(place, Tools(load, no_check, names, build))
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever, name="studio")
     thread.start()

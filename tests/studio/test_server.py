@@ -239,11 +239,14 @@ def test_nothing_of_a_file_runs_in_the_page(studio: Studio) -> None:
 
 def test_the_first_scene_is_named_by_the_page(studio: Studio, folder: Path) -> None:
     _, answer, _ = ask(studio, "GET", "")
-    assert answer.getheader("Link") == "<api/scene>; rel=preload; as=fetch; crossorigin"
+    assert answer.getheader("Link") == "<api/outline>; rel=preload; as=fetch; crossorigin"
     files = ask(studio, "GET", "api/files")[2]["files"]
-    assert ask(studio, "GET", "api/scene")[2]["file"] == files[0] == "arm/arm.yaml"
+    outline, whole = ask(studio, "GET", "api/outline")[2], scene(studio)
+    assert outline["file"] == files[0] == "arm/arm.yaml"
+    assert outline == whole | {"faults": [], "derived": None}
+    assert whole["derived"]
     (folder / "arm" / "arm.yaml").unlink()
-    assert ask(studio, "GET", "api/scene")[2] is None
+    assert ask(studio, "GET", "api/outline")[2] is None
 
 
 def test_one_specification_can_be_served_alone(folder: Path) -> None:

@@ -30,8 +30,7 @@ def button(text: str, inside: str) -> str:
 
 async def press(page: Page, text: str, inside: str = ".run") -> None:
     """Use a button by the keyboard."""
-    await page.until(f"{button(text, inside)} && !{button(text, inside)}.disabled")
-    await page.evaluate(f"{button(text, inside)}.focus()")
+    await page.until(f"!{button(text, inside)}.disabled && ({button(text, inside)}.focus(), true)")
     await page.press("Enter")
 
 
@@ -59,8 +58,7 @@ def row_of(block: str) -> str:
 
 async def open_message(page: Page, block: str) -> None:
     """Open a message of a block."""
-    await page.until(row_of(block))
-    await page.evaluate(f"{row_of(block)}.querySelector('button').click()")
+    await page.until(f"({row_of(block)}.querySelector('button').click(), true)")
 
 
 def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
@@ -83,7 +81,7 @@ def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
         await press(page, "pause")
         await page.until(f"{STATE} === 'robot.yaml, simulation in ghdl: paused'")
         # A response, and the messages before it.
-        await page.evaluate(f"{row_of('point_out')}.querySelector('button').focus()")
+        await page.until(f"({row_of('point_out')}.querySelector('button').focus(), true)")
         await page.press("Enter")
         title = "document.querySelector('.message h2')?.textContent"
         await page.until(f"{title}?.endsWith(': point_out, geometry_msgs/Point')")
@@ -98,8 +96,13 @@ def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
         await page.until(f"{title}.endsWith(': point, geometry_msgs/Point')")
         await press(page, "continue")
         await page.until(f"{count} > {last} + 10")
+        # The old messages stay until the new ones are there.
+        fewest = f"new MutationObserver(() => (window.fewest = Math.min(window.fewest, {ROWS}.length)))"
+        observe = "observe(document.querySelector('.messages tbody'), {childList: true})"
+        await page.evaluate(f"window.fewest = {ROWS}.length, {fewest}.{observe}")
         await press(page, "newest", ".messages")
         await page.until(f"Number([...{ROWS}].at(-1).querySelector('button').textContent) > {last} + 10")
+        assert await page.evaluate("window.fewest") > 0
         await press(page, "stop")
         await page.until(f"{STATE} === 'robot.yaml, simulation in ghdl: ended'")
         await page.until("document.querySelector('.messages pre').textContent.includes('received')")

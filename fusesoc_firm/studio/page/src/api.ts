@@ -59,8 +59,8 @@ async function post<T>(name: string, body: object): Promise<T> {
 
 export const files = () => get<{ files: string[] }>("files");
 export const grammar = () => get<Grammar>("grammar");
-/** The first specification, which the browser requests with the page; null without one. */
-export const first = async () => answer<Scene | null>(await fetch("api/scene"));
+/** The first specification as written, which the browser requests with the page; null without one. */
+export const outline = async () => answer<Scene | null>(await fetch("api/outline"));
 export const scene = (file: string) => get<Scene>("scene", { file });
 export const sources = (file: string) => get<{ faults: Fault[] }>("sources", { file });
 export const messages = (file: string, query: string) =>

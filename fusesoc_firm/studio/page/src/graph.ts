@@ -1,8 +1,7 @@
 // From a specification to nodes and edges in their places.
 
 import type { Edge, Node } from "@xyflow/svelte";
-import ELK from "elkjs/lib/elk-api";
-import worker from "elkjs/lib/elk-worker.min.js?url";
+import { layout } from "./engine";
 import type { Fault, Path, Scene, Section } from "./api";
 
 export type Kind = "subscriber" | "publisher" | "accelerator" | "software" | "manager";
@@ -13,31 +12,11 @@ export type BlockData = BlockWords & { errors: number; warnings: number };
 export type BlockNode = Node<BlockData, "block">;
 
 const LINE = 17;
-const OPTIONS = {
-  "elk.algorithm": "layered",
-  "elk.direction": "RIGHT",
-  "elk.spacing.nodeNode": "24",
-  "elk.layered.spacing.nodeNodeBetweenLayers": "110",
-  "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
-};
-// The layout engine is most of the page, so it loads and warms up beside it while the server derives the system: a browser
-// translates what has run several times to faster code.
-const engine = new ELK({ workerFactory: () => new Worker(worker) });
-const WARM_UPS = 5;
-let isAwaited = false;
-
-async function warmUp() {
-  const ids = ["a", "b", "c", "d", "e", "f"];
-  const ways = ["ab", "ac", "bd", "cd", "de", "bf"];
-  for (let turn = 0; turn < WARM_UPS && !isAwaited; turn++) {
-    await engine.layout({
-      id: "root",
-      layoutOptions: OPTIONS,
-      children: ids.map((id) => ({ id, width: 100, height: 40 })),
-      edges: ways.map((way) => ({ id: way, sources: [way[0]], targets: [way[1]] })),
-    });
-  }
-}
+// The space between the Manager and the blocks beside it.
+const GAP = 110;
+// The width that the derived facts of a converter need, so that the picture stays when they arrive.
+const FACTS_WIDTH = 215;
+const FACTS = "...";
 
 const list = (value: unknown): any[] => (Array.isArray(value) ? value : []);
 const isAt = (path: Path | null | undefined, place: Path) =>
@@ -64,7 +43,7 @@ function linesOf(block: Section, specification: Section, derived: Section | null
     if (block.queue) found.push(`queue of ${block.queue}`);
     const converters = Object.values(derived?.Converters ?? {}).flat() as Section[];
     const own = converters.find((item) => item.block === block.name);
-    if (own) found.push(`id ${own.id}, payload ${own.payloadBytes} bytes`);
+    found.push(own ? `id ${own.id}, payload ${own.payloadBytes} bytes` : FACTS);
   } else {
     const type = typeOf(specification, block)?.[0];
     found.push(type ? `${block.type} (${type.type})` : String(block.type ?? "no type"));
@@ -78,7 +57,8 @@ function linesOf(block: Section, specification: Section, derived: Section | null
 function nodeOf(id: string, data: BlockWords, faults: Fault[]): BlockNode {
   const errors = faults.filter((fault) => fault.severity === "error").length;
   const words = [data.name, ...data.lines];
-  const width = Math.min(320, Math.max(120, ...words.map((line) => 7.2 * line.length + 28)));
+  const least = data.kind === "subscriber" || data.kind === "publisher" ? FACTS_WIDTH : 120;
+  const width = Math.min(320, Math.max(least, ...words.map((line) => 7.2 * line.length + 28)));
   const height = 30 + LINE * data.lines.length;
   const label = `${data.kind} ${data.name}${faults.length ? `, ${faults.length} faults` : ""}`;
   return {
@@ -142,17 +122,24 @@ function fixed(id: string, source: string, target: string, file: string, block: 
   return { id, source, target, type, ...still, class: "stream", data: { file, block } };
 }
 
-/** Place the nodes, from left to right along the data. */
+/**
+ * Place the nodes, from left to right along the data.
+ *
+ * The Manager's two sides stand beside all other blocks. The engine does not see them: their many long wires would take
+ * it most of its time.
+ */
 export async function placed(nodes: BlockNode[], edges: Edge[]): Promise<BlockNode[]> {
-  isAwaited = true;
-  const graph = await engine.layout({
-    id: "root",
-    layoutOptions: OPTIONS,
-    children: nodes.map(({ id, width, height }) => ({ id, width, height })),
-    edges: edges.map(({ id, source, target }) => ({ id, sources: [source], targets: [target] })),
+  const [first, inner, last] = [nodes[0], nodes.slice(1, -1), nodes.at(-1)!];
+  const isInner = (id: string) => id !== first.id && id !== last.id;
+  const graph = await layout({
+    children: inner.map(({ id, width, height }) => ({ id, width, height })),
+    edges: edges
+      .filter(({ source, target }) => isInner(source) && isInner(target))
+      .map(({ id, source, target }) => ({ id, sources: [source], targets: [target] })),
   });
   const places = new Map(graph.children!.map((item) => [item.id, { x: item.x!, y: item.y! }]));
+  const middle = (node: BlockNode) => (graph.height! - node.height!) / 2;
+  places.set(first.id, { x: -GAP - first.width!, y: middle(first) });
+  places.set(last.id, { x: graph.width! + GAP, y: middle(last) });
   return nodes.map((node) => ({ ...node, position: places.get(node.id)! }));
 }
-
-warmUp();

@@ -1,6 +1,6 @@
+// The engine starts its worker before the page itself is loaded.
+import "./engine";
 import "@xyflow/svelte/dist/style.css";
 import "./style.css";
-import { mount } from "svelte";
-import App from "./App.svelte";
 
-mount(App, { target: document.getElementById("app")! });
+import("./page").then(({ show }) => show());

@@ -1,0 +1,117 @@
+"""The folder that is open in the page: its specifications, and what the command line does with them."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+from aiohttp import web
+
+from fusesoc_firm.studio.document import Document
+from fusesoc_firm.studio.run import Build
+from fusesoc_firm.studio.scene import content_of
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import Diagnostic
+from fusesoc_firm.text.files import is_file
+from fusesoc_firm.text.yaml_text import SMALL
+
+# The names that a specification may end with, and folders in which nobody writes one.
+_SUFFIXES = (".yaml", ".yml")
+_NO_SOURCES = ("build", "node_modules")
+
+Load = Callable[[Path, str], LoadedSystem]
+"""Derives the system of a text in the place of a specification. May raise `InputError`."""
+Check = Callable[[LoadedSystem, Path], Sequence[Diagnostic]]
+"""Compares a system's accelerators with their sources and returns the warnings. May raise `InputError`."""
+Names = Callable[[Path, Sequence[str]], Sequence[str]]
+"""Returns the names of all messages for a specification with these `paths`. May raise `InputError`."""
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Tools:
+    """What the command line uses for a specification."""
+
+    load: Load
+    check: Check
+    names: Names
+    build: Build
+
+
+class Workspace:
+    """A folder of specifications, or one specification, and the `tools` for it."""
+
+    def __init__(self, place: Path, tools: Tools) -> None:
+        """Open a file or a folder."""
+        self.tools = tools
+        self._place = place.resolve()
+        self.folder = self._place if self._place.is_dir() else self._place.parent
+        self._documents: dict[str, Document] = {}
+        # Derivations share caches, so one runs at a time.
+        self._turn = asyncio.Lock()
+
+    @property
+    def documents(self) -> list[Document]:
+        """The open documents."""
+        return [*self._documents.values()]
+
+    async def in_turn(self, function: Callable[_P, _T], *arguments: _P.args, **options: _P.kwargs) -> _T:
+        """Call a function that derives systems, in a thread."""
+        async with self._turn:
+            return await asyncio.to_thread(function, *arguments, **options)
+
+    def loaded(self, document: Document) -> LoadedSystem:
+        """Derive the system of a document. May raise `InputError`."""
+        return self.tools.load(document.path, document.text)
+
+    def specifications(self) -> Iterator[str]:
+        """Yield the names of all specifications, relative to the folder."""
+        if not self._place.is_dir():
+            yield self.name(self._place)
+            return
+        for place, folders, names in os.walk(self.folder):
+            folders[:] = sorted(name for name in folders if name not in _NO_SOURCES and not name.startswith("."))
+            for path in (Path(place, name) for name in sorted(names)):
+                if path.suffix in _SUFFIXES and self._is_inside(path) and _is_specification(path):
+                    yield self.name(path)
+
+    def document(self, name: object) -> Document:
+        """Return the open document with a name; raise 404 for files outside the folder and for other files."""
+        path = self.folder / str(name)
+        if (
+            not name
+            or "\0" in str(name)
+            or path.suffix not in _SUFFIXES
+            or not self._is_inside(path)
+            or not is_file(path)
+        ):
+            raise web.HTTPNotFound(reason="there is no such specification")
+        if not self._place.is_dir() and path.resolve() != self._place:
+            raise web.HTTPNotFound(reason="only one specification is open")
+        path = path.resolve()
+        return self._documents.setdefault(str(path), Document(path))
+
+    def _is_inside(self, path: Path) -> bool:
+        return path.resolve().is_relative_to(self.folder)
+
+    def name(self, path: Path) -> str:
+        """Return the name of a specification, relative to the folder."""
+        return path.relative_to(self.folder).as_posix()
+
+
+def _text(path: Path) -> str:
+    with suppress(OSError, UnicodeDecodeError):
+        if path.stat().st_size <= SMALL.bytes:
+            return path.read_text(encoding="utf-8")
+    return ""
+
+
+def _is_specification(path: Path) -> bool:
+    return {"project", "blocks"} <= (content_of(_text(path)) or {}).keys()
