@@ -17,18 +17,19 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 from fusesoc_firm.action import environment
 from fusesoc_firm.action.contents import Contents
+from fusesoc_firm.action.observed import StateOf, states
 from fusesoc_firm.action.results import Results
 from fusesoc_firm.action.tree import Item, Tree
-from fusesoc_firm.building.plan import Build
+from fusesoc_firm.building.build import Build
 from fusesoc_firm.store import own_code
 from fusesoc_firm.store.facts import Fact, state
 from fusesoc_firm.store.layout import digest_of
 from fusesoc_firm.store.own_code import PACKAGE
+from fusesoc_firm.store.packages import version
 from fusesoc_firm.store.reads import Reads, noted
 from fusesoc_firm.tools.library_path import demos_root, library_root
 
@@ -97,7 +98,12 @@ class Recall:
     contents: Contents
     words: Sequence[object]
     build_root: Path
+    # The builds of a command are looked up before any of them runs, so each fact is looked up once for all.
+    state_of: StateOf = field(init=False)
     _states: dict[tuple[str, str], str | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.state_of = states(self.contents, os.environ.get("PATH", os.defpath))
 
     def builds(self) -> tuple[list[Build], str] | None:
         """Return the builds of the same command in the same state of the libraries, and the digest of this state."""
