@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -59,6 +60,8 @@ class Pool:
         told: set[Build] = set()
         failed: dict[Build, Outcome] = {}
         alive = os.pipe()
+        # In a copy of this process, the collector would write to each object, and so copy its page.
+        gc.freeze()
         try:
             while waiting or running:
                 for build, lock in list(waiting.items())[: self.jobs]:
@@ -79,6 +82,7 @@ class Pool:
                         failed[item.build] = outcome
                         waiting[item.build] = item.lock
         finally:
+            gc.unfreeze()
             _end(running)
             for end in alive:
                 os.close(end)

@@ -14,7 +14,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -61,7 +61,8 @@ def observed() -> Iterator[Observed]:
     """Observe what FuseSoC reads within this context."""
     _install_hook()
     apart = [path for path in sys.path if os.path.basename(path) in _PACKAGE_FOLDERS]  # noqa: PTH119
-    found = Observed(Reads(apart=[*Reads().apart, *apart], python_path=()))
+    libraries = (str(library_root()), str(demos_root()))
+    found = Observed(Reads(apart=[*Reads().apart, *apart], kept=libraries, python_path=()))
     _observed.append(found)
     try:
         with noted(found.reads):
@@ -168,21 +169,9 @@ def _session() -> str:
             "machine": platform.machine(),
             "environment": environment.of_step(os.environ),
             "package": str(PACKAGE),
-            "library": [_files(folder) for folder in (library_root(), demos_root())],
             "own": own_code.state(),
         }
     )
-
-
-def _files(folder: Path) -> str:
-    """Return a value that changes when a file of one of this package's libraries changes."""
-    found = []
-    for above, _, names in os.walk(folder, followlinks=True):
-        for name in names:
-            with suppress(OSError):
-                status = os.stat(os.path.join(above, name))  # noqa: PTH116, PTH118
-                found.append([above, name, status.st_size, status.st_mtime_ns, status.st_ctime_ns])
-    return digest_of(sorted(found))
 
 
 @cache
