@@ -20,21 +20,19 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Any
 
 from fusesoc_firm.action import environment as variables
 from fusesoc_firm.action.contents import Contents
-from fusesoc_firm.action.observed import facts_of, hold
+from fusesoc_firm.action.observed import StateOf, facts_of, hold, states
 from fusesoc_firm.action.places import Places, places_of
 from fusesoc_firm.action.results import Record, Results
 from fusesoc_firm.action.sandbox import sandboxed
 from fusesoc_firm.action.trace import Trace, can_trace, fix_addresses, traced
 from fusesoc_firm.action.tree import FILE, PROGRAM, Item, Tree, changed, in_order_of_time, key_of, removed, tree_of
 from fusesoc_firm.store.layout import digest_of
-from fusesoc_firm.tools.launcher import note_launched
+from fusesoc_firm.store.packages import version
 
 TWICE = "FUSESOC_FIRM_ACTIONS_TWICE"
 """The variable with N, if one in N actions is to run twice; 0 for none."""
@@ -72,7 +70,7 @@ class Action:
             "environment": variables.key_of(self.environment),
             "machine": platform.machine(),
             "python": sys.version_info[:3],
-            "edalize": _version("edalize"),
+            "edalize": version("edalize"),
             # A step elsewhere may have found other files.
             **({"sandbox": True} if self.is_sandboxed else {}),
         }
@@ -93,11 +91,15 @@ class Done:
     fault: str = ""
 
 
-def look_up(action: Action, results: Results, contents: Contents) -> Record | None:
-    """Return the stored result of an action, or None if there is none that is still valid."""
+def look_up(action: Action, results: Results, contents: Contents, state_of: StateOf | None = None) -> Record | None:
+    """Return the stored result of an action, or None if there is none that is still valid.
+
+    `state_of` returns the states of facts for several actions with the same PATH, each looked up once.
+    """
 
     def is_valid(record: Record) -> bool:
-        return record.place in ("", str(action.folder)) and hold(record.facts, contents, action.search)
+        is_here = record.place in ("", str(action.folder))
+        return is_here and hold(record.facts, state_of or states(contents, action.search))
 
     key = action.key()
     if (known := results.record(key)) and is_valid(known):
@@ -207,6 +209,8 @@ def _run(action: Action, log: Path) -> tuple[int, Trace | None]:
     def within(*further: Path) -> list[str]:
         return sandboxed(_places(action), *further) if action.is_sandboxed else []
 
+    from fusesoc_firm.tools.launcher import note_launched
+
     fix_addresses()
     try:
         with log.open("ab") as output:
@@ -272,8 +276,3 @@ def _places(action: Action) -> Places:
 def _temporary(action: Action) -> Path:
     """Return the folder for temporary files: always the same, since its path may be in an output."""
     return action.folder.with_name(f"{action.folder.name}.tmp")
-
-
-@cache
-def _version(package: str) -> str:
-    return version(package)

@@ -26,6 +26,9 @@ from fusesoc_firm.action.trace import Trace
 Fact = tuple[str, str, str | None]
 """The kind, the name and the state of a fact; the state of a missing object is None."""
 
+StateOf = Callable[[str, str], str | None]
+"""A function that returns the state of the fact with this kind and name."""
+
 # Python adds this folder beside each imported module.
 _BYTE_CODE = "__pycache__"
 _MODULES = tuple(all_suffixes())
@@ -45,9 +48,14 @@ def facts_of(trace: Trace, contents: Contents, search: str) -> list[Fact]:
     return [(kind, name, state(kind, name, contents, search)) for kind, name in names]
 
 
-def hold(facts: Iterable[Fact], contents: Contents, search: str) -> bool:
+def hold(facts: Iterable[Fact], state_of: StateOf) -> bool:
     """Return whether no state differs."""
-    return all(state(kind, name, contents, search) == was for kind, name, was in facts)
+    return all(state_of(kind, name) == was for kind, name, was in facts)
+
+
+def states(contents: Contents, search: str) -> StateOf:
+    """Return a function for current states, which looks each fact up once."""
+    return cache(lambda kind, name: state(kind, name, contents, search))
 
 
 def state(kind: str, name: str, contents: Contents, search: str) -> str | None:

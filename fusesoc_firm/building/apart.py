@@ -24,9 +24,10 @@ from typing import Any
 from fusesoc_firm.action.contents import Contents
 from fusesoc_firm.action.results import Record, Results, default_results
 from fusesoc_firm.action.tree import FILE, PROGRAM, Tree, changed, in_order_of_time, removed, tree_of
+from fusesoc_firm.building.build import Build, Limits, Outcome
 from fusesoc_firm.building.folder_lock import FolderLock
-from fusesoc_firm.building.plan import Build, Plan
-from fusesoc_firm.building.pool import SHOWN_LINES, Limits, Outcome, Pool
+from fusesoc_firm.building.plan import Plan
+from fusesoc_firm.building.pool import SHOWN_LINES, Pool
 from fusesoc_firm.building.process import set_up
 from fusesoc_firm.building.steps import Step, StepsRun, backend_of, write_report
 from fusesoc_firm.store.layout import digest_of

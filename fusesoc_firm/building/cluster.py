@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from secrets import token_hex
 
-from fusesoc_firm.building.plan import Build, Plan
-from fusesoc_firm.building.pool import SHOWN_LINES, Outcome
+from fusesoc_firm.building.build import Build, Outcome
+from fusesoc_firm.building.plan import Plan
+from fusesoc_firm.building.pool import SHOWN_LINES
 from fusesoc_firm.tools.workers import Workers
 
 # The environment variables that workers need, without paths of programs, which differ between machines.

@@ -5,7 +5,6 @@ A core is read for all targets and flags together, so that the result includes e
 
 from __future__ import annotations
 
-import os
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from fusesoc_firm.building.build import configuration
 from fusesoc_firm.request.core_reader import CoreFile, read_core
 from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import fail
@@ -135,13 +135,6 @@ def target_calls(core: str, target: str) -> list[tuple[str, GeneratorCall]]:
     fusesoc, top = _found(core)
     cores = solved(fusesoc, top, target)
     return [(str(item.name), call) for item, flags in cores for call in calls_of(item, flags)]
-
-
-def configuration() -> Any:
-    """Return FuseSoC's configuration for the current folder, as the command `fusesoc` reads it."""
-    from fusesoc.config import Config
-
-    return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
 
 
 def solved(

@@ -8,7 +8,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.building.cores import calls_of, configuration, solved
+from fusesoc_firm.building.build import Build, configuration
+from fusesoc_firm.building.cores import calls_of, solved
 from fusesoc_firm.building.folder_lock import FolderLock
 from fusesoc_firm.building.run_options import RunOptions
 from fusesoc_firm.building.selection import Selection, is_pattern, matching
@@ -20,28 +21,6 @@ TESTS = ("sim", "test")
 _COLONS_WITH_VERSION = 3
 # The simulators of Edalize's tool interface.
 _SIMULATORS = frozenset("ghdl icarus isim modelsim questaformal rivierapro vcs verilator vunit xcelium xsim".split())
-
-
-@dataclass(frozen=True)
-class Build:
-    """The full name of a core, a target of the core, and the build folder."""
-
-    core: str
-    target: str
-    work_root: Path
-
-    @property
-    def log(self) -> Path:
-        """The file for the build's output."""
-        return self.work_root.with_name(f"{self.work_root.name}.log")
-
-    @property
-    def lock(self) -> Path:
-        """The lock file of the build folder."""
-        return self.work_root.with_name(f"{self.work_root.name}.lock")
-
-    def __str__(self) -> str:
-        return f"{self.core} {self.target}"
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
+from typing import TYPE_CHECKING
 
+from fusesoc_firm.building.build import Build, Limits, Outcome, ignore
 from fusesoc_firm.building.folder_lock import BEAT_SECONDS, FolderLock
-from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.process import Run, build_in_this_process, last_lines, run_all
+
+if TYPE_CHECKING:
+    from fusesoc_firm.building.plan import Plan
 
 _POLL_SECONDS = 0.2
 # The time in seconds between the request to end and the kill.
@@ -21,40 +26,6 @@ _PATIENCE_SECONDS = 5.0
 _END_POLL_SECONDS = 0.02
 SHOWN_LINES = 20
 """The number of lines shown from a failed build's log."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The result of a build: success, the duration of the last try in seconds, and the number of tries.
-
-    `last_lines` are those of the log of the last failed try. A skipped build was not started.
-    """
-
-    build: Build
-    is_good: bool
-    seconds: float
-    last_lines: tuple[str, ...] = ()
-    tries: int = 1
-    is_skipped: bool = False
-
-    @property
-    def result(self) -> str:
-        """`ok`, `flaky` for a success after failed tries, `failed` or `skipped`."""
-        if self.is_skipped:
-            return "skipped"
-        return ("ok" if self.tries == 1 else "flaky") if self.is_good else "failed"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """The limits of each build: the time of a try in seconds (0: unlimited), and the number of further tries."""
-
-    seconds: float = 0
-    retries: int = 0
-
-
-def ignore(_build: Build, _try: int) -> None:
-    """Ignore the start of a build."""
 
 
 @dataclass
@@ -78,7 +49,7 @@ class Pool:
     options: tuple[str, ...]
     jobs: int
     tell: Callable[[str], None]
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
     begin: Callable[[Build, int], None] = ignore
     run_build: Run = run_all
 
@@ -89,6 +60,8 @@ class Pool:
         told: set[Build] = set()
         failed: dict[Build, Outcome] = {}
         alive = os.pipe()
+        # In a copy of this process, the collector would write to each object, and so copy its page.
+        gc.freeze()
         try:
             while waiting or running:
                 for build, lock in list(waiting.items())[: self.jobs]:
@@ -109,6 +82,7 @@ class Pool:
                         failed[item.build] = outcome
                         waiting[item.build] = item.lock
         finally:
+            gc.unfreeze()
             _end(running)
             for end in alive:
                 os.close(end)

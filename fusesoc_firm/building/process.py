@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.building.plan import Build
+from fusesoc_firm.building.build import Build
 from fusesoc_firm.building.run_options import split
 
 Answer = Callable[[list[str], Callable[[], None]], None]

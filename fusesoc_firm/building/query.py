@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-from fusesoc_firm.building.cores import GRAPH_TEMPLATE, ProjectCore, configuration
+from fusesoc_firm.building.build import configuration
+from fusesoc_firm.building.cores import GRAPH_TEMPLATE, ProjectCore
 from fusesoc_firm.building.selection import matching
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import render

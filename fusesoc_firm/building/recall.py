@@ -14,21 +14,22 @@ import os
 import platform
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 from fusesoc_firm.action import environment
 from fusesoc_firm.action.contents import Contents
+from fusesoc_firm.action.observed import StateOf, states
 from fusesoc_firm.action.results import Results
 from fusesoc_firm.action.tree import Item, Tree
-from fusesoc_firm.building.plan import Build
+from fusesoc_firm.building.build import Build
 from fusesoc_firm.store import own_code
 from fusesoc_firm.store.facts import Fact, state
 from fusesoc_firm.store.layout import digest_of
 from fusesoc_firm.store.own_code import PACKAGE
+from fusesoc_firm.store.packages import version
 from fusesoc_firm.store.reads import Reads, noted
 from fusesoc_firm.tools.library_path import demos_root, library_root
 
@@ -60,7 +61,8 @@ def observed() -> Iterator[Observed]:
     """Observe what FuseSoC reads within this context."""
     _install_hook()
     apart = [path for path in sys.path if os.path.basename(path) in _PACKAGE_FOLDERS]  # noqa: PTH119
-    found = Observed(Reads(apart=[*Reads().apart, *apart], python_path=()))
+    libraries = (str(library_root()), str(demos_root()))
+    found = Observed(Reads(apart=[*Reads().apart, *apart], kept=libraries, python_path=()))
     _observed.append(found)
     try:
         with noted(found.reads):
@@ -97,7 +99,12 @@ class Recall:
     contents: Contents
     words: Sequence[object]
     build_root: Path
+    # The builds of a command are looked up before any of them runs, so each fact is looked up once for all.
+    state_of: StateOf = field(init=False)
     _states: dict[tuple[str, str], str | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.state_of = states(self.contents, os.environ.get("PATH", os.defpath))
 
     def builds(self) -> tuple[list[Build], str] | None:
         """Return the builds of the same command in the same state of the libraries, and the digest of this state."""
@@ -162,21 +169,9 @@ def _session() -> str:
             "machine": platform.machine(),
             "environment": environment.of_step(os.environ),
             "package": str(PACKAGE),
-            "library": [_files(folder) for folder in (library_root(), demos_root())],
             "own": own_code.state(),
         }
     )
-
-
-def _files(folder: Path) -> str:
-    """Return a value that changes when a file of one of this package's libraries changes."""
-    found = []
-    for above, _, names in os.walk(folder, followlinks=True):
-        for name in names:
-            with suppress(OSError):
-                status = os.stat(os.path.join(above, name))  # noqa: PTH116, PTH118
-                found.append([above, name, status.st_size, status.st_mtime_ns, status.st_ctime_ns])
-    return digest_of(sorted(found))
 
 
 @cache

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.building.cores import configuration
-from fusesoc_firm.building.plan import Build, make_plan
+from fusesoc_firm.building.build import Build, configuration
+from fusesoc_firm.building.plan import make_plan
 from fusesoc_firm.request.core_reader import read_core
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.library_path import library_root

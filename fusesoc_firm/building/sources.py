@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.building.cores import calls_of, configuration, solved
+from fusesoc_firm.building.build import configuration
+from fusesoc_firm.building.cores import calls_of, solved
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.library_path import library_root
 

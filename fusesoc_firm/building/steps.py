@@ -18,14 +18,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fusesoc_firm.action.action import Action, after, execute, log_of, look_up
 from fusesoc_firm.action.contents import Contents
 from fusesoc_firm.action.results import Record, Results, default_results
 from fusesoc_firm.action.tree import Tree, tree_of
+from fusesoc_firm.building.build import Build
 from fusesoc_firm.building.folder_lock import FolderLock
-from fusesoc_firm.building.plan import Build
 from fusesoc_firm.building.process import run_all, set_up
 from fusesoc_firm.building.reasons import reasons, remember
 from fusesoc_firm.building.recall import Recall, observed
@@ -109,7 +107,8 @@ class Steps:
             return None
         backend, tree = known
         act = partial(action_of, build, backend, is_sandboxed=self.is_sandboxed)
-        found = recorded(self.names, act, tree, results, contents)
+        look = partial(look_up, results=results, contents=contents, state_of=self.recall.state_of)
+        found = recorded(self.names, act, tree, look)
         logs = [log for _, record in found if (log := log_of(record, results, build.work_root)) is not None]
         if len(logs) < len(self.names) or (self.has_outputs and not _is_in_place(build, tree, found, contents)):
             return None
@@ -160,14 +159,14 @@ def action_of(build: Build, backend: tuple[str, str], step: str, inputs: Tree, *
 
 
 def recorded(
-    names: tuple[str, ...], act: Callable[[str, Tree], Action], inputs: Tree, results: Results, contents: Contents
+    names: tuple[str, ...], act: Callable[[str, Tree], Action], inputs: Tree, look: Callable[[Action], Record | None]
 ) -> list[tuple[Action, Record]]:
     """Return the stored results of a build's first steps, up to the first step without one."""
     found: list[tuple[Action, Record]] = []
     tree = inputs
     for name in names:
         action = act(name, tree)
-        record = look_up(action, results, contents)
+        record = look(action)
         if record is None:
             break
         found.append((action, record))
@@ -190,7 +189,8 @@ class StepsRun:
     def all(self, names: tuple[str, ...], *, is_rerun: bool, has_outputs: bool) -> bool:
         """Recall the first steps, and run the others; return whether all succeeded."""
         inputs = tree_of(self.build.work_root, self.contents)
-        known = [] if is_rerun else recorded(names, self._action, inputs, self.results, self.contents)
+        look = partial(look_up, results=self.results, contents=self.contents)
+        known = [] if is_rerun else recorded(names, self._action, inputs, look)
         if (has_outputs or len(known) < len(names)) and not self._restored(known):
             # An output is no longer stored; the folder may contain others.
             self.set_up()
@@ -241,6 +241,8 @@ def _files_of_parameters(edam: Path) -> tuple[str, ...]:
     text = edam.read_text(encoding="utf-8")
     if "datatype: file" not in text:
         return ()
+    import yaml
+
     parameters = yaml.safe_load(text)["parameters"].values()
     return tuple(str(item["default"]) for item in parameters if item["datatype"] == "file" and item.get("default"))
 

@@ -1,9 +1,8 @@
-"""`firm system bring-up`: write the files that bring up a board under Linux. `firm doctor`: find what a board lacks."""
+"""`firm system bring-up`: write the files that bring up a board under Linux."""
 
 from __future__ import annotations
 
 import argparse
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -39,20 +38,6 @@ def add_bring_up(actions: Any) -> argparse.ArgumentParser:
     return bring_up
 
 
-def add_doctor(commands: Any) -> None:
-    """Declare the command."""
-    doctor = command(
-        commands,
-        "doctor",
-        "find what a board with Linux lacks for a node with AXI DMA, and how to mend it",
-        "firm doctor",
-        _examine,
-    )
-    doctor.add_argument(
-        "--root", type=Path, metavar="DIR", default=Path("/"), help="the folder with the board's files (default: /)"
-    )
-
-
 def _write_files(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.boards.board import on_board, read_board
     from fusesoc_firm.system.boards.overlay import bring_up_files
@@ -74,22 +59,3 @@ def _write_files(arguments: argparse.Namespace) -> None:
     for name, text in files.items():
         write(arguments.output / name, text)
         print(arguments.output / name)
-
-
-def _examine(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.node.doctor import examine, transport_address
-    from fusesoc_firm.text.diagnostics import fail
-
-    if not arguments.root.is_dir():
-        fail(f"there is no folder {arguments.root}")
-    findings = examine(arguments.root)
-    width = max(len(finding.subject) for finding in findings)
-    for finding in findings:
-        state = finding.fault or ("in order" if finding.is_known else "not examined")
-        print(f"{finding.subject:{width}}  {state}")
-    faults = [finding for finding in findings if finding.fault]
-    for number, finding in enumerate(faults, start=1):
-        print(f"{number}. {finding.subject}: {finding.remedy}")
-    if faults:
-        sys.exit(1)
-    print(f"the node's transport: {transport_address(arguments.root)}")

@@ -7,7 +7,7 @@ import time
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.build_options import (
     add_fusesoc,
@@ -23,6 +23,11 @@ from fusesoc_firm.cli.build_options import (
 )
 from fusesoc_firm.cli.common import command, positive
 from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.building.plan import Plan
+    from fusesoc_firm.building.run_options import RunOptions
+    from fusesoc_firm.building.selection import Selection
 
 _NOT_CACHED = ("setup", "cluster")
 
@@ -68,7 +73,6 @@ def add_build(commands: Any) -> None:
 
 
 def _build_cached(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.building.plan import select_plan
     from fusesoc_firm.building.steps import Steps
     from fusesoc_firm.cli.build_report import Report, Words
     from fusesoc_firm.cli.cached import run_cached
@@ -89,9 +93,15 @@ def _build_cached(arguments: argparse.Namespace) -> None:
         steps=steps,
     )
     chosen = ("build", *selection.words(), options.command_line(), names)
-    make = partial(select_plan, selection, options, arguments.build_root)
+    make = partial(_plan, selection, options, arguments.build_root)
     report = Report(Words(is_cached=True), outputs_of(arguments))
     run_cached(chosen, make, how, arguments.build_root, report)
+
+
+def _plan(selection: Selection, options: RunOptions, build_root: Path | None) -> Plan:
+    from fusesoc_firm.building.plan import select_plan
+
+    return select_plan(selection, options, build_root)
 
 
 def _build(arguments: argparse.Namespace) -> None:
@@ -101,12 +111,11 @@ def _build(arguments: argparse.Namespace) -> None:
     if arguments.rerun:
         fail("--rerun needs --cached or --sandbox")
 
-    from fusesoc_firm.building.plan import select_plan
     from fusesoc_firm.cli.build_report import Report, Words
     from fusesoc_firm.cli.cached import print_failures
     from fusesoc_firm.plugin.build import How, Listener, build
 
-    plan = select_plan(selection_of(arguments), run_options_of(arguments), arguments.build_root)
+    plan = _plan(selection_of(arguments), run_options_of(arguments), arguments.build_root)
     how = How(
         arguments.clean,
         arguments.setup,

@@ -10,7 +10,7 @@ from fusesoc_firm.cli.common import natural, positive
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.pool import Limits
+    from fusesoc_firm.building.build import Limits
     from fusesoc_firm.building.run_options import RunOptions
     from fusesoc_firm.building.selection import Selection
     from fusesoc_firm.cli.build_report import Outputs
@@ -89,7 +89,7 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
 
 def limits_of(arguments: argparse.Namespace) -> Limits:
     """Return the limits of each build."""
-    from fusesoc_firm.building.pool import Limits
+    from fusesoc_firm.building.build import Limits
 
     return Limits(arguments.timeout or 0, arguments.retries)
 

@@ -11,14 +11,12 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
-from xml.etree import ElementTree as ET
 
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.plan import Build
-    from fusesoc_firm.building.pool import Outcome
+    from fusesoc_firm.building.build import Build, Outcome
     from fusesoc_firm.building.steps import Step
 
 _CACHED, _FAILED = "cached", "failed"
@@ -72,34 +70,34 @@ class Report:
 
     def __init__(self, words: Words, outputs: Outputs) -> None:
         """Begin the reports. Raise `InputError` if the file for the events cannot be written."""
-        from tqdm import tqdm
-
-        # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
-        tqdm.monitor_interval = 0
         self._started = time.monotonic()
         self._words, self._outputs = words, outputs
         self._builds: list[Build] = []
         self._rows: list[Row] = []
         self._running: list[Build] = []
         self._events = _opened(outputs.events) if outputs.events else None
-        self._bar = tqdm(unit=words.unit, disable=outputs.is_quiet or None, file=sys.stderr)
+        # A progress bar, from the first build that is not recalled; its module loads longer than a recalled build.
+        self._bar: Any = None
 
     def plan(self, builds: Sequence[Build]) -> None:
         """Note all builds of the run, before the first one begins or ends."""
         self._builds = list(builds)
-        self._bar.total = len(builds)
+        if self._bar is not None:
+            self._bar.total = len(builds)
         self._event("plan", builds=[_named(build) for build in builds])
 
     def tell(self, text: str) -> None:
         """Print a line above the progress bar."""
-        self._bar.write(text, file=sys.stderr)
+        self._print(text, sys.stderr)
 
     def progress(self, text: str) -> None:
         """Show what happens before the first build."""
+        self._begin_bar()
         self._bar.set_postfix_str(text)
 
     def begin(self, build: Build, number: int) -> None:
         """Note the start of a build's try, from 1."""
+        self._begin_bar()
         self._running.append(build)
         self._event("start", **_named(build), number=number)
         self._show()
@@ -108,16 +106,18 @@ class Report:
         """Note the end of a build, and print its log if the report is verbose."""
         row = _row(outcome, self._words)
         if self._outputs.is_verbose and not outcome.is_skipped:
-            self._bar.write(f"{outcome.build}: {row.result}\n{_text_of(outcome.build.log)}".rstrip(), file=sys.stdout)
+            self._print(f"{outcome.build}: {row.result}\n{_text_of(outcome.build.log)}".rstrip(), sys.stdout)
         self._rows.append(row)
         self._running = [build for build in self._running if build != outcome.build]
         self._event("end", **_facts(row))
-        self._show()
-        self._bar.update()
+        if self._bar is not None:
+            self._show()
+            self._bar.update()
 
     def close(self) -> None:
         """End the progress bar and the events, also of a run that was interrupted."""
-        self._bar.close()
+        if self._bar is not None:
+            self._bar.close()
         self._event("summary", builds=len(self._rows), **self._counts())
         if self._events:
             self._events.close()
@@ -154,6 +154,28 @@ class Report:
         counts = Counter(row.result for row in self._rows)
         return {result: counts[result] for result in self._words.results}
 
+    def _begin_bar(self) -> None:
+        if self._bar is not None:
+            return
+        from tqdm import tqdm
+
+        # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
+        tqdm.monitor_interval = 0
+        self._bar = tqdm(
+            unit=self._words.unit,
+            total=len(self._builds) or None,
+            initial=len(self._rows),
+            disable=self._outputs.is_quiet or None,
+            file=sys.stderr,
+        )
+
+    def _print(self, text: str, file: TextIO) -> None:
+        """Print text above the progress bar."""
+        if self._bar is None:
+            print(text, file=file)
+        else:
+            self._bar.write(text, file=file)
+
     def _show(self) -> None:
         failed = self._counts()[_FAILED]
         now = ", ".join(map(str, dict.fromkeys(self._running)))
@@ -169,6 +191,8 @@ class Report:
 
 def junit(rows: Sequence[Row], seconds: float, words: Words) -> str:
     """Return the results in the format of JUnit: a test case for each build, with the core as its class."""
+    from xml.etree import ElementTree as ET
+
     counts = {
         "tests": len(rows),
         "failures": sum(row.result == _FAILED for row in rows),

@@ -23,7 +23,7 @@ def run_cached(
     `options` are all options that select or change the builds.
     """
     from fusesoc_firm.action.results import default_results
-    from fusesoc_firm.building.cores import configuration
+    from fusesoc_firm.building.build import configuration
     from fusesoc_firm.building.recall import Recall
     from fusesoc_firm.plugin.build import Listener, recall_or_build
 

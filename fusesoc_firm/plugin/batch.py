@@ -1,15 +1,17 @@
 """Generate the cores of many calls in advance and in parallel, since FuseSoC generates them one after another.
 
-    python -m fusesoc_firm.plugin.batch GENERATOR < calls.json
+    python -m fusesoc_firm.plugin.batch GENERATOR PROCESSES < calls.json
 
-This process handles the calls of one generator, so it imports that generator's modules only once. Calls that fail are
+This process imports the modules of one generator, then divides the calls among copies of itself. Calls that fail are
 skipped: FuseSoC's own call then generates the core or reports the faults.
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Generator as Steps
@@ -24,6 +26,7 @@ from fusesoc_firm.plugin.answer import Basis, fulfil
 from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES
 from fusesoc_firm.request.calls import make_request
 from fusesoc_firm.request.request import GeneratorCall, Request
+from fusesoc_firm.store import own_code
 from fusesoc_firm.store.facts import facts
 from fusesoc_firm.text.diagnostics import InputError, SourceRef, fail
 
@@ -42,36 +45,37 @@ def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None
     ours = _ours(calls)
     for generator in dict.fromkeys(call.generator for call in ours):
         mine = [call for call in ours if call.generator == generator]
-        count = min(jobs, len(mine) // _LEAST)
-        yield from _run(generator, [mine[number::count] for number in range(count)], mine[0])
+        if count := min(jobs, len(mine) // _LEAST):
+            yield from _run(generator, mine, count)
 
 
-def _run(generator: str, shares: list[list[GeneratorCall]], first: GeneratorCall) -> Steps[None, None, None]:
+def _run(generator: str, calls: list[GeneratorCall], count: int) -> Steps[None, None, None]:
     steps, end = os.pipe()
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-m", __name__, generator],
-            stdin=subprocess.PIPE,
-            stdout=end,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        for _ in shares
-    ]
+    # All copies are in the process group, so that all can be ended together.
+    process = subprocess.Popen(
+        [sys.executable, "-m", __name__, generator, str(count)],
+        stdin=subprocess.PIPE,
+        stdout=end,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        process_group=0,
+    )
     os.close(end)
     try:
-        for process, share in zip(processes, shares, strict=True):
-            assert process.stdin
-            with process.stdin, suppress(BrokenPipeError):
-                json.dump([vars(call) for call in share], process.stdin, default=str)
-        _load(first)
+        assert process.stdin
+        with process.stdin, suppress(BrokenPipeError):
+            json.dump([vars(call) for call in calls], process.stdin, default=str)
+        _load(calls[0])
         while done := os.read(steps, 100):
             yield from [None] * len(done)
     finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
+        # The pipe ends when the last copy has ended.
+        while os.read(steps, 100):
+            pass
         os.close(steps)
-        for process in processes:
-            process.terminate()
-            process.wait()
+        process.wait()
 
 
 def _ours(calls: Iterable[GeneratorCall]) -> list[GeneratorCall]:
@@ -93,16 +97,37 @@ def _request(call: GeneratorCall) -> Request:
 
 def main() -> None:
     """Process the calls on standard input; write a byte to standard output for each."""
-    (name,) = sys.argv[1:]
+    name, count = sys.argv[1:]
     generator = GENERATORS[name]
     # All calls use the modules that the first call imported, so results are not stored if a module was edited since
     # then.
     code = facts("code", [""])
-    for item in json.load(sys.stdin):
+    calls = [GeneratorCall(**item) for item in json.load(sys.stdin)]
+    own_code.watch()
+
+    def process(call: GeneratorCall) -> None:
         with suppress(InputError):
-            call = GeneratorCall(**item)
             fulfil(_request(call), generator, Basis("", [*code]), _file_of(call))
         os.write(sys.stdout.fileno(), b".")
+
+    process(calls[0])
+    share, copies = _copied(int(count))
+    for call in calls[1 + share :: int(count)]:
+        process(call)
+    for copy in copies:
+        os.waitpid(copy, 0)
+
+
+def _copied(count: int) -> tuple[int, list[int]]:
+    """Return, in each of `count` copies of this process, its number from 0, and the copies that it has to wait for."""
+    # The collector would write to each object, and so copy its page.
+    gc.freeze()
+    copies: list[int] = []
+    for number in range(1, count):
+        if (copy := os.fork()) == 0:
+            return number, []
+        copies.append(copy)
+    return 0, copies
 
 
 def _file_of(call: GeneratorCall) -> bytes:

@@ -1,4 +1,8 @@
-"""Run many builds in parallel after generating their cores in advance: the work of `firm build`."""
+"""Run many builds in parallel after generating their cores in advance: the work of `firm build`.
+
+The modules that plan, generate and run builds are imported where they are used, since builds that are recalled need
+none of them.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +13,19 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from fusesoc_firm.building.apart import Prepare, build_apart, can_build_apart
-from fusesoc_firm.building.cluster import build_on
-from fusesoc_firm.building.plan import Build, Plan
-from fusesoc_firm.building.pool import Limits, Outcome, Pool, ignore
+from fusesoc_firm.building.build import Build, Limits, Outcome, ignore
 from fusesoc_firm.building.process import Run, run_all, save_time
 from fusesoc_firm.building.recall import Recall, note_call, observed, unobserved
 from fusesoc_firm.building.steps import Steps
-from fusesoc_firm.plugin.answer import answer_from_store, noted_facts
-from fusesoc_firm.plugin.batch import prepare
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.plugin.project import check_locked
 from fusesoc_firm.store import own_code
 from fusesoc_firm.tools.launcher import launcher_of_steps
 from fusesoc_firm.tools.library_path import library_root
-from fusesoc_firm.tools.workers import cluster_workers
+
+if TYPE_CHECKING:
+    from fusesoc_firm.building.plan import Plan
+    from fusesoc_firm.building.pool import Pool
 
 _LAUNCHER = "EDALIZE_LAUNCHER"
 
@@ -80,10 +81,25 @@ def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, 
 def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
     _set_launcher(how)
     if how.is_locked:
+        from fusesoc_firm.plugin.project import check_locked
+
         for core in dict.fromkeys(build.core for build in plan.builds):
             check_locked(core)
     options = ["--setup"] * how.is_setup_only + ["--clean"] * how.is_clean
-    if how.cluster and not how.is_setup_only and can_build_apart():
+    if how.cluster:
+        yield from _build_on_cluster(plan, how, listener, options)
+        return
+    options += ["--setup", "--build"] * how.is_build_only
+    words = (*options, *plan.options.options())
+    yield from _pool(plan, how, listener, words, how.steps or run_all).run(plan)
+
+
+def _build_on_cluster(plan: Plan, how: How, listener: Listener, options: list[str]) -> Generator[Outcome, None, None]:
+    from fusesoc_firm.building.apart import Prepare, build_apart, can_build_apart
+    from fusesoc_firm.building.cluster import build_on
+    from fusesoc_firm.tools.workers import cluster_workers
+
+    if not how.is_setup_only and can_build_apart():
         flags = tuple(plan.options.use_flags().items())
         names = ("build",) if how.is_build_only else ("build", "run")
         with cluster_workers(how.cluster) as workers:
@@ -91,24 +107,23 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
             pool = _pool(plan, replace(how, limits=Limits()), listener, tuple(plan.options.options()), Prepare(flags))
             yield from build_apart(workers, pool, plan, names, how.limits)
         return
-    if how.cluster:
-        options += ["--build-only"] * how.is_build_only + ["--build-root", str(plan.build_root)]
-        options += [f"--timeout={how.limits.seconds:g}"] * bool(how.limits.seconds)
-        options += [f"--retries={how.limits.retries}", *plan.options.command_line()]
-        with cluster_workers(how.cluster) as workers:
-            yield from build_on(workers, plan, options)
-        return
-    options += ["--setup", "--build"] * how.is_build_only
-    words = (*options, *plan.options.options())
-    yield from _pool(plan, how, listener, words, how.steps or run_all).run(plan)
+    words = [*options, *["--build-only"] * how.is_build_only, "--build-root", str(plan.build_root)]
+    words += [f"--timeout={how.limits.seconds:g}"] * bool(how.limits.seconds)
+    words += [f"--retries={how.limits.retries}", *plan.options.command_line()]
+    with cluster_workers(how.cluster) as workers:
+        yield from build_on(workers, plan, words)
 
 
 def _pool(plan: Plan, how: How, listener: Listener, words: tuple[str, ...], run_build: Run) -> Pool:
     """Generate the cores of all builds, and return a pool that runs the builds."""
+    from fusesoc_firm.building.pool import Pool
+
     jobs = how.jobs or len(os.sched_getaffinity(0))
     plan.fetch()
     # Each call with a lock file checks this file.
     if not how.is_locked and _generators_run_here():
+        from fusesoc_firm.plugin.batch import prepare
+
         calls = plan.generator_calls()
         with closing(prepare(calls, jobs)) as steps:
             for number, _ in enumerate(steps, start=1):
@@ -165,6 +180,9 @@ def _generators_run_here() -> bool:
 
 def _answer(line: Sequence[str], start: Callable[[], None]) -> None:
     """Answer a call from the store, or start the generator in the command line."""
+    from fusesoc_firm.plugin.answer import answer_from_store, noted_facts
+    from fusesoc_firm.plugin.generators import GENERATORS
+
     *_, script, path = line
     commands = {library_root() / "generators" / f"{name}_generator.py": name for name in GENERATORS}
     name = next((name for known, name in commands.items() if known.resolve() == Path(script).resolve()), None)

@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import Definitions
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.yaml_text import yaml_dump
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.library import MessageLibrary
+    from fusesoc_firm.message.model import Definitions
 
 _LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None

@@ -18,6 +18,9 @@ from fusesoc_firm.store import own_code
 from fusesoc_firm.store.layout import digest, digest_of
 from fusesoc_firm.text.files import read_file
 
+# Python adds this folder beside each imported module.
+_BYTE_CODE = "__pycache__"
+
 Fact = tuple[str, str, str | None]
 """The kind, name and state of a fact; the state of a missing object is None."""
 
@@ -47,7 +50,7 @@ def state(kind: str, name: str) -> str | None:
 def _folder(path: str) -> str | None:
     try:
         with os.scandir(path) as entries:
-            return digest_of(sorted([entry.name, entry.is_dir()] for entry in entries))
+            return digest_of(sorted([entry.name, entry.is_dir()] for entry in entries if entry.name != _BYTE_CODE))
     except OSError:
         return None
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import sys
 import time
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -24,6 +26,18 @@ _NEW_NANOSECONDS = 2 * 10**9
 _STARTED = time.time_ns()
 # The state from `keep_state`, if that was called.
 _kept: list[str] = []
+_BELOW = f"{PACKAGE}{os.sep}"
+
+
+@dataclass
+class _Watch:
+    """After `watch`, the state since which this process has opened none of our files, if known."""
+
+    is_on: bool = False
+    state: str = ""
+
+
+_watch = _Watch()
 
 
 def digest(package: Path = PACKAGE, current: str | None = None) -> str:
@@ -40,15 +54,35 @@ def state(package: Path = PACKAGE) -> str:
     The value is computed from names, sizes and times, which is much faster than `digest`. If a file is so new at the
     start of this process that its time may be unreliable, its content is used instead.
     """
-    if package == PACKAGE and _kept:
-        return _kept[0]
+    if package == PACKAGE and (known := _kept or [_watch.state])[0]:
+        return known[0]
     found = []
     for name, entry in _files(str(package)):
         status = entry.stat()
         times = [status.st_mtime_ns, status.st_ctime_ns]
         content = _content(entry.path) if max(times) > _STARTED - _NEW_NANOSECONDS else ""
         found.append([name, status.st_size, *times, content])
-    return hashlib.sha256(json.dumps(sorted(found)).encode()).hexdigest()
+    current = hashlib.sha256(json.dumps(sorted(found)).encode()).hexdigest()
+    if package == PACKAGE and _watch.is_on:
+        _watch.state = current
+    return current
+
+
+def watch() -> None:
+    """From now on, look through our files again only after this process has opened one of them.
+
+    What a process generates depends on our files as it has read them, so later edits do not matter. Unlike
+    `keep_state`, a process that generates may call this.
+    """
+    if not _watch.is_on:
+        sys.addaudithook(_forget)
+        _watch.is_on = True
+
+
+def _forget(event: str, arguments: tuple[object, ...]) -> None:
+    """Forget the watched state if one of our files is opened."""
+    if event == "open" and _watch.state and str(arguments[0]).startswith(_BELOW):
+        _watch.state = ""
 
 
 def keep_state() -> None:

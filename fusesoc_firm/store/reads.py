@@ -56,14 +56,15 @@ Input = Path | Part
 class Reads:
     """The absolute paths that were read, in order, each with the state before the first reading.
 
-    `parts` are files that were read in part. Files in `apart` and in new temporary folders are not recorded.
-    `python_path` lists the folders in which Python finds packages.
+    `parts` are files that were read in part. Files in `apart` and in new temporary folders are not recorded, unless
+    they are in `kept`. `python_path` lists the folders in which Python finds packages.
     """
 
     files: dict[str, str | None] = field(default_factory=dict)
     parts: dict[str, str | None] = field(default_factory=dict)
     folders: dict[str, str | None] = field(default_factory=dict)
     apart: list[str] = field(default_factory=lambda: [*_apart()])
+    kept: tuple[str, ...] = ()
     python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
 
     def note_file(self, path: str) -> None:
@@ -149,8 +150,8 @@ def _note(path: object, *, is_file: bool) -> None:
     if any(absolute in paths for paths in _partly):
         return
     # An archive may also be on Python's path.
-    is_apart = is_file and absolute in reads.python_path
-    if not is_apart and not _is_below(absolute, reads.apart) and not _is_of_package(absolute, reads):
+    is_apart = (is_file and absolute in reads.python_path) or _is_below(absolute, reads.apart)
+    if _is_below(absolute, reads.kept) or not (is_apart or _is_of_package(absolute, reads)):
         _note_state(reads.files if is_file else reads.folders, "file" if is_file else "folder", absolute)
 
 

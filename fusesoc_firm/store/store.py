@@ -24,13 +24,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 from fusesoc_firm.store import layout, shared_files
 from fusesoc_firm.store.layout import CALL, ENTRY, KEPT, LAYOUT, LOCK, digest, digest_of, place
 from fusesoc_firm.store.own_code import IMPORTED
+from fusesoc_firm.store.packages import version
 from fusesoc_firm.store.remote import Remote, remote_store
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.file_lock import take
@@ -284,21 +283,12 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
         "request": request,
         "inputs": {name: None if data is None else digest(data) for name, data in inputs.items()},
         "code": code,
-        "versions": {name: _version(name) for name in IMPORTED},
+        "versions": {name: version(name) for name in IMPORTED},
         "python": sys.version_info[:2],
         # A compiled accelerator runs only on one kind of machine.
         "machine": platform.machine(),
     }
     return digest_of(parts)
-
-
-@cache
-def _version(package: str) -> str:
-    """Return the version of an imported package.
-
-    It is cached, since the look-up takes longer than the rest of a key.
-    """
-    return version(package)
 
 
 def _locked(root: str, name: str) -> tuple[int, bool]:

@@ -25,8 +25,6 @@ from pathlib import Path
 
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.tools.interrupts import accept_interrupts
-from fusesoc_firm.tools.manifest import note, note_for_other_builds
-from fusesoc_firm.tools.programs import find, ways
 
 # The options that precede the name of an output file.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
@@ -44,6 +42,9 @@ def launch(program: str, arguments: Sequence[str], user_note: Path | None = None
 
     `user_note` is where other builds in this `environment` find the program's entries in the manifest.
     """
+    from fusesoc_firm.tools.manifest import note, note_for_other_builds
+    from fusesoc_firm.tools.programs import find, ways
+
     started = time.time_ns() - _TICK_NANOSECONDS
     path = find(program)
     if path is None:
@@ -104,6 +105,8 @@ def launcher_of_steps() -> str:
 
 def note_launched(temporary: Path, folder: Path) -> None:
     """Record the programs that `launch.sh` has started with this TMPDIR in the folder's manifest."""
+    from fusesoc_firm.tools.manifest import note
+
     with suppress(FileNotFoundError):
         for program in dict.fromkeys((temporary / _LAUNCHED).read_text(encoding="utf-8").split()):
             note(program, folder)

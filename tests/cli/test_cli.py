@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import argparse
 import io
 import json
 import os
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 import yaml
 
+from fusesoc_firm import cli
 from fusesoc_firm.cli import main
 from fusesoc_firm.converter.stages import STAGES
 from fusesoc_firm.tools.library_path import demos_root, library_root
@@ -114,6 +117,23 @@ def test_the_commands_of_the_first_hour_come_first(capsys: Captured) -> None:
     assert places == sorted(places)
     assert places[-1] < text.index("\nlook:") < text.index("\nbuild:") < text.index("\nmore:")
     assert "  scheduler " in text
+
+
+def test_a_command_is_declared_by_the_module_that_is_loaded_for_it() -> None:
+    for module in dict.fromkeys(cli._MODULES.values()):
+        commands = argparse.ArgumentParser().add_subparsers()
+        getattr(import_module(f"fusesoc_firm.cli.{module}"), f"add_{module}")(commands)
+        assert [*commands.choices] == [name for name, other in cli._MODULES.items() if other == module]
+
+
+def test_a_command_loads_no_other_command() -> None:
+    """All modules together take longer than a build that is recalled."""
+    program = "import sys; from fusesoc_firm.cli import main; main(['path']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    _, modules = done.stdout.splitlines()
+    loaded = {name for name in modules.split() if name.startswith("fusesoc_firm.cli.")}
+    assert loaded == {"fusesoc_firm.cli.path", "fusesoc_firm.cli.common"}
+    assert not {"yaml", "numpy", "rosbags", "fusesoc"} & {*modules.split()}
 
 
 @pytest.mark.parametrize(("line", "words"), [("firm ini", ["init"]), ("firm sim --tool ver", ["verilator"])])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.building.plan import Build
+from fusesoc_firm.building.build import Build
 from fusesoc_firm.building.simulation import Simulation
 from fusesoc_firm.cli import main
 from fusesoc_firm.cli.common import coloured

@@ -79,6 +79,26 @@ def test_what_is_old_is_not_read_for_its_state(tmp_path: Path, monkeypatch: pyte
     assert read == [str(path)]
 
 
+def test_a_process_that_watches_looks_again_after_it_has_opened_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "package"
+    package.mkdir()
+    path = aged(package)
+    monkeypatch.setattr(own_code, "PACKAGE", package)
+    monkeypatch.setattr(own_code, "_BELOW", f"{package}{os.sep}")
+    monkeypatch.setattr(own_code, "_watch", own_code._Watch())
+    own_code.watch()
+    before = state(package)
+    edited = tmp_path / "edited.py"
+    edited.write_text("b")
+    edited.replace(path)
+    # Nothing that this process generates can depend on the edit.
+    assert state(package) == before
+    assert path.read_text() == "b"
+    assert state(package) != before
+
+
 def test_a_copy_has_the_same_digest(tmp_path: Path) -> None:
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
