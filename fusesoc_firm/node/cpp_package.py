@@ -154,6 +154,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "publisher_count": len(loaded.system.publishers),
         "queue_depth": DEFAULT_DEPTH,
         "digest": description.digest,
+        "has_status_registers": _word(description.has_status_registers),
         "definitions": [*_definitions(description)],
         "subscribers": [_row(topic) for topic in description.subscribers],
         "publishers": [_row(topic) for topic in description.publishers],

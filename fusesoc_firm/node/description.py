@@ -68,7 +68,7 @@ class NodeDescription:
     each publisher in hardware, `sources` lists the ids of the subscribers whose messages cause the publisher's
     messages. `longest_payload` is the size in bytes of the longest payload from any publisher, or None without a bound.
     `clock_hz` is None if the specification has no clock. `digest` is that of the hardware's identity, or empty if the
-    hardware does not tell it by frames.
+    hardware has no status. With `has_status_registers`, the status is a port for AXI4-Lite; otherwise frames read it.
     """
 
     name: str
@@ -82,6 +82,12 @@ class NodeDescription:
     clock_hz: float | None = None
     digest: str = ""
     services: tuple[NodeService, ...] = ()
+    has_status_registers: bool = False
+
+    @property
+    def has_status_frames(self) -> bool:
+        """Whether frames read the status of the hardware."""
+        return bool(self.digest) and not self.has_status_registers
 
     @property
     def inputs(self) -> tuple[NodeTopic | Crossing, ...]:
@@ -131,8 +137,9 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         leaving,
         max(length for length in lengths if length is not None) if None not in lengths else None,
         None if system.clock is None else float(system.clock),
-        identity(loaded).digest if system.status is StatusAccess.FRAMES else "",
+        identity(loaded).digest if system.status else "",
         tuple(node_service(item, loaded) for item in system.services),
+        system.status is StatusAccess.AXI_LITE,
     )
 
 

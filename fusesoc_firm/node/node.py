@@ -39,6 +39,7 @@ from fusesoc_firm.node.statistics import Statistics
 from fusesoc_firm.node.status import StatusWatch
 from fusesoc_firm.node.status_exchange import ANSWER_SECONDS, NO_ANSWER, StatusExchange
 from fusesoc_firm.node.trace import Entry, Trace
+from fusesoc_firm.node.transport.status_registers import StatusRegisters
 from fusesoc_firm.node.transport.transport import (
     Burst,
     LostFrameError,
@@ -78,7 +79,8 @@ class NodeSettings:
 
     After a stop request, the node processes received messages until the hardware has been silent for `settle` seconds
     and does not report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
-    `report` receives messages to the user, and `watch` records all messages.
+    `report` receives messages to the user, and `watch` records all messages. `registers` are those of the hardware's
+    status, if frames do not read it.
     """
 
     depth: int | None = None
@@ -88,6 +90,7 @@ class NodeSettings:
     restarts: bool = False
     report: Callable[[str], None] = print
     watch: Watch | None = None
+    registers: StatusRegisters | None = None
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ class Node:
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
-        self._status = StatusExchange(self._put_status_request) if description.digest else None
+        self._status = StatusExchange(self._put_status_request) if description.has_status_frames else None
         # The last queue is that of the status.
         depths = [*(self._depth(item) for item in self._inputs), *([1] if self._status else [])]
         self._queues: SubscriberQueues[_Message] = SubscriberQueues(len(depths), depths, overflow=settings.overflow)
@@ -213,9 +216,16 @@ class Node:
 
         Raise `TransportError` if there is none after some seconds.
         """
+        if self._settings.registers:
+            return self._settings.registers.access(request)
         if not self._status:
-            raise TransportError("the system has no 'status: frames'")
+            raise TransportError("the node has no access to a status of the hardware")
         return self._status.access(request, seconds)
+
+    @property
+    def has_status(self) -> bool:
+        """Whether the node has access to a status of the hardware."""
+        return bool(self._status or self._settings.registers)
 
     def _put_status_request(self, request: bytes) -> None:
         try:
@@ -246,7 +256,7 @@ class Node:
             now = self.statistics.troubles() + sum(dropped.values())
             self._tell(Report(f"{self._description.name}: node", now > before, self.statistics.counts(dropped)))
             before = now
-            if self._status:
+            if self.has_status:
                 watch.advance(READING_SECONDS)
                 now = watch.troubles()
                 self._tell(Report(f"{self._description.name}: hardware", now > status_before, watch.counts))

@@ -17,6 +17,13 @@ _REMAPPING = re.compile(r"[~/\w]+:=.*", re.DOTALL)
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of a node to a parser; `remappings` handles the arguments that the parser leaves."""
+    parser.add_argument(
+        "--status",
+        default="",
+        metavar="ADDRESS",
+        help="the registers of a system with 'status: axi_lite', such as axi:/dev/uio1 (default on a board: the UIO "
+        "device that the overlay names)",
+    )
     parser.add_argument("--name", metavar="NAME", help="the node's name (default: the system's name)")
     parser.add_argument(
         "--qos",

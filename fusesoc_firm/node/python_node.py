@@ -94,6 +94,7 @@ def _table(description: NodeDescription) -> dict[str, Any]:
         "longest_payload": repr(description.longest_payload),
         "clock_hz": repr(description.clock_hz),
         "digest": description.digest,
+        "has_status_registers": description.has_status_registers,
         "services": [*map(_service, description.services)],
     }
 

@@ -9,7 +9,8 @@ from fusesoc_firm.node.node import HardwareListener, OpenTransport
 from fusesoc_firm.node.status import check_digest
 from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
-from fusesoc_firm.node.transport.transport import Transport
+from fusesoc_firm.node.transport.status_registers import StatusRegisters, open_registers_at
+from fusesoc_firm.node.transport.transport import Transport, TransportError
 from fusesoc_firm.simulation.simulator import BuiltSimulator
 
 # After this many cycles without a beat, the simulation runs only at intervals. These suffice for accelerators that send
@@ -32,9 +33,44 @@ def at_address(address: str) -> OpenTransport:
     return lambda listener: open_transport(address, _PACE, partial(_tell, listener))
 
 
-def checked(open_transport: OpenTransport, description: NodeDescription) -> OpenTransport:
-    """Return a function that opens a transport, and raises `TransportError` if the hardware is another system's."""
+def status_registers(description: NodeDescription, address: str, transport: str) -> StatusRegisters | None:
+    """Return the registers of the hardware's status, unless frames read it, it has none, or it is a simulator's.
 
+    `address` is that of the registers; if it is empty, the overlay's device is searched. `transport` is the address of
+    the transport, empty for a simulator. May raise `TransportError`.
+    """
+    if not description.has_status_registers:
+        if address:
+            raise TransportError(f"'{description.name}' has no 'status: axi_lite', so '--status' has no effect")
+        return None
+    is_simulated = not transport or transport.startswith("pipe:")
+    return None if is_simulated and not address else open_registers_at(address)
+
+
+def checked(
+    open_transport: OpenTransport, description: NodeDescription, registers: StatusRegisters | None = None
+) -> OpenTransport:
+    """Return a function that opens a transport, and raises `TransportError` if the hardware is another system's.
+
+    `registers` are those of the status, if frames do not read it. Without a status, the hardware is not checked.
+    """
+    if registers:
+        return _checked_before(open_transport, description, registers)
+    return _checked_by_frames(open_transport, description) if description.has_status_frames else open_transport
+
+
+def _checked_before(
+    open_transport: OpenTransport, description: NodeDescription, registers: StatusRegisters
+) -> OpenTransport:
+    def opened(listener: HardwareListener) -> Transport:
+        # Opening the transport would reset the hardware of another system.
+        check_digest(registers, description.digest, description.name)
+        return open_transport(listener)
+
+    return opened
+
+
+def _checked_by_frames(open_transport: OpenTransport, description: NodeDescription) -> OpenTransport:
     def opened(listener: HardwareListener) -> Transport:
         late = _LateListener(listener)
         transport = open_transport(late)

@@ -16,7 +16,7 @@ from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.node import Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.queues import Overflow
-from fusesoc_firm.node.reopening import checked
+from fusesoc_firm.node.reopening import checked, status_registers
 from fusesoc_firm.node.services import NodeService
 from fusesoc_firm.node.software import node_software
 from fusesoc_firm.node.status_socket import StatusServer, served_names
@@ -29,12 +29,16 @@ from fusesoc_firm.text.diagnostics import fail
 
 @dataclass(frozen=True)
 class RunOptions:
-    """The options with which a node starts; `versions` are the versions of ROS to which the node's topics belong."""
+    """The options with which a node starts; `versions` are the versions of ROS to which the node's topics belong.
+
+    `status` is the address of the status' registers, if it is given.
+    """
 
     versions: tuple[int, ...]
     ros: RosOptions
     settings: NodeSettings
     trace: Path | None = None
+    status: str = ""
 
 
 def run_options(
@@ -67,6 +71,7 @@ def run_options(
         ),
         NodeSettings(arguments.queue, Overflow(arguments.overflow), drain=arguments.drain, restarts=arguments.restart),
         arguments.trace,
+        arguments.status,
     )
 
 
@@ -82,17 +87,17 @@ def run_node(
     `loaded` is the system, if it has software. `address` is that of the transport, if it has one. Raise `InputError` if
     ROS or the hardware fails, or if received messages could not be processed in time.
     """
-    settings = replace(options.settings, report=_say)
     try:
         with ExitStack() as stack:
             software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
             trace = stack.enter_context(closing(Trace(options.trace, description))) if options.trace else None
-            opener = checked(open_transport, description) if description.digest else open_transport
-            node = Node(description, opener, settings, software, trace)
+            registers = status_registers(description, options.status, address)
+            settings = replace(options.settings, report=_say, registers=registers)
+            node = Node(description, checked(open_transport, description, registers), settings, software, trace)
             # Published messages are sent before the node prints its statistics.
             stack.callback(lambda: _say(node.statistics.text()))
             stack.callback(node.close)
-            if description.digest:
+            if node.has_status:
                 names = served_names(description.name, address)
                 stack.enter_context(StatusServer(names, node.access_status, _say))
             carriers = {}

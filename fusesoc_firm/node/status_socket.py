@@ -24,12 +24,11 @@ from contextlib import suppress
 from types import TracebackType
 
 from fusesoc_firm.node.transport.open_transport import device_of, open_transport
-from fusesoc_firm.node.transport.status_registers import open_registers
+from fusesoc_firm.node.transport.status_registers import AXI, open_registers_at
 from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError
 from fusesoc_firm.system.status_frames import answered
 
 NODE = "node"
-_AXI = "axi"
 _PREFIX = b"\0firm status "
 _LONGEST_NAME = 90
 _LONGEST_PACKET = 1000
@@ -147,16 +146,15 @@ def open_status(address: str) -> Transport:
     `node:SYSTEM` is the running node of a system, and `axi:UIO` a status with AXI4-Lite at a UIO device. May raise
     `TransportError`.
     """
-    kind, _, device = address.partition(":")
-    if kind == _AXI and device:
-        return open_registers(device)
+    if address.startswith(f"{AXI}:"):
+        return open_registers_at(address)
     is_node = address.startswith(f"{NODE}:")
     name = address if is_node else device_of(address)
     if name and (peer := _connected(name)):
         return NodeTransport(peer)
     if is_node:
         raise TransportError(
-            f"no node of the system '{address.removeprefix(f'{NODE}:')}' with 'status: frames' runs on this computer"
+            f"no node of the system '{address.removeprefix(f'{NODE}:')}' with a status runs on this computer"
         )
     return open_transport(address)
 

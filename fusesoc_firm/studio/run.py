@@ -130,8 +130,7 @@ class SimulatedRun(Run):
         )
         with ExitStack() as stack:
             software = stack.enter_context(node_software(self._loaded, lambda error: self._tell(str(error))))
-            opener = checked(opener, description) if description.digest else opener
-            node = Node(description, opener, settings, software)
+            node = Node(description, checked(opener, description), settings, software)
             stack.callback(node.close)
             self._node = node
             if self._is_over.is_set():

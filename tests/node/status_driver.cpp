@@ -61,7 +61,8 @@ void show(const firm::Status& status) {
 
 bool accepts(firm::Transport& transport, const std::string& digest) {
   try {
-    firm::check_digest(transport, digest, "robot");
+    firm::StatusAccess access(transport);
+    firm::check_digest(access, digest, "robot");
     return true;
   } catch (const firm::TransportError&) {
     return false;

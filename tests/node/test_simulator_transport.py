@@ -303,3 +303,57 @@ def test_another_simulator_takes_its_place_on_request(model: list[str]) -> None:
         with pytest.raises(TransportError, match="status 3") as caught:
             transport.receive(60)
         assert not isinstance(caught.value, TransportResetError)
+
+
+class _TimedSimulator:
+    """A simulator in the time of a test: a beat in each cycle, and a burst at the end of the frame."""
+
+    def __init__(self, cycle_seconds: float, frame_cycles: int) -> None:
+        self.now = 0.0
+        self.cycle = self.quiet = self.begun = 0
+        self.runs: list[tuple[float, float]] = []
+        self._cycle_seconds = cycle_seconds
+        self._left = self._frame_cycles = frame_cycles
+        self._cycles = 0
+        self._end = 0.0
+
+    def request(self, frame: bytes) -> None:
+        self._left = self._frame_cycles
+        self._end = self.now
+
+    def begin(self, cycles: int, runs: int = 1) -> None:
+        self._cycles, self.begun = cycles, self.begun + runs
+
+    def has_report(self, seconds: float) -> bool:
+        return True
+
+    def finish(self) -> list[Event]:
+        cycles = min(self._cycles, self._left)
+        self.begun -= 1
+        self.runs.append((cycles * self._cycle_seconds, self.now - self._end))
+        self.cycle += cycles
+        self.now += cycles * self._cycle_seconds
+        self._left -= cycles
+        return [] if self._left or not cycles else [Taken(0, self.cycle), Burst(b"x")]
+
+    def kill(self) -> None:
+        """Nothing is left to do."""
+
+    close = kill
+
+
+def test_a_long_frame_takes_few_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A frame of 100 ms needed a hundred runs of 1 ms; no run takes much longer than an eighth of the time before."""
+    simulator = _TimedSimulator(1e-6, 100_000)
+    monkeypatch.setattr("fusesoc_firm.node.transport.simulator.time.monotonic", lambda: simulator.now)
+    transport = SimulatorTransport(lambda: simulator)  # type: ignore[arg-type, return-value]
+    for _ in range(3):
+        simulator.runs.clear()
+        transport.send(b"frame")
+        assert transport.receive(10.0)
+        assert 10 < len(simulator.runs) < 50
+        late = [(took, since) for took, since in simulator.runs if took > 0.003 + since / 3]
+        assert not late, late
+        # The time at rest does not count.
+        simulator.now += 10.0
+    transport.close()

@@ -14,6 +14,7 @@ The simulator is a separate process. If it ends unexpectedly, its output is show
 
 from __future__ import annotations
 
+import fcntl
 import os
 import select
 import signal
@@ -45,10 +46,14 @@ _SHOWN_LINES = 20
 # A simulator normally ends immediately on request, or when its pipes close.
 _END_SECONDS = 10.0
 
-# The simulator runs for this time before new frames are checked for, within the limits on cycles.
+# The simulator runs for this time before new frames are checked for, within the limits on cycles; while beats move, also
+# for this share of the time since the last frame or event. Each run costs time of its own, above all on a busy machine.
 _STEP_SECONDS = 0.001
+_STEP_SHARE = 1 / 8
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
 _PIECE_BYTES = 2**16
+# The most that Linux grants every user. In a small pipe, a large frame needs a change of processes for each 64 KiB.
+_PIPE_BYTES = 2**20
 # The longest wait of `poll`, in ms.
 _MOST_POLLED = 2**31 - 1
 
@@ -98,6 +103,16 @@ class _Reports:
         self._file.close()
 
 
+def _pipe() -> tuple[int, int]:
+    """Return the reading and the writing end of a pipe."""
+    ends = os.pipe()
+    if hasattr(fcntl, "F_SETPIPE_SZ"):
+        # Linux limits the pages of all pipes of a user.
+        with suppress(OSError):
+            fcntl.fcntl(ends[0], fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
+    return ends
+
+
 class Simulator:
     """A simulator in lock-step, which runs only on request and may be used by only one thread at a time.
 
@@ -112,8 +127,8 @@ class Simulator:
         self.begun = 0
         self._has_version = False
         self._printed = tempfile.TemporaryFile()  # noqa: SIM115
-        from_us, to_simulator = os.pipe()
-        from_simulator, to_us = os.pipe()
+        from_us, to_simulator = _pipe()
+        from_simulator, to_us = _pipe()
         self._requests = open(to_simulator, "wb")  # noqa: PTH123, SIM115
         self._reports = _Reports(from_simulator)
         try:
@@ -338,8 +353,10 @@ class SimulatorTransport:
         self._is_closed = False
         self._receivers = 0
         self._is_used = False  # the simulator, by a thread that does not hold the lock
-        self._step = self._quiet_step = _FEWEST_CYCLES
-        self._began = self._wakes_at = 0.0
+        # The cycles of the next run, of one that takes about _STEP_SECONDS, and of one after a burst.
+        self._step = self._short_step = self._quiet_step = _FEWEST_CYCLES
+        self._began = self._changed_at = self._wakes_at = 0.0
+        self._passes_frames = False  # the run
         self._simulator = start()
 
     def send(self, frame: bytes) -> None:
@@ -454,6 +471,9 @@ class SimulatorTransport:
             self._simulator.request(self._sent.popleft())
             frames += 1
         self._began = time.monotonic()
+        self._passes_frames = frames > 0
+        if frames:
+            self._changed_at = self._began
         # A run ends when a frame is taken. To wait for this process then would cost more time than the simulation.
         self._simulator.begin(self._step if frames else self._quiet_step, frames + 1)
         return ()
@@ -467,7 +487,10 @@ class SimulatorTransport:
         first = self._simulator.cycle
         events = self._simulator.finish()
         now = time.monotonic()
-        self._adapt(self._simulator.cycle - first, now - self._began)
+        self._adapt(self._simulator.cycle - first, now)
+        if events:
+            self._changed_at = now
+            self._step = self._short_step
         # After a burst, those to whom it goes need the processor more than hardware that may do nothing.
         has_burst = any(isinstance(event, Burst) for event in events)
         self._quiet_step = _FEWEST_CYCLES if has_burst else min(2 * self._quiet_step, self._step)
@@ -478,12 +501,17 @@ class SimulatorTransport:
                 self._observe(event)
         return events
 
-    def _adapt(self, cycles: int, seconds: float) -> None:
-        """Adapt the number of cycles in a step to the simulator's speed."""
-        if cycles == self._step and seconds < _STEP_SECONDS / 2:
+    def _adapt(self, cycles: int, now: float) -> None:
+        """Adapt the number of cycles in a step to the simulator's speed, after a run of `cycles`."""
+        is_moving = self._simulator.quiet < cycles
+        longest = max(_STEP_SECONDS, _STEP_SHARE * (now - self._changed_at) if is_moving else 0.0)
+        seconds = now - self._began
+        if cycles == self._step and seconds < longest / 2:
             self._step = min(2 * self._step, _MOST_CYCLES)
-        elif seconds > 2 * _STEP_SECONDS:
+        elif seconds > 2 * longest and not self._passes_frames:
             self._step = max(self._step // 2, _FEWEST_CYCLES)
+        if longest == _STEP_SECONDS:
+            self._short_step = self._step
 
     def _note(self, event: Event) -> None:
         if isinstance(event, Taken):

@@ -9,10 +9,14 @@ from types import TracebackType
 
 from fusesoc_firm.node.transport.dma_device import MappedRegisters, Registers, number_in
 from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.system.boards.overlay import STATUS_NAME
 from fusesoc_firm.system.status_frames import WRITE, answered, status_answer
 
+# The kind of the addresses of such registers.
+AXI = "axi"
 # Beyond the registers of the channel with the highest number.
 _MAP_BYTES = 2**16
+_DEVICES = "sys/class/uio"
 
 
 class StatusRegisters:
@@ -22,15 +26,23 @@ class StatusRegisters:
         self._registers = registers
         self._answers: deque[bytes] = deque()
 
+    def access(self, request: bytes) -> bytes:
+        """Return the answer to a request; any thread may call this method. May raise `TransportError`."""
+        asked = answered(request)
+        if asked is None:
+            raise TransportError("the frame is not a request of the status")
+        offset = asked[0] & ~WRITE
+        if offset >= _MAP_BYTES:
+            raise TransportError(f"the status has no register at {offset:#x}")
+        answer = status_answer(asked[0], self._registers.read(offset))
+        if asked[0] & WRITE:
+            self._registers.write(offset, asked[1])
+        return answer
+
     def send(self, frame: bytes) -> None:
         """Access the register of a request."""
-        if request := answered(frame):
-            offset = request[0] & ~WRITE
-            if offset >= _MAP_BYTES:
-                raise TransportError(f"the status has no register at {offset:#x}")
-            self._answers.append(status_answer(request[0], self._registers.read(offset)))
-            if request[0] & WRITE:
-                self._registers.write(offset, request[1])
+        if answered(frame):
+            self._answers.append(self.access(frame))
 
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next answer, or None without one."""
@@ -64,7 +76,7 @@ def open_registers(uio: str, root: Path = Path("/")) -> StatusRegisters:
     try:
         file = os.open(root / uio.lstrip("/"), os.O_RDWR | os.O_SYNC)
         try:
-            size = number_in(root / "sys/class/uio" / Path(uio).name / "maps/map0/size")
+            size = number_in(root / _DEVICES / Path(uio).name / "maps/map0/size")
             if size < _MAP_BYTES:
                 raise TransportError(f"{uio} has a map of {size} bytes; a status has {_MAP_BYTES}")
             return StatusRegisters(MappedRegisters(file, size))
@@ -72,3 +84,22 @@ def open_registers(uio: str, root: Path = Path("/")) -> StatusRegisters:
             os.close(file)
     except (OSError, ValueError) as error:
         raise TransportError(f"cannot use the status at {uio}: {error}") from None
+
+
+def open_registers_at(address: str, root: Path = Path("/")) -> StatusRegisters:
+    """Open the status at an address such as `axi:/dev/uio1`, or, for an empty one, at the UIO device of the overlay.
+
+    All paths begin with `root`. May raise `TransportError`.
+    """
+    kind, _, device = address.partition(":")
+    if address and not (kind == AXI and device):
+        raise TransportError(f"the status is '{address}'; legal: {AXI}:UIO, such as {AXI}:/dev/uio1")
+    return open_registers(device or _named_device(root), root)
+
+
+def _named_device(root: Path) -> str:
+    """Return the UIO device that the overlay of `firm system bring-up` names. May raise `TransportError`."""
+    for name in sorted((root / _DEVICES).glob("*/name")):
+        if name.read_text(encoding="utf-8", errors="replace").strip() == STATUS_NAME:
+            return f"/dev/{name.parent.name}"
+    raise TransportError(f"no UIO device is called {STATUS_NAME}; '--status {AXI}:UIO' names the device of the status")

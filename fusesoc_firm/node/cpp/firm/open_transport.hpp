@@ -65,6 +65,9 @@ struct TransportAddress {
   }
 };
 
+// Return whether the hardware at an address is a simulator. Throws TransportError for an illegal address.
+inline bool is_simulated(const std::string& address) { return TransportAddress::of(address).kind == "pipe"; }
+
 // Open the transport at an address. Throws TransportError, also for an illegal address.
 inline std::unique_ptr<Transport> open_transport(const std::string& address, TransportOptions options = {}) {
   const auto parts = TransportAddress::of(address);

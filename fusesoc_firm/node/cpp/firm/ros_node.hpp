@@ -30,6 +30,7 @@
 #include <firm/open_transport.hpp>
 #include <firm/services.hpp>
 #include <firm/status.hpp>
+#include <firm/status_registers.hpp>
 #include <firm/status_server.hpp>
 #include <firm/status_watch.hpp>
 #include <firm/topic.hpp>
@@ -56,7 +57,8 @@ struct System {
   unsigned subscriber_count;
   unsigned publisher_count;
   std::size_t queue_depth;
-  std::string digest;  // empty if the status is not read by frames
+  std::string digest;         // empty without a status
+  bool has_status_registers;  // the status is a port for AXI4-Lite; otherwise frames read it
   std::vector<Topic> subscribers;
   std::vector<Topic> publishers;
   Topic diagnostics;
@@ -64,6 +66,7 @@ struct System {
   Software software{};
   std::vector<Service> services{};
 
+  bool has_status_frames() const { return !digest.empty() && !has_status_registers; }
   bool has_software() const { return !software.inputs.empty(); }
 };
 
@@ -75,6 +78,7 @@ class UsageError : public std::runtime_error {
 
 struct NodeArguments {
   std::string transport;
+  std::string status;  // the address of the status' registers; empty: those that the overlay names
   std::string software;
   std::optional<std::size_t> depth;    // of all topics; nothing: each topic's own
   std::optional<bool> is_reliable;     // all topics; nothing: each topic's own
@@ -128,6 +132,8 @@ inline NodeArguments parse_arguments(const System& system, bool has_quality, int
     }
     if (option == "--transport") {
       arguments.transport = value();
+    } else if (option == "--status" && system.has_status_registers) {
+      arguments.status = value();
     } else if (option == "--software" && system.has_software()) {
       arguments.software = value();
     } else if (option == "--depth") {
@@ -159,6 +165,10 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
       << "usage: " << system.name << "_node --transport ADDRESS [OPTION ...] [ROS ARGUMENTS]\n\n"
       << "  --transport ADDRESS  the transport to the hardware: pipe:COMMAND (a simulator), uart:DEVICE:BAUD[:rtscts],\n"
       << "                       dma:UIO:BUFFER[:poll]\n";
+  if (system.has_status_registers) {
+    out << "  --status ADDRESS     the status registers, such as axi:/dev/uio1 (default on a board: the UIO device that\n"
+        << "                       the overlay names)\n";
+  }
   if (system.has_software()) {
     out << "  --software COMMAND   the command that runs the blocks in software, such as\n"
         << "                       'python3 -m fusesoc_firm.node.software_process SPECIFICATION'\n";
@@ -246,11 +256,15 @@ class Engines {
     }
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
-    configuration.has_status = !system.digest.empty();
+    configuration.has_status = system.has_status_frames();
     configuration.log = &std::cerr;
     configuration.trace = trace;
     if (!system.services.empty()) watch_calls(configuration);
-    hardware_ = std::make_unique<Node>(configuration, opener(system, arguments.transport), by_id(from_hardware_));
+    // A simulator's registers cannot be accessed.
+    if (system.has_status_registers && (!is_simulated(arguments.transport) || !arguments.status.empty())) {
+      registers_.emplace(arguments.status);
+    }
+    hardware_ = std::make_unique<Node>(configuration, opener(arguments.transport), by_id(from_hardware_));
     for (const auto& topic : system.publishers) {
       if (topic.id) from_hardware_.at(*topic.id) = publish_.at(topic.name);
     }
@@ -300,6 +314,13 @@ class Engines {
   Node& hardware() { return *hardware_; }
   Node* software() { return software_.get(); }
 
+  bool has_status() const { return system_.has_status_frames() || registers_.has_value(); }
+
+  // Return the answer of the status to a request. Throws TransportError.
+  Bytes access_status(const Bytes& request, std::chrono::nanoseconds patience) {
+    return registers_ ? registers_->access(request) : hardware_->access_status(request, patience);
+  }
+
   // Wait while work remains. Messages may alternate between hardware and software, and neither knows whether more will
   // follow.
   void settle(std::chrono::nanoseconds longest) const {
@@ -322,10 +343,15 @@ class Engines {
   }
 
   // Return a function that opens the hardware, and refuses that of another system.
-  static Node::Open opener(const System& system, const std::string& address) {
-    return [&system, address](const TransportOptions& options) {
+  Node::Open opener(const std::string& address) {
+    return [this, address](const TransportOptions& options) {
+      // Opening the transport would reset the hardware of another system.
+      if (registers_) check_digest(*registers_, system_.digest, system_.name);
       auto transport = open_transport(address, options);
-      if (!system.digest.empty()) check_digest(*transport, system.digest, system.name);
+      if (system_.has_status_frames()) {
+        StatusAccess access(*transport);
+        check_digest(access, system_.digest, system_.name);
+      }
       return transport;
     };
   }
@@ -344,6 +370,7 @@ class Engines {
   }
 
   const System& system_;
+  std::optional<StatusRegisters> registers_;  // if frames do not read the status
   const std::map<std::string, MessageHandler> publish_;
   std::vector<MessageHandler> from_hardware_;
   std::vector<MessageHandler> from_software_;
@@ -352,9 +379,9 @@ class Engines {
   NodeCalls calls_;  // after the nodes, as its threads use them
 };
 
-// Return the word of a register of an engine's hardware. Throws TransportError.
-inline std::uint32_t word_at(Node& node, std::uint32_t address) {
-  return little_endian(node.access_status(status_request(address, 0), std::chrono::seconds(1)), kFrameHeaderBytes + 4);
+// Return the word of a register of the hardware. Throws TransportError.
+inline std::uint32_t word_at(Engines& engines, std::uint32_t address) {
+  return little_endian(engines.access_status(status_request(address, 0), std::chrono::seconds(1)), kFrameHeaderBytes + 4);
 }
 
 // Print an engine's counts.
@@ -419,10 +446,10 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
   std::optional<StatusWatch> watch;
   std::optional<StatusServer> server;
-  if (!system.digest.empty()) {
-    const auto access = [&](const Bytes& request) { return engines.hardware().access_status(request); };
+  if (engines.has_status()) {
+    const auto access = [&](const Bytes& request) { return engines.access_status(request, std::chrono::seconds(5)); };
     server.emplace(served_names(system.name, arguments.transport), access, std::cerr);
-    watch.emplace([&](std::uint32_t address) { return word_at(engines.hardware(), address); }, system.channels);
+    watch.emplace([&](std::uint32_t address) { return word_at(engines, address); }, system.channels);
   }
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
   Diagnosis diagnosis(ros, system.diagnostics);

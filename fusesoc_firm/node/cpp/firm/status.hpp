@@ -73,11 +73,9 @@ class StatusAccess {
   std::uint32_t read(std::uint32_t address) { return access(address, 0); }
 
   // Write a word; return the word before. Throws TransportError if there is no answer.
-  std::uint32_t write(std::uint32_t address, std::uint32_t word) { return access(address | kWrite, word); }
+  std::uint32_t write(std::uint32_t address, std::uint32_t word) { return access(address | kStatusWrite, word); }
 
  private:
-  static constexpr std::uint32_t kWrite = 1u << 31;
-
   // Frames other than the answer are dropped.
   std::uint32_t access(std::uint32_t address, std::uint32_t word) {
     const Bytes request = status_request(address, word);
@@ -95,11 +93,12 @@ class StatusAccess {
   const std::chrono::nanoseconds patience_;
 };
 
-// Return the digest of the hardware's system, 32 hexadecimal digits. Throws TransportError.
-inline std::string read_digest(Transport& transport) {
+// Return the digest of the hardware's system, 32 hexadecimal digits. `access` reads registers: StatusAccess, or
+// StatusRegisters (firm/status_registers.hpp). Throws TransportError.
+template <typename Access>
+std::string read_digest(Access& access) {
   constexpr char kDigits[] = "0123456789abcdef";
   constexpr unsigned kWords = 4;
-  StatusAccess access(transport);
   std::string digest;
   for (unsigned number = kWords; number-- > 0;) {
     const std::uint32_t word = access.read(status_register::kDigest + 4 * number);
@@ -109,8 +108,9 @@ inline std::string read_digest(Transport& transport) {
 }
 
 // Throws TransportError if the hardware is not that of a system, whose digest is `expected`.
-inline void check_digest(Transport& transport, const std::string& expected, const std::string& system) {
-  const std::string found = read_digest(transport);
+template <typename Access>
+void check_digest(Access& access, const std::string& expected, const std::string& system) {
+  const std::string found = read_digest(access);
   if (found != expected) {
     throw TransportError("the hardware is not that of '" + system + "': its digest is " + found +
                          ", and the specification's is " + expected);
@@ -138,7 +138,7 @@ inline Status read_status(Transport& transport) {
   status.lost = access.read(at::kLost);
   status.has_time_stamps = access.read(at::kFeatures) & 1u;
   if (status.has_time_stamps) status.cycles = access.read(at::kCycles);
-  status.digest = read_digest(transport);
+  status.digest = read_digest(access);
   status.channels.resize(status.subscribers + status.publishers);
   std::uint32_t base = at::kChannels;
   for (auto& channel : status.channels) {

@@ -20,6 +20,9 @@ namespace firm {
 constexpr std::uint8_t kStatusId = 255;
 constexpr char kNoStatusAnswer[] = "the hardware did not answer: it has no status, or is stalled";
 
+// The bit of an address that requests a write.
+constexpr std::uint32_t kStatusWrite = 1u << 31;
+
 // The payload of requests and answers: an address and a word, little-endian.
 constexpr std::size_t kStatusPayloadBytes = 8;
 
