@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
-from fusesoc_firm.node import bridge
+from fusesoc_firm.node.bridge import channel as bridge
 from fusesoc_firm.node.description import NodeDescription, NodeTopic
 from fusesoc_firm.node.diagnostics import Report, diagnostics_payload, diagnostics_topic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
@@ -28,6 +28,8 @@ _INSTALLATION = {
     1: "on Debian, 'apt-get install python3-rospy python3-rosmaster' installs ROS 1",
     2: "'firm ros install' installs ROS 2 beside fusesoc-firm",
 }
+# The folder of the bridge, which Python runs.
+_BRIDGE = Path(bridge.__file__).parent
 _END_SECONDS = 5.0
 
 
@@ -160,7 +162,7 @@ class RosCarrier:
         # In a separate session, the bridge does not receive Ctrl-C: it must still publish the last responses.
         try:
             self._process = subprocess.Popen(
-                [self._python, bridge.__file__, str(its.fileno()), *arguments],
+                [self._python, str(_BRIDGE), str(its.fileno()), *arguments],
                 pass_fds=[its.fileno()],
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,
