@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware, middleware_of
-from fusesoc_firm.node.description import DEFAULT_DEPTH, NodeDescription, NodeTopic, channel_names, describe
+from fusesoc_firm.node.description import NodeDescription, channel_names, describe
 from fusesoc_firm.node.diagnostics import diagnostics_topic
 from fusesoc_firm.node.launch import LAUNCHERS, launch_file, package_name
 from fusesoc_firm.node.software_process import software_ports
+from fusesoc_firm.node.topics import DEFAULT_DEPTH, NodeTopic
 from fusesoc_firm.request.request import GeneratedFile
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail

@@ -12,6 +12,12 @@ from .ros import BridgeError
 # The capacity of the queues of services, in messages. Each client of ROS 2 receives the responses to all clients, so
 # the default of 10 is too few on a busy machine.
 SERVICE_DEPTH = 1000
+# The names of the parts of an action in rclpy.
+_ACTION_PARTS = {
+    "SendGoal": "SendGoalService",
+    "GetResult": "GetResultService",
+    "FeedbackMessage": "FeedbackMessage",
+}
 
 
 def message_class(name: str, word: str = "message") -> Any:
@@ -20,7 +26,11 @@ def message_class(name: str, word: str = "message") -> Any:
 
     package, kind, message = name.split("/")
     try:
-        return getattr(importlib.import_module(f"{package}.{kind}"), message)
+        found = importlib.import_module(f"{package}.{kind}")
+        if kind != "action":
+            return getattr(found, message)
+        action, _, part = message.rpartition("_")
+        return getattr(getattr(found, action).Impl, _ACTION_PARTS[part])
     except (ImportError, AttributeError):
         raise BridgeError(
             f"the {word} '{name}' is not installed for {sys.executable}; 'firm ros install {package}' or"
@@ -50,7 +60,8 @@ def _installed_hash(name: str) -> str:
 
     package, kind, word = name.split("/")
     try:
-        text = Path(get_package_share_directory(package), kind, f"{word}.json").read_text(encoding="utf-8")
+        file = word.partition("_")[0] if kind == "action" else word
+        text = Path(get_package_share_directory(package), kind, f"{file}.json").read_text(encoding="utf-8")
         hashes = json.loads(text)["type_hashes"]
     except (OSError, LookupError, ValueError):
         return ""
