@@ -7,7 +7,6 @@ belong to that call. The same holds for the calls that hardware makes.
 from __future__ import annotations
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -149,12 +148,10 @@ class CallLine:
     def _wait(self) -> Answer | None:
         """Return the answer to the call under way, or None if it does not come in time or the line is closed."""
         with self._changed:
-            ends = time.monotonic() + self._limit
-            while not (self._is_closed or self._answer) and (left := ends - time.monotonic()) > 0:
+            self._is_extended = True
+            while self._is_extended and not (self._is_closed or self._answer):
                 self._is_extended = False
-                self._changed.wait(left)
-                if self._is_extended:
-                    ends = time.monotonic() + self._limit
+                self._changed.wait_for(lambda: self._is_closed or self._answer or self._is_extended, self._limit)
             return self._answer
 
     def _wait_for_late(self) -> None:

@@ -32,6 +32,7 @@ CANCELED = {1: "PREEMPTED", 2: "CANCELED"}
 TRANSLATION = [
     ("    maxLength: 4096\n", ""),
     ("middleware: ROS", "middleware: ROS2"),
+    ("counter.vhd", "ros2/counter.vhd"),
     ("actionlib/TestActionGoal", "test_msgs/Fibonacci_SendGoal_Request"),
     ("goal.goal", "goal.order"),
     ("actionlib_msgs/GoalID", "action_msgs/GoalInfo"),
@@ -174,11 +175,11 @@ def check_counts(node: NodeProcess, **counts: int) -> None:
     assert re.search(f"{python}|{cpp}", node.said(), re.MULTILINE), node.said()
 
 
-@pytest.mark.parametrize("language", ["python"])
+@pytest.mark.parametrize("language", ["python", "cpp"])
 @pytest.mark.parametrize(
     "goals", [pytest.param(10, marks=pytest.mark.check), pytest.param(250, marks=pytest.mark.thorough)]
 )
-@pytest.mark.parametrize("where", ["model"])
+@pytest.mark.parametrize("where", ["model", "hardware"])
 def test_four_clients_at_once_get_their_own_results(place: Place, goals: int, language: str, where: str) -> None:
     """Each goal has its own number, feedback and result; some are canceled while the hardware holds them."""
     with place.node(language, getattr(place, where)) as node:
@@ -193,7 +194,7 @@ def test_four_clients_at_once_get_their_own_results(place: Place, goals: int, la
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("language", ["python"])
+@pytest.mark.parametrize("language", ["python", "cpp"])
 def test_goals_that_fail_are_rejected_or_aborted(place: Place, language: str) -> None:
     """Hardware rejects the frame of a goal, rejects the goal, gives up after feedback, or says nothing."""
     with place.node(language, place.model) as node:
@@ -213,7 +214,7 @@ def test_goals_that_fail_are_rejected_or_aborted(place: Place, language: str) ->
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("language", ["python"])
+@pytest.mark.parametrize("language", ["python", "cpp"])
 def test_a_client_that_dies_harms_nobody(place: Place, language: str) -> None:
     """A client is killed whose goal the hardware does not finish; the goal of the other one waits, and is reached."""
     with place.node(language, place.model) as node:
