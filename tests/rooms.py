@@ -33,12 +33,16 @@ def room_of(path: Path, package: Path) -> str:
 
 
 def imported_rooms(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """The line and room of each import from the package; a relative import counts as room '.'."""
+    """The line and room of each import from the package, except from the module's own folder.
+
+    A relative import that leaves the folder counts as room '.'.
+    """
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level:
-            yield node.lineno, "."
+            if node.level > 1:
+                yield node.lineno, "."
             continue
         elif isinstance(node, ast.ImportFrom) and node.module == NAME:
             names = [f"{NAME}.{alias.name}" for alias in node.names]

@@ -92,6 +92,7 @@ def _md5_of(text: str) -> str:
 def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
     """Return the hash of a ROS 2 message, service or action: `RIHS01_` and 64 hexadecimal digits.
 
+    With the kind of an action, `name` may also be one of its services, such as `Fibonacci_SendGoal`.
     `definitions` must contain the message, or the messages of the service or action, and all nested messages. Raise
     `KeyError` if one is missing.
     """
@@ -102,7 +103,8 @@ def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = In
         case InterfaceKind.SERVICE:
             top = describer.service(name, kind)
         case InterfaceKind.ACTION:
-            top = describer.action(name)
+            is_service = _suffixed(name, "_Request") in definitions
+            top = describer.service(name, kind) if is_service else describer.action(name)
     described = describer.descriptions
     description = {
         "type_description": described[top],

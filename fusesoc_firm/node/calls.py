@@ -63,6 +63,7 @@ class CallLine:
         self._answer: Answer | None = None
         self._is_final = self._is_late = False
         self._is_closed = False
+        self._is_extended = False
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -89,6 +90,12 @@ class CallLine:
             self._answer, self._is_final = answer, is_final
             self._changed.notify_all()
             return True
+
+    def extend(self) -> None:
+        """Give the call that is under way another `limit` seconds from now on."""
+        with self._changed:
+            self._is_extended = True
+            self._changed.notify_all()
 
     def rest(self) -> None:
         """Take note that nothing more follows from the hardware for a call that was given up."""
@@ -141,7 +148,10 @@ class CallLine:
     def _wait(self) -> Answer | None:
         """Return the answer to the call under way, or None if it does not come in time or the line is closed."""
         with self._changed:
-            self._changed.wait_for(lambda: self._is_closed or self._answer, self._limit)
+            self._is_extended = True
+            while self._is_extended and not (self._is_closed or self._answer):
+                self._is_extended = False
+                self._changed.wait_for(lambda: self._is_closed or self._answer or self._is_extended, self._limit)
             return self._answer
 
     def _wait_for_late(self) -> None:

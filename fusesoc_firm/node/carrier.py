@@ -14,12 +14,13 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
-from fusesoc_firm.node import bridge
-from fusesoc_firm.node.description import NodeDescription, NodeTopic
+from fusesoc_firm.node.bridge import channel as bridge
+from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.diagnostics import Report, diagnostics_payload, diagnostics_topic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.ros_wheels import ros_python
 from fusesoc_firm.node.services import NodeService
+from fusesoc_firm.node.topics import NodeTopic
 
 # For each version of ROS, a module that only the Python with that version can import.
 _MODULES = {1: "rospy", 2: "rclpy"}
@@ -28,6 +29,8 @@ _INSTALLATION = {
     1: "on Debian, 'apt-get install python3-rospy python3-rosmaster' installs ROS 1",
     2: "'firm ros install' installs ROS 2 beside fusesoc-firm",
 }
+# The folder of the bridge, which Python runs.
+_BRIDGE = Path(bridge.__file__).parent
 _END_SECONDS = 5.0
 
 
@@ -160,7 +163,7 @@ class RosCarrier:
         # In a separate session, the bridge does not receive Ctrl-C: it must still publish the last responses.
         try:
             self._process = subprocess.Popen(
-                [self._python, bridge.__file__, str(its.fileno()), *arguments],
+                [self._python, str(_BRIDGE), str(its.fileno()), *arguments],
                 pass_fds=[its.fileno()],
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,
@@ -179,9 +182,9 @@ class RosCarrier:
             "ros": ros,
             "name": options.name,
             "is_timed": options.is_timed,
-            "subscribers": _numbered(ros, description.subscribers, options),
-            "publishers": _numbered(ros, description.publishers, options),
-            "services": _services(ros, description.services),
+            "subscribers": _numbered(ros, description.taken_topics, len(description.subscribers), options),
+            "publishers": _numbered(ros, description.given_topics, len(description.publishers), options),
+            "services": _services(ros, description.all_services),
             "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
@@ -285,10 +288,15 @@ def _event_of_service(parcel: bridge.Parcel) -> Called | Answered:
     return Answered(parcel.topic, number, Answer(payload, reason))
 
 
-def _numbered(ros: int, topics: Sequence[NodeTopic], options: RosOptions) -> list[dict[str, object]]:
+def _numbered(ros: int, topics: Sequence[NodeTopic], blocks: int, options: RosOptions) -> list[dict[str, object]]:
+    """Return the topics of a version of ROS with their numbers; the options concern the first ones, those of blocks."""
     given = {"depth": options.depth, "is_reliable": options.is_reliable}
     common = {name: value for name, value in given.items() if value is not None}
-    return [{"number": number, **asdict(topic), **common} for number, topic in enumerate(topics) if topic.ros == ros]
+    return [
+        {"number": number, **asdict(topic), **(common if number < blocks else {})}
+        for number, topic in enumerate(topics)
+        if topic.ros == ros
+    ]
 
 
 def _services(ros: int, services: Sequence[NodeService]) -> list[dict[str, object]]:

@@ -9,15 +9,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware, middleware_of
-from fusesoc_firm.node.description import DEFAULT_DEPTH, NodeDescription, NodeTopic, channel_names, describe
+from fusesoc_firm.node.action_types import NodeAction
+from fusesoc_firm.node.description import NodeDescription, channel_names, describe
 from fusesoc_firm.node.diagnostics import diagnostics_topic
 from fusesoc_firm.node.launch import LAUNCHERS, launch_file, package_name
+from fusesoc_firm.node.services import NodeService
 from fusesoc_firm.node.software_process import software_ports
+from fusesoc_firm.node.topics import DEFAULT_DEPTH, NodeTopic
 from fusesoc_firm.request.request import GeneratedFile
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
@@ -84,8 +88,8 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
     version = _only_version(description, ros)
     dialect = _DIALECTS[version]
     package = package_name(description)
-    types = [topic.type for topic in (*description.subscribers, *description.publishers)]
-    types += [service.type for service in description.services]
+    types = [topic.type for topic in (*description.taken_topics, *description.given_topics)]
+    types += [service.type for service in description.all_services]
     packages = {"diagnostic_msgs"} | {name.partition("/")[0] for name in types}
     build = {
         "package": package,
@@ -161,7 +165,9 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "diagnostics": _row(diagnostics_topic(description.versions[0])),
         "channels": channel_names(description) if description.digest else [],
         "software": _software(loaded, description),
-        "services": [*_services(description)],
+        "has_services": bool(description.services or description.actions),
+        "services": [*map(partial(_service, description), description.services)],
+        "actions": [*map(partial(_action, description), description.actions)],
     }
 
 
@@ -169,8 +175,8 @@ def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, A
     """Return the ends of messages to and from blocks in software, or None if no such block runs on this host."""
     ports = software_ports(loaded.system)
     if not ports.inputs:
-        # The services of the table are after the software.
-        return {"inputs": [], "outputs": []} if description.services else None
+        # The services and actions of the table are after the software.
+        return {"inputs": [], "outputs": []} if description.services or description.actions else None
     topics = {topic.block: topic.name for topic in (*description.subscribers, *description.publishers)}
     leaving = {crossing.block: crossing.id for crossing in description.leaving}
     entering = {crossing.block: crossing.id for crossing in description.entering}
@@ -180,22 +186,48 @@ def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, A
     }
 
 
-def _services(description: NodeDescription) -> Iterator[dict[str, Any]]:
-    """Yield the rows of services; a failure is a list of bytes."""
-    ids = {item.block: item.id for item in (*description.entering, *description.leaving)}
-    for item in description.services:
-        yield {
-            "is_server": _word(item.is_server),
-            "request": ids[item.request],
-            "response": ids[item.response],
-            "name": item.name,
-            "type": item.type,
-            "signature": item.signature,
-            "request_type": item.request_type,
-            "response_type": item.response_type,
-            "milliseconds": ceil(item.time_limit * 1000),
-            "failure": ", ".join(map(str, item.failure)),
-        }
+def _service(description: NodeDescription, item: NodeService) -> dict[str, Any]:
+    """Return the row of a service; a failure is a list of bytes."""
+    ids = _ids(description)
+    return {
+        "is_server": _word(item.is_server),
+        "request": ids[item.request],
+        "response": ids[item.response],
+        "name": item.name,
+        "type": item.type,
+        "signature": item.signature,
+        "request_type": item.request_type,
+        "response_type": item.response_type,
+        "milliseconds": _milliseconds(item.time_limit),
+        "failure": _bytes(item.failure),
+    }
+
+
+def _action(description: NodeDescription, item: NodeAction) -> dict[str, Any]:
+    """Return the row of an action."""
+    ids = _ids(description)
+    return {
+        **{end: ids[getattr(item, end)] for end in ("goal", "cancel", "feedback", "result")},
+        "name": item.name,
+        "subscribers": [*map(_row, item.subscribers)],
+        "publishers": [*map(_row, item.publishers)],
+        "services": [*map(partial(_service, description), item.services)],
+        "limit": _milliseconds(item.time_limit),
+        "accept_limit": _milliseconds(item.accept_limit),
+        "no_result": _bytes(item.no_result),
+    }
+
+
+def _ids(description: NodeDescription) -> dict[str, int]:
+    return {item.block: item.id for item in (*description.entering, *description.leaving)}
+
+
+def _milliseconds(seconds: float) -> int:
+    return ceil(seconds * 1000)
+
+
+def _bytes(payload: bytes) -> str:
+    return ", ".join(map(str, payload))
 
 
 def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) -> dict[str, str]:
@@ -206,7 +238,7 @@ def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) 
 
 def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
     """Yield the definition text of each message once; a ROS 2 message has no text."""
-    topics = (*description.subscribers, *description.publishers, diagnostics_topic(description.versions[0]))
+    topics = (*description.taken_topics, *description.given_topics, diagnostics_topic(description.versions[0]))
     texts = {topic.type: topic.definition for topic in topics}
     for name, text in texts.items():
         if text:

@@ -9,50 +9,18 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 from fusesoc_firm.message import ROS1, ROS2
-from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import Definitions, MessageName, MessageType
-from fusesoc_firm.message.printer import closure_text
-from fusesoc_firm.message.signature import signature
+from fusesoc_firm.node.action_types import NodeAction, node_action
 from fusesoc_firm.node.services import NodeService, node_service
+from fusesoc_firm.node.topics import NodeTopic, node_topic
 from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere, way_to
-from fusesoc_firm.system.derived.model import Converter, Quality, StatusAccess, Topic
+from fusesoc_firm.system.derived.model import Converter, StatusAccess, Topic
 from fusesoc_firm.system.system_core import LoadedSystem, identity, refuse_network
 from fusesoc_firm.text.diagnostics import fail
-
-_HEADER = MessageType(MessageName("std_msgs", "Header"))
-# The capacity, in messages, of a queue without a topic, and of a topic's queues without `qos`.
-DEFAULT_DEPTH = Quality().depth
-
-
-@dataclass(frozen=True)
-class NodeTopic:
-    """A topic of a node.
-
-    `block` is the block in the specification, and `id` is the converter's id, if there is a converter.
-
-    A relative `name` is resolved in the node's namespace. `depth` is the capacity of the topic's queues in messages.
-    With `is_numbered`, a message begins with its publisher's count, since its first field is a Header of ROS 1.
-    `signature` is the definition's signature: the MD5 sum for
-    ROS 1, the RIHS01 hash for ROS 2. `definition` is the definition's text with the texts of all nested messages; only
-    ROS 1 announces it.
-    """
-
-    block: str
-    name: str
-    type: str
-    ros: int
-    signature: str
-    id: int | None = None
-    definition: str = ""
-    is_reliable: bool = True
-    is_transient_local: bool = False
-    depth: int = DEFAULT_DEPTH
-    is_numbered: bool = False
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """A converter with an id but without a topic: of software on this host, or of a service."""
+    """A converter with an id but without a topic: of software on this host, of a service or of an action."""
 
     block: str
     id: int
@@ -63,12 +31,12 @@ class NodeDescription:
     """A system from its node's view.
 
     The node takes messages from the topics of `subscribers` and publishes messages on the topics of `publishers`.
-    Software on this host, and the clients and servers of `services`, send to the hardware through `entering` and
-    receive from the hardware through `leaving`. For
-    each publisher in hardware, `sources` lists the ids of the subscribers whose messages cause the publisher's
-    messages. `longest_payload` is the size in bytes of the longest payload from any publisher, or None without a bound.
-    `clock_hz` is None if the specification has no clock. `digest` is that of the hardware's identity, or empty if the
-    hardware has no status. With `has_status_registers`, the status is a port for AXI4-Lite; otherwise frames read it.
+    Software on this host, and the ends of `services` and `actions`, send to the hardware through `entering` and receive
+    from the hardware through `leaving`. For each publisher in hardware, `sources` lists the ids of the subscribers
+    whose messages cause the publisher's messages. `longest_payload` is the size in bytes of the longest payload from
+    any publisher, or None without a bound. `clock_hz` is None if the specification has no clock. `digest` is that of
+    the hardware's identity, or empty if the hardware has no status. With `has_status_registers`, the status is a port
+    for AXI4-Lite; otherwise frames read it.
     """
 
     name: str
@@ -82,7 +50,23 @@ class NodeDescription:
     clock_hz: float | None = None
     digest: str = ""
     services: tuple[NodeService, ...] = ()
+    actions: tuple[NodeAction, ...] = ()
     has_status_registers: bool = False
+
+    @property
+    def taken_topics(self) -> tuple[NodeTopic, ...]:
+        """All topics that the node subscribes to, in the order of their numbers; those of actions are last."""
+        return (*self.subscribers, *(topic for action in self.actions for topic in action.subscribers))
+
+    @property
+    def given_topics(self) -> tuple[NodeTopic, ...]:
+        """All topics that the node publishes, in the order of their numbers; those of actions are last."""
+        return (*self.publishers, *(topic for action in self.actions for topic in action.publishers))
+
+    @property
+    def all_services(self) -> tuple[NodeService, ...]:
+        """All services of the node, in the order of their numbers; those of actions are last."""
+        return (*self.services, *(service for action in self.actions for service in action.services))
 
     @property
     def has_status_frames(self) -> bool:
@@ -101,9 +85,9 @@ class NodeDescription:
 
     @property
     def versions(self) -> tuple[int, ...]:
-        """The versions of ROS to which the topics and services belong."""
-        topics = (*self.subscribers, *self.publishers)
-        return tuple(sorted({topic.ros for topic in topics} | {item.ros for item in self.services}))
+        """The versions of ROS to which the topics, services and actions belong."""
+        used = (*self.taken_topics, *self.given_topics, *self.all_services)
+        return tuple(sorted({item.ros for item in used}))
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:
@@ -139,6 +123,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         None if system.clock is None else float(system.clock),
         identity(loaded).digest if system.status else "",
         tuple(node_service(item, loaded) for item in system.services),
+        tuple(node_action(item, loaded) for item in system.actions),
         system.status is StatusAccess.AXI_LITE,
     )
 
@@ -190,24 +175,3 @@ def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
         is_transient_local=topic.quality.is_transient_local,
         depth=topic.quality.depth,
     )
-
-
-def node_topic(block: str, topic: str, name: MessageName, library: MessageLibrary) -> NodeTopic:
-    """Return a topic with a message of the library, without a converter."""
-    definitions = library.closure(name)
-    is_first = library.ros is ROS1
-    return NodeTopic(
-        block,
-        topic,
-        str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
-        library.ros.number,
-        signature(name, definitions),
-        definition=closure_text(name, definitions) if is_first else "",
-        is_numbered=is_first and _begins_with_header(name, definitions),
-    )
-
-
-def _begins_with_header(name: MessageName, definitions: Definitions) -> bool:
-    """Return whether a message begins with the field `header`, in whose first bytes ROS 1 numbers messages."""
-    fields = definitions[name].fields
-    return bool(fields) and (fields[0].name, fields[0].type) == ("header", _HEADER)

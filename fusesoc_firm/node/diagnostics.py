@@ -13,7 +13,7 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.node.description import NodeTopic, node_topic
+from fusesoc_firm.node.topics import NodeTopic, node_topic
 
 NAME = "/diagnostics"
 INTERVAL_SECONDS = 1.0

@@ -21,14 +21,13 @@ from functools import partial
 from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.node.actions import NodeActions
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.calls import NodeCalls
 from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Lost, Published, Taken
 from fusesoc_firm.node.description import (
-    DEFAULT_DEPTH,
     Crossing,
     NodeDescription,
-    NodeTopic,
     channel_names,
     converter_names,
 )
@@ -38,6 +37,7 @@ from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.statistics import Statistics
 from fusesoc_firm.node.status import StatusWatch
 from fusesoc_firm.node.status_exchange import ANSWER_SECONDS, NO_ANSWER, StatusExchange
+from fusesoc_firm.node.topics import DEFAULT_DEPTH, NodeTopic
 from fusesoc_firm.node.trace import Entry, Trace
 from fusesoc_firm.node.transport.status_registers import StatusRegisters
 from fusesoc_firm.node.transport.transport import (
@@ -126,7 +126,8 @@ class Node:
         """Open the transport. May raise `TransportError`."""
         self._report = _Reporter(settings.report)
         self._calls = NodeCalls(description.services, self._put_service_message, self._report)
-        self.statistics = Statistics.of(description, self._calls.counts)
+        self._actions = NodeActions(description, self._put_service_message, self._report)
+        self.statistics = Statistics.of(description, self._calls.counts, self._actions.counts)
         self._description = description
         self._open_transport = open_transport
         self._settings = settings
@@ -179,6 +180,7 @@ class Node:
         """
         self._carriers = carriers
         self._calls.start(carriers)
+        self._actions.start(carriers)
         # One carrier may have the topics of several versions.
         takers = [self._start(partial(self._take, carrier)) for carrier in dict.fromkeys(carriers.values())]
         sender, receiver = self._start(self._send), self._start(self._receive)
@@ -193,6 +195,7 @@ class Node:
         receiver.join(_left(latest))
         self._queues.close()
         self._calls.close()
+        self._actions.close()
         self.close()
         for thread in (sender, receiver, *takers):
             # A thread that receives messages ends with its carrier, which the caller closes.
@@ -286,12 +289,13 @@ class Node:
                 if isinstance(event, Published):
                     self._note_published(event)
                 elif isinstance(event, Lost):
-                    self.statistics.inputs[self._inputs[event.topic].block].lost += event.count
+                    self._note_lost(event)
                 elif isinstance(event, Called):
-                    self._calls.called(event)
+                    if not self._actions.called(event):
+                        self._calls.called(event)
                 elif isinstance(event, Answered):
                     self._calls.answered(event)
-                else:
+                elif not self._actions.taken(event):
                     self._take_message(event)
         except CarrierError as error:
             self._fail(error)
@@ -300,11 +304,16 @@ class Node:
             return
         self.stop()
 
+    def _note_lost(self, event: Lost) -> None:
+        # The messages of actions have no input of their own.
+        topic = self._description.taken_topics[event.topic]
+        self.statistics.inputs[topic.block].lost += event.count
+
     def _take_message(self, taken: Taken) -> None:
         self._put(taken.topic, taken.payload, taken.time_ns, None)
 
     def _put_service_message(self, block: str, payload: bytes) -> None:
-        """Send a message of a service to the hardware."""
+        """Send a message of a service or an action to the hardware."""
         self._put(self._numbers[block], payload, time.monotonic_ns(), None)
 
     def _put(self, number: int, payload: bytes, received_ns: int, timeout: float | None) -> None:
@@ -423,10 +432,11 @@ class Node:
                 return
             elif not self._waiting() and hardware.transport.is_at_rest():
                 self._calls.rest()
+                self._actions.rest()
 
     def _is_at_rest(self, hardware: _Hardware) -> bool:
         """Return whether all messages have been processed, as far as the transport can know."""
-        if self._waiting() or hardware.joiner.unfinished or not self._calls.is_idle:
+        if self._waiting() or hardware.joiner.unfinished or not (self._calls.is_idle and self._actions.is_idle):
             return False
         is_silent = time.monotonic() - self._last_traffic > self._settings.settle
         return is_silent and hardware.transport.is_at_rest() is not False
@@ -458,7 +468,11 @@ class Node:
         """Let the call fail whose response had a fault, if the burst belongs to a response."""
         block = self._publisher_names.get(burst.data[0]) if burst.data else None
         if block is not None:
-            self._calls.refuse(block, reason)
+            self._refuse(block, reason)
+
+    def _refuse(self, block: str, reason: str) -> None:
+        self._calls.refuse(block, reason)
+        self._actions.refuse(block, reason)
 
     def _deliver(self, frame: JoinedFrame, cycles: tuple[int, int] | None) -> None:
         block = self._publisher_names[frame.id]
@@ -470,7 +484,7 @@ class Node:
             self._record(self._watch, block, frame.payload, cause, cycles)
         if block in self._topics:
             self._publish(block, frame.payload)
-        elif not self._calls.take(block, frame.payload):
+        elif not (self._calls.take(block, frame.payload) or self._actions.take(block, frame.payload)):
             self._run_software(block, frame.payload)
 
     def _record(
@@ -493,7 +507,7 @@ class Node:
             self.statistics.outputs[block].published += 1
 
     def _note_published(self, event: Published) -> None:
-        publisher = self._description.publishers[event.topic].id
+        publisher = self._description.given_topics[event.topic].id
         if self._trace and publisher is not None:
             self._trace.published(publisher, event.time_ns)
 
@@ -510,7 +524,7 @@ class Node:
             block = self._subscriber_names[converter]
             self.statistics.inputs[block].refused += 1
             self._report(f"the hardware rejected a malformed message from '{block}'")
-            self._calls.refuse(block, "the hardware rejected the request")
+            self._refuse(block, "the hardware rejected the request")
             if self._trace:
                 self._trace.refused(converter)
         else:
@@ -547,6 +561,7 @@ class Node:
             self._trace.forget()
         self._hardware = _Hardware(transport, self._description)
         self._calls.forget("the hardware was restarted")
+        self._actions.forget("the hardware was restarted")
 
 
 class _Reporter:

@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from fusesoc_firm.node.description import DEFAULT_DEPTH
 from fusesoc_firm.node.queues import Overflow
+from fusesoc_firm.node.topics import DEFAULT_DEPTH
 from fusesoc_firm.system.written.specification import RELIABILITIES
 
 ROS_ARGUMENTS = "--ros-args"

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.action_types import NodeAction
+from fusesoc_firm.node.description import NodeDescription, describe
 from fusesoc_firm.node.launch import LAUNCHERS, launch_file, package_name
 from fusesoc_firm.node.services import NodeService
+from fusesoc_firm.node.topics import NodeTopic
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import identifier
@@ -57,8 +59,8 @@ def _package(description: NodeDescription, ros: int, script: str, *, is_linked: 
     """Return the files that make the node a package; `is_linked` if the node must stay beside other files."""
     build_tool, library, cmake = _BUILDS[ros]
     package = package_name(description)
-    types = [topic.type for topic in (*description.subscribers, *description.publishers) if topic.ros == ros]
-    types += [service.type for service in description.services if service.ros == ros]
+    types = [topic.type for topic in (*description.taken_topics, *description.given_topics) if topic.ros == ros]
+    types += [service.type for service in description.all_services if service.ros == ros]
     messages = {"diagnostic_msgs", *(name.partition("/")[0] for name in types)} if ros == 2 else set()
     build = {
         "package": package,
@@ -77,7 +79,7 @@ def _package(description: NodeDescription, ros: int, script: str, *, is_linked: 
 
 
 def _table(description: NodeDescription) -> dict[str, Any]:
-    topics = (*description.subscribers, *description.publishers)
+    topics = (*description.taken_topics, *description.given_topics)
     definitions = {topic.type: topic.definition for topic in topics if topic.definition}
     return {
         "name": description.name,
@@ -96,6 +98,8 @@ def _table(description: NodeDescription) -> dict[str, Any]:
         "digest": description.digest,
         "has_status_registers": description.has_status_registers,
         "services": [*map(_service, description.services)],
+        "has_services": bool(description.all_services),
+        "actions": [*map(_action, description.actions)],
     }
 
 
@@ -118,6 +122,16 @@ def _topic(topic: NodeTopic) -> dict[str, Any]:
 def _service(service: NodeService) -> dict[str, Any]:
     values = ("ros", "is_server", "time_limit", "failure")
     return {name: repr(value) if name in values else str(value) for name, value in asdict(service).items()}
+
+
+def _action(action: NodeAction) -> dict[str, Any]:
+    return {
+        **{name: str(getattr(action, name)) for name in ("block", "name", "goal", "cancel", "feedback", "result")},
+        **{name: repr(getattr(action, name)) for name in ("ros", "time_limit", "accept_limit", "no_result")},
+        "subscribers": [*map(_topic, action.subscribers)],
+        "publishers": [*map(_topic, action.publishers)],
+        "services": [*map(_service, action.services)],
+    }
 
 
 def _constant(message: str) -> str:

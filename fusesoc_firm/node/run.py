@@ -114,10 +114,25 @@ def run_node(
 
 def _topics(carrier: RosCarrier, description: NodeDescription) -> str:
     """Return a text for the user that lists a running node's topics."""
-    taken = [f"  {name} -> {description.subscribers[number].block}" for number, name in carrier.subscribers.items()]
-    given = [f"  {description.publishers[number].block} -> {name}" for number, name in carrier.publishers.items()]
-    called = [_service(name, description.services[number]) for number, name in carrier.services.items()]
-    return "\n".join([f"{description.name} is a node of {carrier.title}", *taken, *given, *called])
+    taken, given, called = carrier.subscribers.items(), carrier.publishers.items(), carrier.services.items()
+    known = description.subscribers, description.publishers, description.services
+    lines = [
+        *(f"  {name} -> {known[0][number].block}" for number, name in taken if number < len(known[0])),
+        *(f"  {known[1][number].block} -> {name}" for number, name in given if number < len(known[1])),
+        *(_service(name, known[2][number]) for number, name in called if number < len(known[2])),
+        *_actions(carrier, description),
+    ]
+    return "\n".join([f"{description.name} is a node of {carrier.title}", *lines])
+
+
+def _actions(carrier: RosCarrier, description: NodeDescription) -> Iterator[str]:
+    """Yield a line for each action; the name of one of its topics or services begins with its name."""
+    topic, service = len(description.subscribers), len(description.services)
+    for action in description.actions:
+        name = carrier.subscribers.get(topic) if action.subscribers else carrier.services.get(service)
+        topic, service = topic + len(action.subscribers), service + len(action.services)
+        if name:
+            yield f"  action {name.removesuffix('/goal').removesuffix('/_action/send_goal')} -> {action.block}"
 
 
 def _service(name: str, service: NodeService) -> str:

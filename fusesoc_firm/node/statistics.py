@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 
+from fusesoc_firm.node.actions import GoalCounts
 from fusesoc_firm.node.calls import CallCounts
 from fusesoc_firm.node.description import NodeDescription
 
@@ -37,6 +38,7 @@ class Statistics:
     inputs: dict[str, Input] = field(default_factory=dict)
     outputs: dict[str, Output] = field(default_factory=dict)
     services: Mapping[str, CallCounts] = field(default_factory=dict)
+    actions: Mapping[str, GoalCounts] = field(default_factory=dict)
     faults: int = 0
     software_faults: int = 0
     restarts: int = 0
@@ -44,12 +46,18 @@ class Statistics:
     """messages in queues, and incomplete frames, when the time limit for ending expired"""
 
     @classmethod
-    def of(cls, description: NodeDescription, services: Mapping[str, CallCounts] | None = None) -> Statistics:
-        """Return the statistics of a node with all counts at zero; `services` are those of its services."""
+    def of(
+        cls,
+        description: NodeDescription,
+        services: Mapping[str, CallCounts] | None = None,
+        actions: Mapping[str, GoalCounts] | None = None,
+    ) -> Statistics:
+        """Return the statistics of a node with all counts at zero, with those of its services and actions."""
         return cls(
             {item.block: Input() for item in description.inputs},
             {item.block: Output() for item in description.outputs},
             services or {},
+            actions or {},
         )
 
     def counts(self, dropped: Mapping[str, int]) -> dict[str, int]:
@@ -60,15 +68,16 @@ class Statistics:
             found |= {f"{name} sent": item.sent, f"{name} refused": item.refused, f"{name} lost": item.lost}
         for name, output in self.outputs.items():
             found |= {f"{name} frames": output.frames, f"{name} published": output.published}
-        for name, calls in self.services.items():
-            found |= {f"{name} {count}": value for count, value in asdict(calls).items()}
+        for name, counts in (*self.services.items(), *self.actions.items()):
+            found |= {f"{name} {count}": value for count, value in asdict(counts).items()}
         return found | {"faults": self.faults, "faults in software": self.software_faults, "restarts": self.restarts}
 
     def troubles(self) -> int:
-        """Return the number of messages that were dropped, lost or refused, of failed calls, faults and restarts."""
+        """Return the number of dropped, lost and refused messages, of failed calls and goals, faults and restarts."""
         inputs = sum(item.dropped + item.refused + item.lost for item in self.inputs.values())
         calls = sum(item.failed + item.unasked for item in self.services.values())
-        return inputs + calls + self.faults + self.software_faults + self.restarts
+        goals = sum(item.aborted + item.rejected + item.unasked for item in self.actions.values())
+        return inputs + calls + goals + self.faults + self.software_faults + self.restarts
 
     def text(self) -> str:
         """Return the counts as a table for the user."""
@@ -85,7 +94,14 @@ class Statistics:
             (name, *map(str, (item.called, item.answered, item.failed, item.unasked)), "")
             for name, item in self.services.items()
         ]
+        if self.actions:
+            rows.append(("action", "goals", "succeeded", "canceled", "aborted", "rejected"))
+        rows += [
+            (name, *map(str, (item.goals, item.succeeded, item.canceled, item.aborted, item.rejected)))
+            for name, item in self.actions.items()
+        ]
         notes = {
+            "feedback and results for no goal": sum(item.unasked for item in self.actions.values()),
             "faults on the route from the hardware": self.faults,
             "faults in software": self.software_faults,
             "restarts": self.restarts,

@@ -44,6 +44,7 @@ from fusesoc_firm.system.boards.board import (
     read_board,
 )
 from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
+from fusesoc_firm.system.derived.actions import with_actions
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
@@ -151,6 +152,7 @@ def load_system(
     needed = Libraries({ros: partial(libraries.__getitem__, ros) for ros in libraries if ros in spoken})
     libraries = with_paths(needed, own, path.parent, core_folders, faults)
     specification = with_services(specification, libraries, faults)
+    specification = with_actions(specification, libraries, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system, None, faults.warnings)
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.node.bridge import MESSAGE, Channel, Ends
+from fusesoc_firm.node.bridge.channel import MESSAGE, Channel
+from fusesoc_firm.node.bridge.ros import Ends
 from fusesoc_firm.node.carrier import CarrierError, RosCarrier, RosOptions
 from fusesoc_firm.node.description import NodeDescription
 

@@ -9,7 +9,10 @@ from types import SimpleNamespace
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.node import bridge, carrier, ros_wheels
+from fusesoc_firm.node import carrier, ros_wheels
+from fusesoc_firm.node.bridge.ros import BridgeError
+from fusesoc_firm.node.bridge.ros1 import _warn_without_master
+from fusesoc_firm.node.bridge.ros2_types import message_class
 from fusesoc_firm.node.carrier import CarrierError
 from fusesoc_firm.text.diagnostics import InputError
 
@@ -74,8 +77,8 @@ def test_a_missing_ros_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_a_missing_message_package_is_reported() -> None:
-    with pytest.raises(bridge.BridgeError, match="'firm ros install no_such_msgs' or 'apt-get install"):
-        bridge._message_class("no_such_msgs/msg/Thing")
+    with pytest.raises(BridgeError, match="'firm ros install no_such_msgs' or 'apt-get install"):
+        message_class("no_such_msgs/msg/Thing")
 
 
 @pytest.mark.parametrize("is_online", [True, False])
@@ -85,6 +88,6 @@ def test_a_missing_master_is_reported(
     uri = "http://localhost:11311"
     fake = SimpleNamespace(is_master_online=lambda: is_online, get_master_uri=lambda: uri)
     monkeypatch.setitem(sys.modules, "rosgraph", fake)
-    bridge._warn_without_master()
+    _warn_without_master()
     said = capsys.readouterr().err
     assert said == "" if is_online else f"waiting for the ROS master at {uri}; start it in another terminal" in said

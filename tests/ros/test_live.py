@@ -377,7 +377,7 @@ def test_ros_kills_or_loses_the_node(place: Place) -> None:
     """The process that is the node in ROS is killed: ours says so, and ends."""
     with place.echo() as node:
         node.wait_until_ready()
-        node.kill_child("bridge.py")
+        node.kill_child("node/bridge")
         assert node.wait() == 1
         assert f"the process for ROS {place.ros.version} ({place.ros.python}) has ended" in node.said()
 

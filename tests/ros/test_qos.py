@@ -150,7 +150,7 @@ def stopped(node: NodeProcess) -> Iterator[None]:
     """The process that speaks to ROS does nothing within this context."""
     number = node.process.pid
     if isinstance(node, LiveNode):
-        (number,) = [found for line, found in node.children().items() if "bridge.py" in line]
+        (number,) = [found for line, found in node.children().items() if "node/bridge" in line]
     os.kill(number, signal.SIGSTOP)
     try:
         yield

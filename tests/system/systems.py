@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.system.derived.actions import with_actions
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.derived.services import with_services
@@ -58,7 +59,7 @@ def read(folder: Path, text: str) -> tuple[Specification, Diagnostics]:
 
 def derived(folder: Path, text: str) -> DerivedSystem:
     found, faults = read(folder, text)
-    return derive(with_services(found, LIBRARIES, faults), folder, LIBRARIES, faults)
+    return derive(with_actions(with_services(found, LIBRARIES, faults), LIBRARIES, faults), folder, LIBRARIES, faults)
 
 
 _INSTANCE = re.compile(

@@ -19,6 +19,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.derived.actions import actions_of
 from fusesoc_firm.system.derived.bypass import with_bypass
 from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.connections import Wiring, places
@@ -86,7 +87,7 @@ def derive(
 ) -> DerivedSystem:
     """Derive the system of a specification in `folder`; unless `needs_sources` is set, source files may be missing.
 
-    `with_services` has replaced the servers and clients of the specification.
+    `with_services` and `with_actions` have replaced the servers and clients of the specification.
     Raise `InputError` with the faults found here and the faults already in `faults`.
     """
     analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
@@ -99,6 +100,7 @@ def derive(
     check_topics(analysis.topic_uses(names), faults)
     parts = analysis.parts(analysis.wiring().connect(), names)
     services = services_of(analysis.blocks, parts, faults)
+    actions = actions_of(analysis.blocks, parts, faults)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
     faults.raise_if_any()
     parts.check(analysis.blocks, specification.project.id_bytes, faults)
@@ -139,6 +141,7 @@ def derive(
         network=network,
         watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),
         services=services,
+        actions=actions,
     )
     check_entities(system, parts.blocks, faults)
     faults.raise_if_any()

@@ -91,7 +91,7 @@ class Converter(Topic):
 
     With `has_default_length`, `max_length` is a default, since neither bounds nor the specification limit the payload.
     A publisher's `late_bytes` are stored in a FIFO while its frames are late (section 6.3.2). If the converter carries
-    the requests or responses of a service, `service` is the block of the service.
+    messages of a service or an action, `service` is the block of that.
     """
 
     id: int
@@ -131,6 +131,26 @@ class Service:
     request: str
     response: str
     time_limit: float
+
+
+@dataclass(frozen=True)
+class Action:
+    """An action that a system serves: `block` is its block in the specification, `type` is the action's name.
+
+    `goal`, `cancel`, `feedback` and `result` are the blocks of the converters. `time_limit` seconds after the hardware
+    last sent something about a goal, the goal fails. After `accept_limit` seconds, a goal is accepted in any case.
+    """
+
+    block: str
+    type: MessageName
+    ros: Middleware
+    ros_name: str
+    goal: str
+    cancel: str
+    feedback: str
+    result: str
+    time_limit: float
+    accept_limit: float
 
 
 class LengthSource(Enum):
@@ -365,7 +385,7 @@ class Clock:
 class DerivedSystem:
     """The whole system; `name` is an identifier, `width` the width of the streams, `clocks` all clocks except clk.
 
-    The messages of `services` have converters, but no topics.
+    The messages of `services` and `actions` have converters, but no topics.
 
     `clock` is the frequency of clk in Hz, if it is given. A publisher that stops in the middle of a frame is cut off
     after `watchdog` cycles, if this is not 0.
@@ -395,6 +415,7 @@ class DerivedSystem:
     tree: Tree | None = None
     pipeline: str | None = None
     services: tuple[Service, ...] = ()
+    actions: tuple[Action, ...] = ()
     network: Network | None = None
 
     @property

@@ -39,7 +39,7 @@ CONVERTER, ACCELERATOR = "converter", "accelerator"
 # The keys that make a block a converter.
 CONVERTER_KEYS = ("middleware", "mode", "message")
 # The keys of servers and clients, and those of the messages and topics of other converters.
-SERVICE_KEYS = frozenset({"service", "timeLimit"})
+SERVICE_KEYS = frozenset({"service", "action", "timeLimit", "acceptLimit"})
 MESSAGE_KEYS = frozenset({"message", "qos", "include", "exclude"})
 # The keyword for the smallest scheduler that meets all deadlines.
 AUTO_SCHEDULER = "auto"
@@ -312,23 +312,34 @@ class Block(Section):
         "the middleware of a converter's message", choices=tuple(MIDDLEWARES), only_of=CONVERTER
     )
     mode: Text | None = key(
-        "direction of a converter; server answers calls of a service, client calls a service",
+        "direction of a converter; server answers calls of a service or pursues goals of an action, client calls a"
+        " service",
         choices=MODES,
         only_of=CONVERTER,
     )
-    message: Text | None = key("a converter's message; not legal for a service", only_of=CONVERTER)
+    message: Text | None = key("a converter's message; not legal for a service or an action", only_of=CONVERTER)
     service: Text | None = key(
         "the type of the service of a server or client, such as std_srvs/SetBool", only_of=CONVERTER
     )
+    action: Text | None = key(
+        "the type of the action of a server, such as test_msgs/Fibonacci", only_of=CONVERTER, is_asked=False
+    )
     time_limit: Text | None = key(
-        "the longest time in which a call of a service is answered, such as 500 ms (default: 5 s)",
+        "the longest time in which a call of a service is answered, or in which the hardware sends nothing about a goal"
+        " of an action, such as 500 ms (default: 5 s)",
         name="timeLimit",
         only_of=CONVERTER,
         is_asked=False,
     )
+    accept_limit: Text | None = key(
+        "the time after which a goal of an action is accepted if the hardware has not sent anything (default: 1 s)",
+        name="acceptLimit",
+        only_of=CONVERTER,
+        is_asked=False,
+    )
     topic: Text | None = key(
-        "the topic of a converter's messages, or the name of its service, such as /arm/left or left (default: the"
-        " block's name)",
+        "the topic of a converter's messages, or the name of its service or action, such as /arm/left or left"
+        " (default: the block's name)",
         only_of=CONVERTER,
     )
     qos: Qos | None = key(
@@ -368,7 +379,7 @@ class Block(Section):
     outgoing: tuple[Outgoing, ...] = key(
         "connections to the blocks that receive the block's message", form="sections", section=Outgoing
     )
-    # The server or client whose request or response this converter carries.
+    # The server or client whose messages this converter carries.
     service_block: Block | None = None
 
 

@@ -70,10 +70,11 @@ inline const rosidl_message_type_support_t* message_support(const TypeName& type
       symbol(type, "__rosidl_typesupport_c.so", "rosidl_typesupport_c__get_message_type_support_handle__", ""))();
 }
 
-// Throw MiddlewareError if the hash of the installed type differs from `signature`.
+// Throw MiddlewareError if the hash of the installed type differs from `signature`; an empty one is not known.
 template <typename Support>
 void check_hash(const Support& support, const TypeName& type, const std::string& signature) {
 #ifdef FIRM_HAS_TYPE_HASH
+  if (signature.empty()) return;
   rosidl_type_hash_t expected;
   if (rosidl_parse_type_hash_string(signature.c_str(), &expected) != RCUTILS_RET_OK) {
     rcl_reset_error();

@@ -79,8 +79,6 @@ class Ros1 {
   // Only messages with a Header have numbers.
   static constexpr bool kCountsDrops = false;
   static constexpr std::size_t kUnlimited = 0;
-  // A call that fails has an answer with the reason.
-  static constexpr bool kTellsFailures = true;
   static constexpr const char* kArguments = "ROS arguments: NAME:=VALUE remaps a topic, __name:=, __ns:=, __log:=";
 
   // Remove ROS's own arguments from `argv`. The node is called `name` unless `__name:=` is given.

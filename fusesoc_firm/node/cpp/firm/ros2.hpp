@@ -48,8 +48,6 @@ class Ros2 {
   // All messages have numbers.
   static constexpr bool kCountsDrops = true;
   static constexpr std::size_t kUnlimited = 0;
-  // A call that fails has no answer.
-  static constexpr bool kTellsFailures = false;
   static constexpr const char* kArguments =
       "ROS arguments, after --ros-args: -r NAME:=VALUE remaps a topic, -r __node:=, -r __ns:=, --log-level";
 

@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include <firm/actions.hpp>
 #include <firm/diagnostics.hpp>
 #include <firm/node.hpp>
 #include <firm/open_transport.hpp>
@@ -65,6 +66,7 @@ struct System {
   std::vector<std::string> channels{};  // of the status, the subscribers first
   Software software{};
   std::vector<Service> services{};
+  std::vector<Action> actions{};
 
   bool has_status_frames() const { return !digest.empty() && !has_status_registers; }
   bool has_software() const { return !software.inputs.empty(); }
@@ -188,6 +190,7 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
     out << (service.is_server ? "service of" : "service called by") << " the hardware:\n  " << service.name << "  "
         << service.type << "\n";
   }
+  for (const auto& action : system.actions) out << "action of the hardware:\n  " << action.name << "\n";
   out << "\nSIGINT and SIGTERM end the node after all pending messages; a second signal ends the node at once.\n"
       << "exit status: 0, 1 if the hardware or ROS failed, 2 for an invalid command line\n";
 }
@@ -237,15 +240,15 @@ class RunningNode {
 // An engine for the hardware and, if the system has software, one for it, with the paths between them and the topics.
 class Engines {
  public:
-  // `publish` maps the names of the system's topics to their publishers. Throws std::invalid_argument.
+  // `publish` maps the names of the system's topics to their publishers. With ROS 1 (`is_first`), a call that fails has an
+  // answer with the reason. Throws std::invalid_argument.
   Engines(const System& system, const NodeArguments& arguments, std::map<std::string, MessageHandler> publish,
-          std::ostream* trace, bool tells_failures)
+          std::ostream* trace, bool is_first)
       : system_(system),
         publish_(std::move(publish)),
         from_hardware_(system.publisher_count),
-        calls_(system.services, tells_failures, [this](unsigned id, const std::uint8_t* payload, std::size_t size) {
-          return hardware_->put(id, payload, size);
-        }) {
+        calls_(system.services, is_first, putter()),
+        actions_(system.actions, is_first, putter()) {
     NodeConfiguration configuration;
     configuration.width = system.width;
     configuration.subscribers = system.subscriber_count;
@@ -259,7 +262,7 @@ class Engines {
     configuration.has_status = system.has_status_frames();
     configuration.log = &std::cerr;
     configuration.trace = trace;
-    if (!system.services.empty()) watch_calls(configuration);
+    if (!system.services.empty() || !system.actions.empty()) watch_calls(configuration);
     // A simulator's registers cannot be accessed.
     if (system.has_status_registers && (!is_simulated(arguments.transport) || !arguments.status.empty())) {
       registers_.emplace(arguments.status);
@@ -273,6 +276,13 @@ class Engines {
       from_hardware_.at(publisher) = [this, publisher](const std::uint8_t* payload, std::size_t size) {
         calls_.take(publisher, payload, size);
       };
+    }
+    for (const auto& action : system.actions) {
+      for (const unsigned publisher : {action.feedback, action.result}) {
+        from_hardware_.at(publisher) = [this, publisher](const std::uint8_t* payload, std::size_t size) {
+          actions_.take(publisher, payload, size);
+        };
+      }
     }
     if (!system.has_software()) return;
 
@@ -310,7 +320,21 @@ class Engines {
     };
   }
 
+  // Serve and call all services, and serve all actions, with a middleware.
+  template <typename Ros>
+  void connect(Ros& ros) {
+    calls_.connect(ros);
+    actions_.connect(ros);
+  }
+
+  // Take no more calls and goals, and wait until all are answered, or for `longest`; then let the others fail.
+  void drain(std::chrono::nanoseconds longest) {
+    calls_.drain(longest);
+    actions_.drain(longest);
+  }
+
   NodeCalls& calls() { return calls_; }
+  NodeActions& actions() { return actions_; }
   Node& hardware() { return *hardware_; }
   Node* software() { return software_.get(); }
 
@@ -334,12 +358,30 @@ class Engines {
  private:
   static constexpr std::chrono::seconds kSilence{1};
 
-  // Tell the calls of services what happens in the hardware.
+  // Tell the services and actions what happens in the hardware.
   void watch_calls(NodeConfiguration& configuration) {
-    configuration.on_rejected = [this](unsigned subscriber) { calls_.refuse_request(subscriber); };
-    configuration.on_aborted = [this](unsigned publisher) { calls_.refuse_response(publisher); };
-    configuration.on_restart = [this] { calls_.forget(); };
-    configuration.on_rest = [this] { calls_.rest(); };
+    configuration.on_rejected = [this](unsigned subscriber) {
+      calls_.refuse_request(subscriber);
+      actions_.refuse_goal(subscriber);
+    };
+    configuration.on_aborted = [this](unsigned publisher) {
+      calls_.refuse_response(publisher);
+      actions_.refuse_result(publisher);
+    };
+    configuration.on_restart = [this] {
+      calls_.forget();
+      actions_.forget();
+    };
+    configuration.on_rest = [this] {
+      calls_.rest();
+      actions_.rest();
+    };
+  }
+
+  NodeCalls::Put putter() {
+    return [this](unsigned id, const std::uint8_t* payload, std::size_t size) {
+      return hardware_->put(id, payload, size);
+    };
   }
 
   // Return a function that opens the hardware, and refuses that of another system.
@@ -377,6 +419,7 @@ class Engines {
   std::unique_ptr<Node> hardware_;
   std::unique_ptr<Node> software_;
   NodeCalls calls_;  // after the nodes, as its threads use them
+  NodeActions actions_;
 };
 
 // Return the word of a register of the hardware. Throws TransportError.
@@ -398,13 +441,19 @@ inline void print_calls(const CallStatistics& counted) {
             << " failed, " << counted.unasked << " unasked" << std::endl;
 }
 
-// The calls of services while they are connected to a middleware, which outlives them.
+inline void print_goals(const GoalStatistics& counted) {
+  std::cerr << "its actions: " << counted.goals << " goals, " << counted.succeeded << " succeeded, " << counted.canceled
+            << " canceled, " << counted.aborted << " aborted, " << counted.rejected << " rejected, " << counted.unasked
+            << " unasked" << std::endl;
+}
+
+// The services and actions while they are connected to a middleware, which outlives them.
 template <typename Ros>
 class ConnectedCalls {
  public:
-  ConnectedCalls(Ros& ros, NodeCalls& calls) : ros_(ros) {
+  ConnectedCalls(Ros& ros, Engines& engines) : ros_(ros) {
     try {
-      calls.connect(ros);
+      engines.connect(ros);
     } catch (...) {
       ros_.stop_calls();
       throw;
@@ -432,7 +481,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
     publish[topic.name] = ros.advertise(topic, arguments.quality_of(topic));
   }
   Engines engines(system, arguments, std::move(publish), arguments.trace.empty() ? nullptr : &trace,
-                  Ros::kTellsFailures);
+                  Ros::kVersion == 1);
   for (const auto& topic : system.subscribers) {
     Quality quality = arguments.quality_of(topic);
     // Only the node's queue then drops messages, which it counts. If it blocks, the one of ROS must have a limit.
@@ -441,7 +490,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   }
 
   RunningNode hardware(engines.hardware(), arguments.drain);
-  const ConnectedCalls<Ros> calls(ros, engines.calls());
+  const ConnectedCalls<Ros> calls(ros, engines);
   std::optional<RunningNode> software;
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
   std::optional<StatusWatch> watch;
@@ -454,6 +503,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
   Diagnosis diagnosis(ros, system.diagnostics);
   while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
+    engines.actions().tick();
     diagnosis.tell([&] {
       std::vector<Report> reports{report_of(system.name + ": node", engines.hardware(), ros.lost())};
       if (watch) reports.push_back(watch->report(system.name + ": hardware"));
@@ -464,7 +514,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   // Handle messages that ROS has already received.
   ros.spin(std::chrono::milliseconds(0));
   ros.unsubscribe();
-  ros.spin_during([&] { engines.calls().drain(arguments.drain); });
+  ros.spin_during([&] { engines.drain(arguments.drain); });
   if (software && is_running()) engines.settle(arguments.drain);
   int status = software ? software->stop() : 0;
   status = std::max(status, hardware.stop());
@@ -472,6 +522,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   print_statistics(system.name + "_node", engines.hardware(), ros.lost());
   if (software) print_statistics("its software", *engines.software());
   if (!system.services.empty()) print_calls(engines.calls().statistics());
+  if (!system.actions.empty()) print_goals(engines.actions().statistics());
   return status;
 }
 

@@ -103,6 +103,13 @@ class CallLine {
     return true;
   }
 
+  // Give the call that is under way another `limit` from now on.
+  void extend() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    is_extended_ = true;
+    changed_.notify_all();
+  }
+
   // Take note that nothing more follows from the hardware for a call that was given up.
   void rest() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -160,7 +167,11 @@ class CallLine {
   // Return the answer to the call under way, or nothing if it does not come in time or the line is closed.
   std::optional<Answer> wait() {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait_for(lock, limit_, [this] { return is_closed_ || answer_; });
+    is_extended_ = true;
+    while (is_extended_ && !is_closed_ && !answer_) {
+      is_extended_ = false;
+      changed_.wait_for(lock, limit_, [this] { return is_closed_ || answer_ || is_extended_; });
+    }
     return answer_;
   }
 
@@ -200,6 +211,7 @@ class CallLine {
   std::optional<Answer> answer_;
   bool is_final_ = false;
   bool is_late_ = false;
+  bool is_extended_ = false;
   bool is_ending_ = false;
   bool is_closed_ = false;
   std::thread thread_;  // the last member, as it uses the others

@@ -1,0 +1,264 @@
+"""The messages of actions as bytes, in both versions of ROS: ids, states, and what surrounds feedback and results.
+
+A goal's id is the UUID of ROS 2, or the text of ROS 1. A stamp is in seconds and nanoseconds. Functions that read raise
+`ValueError` for a payload that is too short.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Iterable
+from enum import Enum
+from typing import NamedTuple, Protocol
+
+Stamp = tuple[int, int]
+NO_STAMP: Stamp = (0, 0)
+
+_CDR = b"\0\1\0\0"
+_UUID_BYTES = 16
+# CDR, UUID; the state of a result is after the CDR header.
+_ID = slice(len(_CDR), len(_CDR) + _UUID_BYTES)
+_STATE_BYTE = len(_CDR)
+
+
+class State(Enum):
+    """The state of a goal: `WAITING` for the hardware, or after its end."""
+
+    WAITING = "waiting"
+    EXECUTING = "executing"
+    CANCELING = "canceling"
+    SUCCEEDED = "succeeded"
+    CANCELED = "canceled"
+    ABORTED = "aborted"
+    REJECTED = "rejected"
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the goal has a result."""
+        return self not in (State.WAITING, State.EXECUTING, State.CANCELING)
+
+
+# The states in actionlib_msgs/GoalStatus and action_msgs/GoalStatus, and those with which hardware ends a goal.
+_ROS1_STATES = {
+    State.EXECUTING: 1,
+    State.CANCELING: 6,
+    State.SUCCEEDED: 3,
+    State.ABORTED: 4,
+    State.REJECTED: 5,
+}
+_ROS1_ENDS = {2: State.CANCELED, 3: State.SUCCEEDED, 4: State.ABORTED, 5: State.REJECTED, 8: State.CANCELED}
+_ROS1_PENDING, _ROS1_PREEMPTED, _ROS1_RECALLED = 0, 2, 8
+_ROS2_STATES = {
+    State.WAITING: 1,
+    State.EXECUTING: 2,
+    State.CANCELING: 3,
+    State.SUCCEEDED: 4,
+    State.CANCELED: 5,
+    State.ABORTED: 6,
+    State.REJECTED: 0,
+}
+_ROS2_ENDS = {0: State.REJECTED, 4: State.SUCCEEDED, 5: State.CANCELED, 6: State.ABORTED}
+
+
+class Reference(NamedTuple):
+    """The goal that a message concerns; both values may be zero in a cancellation."""
+
+    id: bytes
+    stamp: Stamp
+
+
+class Status(NamedTuple):
+    """The state of a goal for all clients; `was_taken` tells whether the hardware has ever had the goal."""
+
+    goal: Reference
+    state: State
+    was_taken: bool = True
+    text: bytes = b""
+
+
+class Messages(Protocol):
+    """The messages of a version of ROS."""
+
+    def goal(self, payload: bytes) -> Reference:
+        """Return the id and the stamp of a goal."""
+
+    def cancellation(self, payload: bytes) -> Reference:
+        """Return the goals that a cancellation concerns."""
+
+    def cancel(self, goal: Reference) -> bytes:
+        """Return the cancellation of one goal, for the hardware."""
+
+    def feedback(self, status: Status, payload: bytes) -> bytes:
+        """Return the hardware's feedback, as feedback for a goal."""
+
+    def state(self, payload: bytes) -> State:
+        """Return the state in the hardware's result; a state that does not end a goal counts as aborted."""
+
+    def result(self, status: Status, payload: bytes) -> bytes:
+        """Return the hardware's result, as the result of a goal."""
+
+    def states(self, goals: Iterable[Status]) -> bytes:
+        """Return the states of all goals."""
+
+
+class Ros1Messages:
+    """The messages of actionlib (ROS 1)."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def goal(self, payload: bytes) -> Reference:
+        """Return the id and the stamp of a goal."""
+        return _goal_id(payload, _after_header(payload))[0]
+
+    def cancellation(self, payload: bytes) -> Reference:
+        """Return the goals that a cancellation concerns."""
+        return _goal_id(payload, 0)[0]
+
+    def cancel(self, goal: Reference) -> bytes:
+        """Return the cancellation of one goal, for the hardware."""
+        return struct.pack("<II", *goal.stamp) + _text(goal.id)
+
+    def feedback(self, status: Status, payload: bytes) -> bytes:
+        """Return the hardware's feedback, as feedback for a goal."""
+        _, _, body = self._parts(payload)
+        return self._header() + self._status(status) + body
+
+    def state(self, payload: bytes) -> State:
+        """Return the state in the hardware's result; a state that does not end a goal counts as aborted."""
+        number, _, _ = self._parts(payload)
+        return _ROS1_ENDS.get(number, State.ABORTED)
+
+    def result(self, status: Status, payload: bytes) -> bytes:
+        """Return the hardware's result, as the result of a goal."""
+        _, text, body = self._parts(payload)
+        return self._header() + self._status(status._replace(text=text or status.text)) + body
+
+    def states(self, goals: Iterable[Status]) -> bytes:
+        """Return the states of all goals."""
+        found = [self._status(status) for status in goals]
+        return self._header() + struct.pack("<I", len(found)) + b"".join(found)
+
+    def _header(self) -> bytes:
+        self._count += 1
+        return struct.pack("<I", self._count & 0xFFFFFFFF) + struct.pack("<II", *now()) + _text(b"")
+
+    def _status(self, status: Status) -> bytes:
+        number = _ROS1_STATES.get(status.state, _ROS1_PENDING)
+        if status.state is State.CANCELED:
+            number = _ROS1_PREEMPTED if status.was_taken else _ROS1_RECALLED
+        return self.cancel(status.goal) + bytes([number]) + _text(status.text)
+
+    def _parts(self, payload: bytes) -> tuple[int, bytes, bytes]:
+        """Return the state, its text and what follows, from feedback or a result."""
+        _, place = _goal_id(payload, _after_header(payload))
+        text, end = _text_at(payload, place + 1)
+        return payload[place], text, payload[end:]
+
+
+class Ros2Messages:
+    """The messages of actions in ROS 2, in CDR."""
+
+    def goal(self, payload: bytes) -> Reference:
+        """Return the id and the stamp of a goal."""
+        return Reference(_uuid(payload), NO_STAMP)
+
+    def cancellation(self, payload: bytes) -> Reference:
+        """Return the goals that a cancellation concerns."""
+        return Reference(_uuid(payload), _numbers("<iI", payload, _ID.stop))
+
+    def cancel(self, goal: Reference) -> bytes:
+        """Return the cancellation of one goal, for the hardware."""
+        return _CDR + self._info(goal)
+
+    def feedback(self, status: Status, payload: bytes) -> bytes:
+        """Return the hardware's feedback, as feedback for a goal."""
+        _uuid(payload)
+        return payload[: _ID.start] + status.goal.id + payload[_ID.stop :]
+
+    def state(self, payload: bytes) -> State:
+        """Return the state in the hardware's result; a state that does not end a goal counts as aborted."""
+        return _ROS2_ENDS.get(_byte(payload, _STATE_BYTE), State.ABORTED)
+
+    def result(self, status: Status, payload: bytes) -> bytes:
+        """Return the hardware's result, as the result of a goal."""
+        _byte(payload, _STATE_BYTE)
+        return payload[:_STATE_BYTE] + bytes([_ROS2_STATES[status.state]]) + payload[_STATE_BYTE + 1 :]
+
+    def states(self, goals: Iterable[Status]) -> bytes:
+        """Return the states of all goals."""
+        known, found = [*goals], bytearray()
+        for status in known:
+            found += status.goal.id
+            found += bytes(-len(found) % 4) + struct.pack("<iIb", *status.goal.stamp, _ROS2_STATES[status.state])
+        return _CDR + struct.pack("<I", len(known)) + bytes(found)
+
+    def accepted(self, stamp: Stamp | None) -> bytes:
+        """Return the response to a goal; without a stamp, it is rejected."""
+        return _CDR + struct.pack("<?3xiI", stamp is not None, *(stamp or NO_STAMP))
+
+    def canceling(self, code: int, goals: Iterable[Reference]) -> bytes:
+        """Return the response to a cancellation: a return code of action_msgs/CancelGoal, and the goals."""
+        found = [self._info(goal) for goal in goals]
+        return _CDR + struct.pack("<b3xI", code, len(found)) + b"".join(found)
+
+    def requested(self, payload: bytes) -> bytes:
+        """Return the id of the goal whose result a client requests."""
+        return _uuid(payload)
+
+    def unknown(self, payload: bytes) -> bytes:
+        """Return a result without contents, with the state of an unknown goal."""
+        return payload[:_STATE_BYTE] + b"\0" + payload[_STATE_BYTE + 1 :]
+
+    def _info(self, goal: Reference) -> bytes:
+        return goal.id + struct.pack("<iI", *goal.stamp)
+
+
+def now() -> Stamp:
+    """Return the stamp of this moment."""
+    return divmod(time.time_ns(), 10**9)
+
+
+def _numbers(form: str, payload: bytes, place: int) -> tuple[int, int]:
+    try:
+        first, second = struct.unpack_from(form, payload, place)
+    except struct.error:
+        raise ValueError("the message is too short") from None
+    return first, second
+
+
+def _byte(payload: bytes, place: int) -> int:
+    if place >= len(payload):
+        raise ValueError("the message is too short")
+    return payload[place]
+
+
+def _uuid(payload: bytes) -> bytes:
+    _byte(payload, _ID.stop - 1)
+    return payload[_ID]
+
+
+def _text(value: bytes) -> bytes:
+    return struct.pack("<I", len(value)) + value
+
+
+def _text_at(payload: bytes, place: int) -> tuple[bytes, int]:
+    """Return a text of ROS 1, and the place after it."""
+    begin = place + 4
+    end = begin + int.from_bytes(payload[place:begin], "little")
+    if end > len(payload) or begin > len(payload):
+        raise ValueError("the message is too short")
+    return payload[begin:end], end
+
+
+def _after_header(payload: bytes) -> int:
+    """Return the place after a Header of ROS 1: number, stamp, text."""
+    return _text_at(payload, 12)[1]
+
+
+def _goal_id(payload: bytes, place: int) -> tuple[Reference, int]:
+    """Return a GoalID of ROS 1 and the place after it, where a byte follows unless the payload ends."""
+    stamp = _numbers("<II", payload, place)
+    text, end = _text_at(payload, place + 8)
+    return Reference(text, stamp), end

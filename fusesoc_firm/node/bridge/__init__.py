@@ -1,0 +1,1 @@
+"""The ROS process of a Python node; `main.py` describes it."""

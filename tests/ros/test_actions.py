@@ -1,0 +1,232 @@
+"""Actions of hardware with real actionlib and rclpy.action: goals with feedback, cancellations, clients that die.
+
+`pytest -m thorough tests/ros/test_actions.py` sends 1,000 goals with each kind of node.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fusesoc_firm.cli import main
+from fusesoc_firm.simulation.simulator import build_simulator
+from tests.ros.action_simulator import HELD, Goal
+from tests.ros.cpp_nodes import Node, NodeProcess, Ros, missing_ros, running_ros
+from tests.ros.live_nodes import REPOSITORY, LiveNode
+
+HERE = Path(__file__).resolve().parent
+CLIENTS = 4
+SUCCEEDED = "SUCCEEDED"
+CANCELED = {1: "PREEMPTED", 2: "CANCELED"}
+# The messages of ROS 2 in place of those of ROS 1.
+TRANSLATION = [
+    ("    maxLength: 4096\n", ""),
+    ("middleware: ROS", "middleware: ROS2"),
+    ("counter.vhd", "ros2/counter.vhd"),
+    ("actionlib/TestActionGoal", "test_msgs/Fibonacci_SendGoal_Request"),
+    ("goal.goal", "goal.order"),
+    ("actionlib_msgs/GoalID", "action_msgs/GoalInfo"),
+    ("actionlib/TestActionFeedback", "test_msgs/Fibonacci_FeedbackMessage"),
+    ("feedback.feedback", "feedback.sequence"),
+    ("actionlib/TestActionResult", "test_msgs/Fibonacci_GetResult_Response"),
+    ("status.status, result.result", "status, result.sequence"),
+    ("actionlib/Test", "test_msgs/Fibonacci"),
+]
+MODULES = {1: "actionlib.msg", 2: "test_msgs.action"}
+
+
+@dataclass
+class Place:
+    """A version of ROS that runs, and a folder with the system of tests/ros/arm."""
+
+    ros: Ros
+    folder: Path
+
+    @property
+    def version(self) -> int:
+        return self.ros.version
+
+    def specification(self) -> Path:
+        spec = self.folder / "arm/arm.yaml"
+        if not spec.exists():
+            shutil.copytree(HERE / "arm", spec.parent)
+            text = (HERE / "arm/arm.yaml").read_text(encoding="utf-8")
+            if self.version == 2:
+                for ours, theirs in TRANSLATION:
+                    text = text.replace(ours, theirs)
+            spec.write_text(text, encoding="utf-8")
+        return spec
+
+    def node(self, language: str, transport: str) -> NodeProcess:
+        """A node in Python or C++."""
+        if language == "python":
+            build = ["--build-root", str(self.folder / "simulators")]
+            return LiveNode(
+                self.ros,
+                self.folder / "node.log",
+                ["live", str(self.specification()), "--transport", transport, *build],
+            )
+        package, program = self.folder / "package", self.folder / "arm_node"
+        if not program.exists():
+            command = ["system", "node", str(self.specification()), "--language", "cpp", "--ros", str(self.version)]
+            assert main([*command, "-o", str(package)]) == 0
+            self.ros.compile(package, program)
+        return Node(self.ros, program, transport, "--drain", "100")
+
+    @property
+    def model(self) -> str:
+        """The address of the model of the hardware."""
+        script = HERE / "action_simulator.py"
+        return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {script} {self.version} --width 32"
+
+    @property
+    def hardware(self) -> str:
+        """The address of the VHDL in GHDL."""
+        build_root = self.folder / "simulators"
+        return f"pipe:{build_simulator(self.specification(), 'ghdl', build_root=build_root).script()}"
+
+    def client(self, *words: str) -> Client:
+        script = [self.ros.python, str(HERE / "action_peer.py"), str(self.version), "/count"]
+        return Client(self.ros, [*script, *words])
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"actions_{version}")) for version in (1, 2)],
+    ids=["ros1", "ros2"],
+)
+def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    folder = tmp_path_factory.mktemp(f"actions{request.param}")
+    if reason := missing_ros(request.param):
+        pytest.skip(reason)
+    with running_ros(request.param, folder) as ros:
+        module = MODULES[request.param]
+        done = subprocess.run(
+            [ros.python, "-c", f"import {module}"], env=dict(ros.environment), capture_output=True, check=False
+        )
+        if done.returncode:
+            pytest.skip(f"{ros.python} lacks {module}")
+        yield Place(ros, folder)
+
+
+class Client:
+    """A client (action_peer.py) in a process of its own."""
+
+    def __init__(self, ros: Ros, command: Sequence[str]) -> None:
+        self.process = subprocess.Popen(
+            command, env=dict(ros.environment), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def line(self) -> str:
+        assert self.process.stdout
+        return self.process.stdout.readline()
+
+    def begin(self) -> None:
+        assert self.process.stdin
+        self.process.stdin.write("\n")
+        self.process.stdin.flush()
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+def run_at_once(place: Place, node: NodeProcess, clients: Sequence[Client]) -> list[list[Any]]:
+    """What all clients found, one list for each."""
+    try:
+        assert [client.line() for client in clients] == ["ready\n"] * len(clients), node.said()
+        for client in clients:
+            client.begin()
+        return [json.loads(client.line()) for client in clients]
+    finally:
+        for client in clients:
+            client.end()
+
+
+def faults(version: int, found: Sequence[Sequence[Any]]) -> list[Any]:
+    """The goals that did not get what belongs to them. ROS may deliver feedback after the result, which is ignored."""
+    wrong = []
+    for goal, state, feedback, result in found:
+        is_held = goal & HELD == HELD
+        expected = [goal + step for step in range(1, (1 if is_held else goal % 4) + 1)]
+        has_come = expected[: len(feedback)] == feedback and (not is_held or feedback)
+        if not has_come or result != goal or state != (CANCELED[version] if is_held else SUCCEEDED):
+            wrong.append([goal, state, feedback, result])
+    return wrong
+
+
+def check_counts(node: NodeProcess, **counts: int) -> None:
+    """Stop the node; it has counted each goal."""
+    assert node.stop() == 0, node.said()
+    names = ("goals", "succeeded", "canceled", "aborted", "rejected")
+    values = [sum(counts.values()), *(counts.get(name, 0) for name in names[1:])]
+    python = r"^count +{} +{} +{} +{} +{}$".format(*values)
+    cpp = "^its actions: {} goals, {} succeeded, {} canceled, {} aborted, {} rejected".format(*values)
+    assert re.search(f"{python}|{cpp}", node.said(), re.MULTILINE), node.said()
+
+
+@pytest.mark.parametrize("language", ["python", "cpp"])
+@pytest.mark.parametrize(
+    "goals", [pytest.param(10, marks=pytest.mark.check), pytest.param(250, marks=pytest.mark.thorough)]
+)
+@pytest.mark.parametrize("where", ["model", "hardware"])
+def test_four_clients_at_once_get_their_own_results(place: Place, goals: int, language: str, where: str) -> None:
+    """Each goal has its own number, feedback and result; some are canceled while the hardware holds them."""
+    with place.node(language, getattr(place, where)) as node:
+        seeds = [random.randrange(2**32) for _ in range(CLIENTS)]
+        print(f"seeds {seeds}")
+        clients = [place.client("--random", str(goals), str(seed)) for seed in seeds]
+        found = [item for goals_of_client in run_at_once(place, node, clients) for item in goals_of_client]
+        assert faults(place.version, found) == []
+        assert len({item[0] for item in found}) == CLIENTS * goals
+        canceled = sum(item[1] == CANCELED[place.version] for item in found)
+        check_counts(node, succeeded=len(found) - canceled, canceled=canceled)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_goals_that_fail_are_rejected_or_aborted(place: Place, language: str) -> None:
+    """Hardware rejects the frame of a goal, rejects the goal, gives up after feedback, or says nothing."""
+    with place.node(language, place.model) as node:
+        client = place.client("--goals", *map(str, [*Goal, 3, HELD]))
+        (found,) = run_at_once(place, node, [client])
+        nothing = 0 if place.version == 1 else None
+        assert [(goal, state, result) for goal, state, _, result in found] == [
+            (Goal.REFUSED, "REJECTED", nothing),
+            (Goal.REJECTED, "REJECTED", nothing),
+            (Goal.ABORTED, "ABORTED", 7),
+            # The time limit is that of acceptance, too.
+            (Goal.SILENT, *(("REJECTED", 0) if place.version == 1 else ("REJECTED", None))),
+            (3, SUCCEEDED, 3),
+            (HELD, CANCELED[place.version], HELD),
+        ]
+        check_counts(node, rejected=3, aborted=1, succeeded=1, canceled=1)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_a_client_that_dies_harms_nobody(place: Place, language: str) -> None:
+    """A client is killed whose goal the hardware does not finish; the goal of the other one waits, and is reached."""
+    with place.node(language, place.model) as node:
+        dying, other = place.client("--goals", str(Goal.SILENT)), place.client("--goals", "5", str(HELD + 1))
+        try:
+            assert dying.line() == other.line() == "ready\n"
+            dying.begin()
+            node.wait_until_said("no answer within 5")
+            dying.end()
+            other.begin()
+            assert faults(place.version, json.loads(other.line())) == []
+        finally:
+            dying.end()
+            other.end()
+        assert node.stop() == 0
