@@ -52,7 +52,7 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
     return {
         **_common(frame, stream, entity or subscriber_entity(frame), "out"),
-        **store_configuration(stores),
+        **store_configuration(stores, stream.beat(ends[-1])),
         "position_bits": max(_CODE_BITS, stream.beat(ends[-1]).bit_length()),
         "is_byte_wide": stream.lanes == 1,
         "fields": _field_slices(frame, stream, stores),

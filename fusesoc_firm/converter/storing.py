@@ -31,24 +31,39 @@ def is_beat(first: int, last: int) -> str:
     return "is_first = '1'" if last == 0 else f"(is_first = '1' or position_r <= {last})"
 
 
+def enables(store: Store, position: str, last_beat: int, *, is_part: bool) -> list[str]:
+    """The conditions on the signal `position`, of which any enables a store; none if every beat does.
+
+    The windows' bytes shift earlier ones out, so the first window needs no lower limit. A part of a larger store keeps
+    it, since a simulator would otherwise copy all parts in each beat. No beat follows `last_beat`.
+    """
+    (first, last), *others = ranges(store.beats)
+    windows = [(first if is_part else 0, last), *others]
+    limits = [(first, None if last == last_beat else last) for first, last in windows]
+    return [] if (0, None) in limits else [within(position, *each) for each in limits]
+
+
 def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
     """The condition for the beats of one store; the windows of all `parts` share a table."""
     used = f"used_{table} = '1'"
     return used if len(parts) == 1 else f"{used} and {is_beat(store.beats[0], store.beats[-1])}"
 
 
-def store_configuration(stores: Sequence[Store]) -> Context:
-    """The partials' configuration for `stores`, which have the form that `stores_of` returns."""
+def store_configuration(stores: Sequence[Store], last_beat: int) -> Context:
+    """The partials' configuration for `stores`, which have the form that `stores_of` returns.
+
+    `last_beat` is that of the longest frame.
+    """
     tables: list[Context] = []
-    enables: list[list[str]] = []
+    conditions: list[list[str]] = []
     for _, group in groupby(stores, lambda store: store.lanes):
         parts = list(group)
         windows = ranges([beat for store in parts for beat in store.beats])
         if len(windows) > _MOST_COMPARED and windows[-1][1] >= _TABLE_BEATS:
-            enables += [[_is_used(len(tables), store, parts)] for store in parts]
+            conditions += [[_is_used(len(tables), store, parts)] for store in parts]
             tables.append({"number": len(tables), **_table(windows)})
         else:
-            enables += [[is_beat(*window) for window in ranges(store.beats)] for store in parts]
+            conditions += [enables(store, "position_r", last_beat, is_part=len(parts) > 1) for store in parts]
     return {
         "stores": [
             {
@@ -57,7 +72,7 @@ def store_configuration(stores: Sequence[Store]) -> Context:
                 "windows": windows,
                 "data": store_data(f"fields{suffix}_r", store, "s_axis_tdata"),
             }
-            for store, suffix, windows in zip(stores, store_names(stores), enables, strict=True)
+            for store, suffix, windows in zip(stores, store_names(stores), conditions, strict=True)
         ],
         "tables": tables,
     }

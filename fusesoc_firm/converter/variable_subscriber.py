@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -50,10 +51,10 @@ from fusesoc_firm.converter.steps import (
     step_sets,
     terminator_of,
 )
-from fusesoc_firm.converter.storing import store_data, stored_slices
-from fusesoc_firm.converter.stream import Store, StoreMap, ranges, stores_of
+from fusesoc_firm.converter.storing import enables, store_data, stored_slices
+from fusesoc_firm.converter.stream import Store, StoreMap, stores_of
 from fusesoc_firm.converter.stream import Stream as Lanes
-from fusesoc_firm.converter.vhdl import hexadecimal, within
+from fusesoc_firm.converter.vhdl import hexadecimal
 from fusesoc_firm.frame.length import longest_payload
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop, Path
 from fusesoc_firm.frame.values import dotted
@@ -337,15 +338,14 @@ class _Subscriber:
     def _stored(self) -> Iterator[Context]:
         """All registers of fields, with the beats in which they store bytes."""
         for place, block, named in self._stores:
+            lanes = Counter(store.lanes for _, store in named)
             for name, store in named:
-                yield self._store(place, block, name, store)
+                yield self._store(place, block, name, store, is_part=lanes[store.lanes] > 1)
 
-    def _store(self, place: int, block: Block, name: str, store: Store) -> Context:
+    def _store(self, place: int, block: Block, name: str, store: Store, *, is_part: bool) -> Context:
         """A register, with the beats of a block in which the register stores lanes of the window."""
         data, beat = ("stored_bytes_r", "stored_beat_r") if self.stores_late else ("window_bytes", "beat_r")
-        beats = ranges(store.beats)
-        is_always = beats == [(0, -(-block.size // self.lanes) - 1)]
-        windows = [] if is_always else [within(beat, *window) for window in beats]
+        windows = enables(store, beat, -(-block.size // self.lanes) - 1, is_part=is_part)
         return {
             "step": place,
             "register": name,

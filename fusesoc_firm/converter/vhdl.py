@@ -38,15 +38,20 @@ def bits_of_bool(port: str) -> str:
     return f'"0000000" & {port}'
 
 
-def between(number: str, first: int, last: int) -> str:
-    """Return the condition that a number is in the range `first` to `last`."""
-    return f"{number} = {first}" if first == last else f"{number} >= {first} and {number} <= {last}"
+def between(number: str, first: int, last: int | None) -> str:
+    """Return the condition that a natural number is in the range `first` to `last`; None is no limit."""
+    if first == last:
+        return f"{number} = {first}"
+    lower, upper = f"{number} >= {first}", f"{number} <= {last}"
+    if last is None:
+        return lower
+    return f"{lower} and {upper}" if first > 0 else upper
 
 
-def within(number: str, first: int, last: int) -> str:
+def within(number: str, first: int, last: int | None) -> str:
     """Return the condition that a number is in the range `first` to `last`, as an operand of other conditions."""
     condition = between(number, first, last)
-    return condition if first == last else f"({condition})"
+    return f"({condition})" if " and " in condition else condition
 
 
 def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:

@@ -210,7 +210,7 @@ def _versions(part: str) -> str:
     if part == "builds":
         return f"Python {platform.python_version()}, {_package('fusesoc')} and two processors"
     if part == "loops":
-        return f"{_first_line('ghdl')}, {_package('rosbags')}"
+        return ", ".join([*map(_first_line, ("ghdl", "yosys", "verilator")), _package("rosbags")])
     if part == "use":
         return f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}"
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]

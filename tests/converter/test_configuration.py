@@ -16,6 +16,7 @@ from fusesoc_firm.converter.configuration import (
 )
 from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.converter.slices import slices_of, windows_of
+from fusesoc_firm.converter.storing import enables
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoredBytes, StoreMap, Stream, ranges, stores_of
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
@@ -149,6 +150,30 @@ def test_lanes_that_are_used_in_the_same_beats_share_a_store() -> None:
     places = StoreMap(Stream(64), [narrow, wide])
     assert places.pieces(0, 8) == [StoredBytes(1, 0, 3), StoredBytes(0, 0, 5)]
     assert places.pieces(24, 8) == [StoredBytes(1, 72, 3), StoredBytes(0, 120, 5)]
+
+
+@pytest.mark.parametrize(
+    ("beats", "last_beat", "is_part", "conditions"),
+    [
+        ((2, 3, 4), 4, False, []),
+        ((2, 3, 4), 5, False, ["p <= 4"]),
+        ((2, 3, 4), 4, True, ["p >= 2"]),
+        ((2, 3, 4), 5, True, ["(p >= 2 and p <= 4)"]),
+        ((0, 3, 4, 6, 7), 7, False, ["p = 0", "(p >= 3 and p <= 4)", "p >= 6"]),
+        ((3,), 3, True, ["p >= 3"]),
+    ],
+)
+def test_a_store_has_no_needless_limits(
+    beats: tuple[int, ...], last_beat: int, is_part: bool, conditions: list[str]
+) -> None:
+    """With the conditions, exactly the bytes of the store's beats are in it in the end."""
+    assert enables(Store((0,), beats), "p", last_beat, is_part=is_part) == conditions
+    enabled = [p for p in range(last_beat + 1) if not conditions or any(_holds(text, p) for text in conditions)]
+    assert tuple(enabled[-len(beats) :]) == beats
+
+
+def _holds(condition: str, p: int) -> bool:
+    return bool(eval(condition.replace(" = ", " == "), {"p": p}))
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -80,8 +80,7 @@ begin
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
 
-  store <= '1' when
-      (position_r >= 4 and position_r <= 35) else '0';
+  store <= '1';
 
   -- Each field from its bytes in the stores.
   x <= fields_r(63 downto 0);

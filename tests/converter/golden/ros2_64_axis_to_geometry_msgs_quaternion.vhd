@@ -87,11 +87,10 @@ begin
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
 
-  store_0 <= '1' when
-      (position_r >= 2 and position_r <= 5) else '0';
+  store_0 <= '1';
 
   store_1 <= '1' when
-      (position_r >= 1 and position_r <= 4) else '0';
+      position_r <= 4 else '0';
 
   -- Each field from its bytes in the stores.
   x(55 downto 0)  <= fields_1_r(55 downto 0);

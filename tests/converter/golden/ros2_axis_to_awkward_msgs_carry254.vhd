@@ -80,7 +80,7 @@ begin
   s_axis_tready <= ready;
 
   store <= '1' when
-      (position_r >= 8 and position_r <= 257) else '0';
+      position_r <= 257 else '0';
 
   -- Each field from its bytes in the stores.
   data <= fields_r(1999 downto 0);

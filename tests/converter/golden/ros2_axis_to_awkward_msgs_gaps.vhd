@@ -87,7 +87,7 @@ begin
   s_axis_tready <= ready;
 
   store <= '1' when
-      position_r = 8 or
+      position_r <= 8 or
       (position_r >= 16 and position_r <= 25) or
       (position_r >= 32 and position_r <= 41) or
       (position_r >= 48 and position_r <= 56) or
