@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fusesoc_firm.node.description import NodeDescription
-from fusesoc_firm.node.options import add_node_options, remappings
+from fusesoc_firm.node.options import ROS_ARGUMENTS, add_node_options, remappings
+from fusesoc_firm.node.parameters import PARAMETERS, option_words, parameters_of
 from fusesoc_firm.node.reopening import at_address
 from fusesoc_firm.node.run import run_node, run_options
 from fusesoc_firm.system.message_sources import load_beside
@@ -26,11 +27,19 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
     """
     accept_interrupts()
     parser = argparse.ArgumentParser(description=f"Run the node of the system {description.name}.")
-    parser.add_argument("--transport", required=True, metavar="ADDRESS", help="the transport to the hardware")
+    parser.epilog = f"Each option is also a parameter of the node in ROS: {', '.join(PARAMETERS)}."
+    parser.add_argument("--transport", metavar="ADDRESS", help="the transport to the hardware")
     add_node_options(parser)
     arguments, rest = parser.parse_known_args()
     passed = remappings(rest, parser.error)
     try:
+        ros_arguments = [*passed, ROS_ARGUMENTS, *arguments.ros_args]
+        name = arguments.name or description.name
+        given = option_words(parameters_of(description.versions, name, ros_arguments, _say))
+        # The command line has priority.
+        arguments, _ = parser.parse_known_args([*given, *sys.argv[1:]])
+        if not arguments.transport:
+            parser.error("the following arguments are required: --transport")
         folder = Path(script).resolve().parent
         places = [folder / path for path in paths]
         # `places` includes the folders of message cores.
@@ -41,3 +50,7 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
         sys.exit(str(error))
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -96,7 +96,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "actions": lambda: actions.measure(_tell, figures.written(), arguments.row),
         "simulators": lambda: simulators.measure(_tell),
         "replay": lambda: replay.measure(seed, _tell),
-        "live": lambda: live.measure(_tell),
+        "live": lambda: live.measure(_tell, figures.written(), arguments.row),
         "resize": lambda: resize.measure(seed, _tell),
         "store": lambda: store.measure(_tell),
         "studio": lambda: studio.measure(seed, _tell),

@@ -127,7 +127,8 @@ _METHODS = {
         simulated host. Frames, stalls and received bytes are the same in every simulator.""",
     "store": "The tables list the number of cores that a second run of FuseSoC generates, and the time of this run.",
     "replay": "`firm replay` replays bags that rosbags has written. rosbags also reads the recorded bags.",
-    "live": "[`firm live`](../how-to/run-live.md) runs as a node of a running ROS.",
+    "live": """[`firm live`](../how-to/run-live.md) runs as a node of a running ROS.
+        `make bench BENCH="live --row 'Images'"` measures only the tables whose titles match.""",
     "resize": "[specs/resize](../../specs/resize/README.md) is a replica of RobotPerf's benchmark a5, resize.",
     "studio": "A browser opens [the page](../how-to/studio.md) and edits a system.",
 }

@@ -1,4 +1,4 @@
-"""A simulated system as a node of real ROS, for a minute at 100 Hz, compared with a plain node that echoes messages.
+"""A simulated system as a node of real ROS, compared with a plain node that echoes messages.
 
 Peers, node and echo run at the same time on one machine: the figures depend on the machine; their ratio does not.
 """
@@ -6,19 +6,29 @@ Peers, node and echo run at the same time on one machine: the figures depend on 
 from __future__ import annotations
 
 import math
+import re
 import statistics
 import subprocess
 import tempfile
+import time
 from bisect import bisect_left
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.ros.cpp_nodes import DEBIAN_PYTHON, ROS2, missing_ros, running_ros
-from tests.ros.live_nodes import LiveNode, paced, specification
+from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.frame.defaults import completed
+from fusesoc_firm.frame.encoder import encode
+from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.transport.transport import Burst
+from fusesoc_firm.simulation.simulator import build_simulator
+from fusesoc_firm.system.message_sources import load_beside
+from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
+from tests.ros.cpp_nodes import DEBIAN_PYTHON, ROS2, Ros, missing_ros, running_ros
+from tests.ros.live_nodes import PACED_PEER, LiveNode, paced, specification
 
 TITLE = "A minute of messages at 100 Hz"
+IMAGES_TITLE = "Images of 1 MB"
 RATE, SECONDS = 100, 60.0
 _NODES = {1: ("firm live, ROS 1", "rospy's echo"), 2: ("firm live, ROS 2", "rclpy's echo")}
 # The bar on the median, as a multiple of the echo's.
@@ -32,14 +42,32 @@ _NOTE = f"""
     order' includes wrong values. To pass, no message may be lost or out of order, and 'to echo' may not exceed the
     third number.
     """
-_WAYS = [("/QuaternionToEuler_sub", "/QuaternionToEuler_pub"), ("/echo_sub", "/echo_pub")]
+_IMAGE_BYTES = 1_000_000
+_IMAGE_RATE, _IMAGE_SECONDS = 2, 20.0
+_IMAGE_COLUMNS = ("node", "sent", "median, ms", "simulator, ms", "rest to echo", "bar", "result")
+_IMAGES_NOTE = f"""
+    The peer and the echo exchange sensor_msgs/Image with {_IMAGE_BYTES:,} bytes of data at {_IMAGE_RATE} Hz. The system
+    forwards them at 64 bits; Verilator needs about 125,000 cycles for each. 'simulator' is the median for the same
+    frame through the simulator's pipe alone, without node and ROS. 'rest to echo' is what the node takes beside it, as
+    a multiple of the echo's median. To pass, all images must return unchanged and in order.
+    """
+_IMAGES_SPECIFICATION = """\
+project: {{name: images, width: 64}}
+blocks:
+  - {{name: image_in, middleware: {ros}, mode: subscriber, message: sensor_msgs/Image,
+     maxLength: 2000000, outgoing: [{{name: image_out}}]}}
+  - {{name: image_out, middleware: {ros}, mode: publisher, message: sensor_msgs/Image}}
+"""
+_WAY = ("/QuaternionToEuler_sub", "/QuaternionToEuler_pub")
+_IMAGE_WAY, _ECHO_WAY = ("/image_in", "/image_out"), ("/echo_sub", "/echo_pub")
 # Angles are right to this, in rad.
 _TOLERANCE = 1e-9
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cell of every row, by table."""
-    return {TITLE: [(name,) for names in _NODES.values() for name in names]}
+    rows: list[tuple[str, ...]] = [(name,) for names in _NODES.values() for name in names]
+    return {TITLE: rows, IMAGES_TITLE: rows}
 
 
 def versions() -> list[str]:
@@ -53,47 +81,104 @@ def versions() -> list[str]:
     return found
 
 
-def measure(tell: Tell) -> list[Table]:
-    """Run both versions of ROS, one after the other; `tell` hears of each."""
-    rows = []
-    for version, names in _NODES.items():
-        reason = missing_ros(version)
-        found: list[dict[str, Any]] = []
-        if not reason:
-            try:
-                found = _run(version)
-            except (AssertionError, subprocess.TimeoutExpired) as error:
-                reason = str(error)
-        if reason:
-            tell(f"ROS {version}: {reason}")
-            rows += [(name, *[""] * (len(_COLUMNS) - 2), FAILED) for name in names]
-            continue
-        echo = statistics.median(found[1]["seconds"])
-        expectations: tuple[Callable[[float], float], ...] = (float, _half_sine)
-        for name, way, expected in zip(names, found, expectations, strict=True):
-            rows.append(_row(name, way, expected, echo))
-            tell(f"{name}: {rows[-1][4]} ms")
-    return [Table(TITLE, _COLUMNS, tuple(rows), _NOTE)]
+def measure(tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
+    """Run both versions of ROS for each table whose title matches; the other rows are those of the written page."""
+    measured = (
+        (TITLE, _COLUMNS, _NOTE, _angles),
+        (IMAGES_TITLE, _IMAGE_COLUMNS, _IMAGES_NOTE, _images),
+    )
+    tables = []
+    for title, columns, note, rows_of in measured:
+        known = known_rows(written, title, columns, keys=1)
+        for version, names in _NODES.items():
+            if re.search(pattern, title):
+                known |= {row[:1]: row for row in _rows(version, len(columns), rows_of, tell)}
+            for name in names:
+                known.setdefault((name,), (name, *[""] * (len(columns) - 2), NOT_MEASURED))
+        tables.append(Table(title, columns, tuple(known[key] for key in keys()[title]), note))
+    return tables
 
 
-def _run(version: int) -> list[dict[str, Any]]:
-    """The responses of the node and of the echo."""
+def _rows(
+    version: int, cells: int, rows_of: Callable[[int], list[tuple[str, ...]]], tell: Tell
+) -> list[tuple[str, ...]]:
+    """The rows of a version of ROS."""
+    reason = missing_ros(version)
+    if not reason:
+        try:
+            rows = rows_of(version)
+        except (AssertionError, subprocess.TimeoutExpired) as error:
+            reason = str(error)
+    if reason:
+        tell(f"ROS {version}: {reason}")
+        return [(name, *[""] * (cells - 2), FAILED) for name in _NODES[version]]
+    for row in rows:
+        tell("  ".join(row))
+    return rows
+
+
+def _angles(version: int) -> list[tuple[str, ...]]:
     with tempfile.TemporaryDirectory() as name, running_ros(version, Path(name)) as ros:
         folder = Path(name)
-        spec = specification("quat2euler", version, folder)
-        command = ["live", str(spec), "--tool", "verilator", "--queue", "1000"]
-        command += ["--build-root", str(folder / "simulators")]
-        with LiveNode(ros, folder / "node.log", command) as node:
-            node.wait_until_ready()
-            script = str(Path(__file__).parents[1] / "ros" / "paced_peer.py")
-            echo = subprocess.Popen([ros.python, script, str(version), "echo", *_WAYS[1]], env=dict(ros.environment))
-            try:
-                found = paced(ros, RATE, SECONDS, _WAYS)
-            finally:
-                echo.kill()
-                echo.wait()
-            assert node.stop() == 0, node.said()
-        return found
+        found = _run(ros, folder, specification("quat2euler", version, folder), 1000, RATE, SECONDS)
+    echo = statistics.median(found[1]["seconds"])
+    expectations: tuple[Callable[[float], float], ...] = (float, _half_sine)
+    ways = zip(_NODES[version], found, expectations, strict=True)
+    return [_row(name, way, expected, echo) for name, way, expected in ways]
+
+
+def _images(version: int) -> list[tuple[str, ...]]:
+    with tempfile.TemporaryDirectory() as name, running_ros(version, Path(name)) as ros:
+        folder = Path(name)
+        spec = folder / "images.yaml"
+        spec.write_text(_IMAGES_SPECIFICATION.format(ros="ROS" if version == 1 else "ROS2"), encoding="utf-8")
+        live, echo = _run(ros, folder, spec, 10, _IMAGE_RATE, _IMAGE_SECONDS, "images")
+        simulated = _seconds_of_simulator(spec, folder / "simulators")
+    middle, plain = (statistics.median(way["seconds"]) for way in (live, echo))
+    rest = (middle - simulated) / plain
+    most = _MOST_ECHOES[_NODES[version][0]]
+    is_right = all(way["z"] == [float(number) for number in range(way["sent"])] for way in (live, echo))
+    result = MET if is_right and rest <= most else MISSED
+    texts = [f"{1000 * seconds:.1f}" for seconds in (middle, plain, simulated)]
+    return [
+        (_NODES[version][0], str(live["sent"]), texts[0], texts[2], f"{rest:.1f}", f"{most:g}", result),
+        (_NODES[version][1], str(echo["sent"]), texts[1], "", "", "", ""),
+    ]
+
+
+def _run(ros: Ros, folder: Path, spec: Path, depth: int, rate: int, seconds: float, *kind: str) -> list[dict[str, Any]]:
+    """The responses of the node of a system and of the echo."""
+    command = ["live", str(spec), "--tool", "verilator", "--queue", str(depth)]
+    command += ["--build-root", str(folder / "simulators")]
+    ways = [_IMAGE_WAY if kind else _WAY, _ECHO_WAY]
+    with LiveNode(ros, folder / "node.log", command) as node:
+        node.wait_until_ready()
+        words = [ros.python, PACED_PEER, str(ros.version), "echo", *_ECHO_WAY, *kind]
+        echo = subprocess.Popen(words, env=dict(ros.environment))
+        try:
+            found = paced(ros, rate, seconds, ways, *kind)
+        finally:
+            echo.kill()
+            echo.wait()
+        assert node.stop() == 0, node.said()
+    return found
+
+
+def _seconds_of_simulator(spec: Path, root: Path) -> float:
+    """The median time of a frame with an image through the simulator alone, at its pipe."""
+    built = build_simulator(spec, "verilator", build_root=root)
+    loaded = load_beside(spec, [], None)
+    layout = loaded.system.subscribers[0].frame
+    frame = pack_frame(0, encode(layout, completed(layout, {"data": bytes(_IMAGE_BYTES)})))
+    found = []
+    with Simulator(built.command(), built.folder) as simulator:
+        for _ in range(round(_IMAGE_RATE * _IMAGE_SECONDS)):
+            start = time.perf_counter()
+            simulator.request(frame)
+            while not any(isinstance(event, Burst) for event in simulator.run(2**20)):
+                continue
+            found.append(time.perf_counter() - start)
+    return statistics.median(found)
 
 
 def _is_among(value: float, ascending: list[float]) -> bool:

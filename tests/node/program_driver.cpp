@@ -17,6 +17,9 @@ class Alone {
   Alone(int&, char**, const std::string&) {}
 
   bool start(const std::function<bool()>&) { return true; }
+  std::map<std::string, std::string> parameters(const std::vector<std::string>&) const {
+    return {{"overflow", "drop_newest"}, {"restart", "false"}};
+  }
   void subscribe(const firm::Topic&, const firm::Quality&, firm::MessageHandler) {}
   firm::MessageHandler advertise(const firm::Topic& topic, const firm::Quality&) {
     return [name = topic.name](const std::uint8_t* data, std::size_t size) {

@@ -17,6 +17,7 @@ from tests.ros.cpp_nodes import NodeProcess, Ros
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SPECS = REPOSITORY / "specs"
+PACED_PEER = str(Path(__file__).with_name("paced_peer.py"))
 MODEL_SIMULATOR = REPOSITORY / "tests/node/model_simulator.py"
 
 
@@ -67,10 +68,12 @@ class LiveNode(NodeProcess):
         os.kill(number, signal.SIGKILL)
 
 
-def paced(ros: Ros, rate: int, seconds: float, ways: Sequence[tuple[str, str]]) -> list[dict[str, Any]]:
-    """Quaternions at a rate to the first topic of each way; what came from its second one (paced_peer.py)."""
-    script = str(Path(__file__).with_name("paced_peer.py"))
-    command = [ros.python, script, str(ros.version), str(rate), str(seconds), json.dumps(ways)]
+def paced(ros: Ros, rate: int, seconds: float, ways: Sequence[tuple[str, str]], *kind: str) -> list[dict[str, Any]]:
+    """Quaternions at a rate to the first topic of each way; what came from its second one (paced_peer.py).
+
+    Of the `kind` images, images of 1 MB.
+    """
+    command = [ros.python, PACED_PEER, str(ros.version), str(rate), str(seconds), json.dumps(ways), *kind]
     done = subprocess.run(command, env=dict(ros.environment), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     found: list[dict[str, Any]] = json.loads(done.stdout)

@@ -1,15 +1,16 @@
 """A node of rospy or rclpy that sends quaternions at a rate, and takes the time until something comes back.
 
-    python paced_peer.py 1|2 RATE SECONDS '[["in", "out"], ...]'
+    python paced_peer.py 1|2 RATE SECONDS '[["in", "out"], ...]' [images]
 
 Quaternion n of a topic turns by n thousandths of a rad about z, from -3 on, and around again behind 3. The result, as
 JSON: for each way how many were sent, the z of the points that came, and the seconds that each took, the n-th that came
 being the answer to the n-th that was sent. `echo IN OUT` in place of a rate is a node that answers with x, y and z of
-what comes.
+what comes. With `images`, images of 1 MB are sent and come back; z is the `step` of one, which is its number.
 """
 
 from __future__ import annotations
 
+import array
 import json
 import math
 import sys
@@ -18,21 +19,21 @@ import time
 from typing import Any
 
 _TURN = 6000
+_IMAGE_BYTES = 1_000_000
 
 
 class Ros1:
     def __init__(self) -> None:
         import rospy
-        from geometry_msgs.msg import Point, Quaternion
 
-        self.rospy, self.point, self.quaternion = rospy, Point, Quaternion
+        self.rospy = rospy
         rospy.init_node("paced", anonymous=True, disable_signals=True)
 
     def publisher(self, topic: str, message: Any) -> Any:
         return self.rospy.Publisher(topic, message, queue_size=1000, tcp_nodelay=True)
 
     def subscriber(self, topic: str, message: Any, take: Any) -> Any:
-        return self.rospy.Subscriber(topic, message, take, tcp_nodelay=True)
+        return self.rospy.Subscriber(topic, message, take, tcp_nodelay=True, buff_size=2 * _IMAGE_BYTES)
 
     def is_connected(self, publisher: Any, subscriber: Any) -> bool:
         return bool(publisher.get_num_connections() and subscriber.get_num_connections())
@@ -41,9 +42,7 @@ class Ros1:
 class Ros2:
     def __init__(self) -> None:
         import rclpy
-        from geometry_msgs.msg import Point, Quaternion
 
-        self.point, self.quaternion = Point, Quaternion
         rclpy.init()
         self.node = rclpy.create_node("paced")
         threading.Thread(target=rclpy.spin, args=(self.node,), daemon=True).start()
@@ -58,20 +57,60 @@ class Ros2:
         return bool(publisher.get_subscription_count() and self.node.count_publishers(subscriber.topic_name))
 
 
+class Angles:
+    """Quaternions, which points answer."""
+
+    def __init__(self) -> None:
+        from geometry_msgs.msg import Point, Quaternion
+
+        self.sent, self.received = Quaternion, Point
+
+    def message(self, number: int) -> Any:
+        angle = (number % _TURN) / 1000 - 3
+        return self.sent(x=0.0, y=0.0, z=math.sin(angle / 2), w=math.cos(angle / 2))
+
+    def answer(self, quaternion: Any) -> Any:
+        return self.received(x=quaternion.x, y=quaternion.y, z=quaternion.z)
+
+    def value(self, point: Any) -> float:
+        return float(point.z)
+
+
+class Images:
+    """Images, which the same images answer."""
+
+    def __init__(self, version: int) -> None:
+        from sensor_msgs.msg import Image
+
+        self.sent = self.received = Image
+        content = bytes(range(250)) * (_IMAGE_BYTES // 250)
+        self._data: Any = content if version == 1 else array.array("B", content)
+
+    def message(self, number: int) -> Any:
+        image = self.sent()
+        image.step, image.data = number, self._data
+        return image
+
+    def answer(self, image: Any) -> Any:
+        return image
+
+    def value(self, image: Any) -> float:
+        return float(image.step) if image.data == self._data else -1.0
+
+
 class Way:
-    def __init__(self, ros: Any, sent: str, received: str) -> None:
-        self.ros = ros
+    def __init__(self, ros: Any, kind: Any, sent: str, received: str) -> None:
+        self.kind = kind
         self.sent_at: list[float] = []
         self.came: list[tuple[float, float]] = []
-        self.publisher = ros.publisher(sent, ros.quaternion)
-        self.subscriber = ros.subscriber(received, ros.point, self.take)
+        self.publisher = ros.publisher(sent, kind.sent)
+        self.subscriber = ros.subscriber(received, kind.received, self.take)
 
-    def take(self, point: Any) -> None:
-        self.came.append((time.perf_counter(), point.z))
+    def take(self, message: Any) -> None:
+        self.came.append((time.perf_counter(), self.kind.value(message)))
 
     def send(self) -> None:
-        angle = (len(self.sent_at) % _TURN) / 1000 - 3
-        message = self.ros.quaternion(x=0.0, y=0.0, z=math.sin(angle / 2), w=math.cos(angle / 2))
+        message = self.kind.message(len(self.sent_at))
         self.sent_at.append(time.perf_counter())
         self.publisher.publish(message)
 
@@ -95,19 +134,20 @@ def run(ros: Any, rate: int, seconds: float, ways: list[Way]) -> None:
     print(json.dumps([way.result() for way in ways]), flush=True)
 
 
-def echo(ros: Any, sent: str, received: str) -> None:
-    publisher = ros.publisher(received, ros.point)
-    subscriber = ros.subscriber(sent, ros.quaternion, lambda q: publisher.publish(ros.point(x=q.x, y=q.y, z=q.z)))
+def echo(ros: Any, kind: Any, sent: str, received: str) -> None:
+    publisher = ros.publisher(received, kind.received)
+    subscriber = ros.subscriber(sent, kind.sent, lambda message: publisher.publish(kind.answer(message)))
     while subscriber:
         time.sleep(1)
 
 
 if __name__ == "__main__":
     middleware: Any = {"1": Ros1, "2": Ros2}[sys.argv[1]]()
+    messages: Any = Images(int(sys.argv[1])) if sys.argv[5:] == ["images"] else Angles()
     if sys.argv[2] == "echo":
-        echo(middleware, *sys.argv[3:])
+        echo(middleware, messages, *sys.argv[3:5])
     else:
-        pairs = [Way(middleware, *pair) for pair in json.loads(sys.argv[4])]
+        pairs = [Way(middleware, messages, *pair) for pair in json.loads(sys.argv[4])]
         run(middleware, int(sys.argv[2]), float(sys.argv[3]), pairs)
     # rclpy's thread is still at work.
     sys.stdout.flush()

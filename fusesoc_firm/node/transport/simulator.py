@@ -46,8 +46,8 @@ _SHOWN_LINES = 20
 # A simulator normally ends immediately on request, or when its pipes close.
 _END_SECONDS = 10.0
 
-# The simulator runs for this time before new frames are checked for, within the limits on cycles; while beats move, also
-# for this share of the time since the last frame or event. Each run costs time of its own, above all on a busy machine.
+# The simulator runs for this time before new frames are checked for, within the limits on cycles; while beats move,
+# also for this share of the time since the last frame or event. Each run costs time, above all on a busy machine.
 _STEP_SECONDS = 0.001
 _STEP_SHARE = 1 / 8
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20

@@ -23,6 +23,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <typeinfo>
@@ -107,6 +108,27 @@ class Ros1 {
     node_ = std::make_unique<ros::NodeHandle>();
     node_->setCallbackQueue(&callbacks_);
     return true;
+  }
+
+  // Return the private parameters of the node with these names that are set, as texts.
+  std::map<std::string, std::string> parameters(const std::vector<std::string>& names) const {
+    std::map<std::string, std::string> found;
+    for (const auto& name : names) {
+      XmlRpc::XmlRpcValue value;
+      if (!ros::param::get("~" + name, value)) continue;
+      std::ostringstream text;
+      if (value.getType() == XmlRpc::XmlRpcValue::TypeBoolean) {
+        text << (static_cast<bool>(value) ? "true" : "false");
+      } else if (value.getType() == XmlRpc::XmlRpcValue::TypeDouble) {
+        text << static_cast<double>(value);
+      } else if (value.getType() == XmlRpc::XmlRpcValue::TypeString) {
+        text << static_cast<std::string>(value);
+      } else {
+        text << value;
+      }
+      found[name] = text.str();
+    }
+    return found;
   }
 
   // Pass every message of a topic to `handler`, in the thread that calls spin().

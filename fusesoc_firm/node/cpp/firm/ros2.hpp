@@ -21,14 +21,20 @@
 #include <rcl/publisher.h>
 #include <rcl/subscription.h>
 #include <rcl/wait.h>
+#include <rcl_yaml_param_parser/parser.h>
 #include <rcutils/logging_macros.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <optional>
+#include <regex>
 #include <set>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -88,6 +94,25 @@ class Ros2 {
     check_rcl(rcl_wait_set_init(&waiting_, 0, 0, 0, 0, 0, 0, &context_, allocator), "wait for messages");
     is_started_ = true;
     return true;
+  }
+
+  // Return the parameters of the node with these names that command line and parameter files set, as texts. Throws
+  // MiddlewareError.
+  std::map<std::string, std::string> parameters(const std::vector<std::string>& names) const {
+    rcl_params_t* given = nullptr;
+    check_rcl(rcl_arguments_get_param_overrides(&context_.global_arguments, &given), "read the parameters");
+    std::map<std::string, std::string> found;
+    for (std::size_t node = 0; given != nullptr && node < given->num_nodes; ++node) {
+      if (!is_meant(given->node_names[node])) continue;
+      const rcl_node_params_t& set = given->params[node];
+      for (std::size_t index = 0; index < set.num_params; ++index) {
+        const std::string name = set.parameter_names[index];
+        if (std::find(names.begin(), names.end(), name) == names.end()) continue;
+        if (const auto text = text_of(set.parameter_values[index])) found[name] = *text;
+      }
+    }
+    if (given != nullptr) rcl_yaml_node_struct_fini(given);
+    return found;
   }
 
   // Pass every message of a topic to `handler`, in the thread that calls spin(). Throws MiddlewareError.
@@ -210,6 +235,38 @@ class Ros2 {
   }
 
  private:
+  // Return whether a name in a parameter file means this node: `*` stands for a part of a name, `**` for any parts.
+  bool is_meant(std::string pattern) const {
+    if (pattern.empty() || pattern[0] != '/') pattern = "/" + pattern;
+    std::string expression;
+    for (std::size_t place = 0; place < pattern.size(); ++place) {
+      if (pattern.compare(place, 3, "/**") == 0) {
+        expression += "(/\\w+)*";
+        place += 2;
+      } else {
+        expression += pattern[place] == '*' ? "\\w+" : std::string(1, pattern[place]);
+      }
+    }
+    return std::regex_match(rcl_node_get_fully_qualified_name(&node_), std::regex(expression));
+  }
+
+  // Return nothing for an array.
+  static std::optional<std::string> text_of(const rcl_variant_t& value) {
+    std::ostringstream text;
+    if (value.bool_value != nullptr) {
+      text << (*value.bool_value ? "true" : "false");
+    } else if (value.integer_value != nullptr) {
+      text << *value.integer_value;
+    } else if (value.double_value != nullptr) {
+      text << *value.double_value;
+    } else if (value.string_value != nullptr) {
+      text << value.string_value;
+    } else {
+      return std::nullopt;
+    }
+    return text.str();
+  }
+
   static constexpr std::chrono::seconds kLookInterval{1};
 
   struct Publisher {

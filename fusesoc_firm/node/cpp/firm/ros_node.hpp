@@ -118,15 +118,34 @@ Value word_of(const std::string& option, const std::string& text, const std::map
   throw UsageError(option + " is '" + text + "'; legal: " + legal);
 }
 
+// The parameters of the node that have the effect of an option.
+inline const std::vector<std::string>& parameter_names() {
+  static const std::vector<std::string> names{"transport", "status", "software", "depth", "overflow",
+                                              "drain",     "restart", "trace",   "qos"};
+  return names;
+}
+
+// Return the options that parameters stand for. Throws UsageError.
+inline std::vector<std::string> options_of(const std::map<std::string, std::string>& parameters) {
+  std::vector<std::string> words;
+  for (const auto& [name, text] : parameters) {
+    const bool is_switch = name == "restart";
+    if (is_switch && !word_of<bool>("the parameter " + name, text, {{"false", false}, {"true", true}})) continue;
+    words.push_back("--" + name);
+    if (!is_switch) words.push_back(text);
+  }
+  return words;
+}
+
 // Parse the arguments that ROS has left; `has_quality` tells whether topics of this ROS have a quality of service.
 // Throws UsageError.
-inline NodeArguments parse_arguments(const System& system, bool has_quality, int argc, char** argv) {
+inline NodeArguments parse_arguments(const System& system, bool has_quality, const std::vector<std::string>& words) {
   NodeArguments arguments;
-  for (int index = 1; index < argc; ++index) {
-    const std::string option = argv[index];
+  for (std::size_t index = 0; index < words.size(); ++index) {
+    const std::string option = words[index];
     const auto value = [&] {
-      if (++index == argc) throw UsageError(option + " needs a value");
-      return std::string(argv[index]);
+      if (++index == words.size()) throw UsageError(option + " needs a value");
+      return words[index];
     };
     if (option == "--help" || option == "-h") {
       arguments.wants_help = true;
@@ -157,9 +176,13 @@ inline NodeArguments parse_arguments(const System& system, bool has_quality, int
       throw UsageError("unknown option '" + option + "'");
     }
   }
+  return arguments;
+}
+
+// Throws UsageError if an option is missing.
+inline void check_complete(const System& system, const NodeArguments& arguments) {
   if (arguments.transport.empty()) throw UsageError("--transport is missing");
   if (arguments.software.empty() && system.has_software()) throw UsageError("--software is missing");
-  return arguments;
 }
 
 inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool has_quality) {
@@ -182,7 +205,9 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
       << "  --restart            reopen the transport each time it fails\n"
       << "  --trace FILE         write each step of each message to FILE, as CSV\n";
   if (has_quality) out << "  --qos WORD           reliability of all topics: reliable or best_effort (default: each topic's)\n";
-  out << "  --help               print this help\n\n" << ros_arguments << "\n\ntopics to the hardware:\n";
+  out << "  --help               print this help\n\n"
+      << "Each option except --help is also a parameter of the node, such as transport; the command line has priority.\n"
+      << ros_arguments << "\n\ntopics to the hardware:\n";
   for (const auto& topic : system.subscribers) out << "  " << topic.name << "  " << topic.type << "\n";
   out << "topics from the hardware:\n";
   for (const auto& topic : system.publishers) out << "  " << topic.name << "  " << topic.type << "\n";
@@ -467,7 +492,7 @@ class ConnectedCalls {
   Ros& ros_;
 };
 
-// Run the node until a signal, ROS, or the hardware ends it. Return the exit status.
+// Run the node, which ROS knows, until a signal, ROS, or the hardware ends it. Return the exit status.
 template <typename Ros>
 int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   std::ofstream trace;
@@ -475,7 +500,6 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
     trace.open(arguments.trace);
     if (!trace) throw UsageError("cannot write '" + arguments.trace + "'");
   }
-  if (!ros.start([] { return is_interrupted != 0; })) return 0;
   std::map<std::string, MessageHandler> publish;
   for (const auto& topic : system.publishers) {
     publish[topic.name] = ros.advertise(topic, arguments.quality_of(topic));
@@ -531,11 +555,16 @@ int run(const System& system, int argc, char** argv) {
   try {
     handle_signals();
     Ros ros(argc, argv, system.name + "_node");
-    const NodeArguments arguments = parse_arguments(system, Ros::kHasQuality, argc, argv);
-    if (arguments.wants_help) {
+    const std::vector<std::string> given(argv + 1, argv + argc);
+    if (parse_arguments(system, Ros::kHasQuality, given).wants_help) {
       print_help(std::cout, system, Ros::kArguments, Ros::kHasQuality);
       return 0;
     }
+    if (!ros.start([] { return is_interrupted != 0; })) return 0;
+    std::vector<std::string> words = options_of(ros.parameters(parameter_names()));
+    words.insert(words.end(), given.begin(), given.end());
+    const NodeArguments arguments = parse_arguments(system, Ros::kHasQuality, words);
+    check_complete(system, arguments);
     return serve(ros, system, arguments);
   } catch (const UsageError& fault) {
     std::cerr << system.name << "_node: " << fault.what() << "; see --help" << std::endl;
