@@ -112,7 +112,7 @@ def _rows(layout: Layout, folder: Path, pattern: str) -> list[tuple[str, ...]]:
     firm = [sys.executable, "-m", "fusesoc_firm.cli", "build", "--setup", "--target", "default"]
     has_plain = layout.has_speed_up and re.search(pattern, f"{layout.name} {_PLAIN}")
     plain = run(fusesoc, [[core] for core in cores], folder, 2) if has_plain else None
-    first = [(layout.name, _PLAIN, "2", *plain.cells(), "", "", "")] if plain else []
+    first: list[tuple[str, ...]] = [(layout.name, _PLAIN, "2", *plain.cells(), "", "", "")] if plain else []
     if not re.search(pattern, f"{layout.name} {_FIRM}"):
         return first
     turns = [(run(firm, [cores], folder, 1), run(firm, [cores], folder, 2)) for _ in range(RUNS)]
