@@ -21,8 +21,8 @@ FILE, PROGRAM, LINK, FOLDER = "file", "program", "link", "folder"
 _PRIVATE = ("generator_cache", "generated")
 # Our launcher's notes of paths, and records of steps.
 _NOTES = (".firm_noted",)
-# GHDL writes the time of analysis into a library, and Verilator the times of its inputs. Yosys and nextpnr write how long
-# they took into their logs.
+# GHDL writes the time of analysis into a library, and Verilator the times of its inputs. Yosys and nextpnr log how long
+# they took.
 _STAMPS: dict[str, re.Pattern[bytes]] = {
     ".cf": re.compile(rb'"\d{14}\.\d{3}"'),
     # The origins of cores, which no flow uses.
