@@ -38,7 +38,10 @@ _OURS = _Below(tuple(f"{PACKAGE}/{part}" for part in _PARTS))
 
 @dataclass(frozen=True)
 class Places:
-    """The folder of a step, the folder for its temporary files, the places of tools and of their caches, and HOME."""
+    """The folder of a step, the folder for its temporary files, the places of tools and of their caches, and HOME.
+
+    `histories` are the beginnings of the paths of histories that tools keep of typed commands.
+    """
 
     folder: str
     temporary: str
@@ -46,13 +49,20 @@ class Places:
     caches: tuple[str, ...] = ()
     declared: frozenset[str] = field(default_factory=frozenset)
     home: str = ""
+    histories: tuple[str, ...] = ()
 
     def outside(self, trace: Trace) -> Trace:
         """Return what a step used outside its folder, without what is not recorded."""
         apart = _Below((self.folder, self.temporary, *self.caches, *_MACHINE))
 
         def kept(paths: Iterable[str]) -> set[str]:
-            return {path for path in paths if path not in apart and (path not in _OF_PACKAGE or path in _OURS)}
+            return {
+                path
+                for path in paths
+                if path not in apart
+                and not path.startswith(self.histories)
+                and (path not in _OF_PACKAGE or path in _OURS)
+            }
 
         return Trace(
             kept(trace.programs) | kept(_interpreters(trace.programs)),
@@ -79,7 +89,8 @@ class Places:
 
     def _may_be_written(self, path: str) -> bool:
         is_byte_code = _BYTE_CODE in path and self._is_known(path)
-        return is_byte_code or path in _Below((self.folder, self.temporary, *self.caches, *_WRITABLE))
+        is_legal = path in _Below((self.folder, self.temporary, *self.caches, *_WRITABLE))
+        return is_legal or is_byte_code or path.startswith(self.histories)
 
 
 def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], declared: Iterable[str] = ()) -> Places:
@@ -97,6 +108,8 @@ def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], dec
         ),
         frozenset(map(os.path.realpath, declared)),
         home,
+        # Yosys keeps a history even if nobody types commands; it writes a temporary file and renames it.
+        (os.path.join(home, ".yosys_history"),),
     )
 
 

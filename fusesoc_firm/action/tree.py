@@ -21,11 +21,14 @@ FILE, PROGRAM, LINK, FOLDER = "file", "program", "link", "folder"
 _PRIVATE = ("generator_cache", "generated")
 # Our launcher's notes of paths, and records of steps.
 _NOTES = (".firm_noted",)
-# GHDL writes the time of analysis into a library, and Verilator the times of its inputs.
+# GHDL writes the time of analysis into a library, and Verilator the times of its inputs. Yosys and nextpnr log how long
+# they took.
 _STAMPS: dict[str, re.Pattern[bytes]] = {
     ".cf": re.compile(rb'"\d{14}\.\d{3}"'),
     # The origins of cores, which no flow uses.
     ".eda.yml": re.compile(rb"^(?:cores|dependencies):\n(?:[ -].*\n)*", re.MULTILINE),
+    "yosys.log": re.compile(rb"^(?:End of script\.|Time spent:|ABC: Total runtime).*$", re.MULTILINE),
+    "next.log": re.compile(rb"\b\d+\.\d\d(?:s\b| +\d+\.\d\d\|)"),
     "__verFiles.dat": re.compile(rb"(?<=[CST] ) *\d+ +\d+ +\d+ +\d+ +\d+ +\d+"),
 }
 

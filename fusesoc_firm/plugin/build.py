@@ -121,10 +121,9 @@ def _pool(plan: Plan, how: How, listener: Listener, words: tuple[str, ...], run_
     jobs = how.jobs or len(os.sched_getaffinity(0))
     plan.fetch()
     # Each call with a lock file checks this file.
-    if not how.is_locked and _generators_run_here():
+    if not how.is_locked and _generators_run_here() and (calls := plan.generator_calls()):
         from fusesoc_firm.plugin.batch import prepare
 
-        calls = plan.generator_calls()
         with closing(prepare(calls, jobs)) as steps:
             for number, _ in enumerate(steps, start=1):
                 listener.progress(f"generated {number} of {len(calls)}")

@@ -10,7 +10,6 @@ import json
 import os
 import sys
 import time
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -29,12 +28,11 @@ _kept: list[str] = []
 _BELOW = f"{PACKAGE}{os.sep}"
 
 
-@dataclass
 class _Watch:
     """After `watch`, the state since which this process has opened none of our files, if known."""
 
-    is_on: bool = False
-    state: str = ""
+    is_on = False
+    state = ""
 
 
 _watch = _Watch()

@@ -86,6 +86,7 @@ def places() -> Places:
         Trace(read={"/work/build/src/a.vhd", "/work/build.tmp/x", "/ccache/1", "/etc/passwd", "/proc/self/maps"}),
         Trace(written={"/work/build/out", "/work/build.tmp/x", "/ccache/1", "/dev/null", "/proc/self/comm"}),
         Trace(written={f"{sys.prefix}/lib/__pycache__/x.pyc"}, asked={"/home/me/secret"}, listed={"/work"}),
+        Trace(read={"/home/me/.yosys_history"}, written={"/home/me/.yosys_history-71.tmp"}),
     ],
 )
 def test_what_a_step_may_do(places: Places, trace: Trace) -> None:

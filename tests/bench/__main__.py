@@ -55,7 +55,7 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing, fuzz, loops and actions: only rows whose names match, such as 'Image.* 64 bits'",
+        help="for timing, fuzz, loops, builds and actions: only rows whose names match, such as 'Image.* 64 bits'",
     )
     parser.add_argument(
         "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"
@@ -92,7 +92,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "links": lambda: links.measure(Yosys(), _tell),
         "applications": lambda: applications.measure(Yosys(), _tell),
         "systems": lambda: systems.measure(seed, _tell),
-        "builds": lambda: builds.measure(_tell),
+        "builds": lambda: builds.measure(_tell, figures.written(), arguments.row),
         "actions": lambda: actions.measure(_tell, figures.written(), arguments.row),
         "simulators": lambda: simulators.measure(_tell),
         "replay": lambda: replay.measure(seed, _tell),

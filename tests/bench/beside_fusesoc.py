@@ -79,7 +79,7 @@ def bench_rows(tell: Tell) -> dict[tuple[str, ...], tuple[str, ...]]:
     with tempfile.TemporaryDirectory() as place:
         folder = serv(Path(place)).folder
         arguments = ["run", "--build-root", "plain", f"--target={_BENCH_TARGET}", _BENCH_CORE, *_BENCH_OPTIONS]
-        plain = min(_fusesoc(folder, [*arguments[:1], "--clean", *arguments[1:]], "") for _ in range(2))
+        plain = min(run_fusesoc(folder, [*arguments[:1], "--clean", *arguments[1:]], "") for _ in range(2))
         first, ran = _tested(folder)
         unchanged, ran_again = _tested(folder)
         (log,) = (folder / "build").glob(f"*/{_BENCH_TARGET}.log")
@@ -136,10 +136,10 @@ def launcher_cells(tell: Tell) -> tuple[str, ...]:
         (folder / "small.core").write_text(_LAUNCHER_CORE)
         (folder / "small.vhd").write_text(_SMALL)
         command = ["run", "--clean", "--target=sim", "bench:launcher:small"]
-        _fusesoc(folder, command, None)
+        run_fusesoc(folder, command, None)
         for _ in range(int(LAUNCHER_KEY[1])):
             for launcher, seconds in times.items():
-                seconds.append(_fusesoc(folder, command, launcher))
+                seconds.append(run_fusesoc(folder, command, launcher))
     without, with_it = (min(seconds) for seconds in times.values())
     result = MET if with_it - without <= _LAUNCHER_BAR else MISSED
     figures = (f"{without:.2f}", f"{with_it:.2f}", f"{with_it - without:.2f}", f"{_LAUNCHER_BAR:g}", result)
@@ -170,7 +170,7 @@ def _library_rows(name: str, library: Library) -> list[tuple[str, ...]]:
     again = library.run()
     unchanged = processor_time() - before
     plain = sum(
-        _fusesoc(library.folder, ["run", "--build-root", "plain", "--build", f"--target={target}", core], "")
+        run_fusesoc(library.folder, ["run", "--build-root", "plain", "--build", f"--target={target}", core], "")
         for core, target in (build.split(" ") for build in states)
     )
     count, ran = str(len(states)), [sum(step != "cached" for step in steps) for steps in states.values()]
@@ -185,7 +185,7 @@ def _library_rows(name: str, library: Library) -> list[tuple[str, ...]]:
     ]
 
 
-def _fusesoc(folder: Path, arguments: Sequence[str], launcher: str | None) -> float:
+def run_fusesoc(folder: Path, arguments: Sequence[str], launcher: str | None) -> float:
     """Run FuseSoC with a launcher (None: the core's own); return the processor time in seconds."""
     variables = {"PYTHONPATH": str(REPOSITORY), "FUSESOC_FIRM_CACHE": str(folder / "store")}
     kept = {name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"}

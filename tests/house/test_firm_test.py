@@ -25,6 +25,7 @@ from fusesoc_firm.action.tree import tree_of
 from fusesoc_firm.store.server import Server
 from fusesoc_firm.store.store import Store
 from fusesoc_firm.tools.library_path import library_root
+from fusesoc_firm.tools.programs import find
 from tests.certificates import needs_openssl, tls_files, write_certificates
 from tests.hdl.ghdl import REPOSITORY
 from tests.house.test_build import wait_until
@@ -120,6 +121,11 @@ module gate;
     $display("code %h", code[0]);
     $finish;
   end
+endmodule
+"""
+BLINK = """\
+module blink(input clk, output reg led);
+  always @(posedge clk) led <= !led;
 endmodule
 """
 TOOLS = {"make", "ghdl", "ghdl-mcode", "iverilog", "vvp", "verilator", "verilator_bin", "g++", "vgate", "sh"}
@@ -232,6 +238,34 @@ def test_second_runs_of_steps_write_the_same_bytes(library: Path) -> None:
     for expected in ("passed", "cached"):
         status, text = run(library, "--target", "sim", "sim_icarus", FUSESOC_FIRM_ACTIONS_TWICE="1")
         assert (status, results(text)) == (0, {"sim": expected, "sim_icarus": expected}), text
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(
+    ("flow", "program"),
+    [
+        ("flow: generic, flow_options: {tool: yosys, arch: xilinx}", "yosys"),
+        ("flow: icestorm, flow_options: {nextpnr_options: [--hx1k, --package, tq144]}", "nextpnr-ice40"),
+    ],
+    ids=("netlist", "bitstream"),
+)
+def test_netlists_and_bitstreams_are_cached(library: Path, flow: str, program: str) -> None:
+    """Yosys keeps a history of commands in HOME, and both programs log how long they took."""
+    if find(program) is None or find("yosys") is None:
+        pytest.skip(f"{program} or yosys is not installed")
+    with (library / "gate" / "gate.core").open("a") as core:
+        core.write(f"  made: {{filesets: [rtl], toplevel: blink, {flow}}}\n")
+    (library / "gate" / "gate.v").write_text(BLINK)
+    selected = ("acme:m:gate", "--target", "made", "--cached", "--build-only")
+    status, text = run(library, *selected, name="build", FUSESOC_FIRM_ACTIONS_TWICE="1")
+    assert (status, results(text)) == (0, {"made": "ok"}), text
+    assert "not cached" not in text
+    place = library / "build" / "acme_m_gate_1.0" / "made"
+    made = {path.name: path.read_bytes() for path in place.glob("acme_m_gate_1.0.*")}
+    shutil.rmtree(library / "build")
+    status, text = run(library, *selected, name="build")
+    assert (status, results(text)) == (0, {"made": "cached"}), text
+    assert {path.name: path.read_bytes() for path in place.glob("acme_m_gate_1.0.*")} == made
 
 
 @pytest.mark.skipif(not can_sandbox(), reason="bwrap is not installed or not permitted")
