@@ -86,7 +86,7 @@ class Board:
         self.chip = chip
         self.is_running = True
         self.to_offer: SimpleQueue[bytes] = SimpleQueue()
-        self._error: list[BaseException] = []
+        self._error: list[Exception] = []
         self._thread = threading.Thread(target=self._run, args=(run,), daemon=True)
         self._thread.start()
 
@@ -111,12 +111,16 @@ class Board:
             except Empty:
                 return data
 
-    def close(self) -> None:
-        """Stop the board. It must not have misused its chip."""
+    def stop(self) -> None:
+        """Stop the board. Its connections remain."""
         self.is_running = False
         self._thread.join()
         if self._error:
             raise self._error[0]
+
+    def close(self) -> None:
+        """Stop the board and end its connections. It must not have misused its chip."""
+        self.stop()
         misuses = self.chip.misuses
         self.chip.close()
         assert not misuses
@@ -124,7 +128,7 @@ class Board:
     def _run(self, run: Callable[[Board], None]) -> None:
         try:
             run(self)
-        except BaseException as error:  # for the test's thread
+        except Exception as error:  # noqa: BLE001 - for the test's thread
             self._error.append(error)
 
 
@@ -162,7 +166,9 @@ class Frame:
 
 def hardware(chip_number: int, folder: Path, half_bit: int = 1) -> Path:
     """The program of firm_wiznet_node's netlist, and its bench."""
-    verilog = netlist("firm_wiznet_node", folder, _HARDWARE[-1:], _HARDWARE[:-1], (), CHIP=chip_number, HALF_BIT=half_bit)
+    verilog = netlist(
+        "firm_wiznet_node", folder, _HARDWARE[-1:], _HARDWARE[:-1], (), CHIP=chip_number, HALF_BIT=half_bit
+    )
     bench = (HERE / "node.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_node", bench, folder, (HERE,))
 

@@ -51,7 +51,8 @@ def running(request: pytest.FixtureRequest) -> Iterator[Running]:
 
 def _rospy(method: str, *parameters: Any) -> bytes:
     body = xmlrpc.client.dumps(parameters, method).encode()
-    return b"POST /RPC2 HTTP/1.1\r\nHost: x:1\r\nAccept-Encoding: gzip\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
+    head = f"POST /RPC2 HTTP/1.1\r\nHost: x:1\r\nAccept-Encoding: gzip\r\nContent-Length: {len(body)}\r\n\r\n"
+    return head.encode() + body
 
 
 def _roscpp(method: str, *parameters: Any) -> bytes:
@@ -61,7 +62,8 @@ def _roscpp(method: str, *parameters: Any) -> bytes:
         return f"<value><i4>{item}</i4></value>" if isinstance(item, int) else f"<value>{item}</value>"
 
     inside = "".join(f"<param>{value(item)}</param>" for item in parameters)
-    text = f'<?xml version="1.0"?>\r\n<methodCall><methodName>{method}</methodName>\r\n<params>{inside}</params></methodCall>\r\n'
+    name = f"<methodCall><methodName>{method}</methodName>"
+    text = f'<?xml version="1.0"?>\r\n{name}\r\n<params>{inside}</params></methodCall>\r\n'
     return f"POST / HTTP/1.1\r\nUser-Agent: XMLRPC++ 0.7\r\nContent-length: {len(text)}\r\n\r\n{text}".encode()
 
 
