@@ -1,4 +1,4 @@
-"""A node of ROS 1 in a chip's sockets among those of rospy and roscpp: the interpreter, and the hardware at the pins."""
+"""A node of ROS 1 in a chip's sockets among those of rospy and roscpp: interpreted, and as hardware at the pins."""
 
 from __future__ import annotations
 
