@@ -237,8 +237,8 @@ def _texts(node: Node) -> dict[str, Text]:
         texts[f"greeting_{index}"] = _header(name, *fields)
     for index, item in enumerate(node.publishers):
         definition = f"message_definition={item.definition}"
-        fields = ("latching=0", f"md5sum={item.md5}", definition, f"topic={item.topic}", f"type={item.type}")
-        texts[f"header_{index}"] = _header(name, *fields)
+        lines = ("latching=0", f"md5sum={item.md5}", definition, f"topic={item.topic}", f"type={item.type}")
+        texts[f"header_{index}"] = _header(name, *lines)
     texts["refusal"] = _header("error=topic, type or md5sum is not that of the publisher")
     return texts
 

@@ -173,7 +173,8 @@ def test_the_tools_of_ros_know_the_hardware(running: Clocked, tmp_path: Path) ->
         assert [connection.msgtype for connection in bag.connections] == ["geometry_msgs/msg/Point"]
         ((_, _, data), *others) = bag.messages()
         assert len(others) == 2
-        assert bag.deserialize(data, "geometry_msgs/msg/Point").x == 0
+        point: Any = bag.deserialize(data, "geometry_msgs/msg/Point")
+        assert point.x == 0
     listed = _tool(ros, "rostopic", "list", "-v").stdout
     assert " * /place [geometry_msgs/Point] 1 publisher" in listed
     assert " * /turn [geometry_msgs/Quaternion] 1 subscriber" in listed

@@ -133,7 +133,8 @@ def _check_call(running: Running, dialect: Any, call: tuple[str, tuple[Any, ...]
         with pytest.raises(xmlrpc.client.Fault, match="no such method"):
             xmlrpc.client.loads(body)
         return
-    ((code, _, value),), _ = xmlrpc.client.loads(body)
+    answer: Any = xmlrpc.client.loads(body)[0][0]
+    code, _, value = answer
     refused = method == "requestTopic" and parameters[1] not in {"/place", "/turn"}
     assert (code, value) == (0 if refused else 1, _expected(running, method, parameters)), (call, body)
 
