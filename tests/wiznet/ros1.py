@@ -31,6 +31,7 @@ from tests.wiznet.w5500 import W5500
 HERE = Path(__file__).parent
 _HARDWARE = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
+_IDLE_BYTES = 5  # of a turn without news
 _LONGEST_SECONDS = 60
 # The bench plays milliseconds while the header of an SPI frame is sent.
 _MOST_MS = 32
@@ -80,10 +81,12 @@ def framed(number: int, payload: bytes) -> bytes:
 
 
 class Board:
-    """A running board in a thread. `send` offers a frame of the Manager."""
+    """A running board in a thread. `turns` has the SPI bytes of each turn of an interpreter."""
 
-    def __init__(self, run: Callable[[Board], None], chip: W5200 | W5500) -> None:
+    def __init__(self, run: Callable[[Board], None], chip: W5200 | W5500, manager: Manager) -> None:
         self.chip = chip
+        self.manager = manager
+        self.turns: list[int] = []
         self.is_running = True
         self.to_offer: SimpleQueue[bytes] = SimpleQueue()
         self._error: list[Exception] = []
@@ -94,13 +97,21 @@ class Board:
         """Offer a frame."""
         self.to_offer.put(framed(number, payload))
 
-    def wait_until_listening(self) -> None:
-        """Wait until all sockets but the first listen."""
+    def listening(self) -> int:
+        """The number of sockets that listen."""
+        return sum(item.status == Status.LISTEN for item in self.chip.sockets)
+
+    def wait_until(self, is_true: Callable[[], bool]) -> None:
+        """Wait until something has happened to the board."""
         latest = time.monotonic() + _LONGEST_SECONDS
-        while [item.status for item in self.chip.sockets[1:]] != [Status.LISTEN] * 7:
+        while not is_true():
             assert self._thread.is_alive(), self._error
             assert time.monotonic() < latest, [item.status.name for item in self.chip.sockets]
-            time.sleep(0.01)
+            time.sleep(0.005)
+
+    def wait_until_listening(self) -> None:
+        """Wait until all sockets but the first listen."""
+        self.wait_until(lambda: self.listening() == 7)
 
     def offered(self) -> bytes:
         """What has been offered since the last call."""
@@ -143,15 +154,16 @@ def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
             image(board, chip_number), access, lambda: time.monotonic_ns() // (1_000_000 * _MS_PER_UNIT)
         )
         while running.is_running:
-            before = access.frames
+            before = access.bytes
             sequencer.turn()
-            if access.frames == before + 1:
+            running.turns.append(access.bytes - before)
+            if running.turns[-1] <= _IDLE_BYTES:
                 chip.poll(0.002)
             while sequencer.given:
                 sequencer.offered.extend(manager.take(*sequencer.given.popleft()))
             sequencer.offered.extend(running.offered())
 
-    return Board(run, chip)
+    return Board(run, chip, manager)
 
 
 @dataclass(frozen=True)
@@ -213,4 +225,4 @@ def clocked(
                         raise AssertionError(f"the bench says {other!r}")
             process.kill()
 
-    return Board(run, chip)
+    return Board(run, chip, manager)

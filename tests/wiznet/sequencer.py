@@ -26,11 +26,10 @@ class Access(Protocol):
 
 
 class Access5500:
-    """Accesses as SPI frames of a W5500. `frames` counts them."""
+    """Accesses as SPI frames of a W5500. `bytes` counts their bytes."""
 
     def __init__(self, slave: Slave) -> None:
         self._slave = slave
-        self.frames = 0
         self.bytes = 0
 
     def read(self, space: int, socket: int, address: int, length: int) -> bytes:
@@ -46,7 +45,6 @@ class Access5500:
         return [address >> 8, address & 0xFF, block << 3 | control]
 
     def _frame(self, sent: list[int]) -> bytes:
-        self.frames += 1
         self.bytes += len(sent)
         self._slave.select()
         received = bytes(exchange(self._slave, byte) for byte in sent)
