@@ -58,7 +58,9 @@ PROGRAMS: Mapping[str, str] = {
     "python3-rosbag": "ROS 1, in tests",
     "python3-roslaunch": "ROS 1, in tests",
     "python3-rosmaster": "ROS 1, in tests",
+    "python3-rosnode": "ROS 1, in tests",
     "python3-rospy": "nodes in Python for ROS 1",
+    "python3-rostopic": "ROS 1, in tests",
     "python3-sensor-msgs": "ROS 1, in tests",
     "python3-std-msgs": "ROS 1, in tests",
 }

@@ -1,1 +1,1 @@
-"""A ROS 2 node in fabric: what its hardware sends and compares, as plain values."""
+"""A node in fabric: what its hardware sends and compares, as plain values."""

@@ -122,7 +122,9 @@ class Node:
         return _uri(self.network.address, self.port)
 
 
-def node_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary], master: tuple[IPv4Address, int]) -> Node:
+def node_of(
+    system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary], master: tuple[IPv4Address, int]
+) -> Node:
     """Return the node of a system with a network."""
     library, network = libraries[ROS1], system.network
     assert network is not None
@@ -204,13 +206,23 @@ def _texts(node: Node) -> dict[str, Text]:
     answers: list[Text] = [
         _fault("no such method"),
         _answer((b"<i4>0</i4>",)),
-        _answer(_list(_value(b"TCPROS"), _value(str(node.network.address).encode()), _value(b"<i4>%d</i4>" % node.port))),
+        _answer(
+            _list(_value(b"TCPROS"), _value(str(node.network.address).encode()), _value(b"<i4>%d</i4>" % node.port))
+        ),
         _answer((one,)),
         _answer(_list()),
         _answer(_list(*[_value(*_list())] * 3)),
         _answer((_uri(*node.master).encode(),)),
-        _answer(_list(*(_value(*_list(_value(item.topic.encode()), _value(item.type.encode()))) for item in node.subscribers))),
-        _answer(_list(*(_value(*_list(_value(item.topic.encode()), _value(item.type.encode()))) for item in node.publishers))),
+        _answer(
+            _list(
+                *(_value(*_list(_value(item.topic.encode()), _value(item.type.encode()))) for item in node.subscribers)
+            )
+        ),
+        _answer(
+            _list(
+                *(_value(*_list(_value(item.topic.encode()), _value(item.type.encode()))) for item in node.publishers)
+            )
+        ),
         _answer((b"<i4>0</i4>",)),
         _answer((b"<i4>0</i4>",)),
         _answer((b"<i4>0</i4>",), code=0),
@@ -225,8 +237,8 @@ def _texts(node: Node) -> dict[str, Text]:
         texts[f"greeting_{index}"] = _header(name, *fields)
     for index, item in enumerate(node.publishers):
         definition = f"message_definition={item.definition}"
-        fields = ("latching=0", f"md5sum={item.md5}", definition, f"topic={item.topic}", f"type={item.type}")
-        texts[f"header_{index}"] = _header(name, *fields)
+        lines = ("latching=0", f"md5sum={item.md5}", definition, f"topic={item.topic}", f"type={item.type}")
+        texts[f"header_{index}"] = _header(name, *lines)
     texts["refusal"] = _header("error=topic, type or md5sum is not that of the publisher")
     return texts
 

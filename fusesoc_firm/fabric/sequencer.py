@@ -1,8 +1,9 @@
 """The instructions of `firm_wiznet_sequencer`, and the assembler that makes its memory of a program and texts.
 
-The sequencer runs nine coroutines in turn: one for each socket of the chip, and one for what they share. Each has a page
-of 32 bytes, whose first two hold the address at which it goes on. The rest of the memory is global. The two highest bits
-of an instruction are the number of the bytes that follow it. Addresses and 16-bit fields have their high byte first.
+The sequencer runs nine coroutines in turn: one for each socket of the chip, and one for what they share. Each has a
+page of 32 bytes, whose first two hold the address at which it goes on. The rest of the memory is global. The two
+highest bits of an instruction are the number of the bytes that follow it. Addresses and fields of 16 bits have their
+high byte first.
 
 A program is text. Each line is `label:`, an instruction with its operands, or a declaration:
 
@@ -29,8 +30,11 @@ MEMORY_BYTES = 512
 
 
 class Operation(IntEnum):
-    """The instructions. `a` is the accumulator, `f` a field, `ff` one of 16 bits, `n` a number, `p` the chip's pointer,
-    `t` the pointer in the ROM, `z` and `c` are flags."""
+    """The instructions.
+
+    `a` is the accumulator, `f` a field, `ff` one of 16 bits, `n` a number, `p` the pointer in a buffer of the chip, `t`
+    the pointer in the ROM; `z` and `c` are flags.
+    """
 
     YIELD = 0x00  # store the address, go on with the next coroutine
     PAGE = 0x01  # fields and socket are those of page a

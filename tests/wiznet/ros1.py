@@ -31,6 +31,7 @@ from tests.wiznet.w5500 import W5500
 HERE = Path(__file__).parent
 _HARDWARE = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
+_IDLE_BYTES = 5  # of a turn without news
 _LONGEST_SECONDS = 60
 # The bench plays milliseconds while the header of an SPI frame is sent.
 _MOST_MS = 32
@@ -80,13 +81,15 @@ def framed(number: int, payload: bytes) -> bytes:
 
 
 class Board:
-    """A running board in a thread. `send` offers a frame of the Manager."""
+    """A running board in a thread. `turns` has the SPI bytes of each turn of an interpreter."""
 
-    def __init__(self, run: Callable[[Board], None], chip: W5200 | W5500) -> None:
+    def __init__(self, run: Callable[[Board], None], chip: W5200 | W5500, manager: Manager) -> None:
         self.chip = chip
+        self.manager = manager
+        self.turns: list[int] = []
         self.is_running = True
         self.to_offer: SimpleQueue[bytes] = SimpleQueue()
-        self._error: list[BaseException] = []
+        self._error: list[Exception] = []
         self._thread = threading.Thread(target=self._run, args=(run,), daemon=True)
         self._thread.start()
 
@@ -94,13 +97,21 @@ class Board:
         """Offer a frame."""
         self.to_offer.put(framed(number, payload))
 
-    def wait_until_listening(self) -> None:
-        """Wait until all sockets but the first listen."""
+    def listening(self) -> int:
+        """The number of sockets that listen."""
+        return sum(item.status == Status.LISTEN for item in self.chip.sockets)
+
+    def wait_until(self, is_true: Callable[[], bool]) -> None:
+        """Wait until something has happened to the board."""
         latest = time.monotonic() + _LONGEST_SECONDS
-        while [item.status for item in self.chip.sockets[1:]] != [Status.LISTEN] * 7:
+        while not is_true():
             assert self._thread.is_alive(), self._error
             assert time.monotonic() < latest, [item.status.name for item in self.chip.sockets]
-            time.sleep(0.01)
+            time.sleep(0.005)
+
+    def wait_until_listening(self) -> None:
+        """Wait until all sockets but the first listen."""
+        self.wait_until(lambda: self.listening() == 7)
 
     def offered(self) -> bytes:
         """What has been offered since the last call."""
@@ -111,12 +122,16 @@ class Board:
             except Empty:
                 return data
 
-    def close(self) -> None:
-        """Stop the board. It must not have misused its chip."""
+    def stop(self) -> None:
+        """Stop the board. Its connections remain."""
         self.is_running = False
         self._thread.join()
         if self._error:
             raise self._error[0]
+
+    def close(self) -> None:
+        """Stop the board and end its connections. It must not have misused its chip."""
+        self.stop()
         misuses = self.chip.misuses
         self.chip.close()
         assert not misuses
@@ -124,7 +139,7 @@ class Board:
     def _run(self, run: Callable[[Board], None]) -> None:
         try:
             run(self)
-        except BaseException as error:  # for the test's thread
+        except Exception as error:  # noqa: BLE001 - for the test's thread
             self._error.append(error)
 
 
@@ -139,15 +154,16 @@ def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
             image(board, chip_number), access, lambda: time.monotonic_ns() // (1_000_000 * _MS_PER_UNIT)
         )
         while running.is_running:
-            before = access.frames
+            before = access.bytes
             sequencer.turn()
-            if access.frames == before + 1:
+            running.turns.append(access.bytes - before)
+            if running.turns[-1] <= _IDLE_BYTES:
                 chip.poll(0.002)
             while sequencer.given:
                 sequencer.offered.extend(manager.take(*sequencer.given.popleft()))
             sequencer.offered.extend(running.offered())
 
-    return Board(run, chip)
+    return Board(run, chip, manager)
 
 
 @dataclass(frozen=True)
@@ -162,7 +178,9 @@ class Frame:
 
 def hardware(chip_number: int, folder: Path, half_bit: int = 1) -> Path:
     """The program of firm_wiznet_node's netlist, and its bench."""
-    verilog = netlist("firm_wiznet_node", folder, _HARDWARE[-1:], _HARDWARE[:-1], (), CHIP=chip_number, HALF_BIT=half_bit)
+    verilog = netlist(
+        "firm_wiznet_node", folder, _HARDWARE[-1:], _HARDWARE[:-1], (), CHIP=chip_number, HALF_BIT=half_bit
+    )
     bench = (HERE / "node.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_node", bench, folder, (HERE,))
 
@@ -207,4 +225,4 @@ def clocked(
                         raise AssertionError(f"the bench says {other!r}")
             process.kill()
 
-    return Board(run, chip)
+    return Board(run, chip, manager)

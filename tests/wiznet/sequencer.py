@@ -26,11 +26,10 @@ class Access(Protocol):
 
 
 class Access5500:
-    """Accesses as SPI frames of a W5500. `frames` counts them."""
+    """Accesses as SPI frames of a W5500. `bytes` counts their bytes."""
 
     def __init__(self, slave: Slave) -> None:
         self._slave = slave
-        self.frames = 0
         self.bytes = 0
 
     def read(self, space: int, socket: int, address: int, length: int) -> bytes:
@@ -46,7 +45,6 @@ class Access5500:
         return [address >> 8, address & 0xFF, block << 3 | control]
 
     def _frame(self, sent: list[int]) -> bytes:
-        self.frames += 1
         self.bytes += len(sent)
         self._slave.select()
         received = bytes(exchange(self._slave, byte) for byte in sent)
@@ -164,26 +162,36 @@ class Sequencer:
                 self.given.append((self._a, operation is Operation.GIVE_LAST))
 
     def _with_byte(self, operation: Operation, operand: int) -> None:
-        value = operand if operation & _IMMEDIATE else self.memory[self._place(operand)]
+        if operation & _IMMEDIATE:
+            self._compute(Operation(operation & ~_IMMEDIATE), operand)
+        elif operation < Operation.STORE:
+            self._compute(operation, self.memory[self._place(operand)])
+        elif operation is Operation.STORE:
+            self.memory[self._place(operand)] = self._a
+        elif operation is Operation.FILL:
+            for index in range(self._count):
+                self.memory[self._place(operand) + index] = self.offered.popleft()
+        else:
+            self._with_word(operation, operand)
+
+    def _compute(self, operation: Operation, value: int) -> None:
+        a, carry = self._a, self._carry
+        totals = {
+            Operation.ADD: a + value,
+            Operation.ADDC: a + value + carry,
+            Operation.SUB: a - value,
+            Operation.COMPARE: a - value,
+            Operation.SUBC: a - value - carry,
+        }
+        if operation in totals:
+            self._carry = not 0 <= totals[operation] <= 0xFF
+        others = {Operation.LOAD: value, Operation.AND: a & value, Operation.OR: a | value}
+        self._set({**totals, **others}[operation])
+        if operation is Operation.COMPARE:
+            self._a = a
+
+    def _with_word(self, operation: Operation, operand: int) -> None:
         match operation:
-            case Operation.LOAD | Operation.SET:
-                self._set(value)
-            case Operation.STORE:
-                self.memory[self._place(operand)] = self._a
-            case Operation.ADD | Operation.ADDC | Operation.ADDI:
-                total = self._a + value + (operation is Operation.ADDC and self._carry)
-                self._set(total)
-                self._carry = total > 0xFF
-            case Operation.SUB | Operation.SUBC | Operation.SUBI:
-                total = self._a - value - (operation is Operation.SUBC and self._carry)
-                self._set(total)
-                self._carry = total < 0
-            case Operation.COMPARE | Operation.COMPAREI:
-                self._zero, self._carry = self._a == value, self._a < value
-            case Operation.AND | Operation.ANDI:
-                self._set(self._a & value)
-            case Operation.OR:
-                self._set(self._a | value)
             case Operation.RETURN:
                 self._next = self._word(operand)
             case Operation.POINT:
@@ -198,9 +206,6 @@ class Sequencer:
                 self._store_word(operand, self._matched(self._word(operand)))
             case Operation.MATCHED:
                 self._set(self._number(self._word(operand)))
-            case Operation.FILL:
-                for index in range(self._count):
-                    self.memory[self._place(operand) + index] = self.offered.popleft()
 
     def _matched(self, place: int) -> int:
         """The place in the trie after the character in a; 0 if no string goes on with it."""

@@ -5,53 +5,30 @@ from __future__ import annotations
 import random
 import socket
 import struct
-import time
 import xmlrpc.client
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import pytest
 
-from fusesoc_firm.fabric.ros1 import Node
 from tests.wiznet.chips import CHIPS
-from tests.wiznet.peers import free_port
-from tests.wiznet.ros1 import Board, Manager, endpoint, framed, interpreted, node
+from tests.wiznet.ros1 import framed
+from tests.wiznet.ros1_peers import Running, header, header_of, pause, read, running_node
 
 SEED = 20261126
-SECONDS = 20  # for a connection; a busy machine is slow
 QUATERNION = "a779879fadf0160734f906b8c19c7004"
 POINT = "4a842b65f413084dc2b10fb484ea7f17"
 
 
-@dataclass
-class Running:
-    """A board without a master."""
-
-    node: Node
-    board: Board
-
-    def connect(self) -> socket.socket:
-        """A connection to it."""
-        return socket.create_connection((str(self.node.network.address), self.node.port), SECONDS)
-
-
 @pytest.fixture(params=CHIPS, ids="w{}".format)
 def running(request: pytest.FixtureRequest) -> Iterator[Running]:
-    made = node(
-        ("127.0.0.1", free_port()),
-        (endpoint("/turn", "geometry_msgs", "Quaternion"), endpoint("/turn/2", "geometry_msgs", "Point")),
-        (endpoint("/place", "geometry_msgs", "Point"), endpoint("/turn", "geometry_msgs", "Quaternion")),
-    )
-    board = interpreted(made, request.param, Manager(lambda number, payload: iter([(number, payload)])))
-    board.wait_until_listening()
-    yield Running(made, board)
-    board.close()
+    yield from running_node(request.param)
 
 
 def _rospy(method: str, *parameters: Any) -> bytes:
     body = xmlrpc.client.dumps(parameters, method).encode()
-    return b"POST /RPC2 HTTP/1.1\r\nHost: x:1\r\nAccept-Encoding: gzip\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
+    head = f"POST /RPC2 HTTP/1.1\r\nHost: x:1\r\nAccept-Encoding: gzip\r\nContent-Length: {len(body)}\r\n\r\n"
+    return head.encode() + body
 
 
 def _roscpp(method: str, *parameters: Any) -> bytes:
@@ -61,7 +38,8 @@ def _roscpp(method: str, *parameters: Any) -> bytes:
         return f"<value><i4>{item}</i4></value>" if isinstance(item, int) else f"<value>{item}</value>"
 
     inside = "".join(f"<param>{value(item)}</param>" for item in parameters)
-    text = f'<?xml version="1.0"?>\r\n<methodCall><methodName>{method}</methodName>\r\n<params>{inside}</params></methodCall>\r\n'
+    name = f"<methodCall><methodName>{method}</methodName>"
+    text = f'<?xml version="1.0"?>\r\n{name}\r\n<params>{inside}</params></methodCall>\r\n'
     return f"POST / HTTP/1.1\r\nUser-Agent: XMLRPC++ 0.7\r\nContent-length: {len(text)}\r\n\r\n{text}".encode()
 
 
@@ -115,7 +93,7 @@ def _answer(running: Running, request: bytes, rng: random.Random) -> bytes:
             peer.sendall(request[:size])
             request = request[size:]
             if rng.random() < 0.1:
-                time.sleep(0.002)
+                pause()
         received = b""
         while data := peer.recv(4096):
             received += data
@@ -131,7 +109,8 @@ def _check_call(running: Running, dialect: Any, call: tuple[str, tuple[Any, ...]
         with pytest.raises(xmlrpc.client.Fault, match="no such method"):
             xmlrpc.client.loads(body)
         return
-    ((code, _, value),), _ = xmlrpc.client.loads(body)
+    answer: Any = xmlrpc.client.loads(body)[0][0]
+    code, _, value = answer
     refused = method == "requestTopic" and parameters[1] not in {"/place", "/turn"}
     assert (code, value) == (0 if refused else 1, _expected(running, method, parameters)), (call, body)
 
@@ -151,28 +130,6 @@ def test_a_thousand_calls_are_answered(running: Running) -> None:
         _check_call(running, rng.choice((_rospy, _roscpp)), rng.choice(CALLS), rng)
 
 
-def _fields(*fields: str) -> bytes:
-    body = b"".join(struct.pack("<I", len(field)) + field.encode() for field in fields)
-    return struct.pack("<I", len(body)) + body
-
-
-def _read(peer: socket.socket, length: int) -> bytes:
-    data = b""
-    while len(data) < length and (more := peer.recv(length - len(data))):
-        data += more
-    return data
-
-
-def _header_of(peer: socket.socket) -> dict[str, str]:
-    body = _read(peer, int.from_bytes(_read(peer, 4), "little"))
-    found = {}
-    while body:
-        size = int.from_bytes(body[:4], "little")
-        name, _, value = body[4 : 4 + size].decode().partition("=")
-        found[name], body = value, body[4 + size :]
-    return found
-
-
 @pytest.mark.parametrize(
     ("fields", "accepted"),
     [
@@ -189,17 +146,17 @@ def _header_of(peer: socket.socket) -> dict[str, str]:
 )
 def test_a_header_is_accepted_or_refused(running: Running, fields: tuple[str, ...], accepted: bool) -> None:
     with running.connect() as peer:
-        peer.sendall(_fields("callerid=/me", *fields))
-        header = _header_of(peer)
+        peer.sendall(header("callerid=/me", *fields))
+        found = header_of(peer)
         if not accepted:
-            assert [*header] == ["error"]
+            assert [*found] == ["error"]
             assert peer.recv(1) == b""
             return
-        assert header["md5sum"] == POINT
-        assert header["message_definition"] == running.node.publishers[0].definition
+        assert found["md5sum"] == POINT
+        assert found["message_definition"] == running.node.publishers[0].definition
         payload = bytes(range(24))
         running.board.send(0, payload)
-        assert _read(peer, 28) == framed(0, payload)[1:]
+        assert read(peer, 28) == framed(0, payload)[1:]
 
 
 def test_sockets_listen_again_after_garbage(running: Running) -> None:
@@ -214,7 +171,7 @@ def test_sockets_listen_again_after_a_thousand_connections_of_garbage(running: R
 def _garbage(running: Running, count: int) -> None:
     print(f"seed {SEED}")
     rng = random.Random(SEED)
-    valid = [_rospy("getPid", "/me"), _fields("callerid=/me", "md5sum=*", "topic=/place")]
+    valid = [_rospy("getPid", "/me"), header("callerid=/me", "md5sum=*", "topic=/place")]
     for _ in range(count):
         with running.connect() as peer:
             data = bytearray(rng.choice([*valid, rng.randbytes(40), b"POST" + rng.randbytes(60)]))

@@ -55,7 +55,9 @@ def test_a_trie_knows_its_strings_and_no_others() -> None:
 
 
 def test_operands_are_numbers_characters_fields_and_addresses() -> None:
-    rom = _assembled("global field 4\nalias part field+2\nload part+1 ; a comment\nset 'A'\nset 0x1F\nset >end\nend:\nown")
+    rom = _assembled(
+        "global field 4\nalias part field+2\nload part+1 ; a comment\nset 'A'\nset 0x1F\nset >end\nend:\nown"
+    )
     set_a = Operation.SET
     expected = [Operation.LOAD, 0x20 + 3, set_a, ord("A"), set_a, 0x1F, set_a, 0, Operation.OWN]
     assert rom.image() == bytes(expected)

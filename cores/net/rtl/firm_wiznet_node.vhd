@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node in the sockets of a W5500 or W5200: the sequencer, and its way to the chip. What it does is in the ROM outside.
+-- A node in the sockets of a W5500 or W5200: the sequencer, and its way to the chip. The ROM outside makes it a node.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

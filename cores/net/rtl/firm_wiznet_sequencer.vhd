@@ -1,7 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Runs nine coroutines in turn over the accesses of firm_wiznet_access: one for each socket of the chip, and one for all.
--- The program, its texts and its tries are in a ROM outside, which answers one cycle after the address. README.md lists
--- the instructions.
+-- Runs nine coroutines in turn over the accesses of firm_wiznet_access: one for each socket of the chip, and one for
+-- what they share. The program, its texts and its tries are in a ROM outside. README.md lists the instructions.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -115,14 +114,14 @@ architecture rtl of firm_wiznet_sequencer is
   signal page_r    : unsigned(3 downto 0);              -- page of fields and socket
   signal time_r    : unsigned(13 downto 0);             -- in ms
 
-  signal name      : unsigned(7 downto 0);
-  signal value     : byte_t;
-  signal sum       : unsigned(8 downto 0);
-  signal result    : byte_t;
-  signal is_buffer : std_logic;
-  signal side      : std_logic_vector(1 downto 0);
-  signal length    : unsigned(7 downto 0);
-  signal is_jump   : std_logic;
+  signal name       : unsigned(7 downto 0);
+  signal value      : byte_t;
+  signal sum        : unsigned(8 downto 0);
+  signal result     : byte_t;
+  signal is_buffer  : std_logic;
+  signal side       : std_logic_vector(1 downto 0);
+  signal length     : unsigned(7 downto 0);
+  signal is_jump    : std_logic;
   signal to_manager : std_logic;
   signal is_read    : std_logic;
   signal is_filled  : std_logic;
@@ -176,14 +175,12 @@ begin
             a_r or value when operation_r(2 downto 0) = OF_OR else
             std_logic_vector(sum(7 downto 0));
 
-  with operation_r(2 downto 0) select
-    is_jump <=
-      '1'           when "000",
-      zero_r        when "001",
-      not zero_r    when "010",
-      carry_r       when "011",
-      not carry_r   when "100",
-      s_axis_tvalid when others;
+  is_jump <= '1' when operation_r(2 downto 0) = "000" else
+             zero_r when operation_r(2 downto 0) = "001" else
+             not zero_r when operation_r(2 downto 0) = "010" else
+             carry_r when operation_r(2 downto 0) = "011" else
+             not carry_r when operation_r(2 downto 0) = "100" else
+             s_axis_tvalid;
 
   power_of_page : process (page_r)
   begin
@@ -251,9 +248,11 @@ begin
       end if;
       case state_r is
         when OPCODE =>
+
           next_r  <= next_r + 1;
           state_r <= DECODE;
         when DECODE =>
+
           operation_r <= rom_data;
           left_r      <= "000000" & unsigned(rom_data(7 downto 6));
           if rom_data(7 downto 6) = "00" then
@@ -263,6 +262,7 @@ begin
             state_r <= OPERAND;
           end if;
         when OPERAND =>
+
           operands_r <= operands_r(15 downto 0) & rom_data;
           left_r     <= left_r - 1;
           if left_r = 1 then
@@ -271,39 +271,51 @@ begin
             next_r <= next_r + 1;
           end if;
         when EXECUTE =>
+
           state_r <= OPCODE;
           case operation_r(7 downto 6) is
             when "00" =>
+
               case operation_r is
                 when DO_YIELD =>
+
                   page_r                 <= own_r;
                   word_r                 <= next_r;
                   operands_r(7 downto 0) <= (others => '0');
                   state_r                <= STORE_HIGH;
                 when DO_PAGE =>
+
                   page_r <= unsigned(a_r(3 downto 0));
                 when DO_OWN =>
+
                   page_r <= own_r;
                 when DO_BIT =>
+
                   a_r <= a_of_page;
                 when DO_TIME =>
+
                   a_r <= std_logic_vector(time_r(13 downto 6));
                 when DO_FETCH =>
+
                   text_r  <= text_r + 1;
                   state_r <= LOADED;
                 when DO_COUNT =>
+
                   count_r <= unsigned(a_r);
                 when DO_TAKE =>
+
                   a_r <= s_axis_tdata;
                   if s_axis_tvalid = '0' then
                     state_r <= EXECUTE;
                   end if;
                 when others =>
+
                   if m_axis_tready = '0' then
                     state_r <= EXECUTE;
                   end if;
               end case;
             when "01" =>
+
               word_r <= pointer_r;
               left_r <= count_r;
               if operation_r(5) = '1' or operation_r(4 downto 3) = "00" then
@@ -319,6 +331,7 @@ begin
                 state_r <= LOAD_HIGH;
               end if;
             when "10" =>
+
               if operation_r = DO_AT then
                 text_r <= unsigned(operands_r(15 downto 0));
               elsif operation_r = DO_LOOKUP then
@@ -327,6 +340,7 @@ begin
                 next_r <= unsigned(operands_r(15 downto 0));
               end if;
             when others =>
+
               left_r <= length;
               if operation_r = DO_CALL then
                 word_r                 <= next_r;
@@ -342,6 +356,7 @@ begin
               end if;
           end case;
         when COMPUTE =>
+
           if operation_r(2 downto 0) /= OF_COMPARE then
             a_r <= result;
           end if;
@@ -356,12 +371,15 @@ begin
           end if;
           state_r <= OPCODE;
         when LOADED =>
+
           set_a(rom_data);
           state_r <= OPCODE;
         when LOAD_HIGH =>
+
           high_r  <= memory_data;
           state_r <= LOAD_LOW;
         when LOAD_LOW =>
+
           word_r  <= field;
           state_r <= OPCODE;
           if operation_r = DO_POINT then
@@ -376,8 +394,10 @@ begin
             set_a(x"00");
           end if;
         when STORE_HIGH =>
+
           state_r <= STORE_LOW;
         when STORE_LOW =>
+
           state_r <= OPCODE;
           if operation_r = DO_YIELD then
             own_r  <= own_r + 1;
@@ -392,9 +412,11 @@ begin
 
         -- A place in a trie: a choice (bit 7) and two bytes of the next place, a character, or an end and its number.
         when MARK =>
+
           word_r  <= word_r + 1;
           state_r <= MARKED;
         when MARKED =>
+
           if rom_data(7) = '1' and (operation_r = DO_MATCHED or '0' & rom_data(6 downto 0) /= a_r) then
             word_r  <= word_r + 2;
             state_r <= MARK;
@@ -413,16 +435,20 @@ begin
             state_r <= OPCODE;
           end if;
         when TARGET_HIGH =>
+
           high_r  <= rom_data;
           state_r <= TARGET_LOW;
         when TARGET_LOW =>
+
           word_r  <= unsigned(high_r) & unsigned(rom_data);
           state_r <= STORE_HIGH;
         when NUMBERED =>
+
           set_a(rom_data);
           state_r <= OPCODE;
 
         when FILLING =>
+
           if is_filled = '1' then
             advance;
             if left_r = 1 then
@@ -430,8 +456,10 @@ begin
             end if;
           end if;
         when PRESENT =>
+
           state_r <= OFFER;
         when OFFER =>
+
           if write_ready = '1' then
             advance;
             if is_buffer = '1' then
@@ -446,6 +474,7 @@ begin
             end if;
           end if;
         when RECEIVE =>
+
           if is_read = '1' then
             advance;
             if is_buffer = '1' then
@@ -456,6 +485,7 @@ begin
             end if;
           end if;
         when FINISH =>
+
           if is_done = '1' then
             state_r <= OPCODE;
           end if;

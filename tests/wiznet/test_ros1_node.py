@@ -1,0 +1,198 @@
+"""A node of ROS 1 in a chip's sockets among those of rospy and roscpp: interpreted, and as hardware at the pins."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from rosbags.highlevel import AnyReader
+
+from fusesoc_firm.fabric.ros1 import Node, image
+from tests.ros.cpp_nodes import Ros, missing_ros1, ros1
+from tests.ros.live_nodes import paced
+from tests.wiznet.chips import CHIPS
+from tests.wiznet.ros1 import Board, Frame, Manager, clocked, endpoint, hardware, interpreted, node
+from tests.wiznet.sequencer import ACCESSES, Sequencer
+
+SEED = 20261126
+HERE = Path(__file__).parent
+ROS = HERE.parent / "ros"
+TURN, PLACE = endpoint("/turn", "geometry_msgs", "Quaternion"), endpoint("/place", "geometry_msgs", "Point")
+TOOLS = ("rosnode", "rostopic", "rosbag")
+
+pytestmark = [pytest.mark.check, pytest.mark.skipif(bool(missing_ros1()), reason=missing_ros1())]
+
+
+def _first_three(_: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
+    """The accelerator: x, y and z of each quaternion as a point."""
+    yield 0, payload[:24]
+
+
+def _node(ros: Ros) -> Node:
+    master = urlsplit(ros.environment["ROS_MASTER_URI"])
+    return node((str(master.hostname), int(master.port or 0)), (TURN,), (PLACE,))
+
+
+def _check_paced(results: list[dict[str, Any]], count: int) -> None:
+    for result in results:
+        assert result["sent"] == count
+        assert result["z"] == [math.sin((number / 1000 - 3) / 2) for number in range(count)]
+
+
+@pytest.mark.parametrize("number", CHIPS)
+def test_the_interpreter_answers_rospy(tmp_path: Path, number: int) -> None:
+    with ros1(tmp_path) as ros:
+        board = interpreted(_node(ros), number, Manager(_first_three))
+        _check_paced(paced(ros, 50, 2, [("/turn", "/place")]), 100)
+        board.close()
+
+
+@dataclass
+class Clocked:
+    """The hardware of a chip, running, and what it did."""
+
+    ros: Ros
+    node: Node
+    board: Board
+    manager: Manager
+    log: list[Frame]
+    chip: int
+
+
+@pytest.fixture(scope="module", params=[pytest.param(5200, marks=pytest.mark.thorough), 5500], ids="w{}".format)
+def program(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path]:
+    return request.param, hardware(request.param, tmp_path_factory.mktemp("hardware"))
+
+
+@pytest.fixture
+def running(program: tuple[int, Path], tmp_path: Path) -> Iterator[Clocked]:
+    print(f"seed {SEED}")
+    with ros1(tmp_path) as ros:
+        made, manager, log = _node(ros), Manager(_first_three), list[Frame]()
+        board = clocked(made, program[0], manager, program[1], 20, SEED, log)
+        yield Clocked(ros, made, board, manager, log, program[0])
+        board.close()
+
+
+class Recorded:
+    """The chip that a run of hardware had, for the interpreter: answers the same, and expects the same."""
+
+    sequencer: Sequencer
+
+    def __init__(self, log: list[Frame]) -> None:
+        self._log = log
+        self._index = -1
+        self.milliseconds = 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the next frame is not in the record."""
+        return self._index + 1 == len(self._log)
+
+    def select(self) -> None:
+        """The next frame begins."""
+        self._index += 1
+        self._byte = 0
+        self.milliseconds += self._log[self._index].milliseconds
+        self.sequencer.offered.extend(self._log[self._index].offered)
+
+    def answer(self) -> int:
+        """The byte that the hardware read."""
+        return self._log[self._index].answered[self._byte]
+
+    def take(self, byte: int) -> None:
+        """A byte of the interpreter."""
+        assert byte == self._log[self._index].sent[self._byte], (self._index, self._byte)
+        self._byte += 1
+
+    def deselect(self) -> None:
+        """The frame ends."""
+        assert self._byte == len(self._log[self._index].sent), self._index
+
+
+def _check_lock_step(running: Clocked) -> None:
+    """The interpreter sends the same SPI frames, and gives the same to the Manager."""
+    whole = running.log[:-1]  # the last one may be cut
+    slave = Recorded(whole)
+    sequencer = Sequencer(
+        image(running.node, running.chip), ACCESSES[running.chip](slave), lambda: slave.milliseconds // 64
+    )
+    slave.sequencer = sequencer
+    try:
+        while not slave.is_over:
+            sequencer.step()
+    except IndexError:  # an access of the W5200 has a second frame, which the record cuts off
+        assert slave.is_over
+    manager = Manager(_first_three)
+    for byte, is_last in sequencer.given:
+        manager.take(byte, is_last)
+    assert len(manager.taken) > 0
+    assert manager.taken == running.manager.taken[: len(manager.taken)]
+
+
+def _roscpp(running: Clocked, folder: Path, count: int) -> subprocess.Popen[str]:
+    peer = folder / "peer"
+    options = ["-std=c++17", "-O0", "-pthread", str(HERE / "ros1_peer.cpp"), "-o", str(peer)]
+    subprocess.run(["g++", *options, *running.ros.libraries], check=True)
+    words = [str(peer), "/turn", "/place", str(count), TURN.md5, PLACE.md5]
+    return subprocess.Popen(words, env=dict(running.ros.environment), stdout=subprocess.PIPE, text=True)
+
+
+def test_the_hardware_answers_rospy_and_roscpp_as_the_interpreter_does(running: Clocked, tmp_path: Path) -> None:
+    _check_paced(paced(running.ros, 20, 1, [("/turn", "/place")]), 20)
+    peer = _roscpp(running, tmp_path, 20)
+    assert peer.communicate()[0].strip() == "20"
+    running.board.stop()
+    _check_lock_step(running)
+
+
+def _tool(ros: Ros, *words: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words, env=dict(ros.environment), cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"one of {', '.join(TOOLS)} is not installed")
+def test_the_tools_of_ros_know_the_hardware(running: Clocked, tmp_path: Path) -> None:
+    ros = running.ros
+    words = [ros.python, str(ROS / "paced_peer.py"), "1", "20", "120", '[["/turn", "/place"]]']
+    with subprocess.Popen(words, env=dict(ros.environment), stdout=subprocess.DEVNULL) as peer:
+        echoed = _tool(ros, "rostopic", "echo", "-p", "-n", "3", "/place").stdout.splitlines()
+        assert echoed[0] == "%time,field.x,field.y,field.z"
+        assert len(echoed) == 4
+        _tool(ros, "rosbag", "record", "-l", "3", "-O", "places.bag", "/place", folder=tmp_path)
+        peer.send_signal(signal.SIGKILL)
+    with AnyReader([tmp_path / "places.bag"]) as bag:
+        assert [connection.msgtype for connection in bag.connections] == ["geometry_msgs/msg/Point"]
+        ((_, _, data), *others) = bag.messages()
+        assert len(others) == 2
+        point: Any = bag.deserialize(data, "geometry_msgs/msg/Point")
+        assert point.x == 0
+    listed = _tool(ros, "rostopic", "list", "-v").stdout
+    assert " * /place [geometry_msgs/Point] 1 publisher" in listed
+    assert " * /turn [geometry_msgs/Quaternion] 1 subscriber" in listed
+    assert _tool(ros, "rostopic", "type", "/place").stdout.strip() == "geometry_msgs/Point"
+    assert str(running.node.uri()) in _tool(ros, "rostopic", "info", "/place").stdout
+    assert "Pid: 1" in _tool(ros, "rosnode", "info", "/fabric").stdout
+    assert "xmlrpc reply from" in _tool(ros, "rosnode", "ping", "-c", "1", "/fabric").stdout
+    assert "killed" in _tool(ros, "rosnode", "kill", "/fabric").stdout
+    while "/fabric" in _tool(ros, "rosnode", "list").stdout:
+        time.sleep(0.1)
+    assert "/place" not in _tool(ros, "rostopic", "list", "-p").stdout
+
+
+def test_a_killed_peer_disturbs_nobody(running: Clocked) -> None:
+    ros = running.ros
+    words = [ros.python, str(ROS / "paced_peer.py"), "1", "20", "120", '[["/turn", "/place"]]']
+    with subprocess.Popen(words, env=dict(ros.environment), stdout=subprocess.DEVNULL) as peer:
+        while not running.manager.taken:
+            time.sleep(0.05)
+        peer.send_signal(signal.SIGKILL)
+    _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
