@@ -340,28 +340,32 @@ def test_the_picture_stays_in_view_when_it_grows(robot: Path, tmp_path: Path) ->
 def test_a_service_has_both_streams(tmp_path: Path) -> None:
     text = """\
 project: {name: robot}
+paths: [messages]
 accelerators:
-  - name: logic
+  - name: switch
     type: VHDL
-    sources: [logic.vhd]
+    sources: [switch.vhd]
     interface:
-      input: [{middleware: ROS2, message: std_srvs/SetBool_Request}]
-      output: [{middleware: ROS2, message: std_srvs/SetBool_Response}]
+      input: [{middleware: ROS2, message: demo_msgs/Enable_Request}]
+      output: [{middleware: ROS2, message: demo_msgs/Enable_Response}]
 blocks:
-  - {name: enable, middleware: ROS2, mode: server, service: std_srvs/SetBool, outgoing: [{name: logic}]}
-  - {name: logic, type: logic, outgoing: [{name: enable}]}
+  - {name: enable, middleware: ROS2, mode: server, service: demo_msgs/Enable, outgoing: [{name: switch}]}
+  - {name: switch, type: switch, outgoing: [{name: enable}]}
 """
     spec = tmp_path / "robot.yaml"
     spec.write_text(text, encoding="utf-8")
-    (tmp_path / "logic.vhd").touch()
+    (tmp_path / "switch.vhd").touch()
+    package = tmp_path / "messages" / "demo_msgs" / "srv"
+    package.mkdir(parents=True)
+    (package / "Enable.srv").write_text("bool data\n---\nbool success\n", encoding="utf-8")
 
     async def steps(page: Page) -> None:
         await page.until("document.querySelector('header output').textContent === 'no faults'")
         await page.until("document.querySelectorAll('.svelte-flow__edge').length === 4")
-        await page.until("document.querySelector('.block.service').innerText.includes('server of std_srvs/SetBool')")
+        await page.until("document.querySelector('.block.service').innerText.includes('server of demo_msgs/Enable')")
         await page.until("document.querySelector('.block.service').innerText.includes('ids 0, 0')")
         await page.click(block("enable"))
-        await page.until(f"{labelled('service')}.value === 'std_srvs/SetBool'")
+        await page.until(f"{labelled('service')}.value === 'demo_msgs/Enable'")
 
     run(spec, tmp_path, steps)
 
