@@ -163,4 +163,4 @@ def _studio(arguments: argparse.Namespace, place: Path) -> Studio:
     def build(spec: Path, tool: str) -> BuiltSimulator:
         return build_simulator(spec, tool, sources=CoreSources(paths, distro or "", core_folders=core_folders))
 
-    return Studio(place, Tools(load, check_sources, names, build))
+    return Studio(place, Tools(load, check_sources, names, build, paths, distro))

@@ -263,6 +263,8 @@ class Node:
                 watch.advance(READING_SECONDS)
                 now = watch.troubles()
                 self._tell(Report(f"{self._description.name}: hardware", now > status_before, watch.counts))
+                if self._watch:
+                    self._watch.status = watch.counts
                 status_before = now
 
     def _tell(self, report: Report) -> None:
@@ -459,10 +461,16 @@ class Node:
         first = None
         if burst.first_cycle is not None and burst.data:
             first = hardware.first_cycles.setdefault(burst.data[0], burst.first_cycle)
+            self._note_grant(burst)
         if frame:
             hardware.first_cycles.pop(frame.id, None)
             cycles = None if first is None or burst.last_cycle is None else (first, burst.last_cycle)
             self._deliver(frame, cycles)
+
+    def _note_grant(self, burst: Burst) -> None:
+        block = self._publisher_names.get(burst.data[0])
+        if self._watch and block is not None and burst.first_cycle is not None and burst.last_cycle is not None:
+            self._watch.granted(block, burst.first_cycle, burst.last_cycle)
 
     def _refuse_call(self, burst: Burst, reason: str) -> None:
         """Let the call fail whose response had a fault, if the burst belongs to a response."""

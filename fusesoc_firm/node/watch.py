@@ -14,8 +14,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 
 _MOST_BYTES, _MOST_MESSAGES = 64 * 2**20, 20_000
+# The number of the latest bursts.
+_MOST_GRANTS = 5000
 # The number of latencies of a block from which percentiles are computed.
 _MOST_LATENCIES = 1000
 
@@ -45,6 +48,15 @@ class Seen:
     time_ns: int
     payload: bytes
     latency: Latency = Latency()
+
+
+@dataclass(frozen=True)
+class Grant:
+    """A burst of simulated hardware: the scheduler let a publisher send from the cycle `first` to the cycle `last`."""
+
+    block: str
+    first: int
+    last: int
 
 
 @dataclass(frozen=True)
@@ -112,6 +124,9 @@ class Watch:
         self._next = 0
         self._counts: dict[str, _Counting] = {}
         self._loads: Callable[[], Mapping[str, Load]] = dict
+        self._grants: deque[Grant] = deque(maxlen=_MOST_GRANTS)
+        self.status: Mapping[str, int] = {}
+        """The counts of the hardware's status that were read last, by texts for the user."""
         self.restart()
 
     def restart(self) -> None:
@@ -145,6 +160,16 @@ class Watch:
                 count.wall_ns.append(latency.wall_ns)
             return seen.number
 
+    def granted(self, block: str, first: int, last: int) -> None:
+        """Record a burst of a publisher."""
+        with self._lock:
+            self._grants.append(Grant(block, first, last))
+
+    def grants(self, most: int) -> list[Grant]:
+        """Return the latest bursts, at most `most`, the oldest first."""
+        with self._lock:
+            return [*islice(self._grants, max(0, len(self._grants) - most), None)]
+
     def since(self, number: int, most: int) -> News:
         """Return the newest messages after the one with this number, at most `most`; -1 is before the first."""
         with self._lock:
@@ -162,6 +187,12 @@ class Watch:
         with self._lock:
             first, end = self.first, min(number, self._next)
             return [self._messages[index - first] for index in range(max(first, end - most), end)]
+
+    def of(self, block: str, most: int) -> list[Seen]:
+        """Return the latest messages of a block in the record, at most `most`, the oldest first."""
+        with self._lock:
+            found = [*islice((seen for seen in reversed(self._messages) if seen.block == block), most)]
+        return found[::-1]
 
     @property
     def first(self) -> int:

@@ -12,13 +12,13 @@ from aiohttp import WSMsgType, web
 from fusesoc_firm.studio.document import Document
 from fusesoc_firm.studio.requests import Requests, body_of, in_json
 from fusesoc_firm.studio.scene import content_of, grammar, outline, scene
-from fusesoc_firm.studio.workspace import Workspace
+from fusesoc_firm.studio.workspace import MOST_NAMES, Workspace, with_words
 from fusesoc_firm.text.diagnostics import InputError
 
 # The seconds between two looks at the opened files.
 _LOOK = 0.3
-# The largest number of messages in an answer to a search, and of specifications in a list.
-_MOST_NAMES, _MOST_FILES = 50, 1000
+# The largest number of specifications in a list.
+_MOST_FILES = 1000
 
 
 class Editing:
@@ -70,12 +70,11 @@ class Editing:
     async def _messages(self, request: web.Request) -> web.Response:
         """Search all messages for the words of a query."""
         document = self._workspace.document(request.query.get("file", ""))
-        words = request.query.get("query", "").lower().split()
         found = (content_of(document.text) or {}).get("paths") or []
         paths = [str(item) for item in found] if isinstance(found, list) else [str(found)]
         names = await self._workspace.in_turn(self._workspace.tools.names, document.path, paths)
-        found = [name for name in names if all(word in name.lower() for word in words)]
-        return in_json({"messages": found[:_MOST_NAMES], "count": len(found)})
+        found = with_words(names, request.query.get("query", ""))
+        return in_json({"messages": found[:MOST_NAMES], "count": len(found)})
 
     async def _sources(self, request: web.Request) -> web.Response:
         """Compare the accelerators' sources with their interfaces."""

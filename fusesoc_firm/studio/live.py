@@ -7,17 +7,18 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
 from aiohttp import WSMsgType, web
 
+from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.node.watch import Seen
 from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
-from fusesoc_firm.studio.message import fields_of, has_picture, picture_of
+from fusesoc_firm.studio.message import fields_of, has_picture, numbers_of, picture_of
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
 from fusesoc_firm.studio.run import Run, SimulatedRun, Wishes
 from fusesoc_firm.studio.workspace import Workspace
@@ -26,6 +27,10 @@ from fusesoc_firm.tools.simulators import fitting
 # The least time between two news, and the number of messages in one and in an answer about the record.
 _SECONDS = 0.05
 _MOST_NEW, _MOST_ROWS = 50, 200
+# The number of bursts and of points in an answer.
+_MOST_GRANTS, _MOST_POINTS = 500, 500
+# What can be plotted of each message beside its own numbers.
+LATENCY, BYTES = "latency", "bytes"
 # The highest rate of messages a second that the page may ask for.
 _MOST_RATE = 100_000
 _CONTROLS = ("pause", "resume", "step", "stop")
@@ -55,6 +60,9 @@ class Live:
             "GET record": self._record,
             "GET message": self._message,
             "GET picture": self._picture,
+            "GET grants": self._grants,
+            "GET status": self._status,
+            "GET series": self._series,
             "POST run": self._run,
             "POST control": self._control,
             f"GET {FOXGLOVE}": self._foxglove,
@@ -164,6 +172,25 @@ class Live:
             raise web.HTTPNotFound(reason="this message has no picture that a browser shows")
         return web.Response(body=found[0], content_type=found[1])
 
+    async def _grants(self, _: web.Request) -> web.Response:
+        """Return the latest bursts of the hardware."""
+        grants = self._current().watch.grants(_MOST_GRANTS)
+        return in_json({"grants": [(item.block, item.first, item.last) for item in grants]})
+
+    async def _status(self, _: web.Request) -> web.Response:
+        """Return what the hardware's status has counted."""
+        run = self._current()
+        return in_json({"access": run.system.status and run.system.status.value, "counts": run.watch.status})
+
+    async def _series(self, request: web.Request) -> web.Response:
+        """Return the latest values of a number in a block's messages, and the names of its numbers."""
+        run, block = self._current(), request.query.get("block", "")
+        topic = run.topics.get(block)
+        if not topic:
+            raise web.HTTPNotFound(reason="there is no such block")
+        seen = run.watch.of(block, _MOST_POINTS)
+        return in_json(await asyncio.to_thread(series, topic.frame, seen, request.query.get("field", LATENCY)))
+
     async def _run(self, request: web.Request) -> web.Response:
         """Simulate the system of a file with the stimuli of its core; the run before ends."""
         body, workspace = await body_of(request), self._workspace
@@ -200,6 +227,23 @@ class Live:
         if not seen:
             raise web.HTTPNotFound(reason="this message is not in the record any more")
         return run, seen
+
+
+def series(frame: Frame, messages: Sequence[Seen], field: str) -> dict[str, Any]:
+    """Return the value of a field in messages: points of seconds and value, and the names of all that can be asked for.
+
+    The value is None where the message has no such number.
+    """
+    fields = [LATENCY, BYTES, *(numbers_of(frame, messages[-1].payload) if messages else ())]
+    return {"fields": fields, "points": [(seen.time_ns / 1e9, _value(frame, seen, field)) for seen in messages]}
+
+
+def _value(frame: Frame, seen: Seen, field: str) -> float | None:
+    if field == BYTES:
+        return len(seen.payload)
+    if field == LATENCY:
+        return seen.latency.wall_ns if seen.latency.cycles is None else seen.latency.cycles
+    return numbers_of(frame, seen.payload).get(field)
 
 
 def _row(seen: Seen) -> tuple[object, ...]:

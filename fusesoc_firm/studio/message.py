@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
+from math import isfinite
 from typing import Any
 
 from fusesoc_firm.frame.codec import CodecError, decode
@@ -14,6 +15,8 @@ from fusesoc_firm.frame.model import Frame
 # The largest parts of a message that the page gets.
 _MOST_FIELDS, _MOST_ITEMS, _MOST_CHARACTERS, _MOST_BYTES = 500, 16, 500, 32
 _MOST_PIXELS = 2**24
+# The longest payload in bytes of which single numbers are plotted.
+_MOST_PLOTTED = 2**16
 _IMAGE, _COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
 # For each encoding of sensor_msgs/Image: bits of a value, and the places of red, green and blue or of gray in a pixel.
 _ENCODINGS: dict[str, tuple[int, tuple[int, ...], int]] = {
@@ -42,6 +45,19 @@ def fields_of(frame: Frame, payload: bytes) -> dict[str, Any]:
     except CodecError as error:
         return {"fields": [], "isShortened": False, "fault": str(error)}
     return {"fields": rows[:_MOST_FIELDS], "isShortened": len(rows) > _MOST_FIELDS, "fault": ""}
+
+
+def numbers_of(frame: Frame, payload: bytes) -> dict[str, float | None]:
+    """Return the numbers in a message by their dotted names, None for those that are not finite.
+
+    A payload that is not a message of the frame, or a long one, has none.
+    """
+    if len(payload) > _MOST_PLOTTED:
+        return {}
+    try:
+        return dict(islice(_numbers("", decode(frame, payload)), _MOST_FIELDS))
+    except CodecError:
+        return {}
 
 
 def has_picture(frame: Frame) -> bool:
@@ -73,6 +89,17 @@ def _rows(name: str, value: Any) -> Iterator[tuple[str, str]]:
             yield from _rows(f"{name}[{number}]", item)
     else:
         yield name, _text(value)
+
+
+def _numbers(name: str, value: Any) -> Iterator[tuple[str, float | None]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _numbers(f"{name}.{key}" if name else str(key), item)
+    elif isinstance(value, list | tuple):
+        for number, item in enumerate(value[:_MOST_ITEMS]):
+            yield from _numbers(f"{name}[{number}]", item)
+    elif isinstance(value, int | float):
+        yield name, float(value) if isfinite(value) else None
 
 
 def _text(value: Any) -> str:

@@ -12,10 +12,12 @@ from pathlib import Path
 
 from aiohttp import web
 
+from fusesoc_firm.studio.begin import Begin
 from fusesoc_firm.studio.editing import Editing
 from fusesoc_firm.studio.foxglove import FOXGLOVE
 from fusesoc_firm.studio.live import Live
-from fusesoc_firm.studio.requests import Handler, Requests, in_json
+from fusesoc_firm.studio.requests import Handler, in_json
+from fusesoc_firm.studio.views import Views
 from fusesoc_firm.studio.workspace import Tools, Workspace
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.yaml_edit import EditError
@@ -43,8 +45,8 @@ class Studio:
     def __init__(self, place: Path, tools: Tools) -> None:
         """Serve a file or folder with what the command line uses."""
         workspace = Workspace(place, tools)
-        self._editing = Editing(workspace)
-        self.live = Live(workspace)
+        self._editing, self.live = Editing(workspace), Live(workspace)
+        self._parts = (self._editing, self.live, Views(workspace), Begin(workspace))
         self._own_hosts: set[str] = set()
         self.secret = secrets.token_urlsafe(24)
 
@@ -52,9 +54,8 @@ class Studio:
         """Start the server on a port of loopback (0: any free one); `address` is known afterwards."""
         app = web.Application(middlewares=[self._guard], client_max_size=2 * SMALL.bytes)
         under = f"/{self.secret}"
-        requests: Requests = self._editing.requests() | self.live.requests()
         app.router.add_get(f"{under}/", self._page)
-        for words, handler in requests.items():
+        for words, handler in (item for part in self._parts for item in part.requests().items()):
             method, name = words.split()
             app.router.add_route(method, f"{under}/api/{name}", handler)
         if (_PAGE / "assets").is_dir():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +23,8 @@ from fusesoc_firm.text.yaml_text import SMALL
 # The names that a specification may end with, and folders in which nobody writes one.
 _SUFFIXES = (".yaml", ".yml")
 _NO_SOURCES = ("build", "node_modules")
+# The largest number of messages in an answer to a search.
+MOST_NAMES = 50
 
 Load = Callable[[Path, str], LoadedSystem]
 """Derives the system of a text in the place of a specification. May raise `InputError`."""
@@ -37,12 +39,14 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class Tools:
-    """What the command line uses for a specification."""
+    """What the command line uses for a specification; `paths` and `distro` are the sources of messages."""
 
     load: Load
     check: Check
     names: Names
     build: Build
+    paths: Sequence[Path] = ()
+    distro: str | None = None
 
 
 class Workspace:
@@ -56,6 +60,11 @@ class Workspace:
         self._documents: dict[str, Document] = {}
         # Derivations share caches, so one runs at a time.
         self._turn = asyncio.Lock()
+
+    @property
+    def is_single(self) -> bool:
+        """Whether only one specification is open."""
+        return not self._place.is_dir()
 
     @property
     def documents(self) -> list[Document]:
@@ -73,7 +82,7 @@ class Workspace:
 
     def specifications(self) -> Iterator[str]:
         """Yield the names of all specifications, relative to the folder."""
-        if not self._place.is_dir():
+        if self.is_single:
             yield self.name(self._place)
             return
         for place, folders, names in os.walk(self.folder):
@@ -93,7 +102,7 @@ class Workspace:
             or not is_file(path)
         ):
             raise web.HTTPNotFound(reason="there is no such specification")
-        if not self._place.is_dir() and path.resolve() != self._place:
+        if self.is_single and path.resolve() != self._place:
             raise web.HTTPNotFound(reason="only one specification is open")
         path = path.resolve()
         return self._documents.setdefault(str(path), Document(path))
@@ -104,6 +113,12 @@ class Workspace:
     def name(self, path: Path) -> str:
         """Return the name of a specification, relative to the folder."""
         return path.relative_to(self.folder).as_posix()
+
+
+def with_words(names: Iterable[str], query: str) -> list[str]:
+    """Return the names that contain all words of a query."""
+    words = query.lower().split()
+    return [name for name in names if all(word in name.lower() for word in words)]
 
 
 def _text(path: Path) -> str:

@@ -1,4 +1,7 @@
-"""The path of the first hour, in the browser: a new project gets a second accelerator, runs, and shows its latency."""
+"""The path of the first hour, in the browser: a new project begins, gets a second accelerator, runs, shows its latency.
+
+All of it is done in the page. Only the accelerator's computation is written as in an editor beside it.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
 from tests.studio.browser import PROGRAM, Page, opened
 from tests.studio.served import served
@@ -70,15 +72,25 @@ async def measured(page: Page) -> int:
 @pytest.mark.check
 @pytest.mark.skipif(not PROGRAM, reason="Chromium is missing")
 @pytest.mark.skipif(not (ROOM / "static" / "index.html").exists(), reason="make studio builds the page")
-def test_a_second_accelerator_is_drawn_run_and_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    message = "geometry_msgs/Vector3"
-    assert main(["init", "tilt", "--in", message, "--out", message, "--width", "32"]) == 0
-    spec, source = tmp_path / "tilt" / "tilt.yaml", tmp_path / "tilt" / "rtl" / "tilt.vhd"
-    source.write_text(source.read_text(encoding="utf-8").partition("architecture")[0] + _REGISTERED, encoding="utf-8")
+def test_a_system_is_begun_extended_run_and_measured(tmp_path: Path) -> None:
+    folder = tmp_path / "hour"
+    folder.mkdir()
+    spec, source = folder / "tilt" / "tilt.yaml", folder / "tilt" / "rtl" / "tilt.vhd"
 
     async def steps(page: Page) -> None:
+        # The form of an empty folder: name, two messages, language, width.
+        await page.until("document.activeElement?.id === 'begin-name'")
+        await page.write("tilt")
+        for _ in range(2):
+            await page.press("Tab")
+            await page.evaluate("document.activeElement.select()")
+            await page.write("geometry_msgs/Vector3")
+        await page.press("Tab", "Tab", "3", "Tab", "Tab", "Enter")
         await page.until("document.querySelectorAll('.svelte-flow__node').length === 5")
+        await page.until("document.querySelector('header output').textContent === 'no faults'")
+        assert yaml.safe_load(spec.read_text(encoding="utf-8"))["project"]["width"] == 32
+        text = source.read_text(encoding="utf-8")
+        source.write_text(text.partition("architecture")[0] + _REGISTERED, encoding="utf-8")
         before = await measured(page)
         # The second accelerator, between the first one and the publisher.
         await page.evaluate("document.activeElement.blur()")
@@ -109,7 +121,7 @@ def test_a_second_accelerator_is_drawn_run_and_measured(tmp_path: Path, monkeypa
                 print(f"the page at the end: {tmp_path / 'page.png'}")
             assert page.trouble == []
 
-    with served(spec, partial(build_simulator, build_root=tmp_path / "simulators")) as studio:
+    with served(folder, partial(build_simulator, build_root=tmp_path / "simulators")) as studio:
         asyncio.run(all_steps(studio.address))
     blocks = {item["name"]: item for item in yaml.safe_load(spec.read_text(encoding="utf-8"))["blocks"]}
     ways = {name: [way["name"] for way in item.get("outgoing", ())] for name, item in blocks.items()}

@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 import json
 import re
+import xml.etree.ElementTree as ET
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
 import yaml
+from matplotlib import image as pictures
 
 import fusesoc_firm.studio
 from tests.studio.browser import PROGRAM, Page, opened
@@ -68,6 +70,11 @@ def labelled(name: str) -> str:
 def button(name: str) -> str:
     """The script that finds a button of the properties."""
     return f"[...document.querySelectorAll('aside button')].find(button => button.textContent === '{name}')"
+
+
+def view(name: str) -> str:
+    """The script that finds the button of a view below the picture."""
+    return f"[...document.querySelectorAll('.text > [role=group] button')].find(item => item.textContent === '{name}')"
 
 
 def run(place: Path, folder: Path, steps: Callable[[Page], Awaitable[None]], *options: str) -> None:
@@ -247,6 +254,120 @@ def test_nothing_of_a_specification_runs(robot: Path, tmp_path: Path, name: str)
         assert await page.evaluate("window.broken") is None
 
     run(robot, tmp_path, steps)
+
+
+def test_a_generated_line_leads_to_its_line_in_the_file(robot: Path, tmp_path: Path) -> None:
+    wanted = TEXT.splitlines().index("  - name: b")
+    chosen = "document.querySelector('.code select')"
+
+    async def steps(page: Page) -> None:
+        await page.click(block("b"))
+        await page.evaluate(f"{view('VHDL')}.click()")
+        line = "[...document.querySelectorAll('.code .cm-line')].find(line => line.textContent.startsWith('entity '))"
+        await page.until(f"{line}.textContent === 'entity geometry_msgs_point_to_axis is'")
+        await page.evaluate("document.querySelector('.code .cm-content').focus()")
+        await page.press("ArrowDown", "ArrowDown")
+        why = "document.querySelector('section[aria-label^=why]')"
+        await page.until(
+            f"{why}.innerText.includes('Why line 3') && {why}.innerText.includes('publisher.vhd.mustache')"
+        )
+        # The instance of the block in the top level.
+        await page.evaluate(f"{chosen}.value = 'robot_system.vhd'")
+        await page.evaluate(f"{chosen}.dispatchEvent(new Event('change', {{bubbles: true}}))")
+        await page.until("document.querySelector('.code .cm-content').textContent.includes('entity robot_system is')")
+        leads = f"[...{why}.querySelectorAll('button')].find(button => button.textContent === 'line {wanted + 1}')"
+        for _ in range(300):
+            if await page.evaluate(f"Boolean({leads})"):
+                break
+            await page.press("ArrowDown")
+        await page.evaluate(f"{leads}.click()")
+        active = "document.querySelector('.text .cm-activeLine')?.textContent"
+        await page.until(f"{active} === {json.dumps(TEXT.splitlines()[wanted])}")
+
+    run(robot, tmp_path, steps)
+
+
+def test_bounds_and_schedulers_are_compared(robot: Path, tmp_path: Path) -> None:
+    robot.write_text(f"{TEXT}    period: 200\n", encoding="utf-8")
+
+    async def steps(page: Page) -> None:
+        await page.evaluate(f"{view('evaluate')}.click()")
+        tables = "[...document.querySelectorAll('.view table')]"
+        await page.until(f"{tables}[0].innerText.includes('200 cycles') && {tables}[1].rows.length === 8")
+        await page.until("document.querySelector('.view tr.chosen td').textContent.startsWith('fixed_priority')")
+
+    run(robot, tmp_path, steps)
+
+
+def test_the_picture_is_saved_as_svg_and_png(robot: Path, tmp_path: Path) -> None:
+    """What is saved is well-formed, with every name as text, also a hostile one."""
+    hostile = "<script>window.broken=1</script>&"
+    robot.write_text(TEXT.replace("name: b\n", f"name: {json.dumps(hostile)}\n"), encoding="utf-8")
+
+    async def steps(page: Page) -> None:
+        place = str(tmp_path / "saved")
+        await page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=place)
+        for form in "SVG", "PNG":
+            found = f"[...document.querySelectorAll('header button')].find(button => button.textContent === '{form}')"
+            await page.evaluate(f"{found}.click()")
+        svg, png = (tmp_path / "saved" / f"robot.{form}" for form in ("svg", "png"))
+        for _ in range(300):
+            if svg.exists() and png.exists():
+                break
+            await asyncio.sleep(0.1)
+        root = ET.fromstring(svg.read_text(encoding="utf-8"))
+        texts = [item.text for item in root.iter("{http://www.w3.org/2000/svg}text")]
+        assert {"a", "f", hostile, "filter (VHDL)", "from the host", "to the host"} <= {*texts}
+        assert not [*root.iter("{http://www.w3.org/2000/svg}script")]
+        size = pictures.imread(png).shape
+        assert (size[1], size[0]) == tuple(round(2 * float(root.get(name) or 0)) for name in ("width", "height"))
+
+    run(robot, tmp_path, steps)
+
+
+def test_the_picture_stays_in_view_when_it_grows(robot: Path, tmp_path: Path) -> None:
+    async def steps(page: Page) -> None:
+        lines = "".join(f"  - {{name: f{number}, type: filter}}\n" for number in range(12))
+        robot.write_text(TEXT + lines, encoding="utf-8")
+        boxes = "[...document.querySelectorAll('.svelte-flow__node')].map(node => node.getBoundingClientRect())"
+        whole = "document.querySelector('.picture').getBoundingClientRect()"
+        await page.until(f"{boxes}.length === 17")
+        await page.until(f"{boxes}.every(box => box.top >= {whole}.top && box.bottom <= {whole}.bottom)")
+
+    run(robot, tmp_path, steps)
+
+
+def test_a_service_has_both_streams(tmp_path: Path) -> None:
+    text = """\
+project: {name: robot}
+paths: [messages]
+accelerators:
+  - name: switch
+    type: VHDL
+    sources: [switch.vhd]
+    interface:
+      input: [{middleware: ROS2, message: demo_msgs/Enable_Request}]
+      output: [{middleware: ROS2, message: demo_msgs/Enable_Response}]
+blocks:
+  - {name: enable, middleware: ROS2, mode: server, service: demo_msgs/Enable, outgoing: [{name: switch}]}
+  - {name: switch, type: switch, outgoing: [{name: enable}]}
+"""
+    spec = tmp_path / "robot.yaml"
+    spec.write_text(text, encoding="utf-8")
+    (tmp_path / "switch.vhd").touch()
+    package = tmp_path / "messages" / "demo_msgs" / "srv"
+    package.mkdir(parents=True)
+    (package / "Enable.srv").write_text("bool data\n---\nbool success\n", encoding="utf-8")
+
+    async def steps(page: Page) -> None:
+        await page.until("document.querySelector('header output').textContent === 'no faults'")
+        await page.until("document.querySelectorAll('.svelte-flow__edge').length === 4")
+        await page.until("document.querySelector('.block.service').innerText.includes('server of demo_msgs/Enable')")
+        await page.until("document.querySelector('.block.service').innerText.includes('ids 0, 0')")
+        await page.click(block("enable"))
+        await page.until(f"{labelled('service')}.value === 'demo_msgs/Enable'")
+
+    run(spec, tmp_path, steps)
 
 
 @pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")

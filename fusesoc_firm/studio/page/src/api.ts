@@ -48,7 +48,7 @@ async function answer<T>(response: Response): Promise<T> {
   throw new Error(isJson ? (await response.json()).reason : await response.text());
 }
 
-async function get<T>(name: string, query: Record<string, string> = {}): Promise<T> {
+export async function get<T>(name: string, query: Record<string, string> = {}): Promise<T> {
   return answer(await fetch(`api/${name}?${new URLSearchParams(query)}`));
 }
 
@@ -93,6 +93,17 @@ export const run = (file: string, wishes: Wishes) => post<object>("run", { file,
 export const control = (what: "pause" | "resume" | "step" | "stop") => post<object>("control", { do: what });
 export const message = (number: number) => get<Message>("message", { number: String(number) });
 export const record = (before: number) => get<{ messages: Row[] }>("record", { before: String(before) });
+
+export interface Choices {
+  languages: string[];
+  widths: number[];
+  ros: number[];
+}
+
+export const choices = () => get<Choices>("choices");
+export const types = (ros: number, query: string) => get<{ messages: string[] }>("types", { ros: String(ros), query });
+/** Write a new project. */
+export const init = (project: object) => post<{ file: string }>("init", project);
 
 /** Call a function whenever another program has changed a file; reconnects if the server was restarted. */
 export function follow(changed: (file: string) => void): () => void {

@@ -4,7 +4,7 @@ import type { Edge, Node } from "@xyflow/svelte";
 import { layout } from "./engine";
 import type { Fault, Path, Scene, Section } from "./api";
 
-export type Kind = "subscriber" | "publisher" | "accelerator" | "software" | "manager";
+export type Kind = "subscriber" | "publisher" | "service" | "accelerator" | "software" | "manager";
 
 export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path };
 export type BlockData = BlockWords & { errors: number; warnings: number };
@@ -17,6 +17,8 @@ const GAP = 110;
 // The width that the derived facts of a converter need, so that the picture stays when they arrive.
 const FACTS_WIDTH = 215;
 const FACTS = "...";
+// The two converters of a service; the first one's messages come to a server and go from a client.
+const SIDES = ["request", "response"] as const;
 
 const list = (value: unknown): any[] => (Array.isArray(value) ? value : []);
 const isAt = (path: Path | null | undefined, place: Path) =>
@@ -32,18 +34,30 @@ export function typeOf(specification: Section, block: Section): [Section, number
 
 export function kindOf(specification: Section, block: Section): Kind {
   if (block.mode === "subscriber" || block.mode === "publisher") return block.mode;
+  if (block.mode === "server" || block.mode === "client") return "service";
   return typeOf(specification, block)?.[0].type === "ROS-SW" ? "software" : "accelerator";
 }
 
+/** The facts of a block's converters: one, or for a service those of its requests and its responses. */
+function factsOf(block: Section, derived: Section | null): string {
+  const converters = Object.values(derived?.Converters ?? {}).flat() as Section[];
+  const names = isService(block) ? SIDES.map((side) => `${block.name}_${side}`) : [block.name];
+  const own = names.flatMap((name) => converters.filter((item) => item.block === name));
+  if (!own.length) return FACTS;
+  return isService(block) ? `ids ${own.map((item) => item.id).join(", ")}` : `id ${own[0].id}, payload ${own[0].payloadBytes} bytes`;
+}
+
+const isService = (block: Section) => block.mode === "server" || block.mode === "client";
+
 function linesOf(block: Section, specification: Section, derived: Section | null): string[] {
   const found: string[] = [];
-  if (block.mode) {
+  if (isService(block)) {
+    found.push(`${block.mode} of ${block.service ?? ""}`, `service ${block.topic ?? block.name}`, factsOf(block, derived));
+  } else if (block.mode) {
     found.push(String(block.message ?? ""), `topic ${block.topic ?? block.name}`);
     if (block.period) found.push(`period ${block.period}`);
     if (block.queue) found.push(`queue of ${block.queue}`);
-    const converters = Object.values(derived?.Converters ?? {}).flat() as Section[];
-    const own = converters.find((item) => item.block === block.name);
-    found.push(own ? `id ${own.id}, payload ${own.payloadBytes} bytes` : FACTS);
+    found.push(factsOf(block, derived));
   } else {
     const type = typeOf(specification, block)?.[0];
     found.push(type ? `${block.type} (${type.type})` : String(block.type ?? "no type"));
@@ -57,7 +71,7 @@ function linesOf(block: Section, specification: Section, derived: Section | null
 function nodeOf(id: string, data: BlockWords, faults: Fault[]): BlockNode {
   const errors = faults.filter((fault) => fault.severity === "error").length;
   const words = [data.name, ...data.lines];
-  const least = data.kind === "subscriber" || data.kind === "publisher" ? FACTS_WIDTH : 120;
+  const least = ["subscriber", "publisher", "service"].includes(data.kind) ? FACTS_WIDTH : 120;
   const width = Math.min(320, Math.max(least, ...words.map((line) => 7.2 * line.length + 28)));
   const height = 30 + LINE * data.lines.length;
   const label = `${data.kind} ${data.name}${faults.length ? `, ${faults.length} faults` : ""}`;
@@ -95,8 +109,9 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
   nodes.push(manager("manager:out", "to the host", [`scheduler ${project.scheduler ?? "fixed_priority"}`], faults));
   const edges: Edge[] = [];
   blocks.forEach((block, index) => {
-    if (block?.mode === "subscriber") edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, scene.file, block.name));
-    if (block?.mode === "publisher") edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", scene.file, block.name));
+    const [taken, given] = streamsOf(block ?? {});
+    if (taken) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, scene.file, taken));
+    if (given) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", scene.file, given));
     list(block?.outgoing).forEach((way, number) => {
       const sink = blocks.findIndex((other) => other?.name === way?.name);
       if (sink < 0) return;
@@ -113,6 +128,14 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
     });
   });
   return { nodes, edges };
+}
+
+/** The converters of a block that take from the Manager and give to it. */
+function streamsOf(block: Section): [string | null, string | null] {
+  const [request, response] = SIDES.map((side) => `${block.name}_${side}`);
+  if (block.mode === "server") return [request, response];
+  if (block.mode === "client") return [response, request];
+  return [block.mode === "subscriber" ? block.name : null, block.mode === "publisher" ? block.name : null];
 }
 
 /** The stream between the Manager and a converter, whose wire shows the live words of its block. */

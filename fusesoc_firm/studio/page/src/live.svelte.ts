@@ -73,6 +73,8 @@ export class Live {
   words = $state.raw<Record<string, string>>({});
   /** The names of inputs whose queues are full. */
   crowded = $state.raw<Set<string>>(new Set());
+  /** The longest of the latest latencies of each block, in cycles. */
+  longest = $state.raw<Record<string, number>>({});
   isFollowing = $state(true);
   #history: { seconds: number; counts: Record<string, Count> }[] = [];
 
@@ -113,6 +115,8 @@ export class Live {
     const first = this.#history.findIndex((item) => item.seconds >= news.seconds - WINDOW);
     this.#history = [...this.#history.slice(Math.max(0, first - 1)), { seconds: news.seconds, counts: news.counts }];
     this.words = this.#wordsOf(news, news.run);
+    const timed = Object.entries(news.counts).filter(([, count]) => count.cycles);
+    this.longest = Object.fromEntries(timed.map(([name, count]) => [name, count.cycles!.maximum]));
     this.crowded = new Set(Object.keys(news.loads).filter((name) => news.loads[name].waiting >= news.loads[name].capacity));
   }
 

@@ -1,0 +1,80 @@
+// What the page asks of the server for the views below the picture.
+
+import { get } from "./api";
+
+/** Bytes with one meaning; see fusesoc_firm/studio/byte_map.py. */
+export interface Part {
+  name: string;
+  type: string;
+  offset: number | null;
+  size: number | null;
+  depth: number;
+}
+
+export interface Line {
+  text: string;
+  template: string;
+  specification: number[];
+  messages: string[];
+}
+
+export interface Bound {
+  name: string;
+  periodCycles: number;
+  wcetCycles: number;
+  deadlineCycles: number;
+  responseCycles: number | null;
+  latenessCycles: number | null;
+  bufferBytes: number | null;
+}
+
+export interface Policy {
+  name: string;
+  schedulable: boolean;
+  allFinish: boolean;
+  worstLatenessCycles: number | null;
+  bufferBytes: number | null;
+  luts: number | null;
+  publishers: Bound[];
+}
+
+export interface Schedulers {
+  chosen: string;
+  clock: number | null;
+  scheduler: string;
+  utilisation: number;
+  reasons: string[];
+  policies: Policy[];
+}
+
+/** A burst: block, first and last cycle. */
+export type Grant = [string, number, number];
+
+export interface Series {
+  fields: string[];
+  points: [number, number | null][];
+}
+
+export const bytes = (file: string) => get<{ width: number; blocks: Record<string, Part[]> }>("bytes", { file });
+export const generated = (file: string, name: string) =>
+  get<{ names: string[]; name: string; lines: Line[] }>("generated", { file, name });
+export const schedulers = (file: string) => get<Schedulers | { missing: string }>("schedulers", { file });
+export const grants = () => get<{ grants: Grant[] }>("grants");
+export const status = () => get<{ access: string | null; counts: Record<string, number> }>("status");
+export const series = (block: string, field: string) => get<Series>("series", { block, field });
+
+/** Do something at once and then at intervals, one after the other, until the returned function is called. */
+export function repeat(milliseconds: number, action: () => Promise<void>): () => void {
+  let isOver = false;
+  const turn = async () => {
+    if (!document.hidden) await action().catch(() => undefined);
+    if (!isOver) setTimeout(turn, milliseconds);
+  };
+  turn();
+  return () => void (isOver = true);
+}
+
+export const words = (error: unknown) => (error instanceof Error ? error.message : String(error));
+
+/** Let the keyboard reach what scrolls. */
+export const reachable = (element: HTMLElement) => void (element.tabIndex = 0);
