@@ -20,7 +20,7 @@ from fusesoc_firm.frame.codec import decode, pack_frame
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.frame.select import with_names_in_use
+from fusesoc_firm.frame.select import Names, with_names_in_use
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName
@@ -49,7 +49,7 @@ STATES = {1: (3, 2, 4, 5), 2: (4, 5, 6, 0)}
 def frames(version: int) -> tuple[Frame, Frame, Frame]:
     """The goal, the feedback and the result, with the fields that the accelerator uses."""
     library = MessageLibrary(middleware_of(version), [HERE / "arm/msg"])
-    kinds = [
+    kinds: list[tuple[str, str, set[Names] | None]] = [
         ("actionlib", "TestActionGoal", None),
         ("actionlib", "TestActionFeedback", {("feedback", "feedback")}),
         ("actionlib", "TestActionResult", {("status", "status"), ("result", "result")}),
