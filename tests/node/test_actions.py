@@ -28,10 +28,7 @@ from fusesoc_firm.node.python_node import python_node
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from tests.node.fake_node import FakeHardware, Run, until
-from tests.ros.action_simulator import HELD, feedback_of, number_of, result_of
-from tests.ros.action_simulator import STATES as NUMBERS
-from tests.ros.test_actions import HERE as ROS_TESTS
-from tests.ros.test_actions import TRANSLATION
+from tests.ros.action_simulator import HELD, HERE, NUMBERS, feedback_of, in_ros2, number_of, result_of
 
 LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 SUCCEEDED, CANCELED, ABORTED, REJECTED = range(4)
@@ -41,17 +38,16 @@ IDS = {1: b"goal-%d", 2: b"%016d"}
 
 
 def system(folder: Path, version: int) -> LoadedSystem:
-    text = (ROS_TESTS / "arm/arm.yaml").read_text(encoding="utf-8")
+    text = (HERE / "arm/arm.yaml").read_text(encoding="utf-8")
     if version == 2:
-        for ours, theirs in TRANSLATION:
-            text = text.replace(ours, theirs)
+        text = in_ros2(text)
     spec = folder / "arm.yaml"
-    spec.write_text(text.replace("paths: msg", f"paths: {ROS_TESTS / 'arm/msg'}"), encoding="utf-8")
+    spec.write_text(text.replace("paths: msg", f"paths: {HERE / 'arm/msg'}"), encoding="utf-8")
     return load_system(spec, LIBRARIES, needs_sources=False)
 
 
 def frame(version: int, name: str) -> Frame:
-    library = MessageLibrary(middleware_of(version), [ROS_TESTS / "arm/msg"])
+    library = MessageLibrary(middleware_of(version), [HERE / "arm/msg"])
     return frame_of(parse_name(name), library.closure(parse_name(name)))
 
 
