@@ -54,6 +54,7 @@ PROGRAMS: Mapping[str, str] = {
     "verilator": "simulates Verilog",
     "yosys": "synthesises for iCE40, ECP5 and Gowin",
     "libroscpp-dev": "nodes in C++ for ROS 1",
+    "python3-actionlib": "ROS 1, in tests",
     "python3-geometry-msgs": "ROS 1, in tests",
     "python3-rosbag": "ROS 1, in tests",
     "python3-roslaunch": "ROS 1, in tests",

@@ -86,8 +86,8 @@ class NodeDescription:
     @property
     def versions(self) -> tuple[int, ...]:
         """The versions of ROS to which the topics, services and actions belong."""
-        used = (*self.taken_topics, *self.given_topics, *self.all_services)
-        return tuple(sorted({item.ros for item in used}))
+        topics = (*self.taken_topics, *self.given_topics)
+        return tuple(sorted({topic.ros for topic in topics} | {item.ros for item in self.all_services}))
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:

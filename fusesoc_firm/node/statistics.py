@@ -68,7 +68,8 @@ class Statistics:
             found |= {f"{name} sent": item.sent, f"{name} refused": item.refused, f"{name} lost": item.lost}
         for name, output in self.outputs.items():
             found |= {f"{name} frames": output.frames, f"{name} published": output.published}
-        for name, counts in (*self.services.items(), *self.actions.items()):
+        counted: dict[str, CallCounts | GoalCounts] = {**self.services, **self.actions}
+        for name, counts in counted.items():
             found |= {f"{name} {count}": value for count, value in asdict(counts).items()}
         return found | {"faults": self.faults, "faults in software": self.software_faults, "restarts": self.restarts}
 

@@ -167,12 +167,13 @@ class Run:
         parts = {name: getattr(given, name) for name in ("depth", "overflow", "settle", "drain", "restarts", "watch")}
         settings = NodeSettings(**parts, report=self.reports.append)
         self.node = Node(description, open_transport, settings, software, trace)
+        self._ros = min(description.versions, default=1)
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
         try:
-            self.is_complete = self.node.run({1: self.carrier})
+            self.is_complete = self.node.run({self._ros: self.carrier})
         except Exception as error:  # noqa: BLE001 - it is the test's
             self.error = error
 

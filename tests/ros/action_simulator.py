@@ -20,7 +20,7 @@ from fusesoc_firm.frame.codec import decode, pack_frame
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.frame.select import with_names_in_use
+from fusesoc_firm.frame.select import Names, with_names_in_use
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName
@@ -42,14 +42,38 @@ class Goal(IntEnum):
 
 
 # The states of the results, for each version of ROS: succeeded, canceled, aborted, rejected.
-STATES = {1: (3, 2, 4, 5), 2: (4, 5, 6, 0)}
+NUMBERS = {1: (3, 2, 4, 5), 2: (4, 5, 6, 0)}
+
+
+# The messages of ROS 2 in place of those of ROS 1.
+_TRANSLATION = [
+    ("    maxLength: 4096\n", ""),
+    ("middleware: ROS", "middleware: ROS2"),
+    ("counter.vhd", "ros2/counter.vhd"),
+    ("actionlib/TestActionGoal", "test_msgs/Fibonacci_SendGoal_Request"),
+    ("goal.goal", "goal.order"),
+    ("actionlib_msgs/GoalID", "action_msgs/GoalInfo"),
+    ("actionlib/TestActionFeedback", "test_msgs/Fibonacci_FeedbackMessage"),
+    ("feedback.feedback", "feedback.sequence"),
+    ("actionlib/TestActionResult", "test_msgs/Fibonacci_GetResult_Response"),
+    ("status.status, result.result", "status, result.sequence"),
+    ("actionlib/Test", "test_msgs/Fibonacci"),
+    ("{goal: {goal:", "{goal: {order:"),
+]
+
+
+def in_ros2(text: str) -> str:
+    """The specification or the stimuli of arm/ for ROS 2."""
+    for ours, theirs in _TRANSLATION:
+        text = text.replace(ours, theirs)
+    return text
 
 
 @cache
 def frames(version: int) -> tuple[Frame, Frame, Frame]:
     """The goal, the feedback and the result, with the fields that the accelerator uses."""
     library = MessageLibrary(middleware_of(version), [HERE / "arm/msg"])
-    kinds = [
+    kinds: list[tuple[str, str, set[Names] | None]] = [
         ("actionlib", "TestActionGoal", None),
         ("actionlib", "TestActionFeedback", {("feedback", "feedback")}),
         ("actionlib", "TestActionResult", {("status", "status"), ("result", "result")}),
@@ -79,7 +103,7 @@ def feedback_of(version: int, value: int) -> bytes:
 
 
 def result_of(version: int, state: int, value: int) -> bytes:
-    number = STATES[version][state]
+    number = NUMBERS[version][state]
     if version == 1:
         return encode_used(frames(1)[2], {"status": {"status": number}, "result": {"result": value}})
     return encode_used(frames(2)[2], {"status": number, "result": {"sequence": [value]}})

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
-from tests.ros.action_simulator import HELD, Goal
+from tests.ros.action_simulator import HELD, Goal, in_ros2
 from tests.ros.cpp_nodes import Node, NodeProcess, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import REPOSITORY, LiveNode
 
@@ -28,20 +29,6 @@ HERE = Path(__file__).resolve().parent
 CLIENTS = 4
 SUCCEEDED = "SUCCEEDED"
 CANCELED = {1: "PREEMPTED", 2: "CANCELED"}
-# The messages of ROS 2 in place of those of ROS 1.
-TRANSLATION = [
-    ("    maxLength: 4096\n", ""),
-    ("middleware: ROS", "middleware: ROS2"),
-    ("counter.vhd", "ros2/counter.vhd"),
-    ("actionlib/TestActionGoal", "test_msgs/Fibonacci_SendGoal_Request"),
-    ("goal.goal", "goal.order"),
-    ("actionlib_msgs/GoalID", "action_msgs/GoalInfo"),
-    ("actionlib/TestActionFeedback", "test_msgs/Fibonacci_FeedbackMessage"),
-    ("feedback.feedback", "feedback.sequence"),
-    ("actionlib/TestActionResult", "test_msgs/Fibonacci_GetResult_Response"),
-    ("status.status, result.result", "status, result.sequence"),
-    ("actionlib/Test", "test_msgs/Fibonacci"),
-]
 MODULES = {1: "actionlib.msg", 2: "test_msgs.action"}
 
 
@@ -60,11 +47,8 @@ class Place:
         spec = self.folder / "arm/arm.yaml"
         if not spec.exists():
             shutil.copytree(HERE / "arm", spec.parent)
-            text = (HERE / "arm/arm.yaml").read_text(encoding="utf-8")
             if self.version == 2:
-                for ours, theirs in TRANSLATION:
-                    text = text.replace(ours, theirs)
-            spec.write_text(text, encoding="utf-8")
+                spec.write_text(in_ros2(spec.read_text(encoding="utf-8")), encoding="utf-8")
         return spec
 
     def node(self, language: str, transport: str) -> NodeProcess:
@@ -175,12 +159,18 @@ def check_counts(node: NodeProcess, **counts: int) -> None:
     assert re.search(f"{python}|{cpp}", node.said(), re.MULTILINE), node.said()
 
 
-@pytest.mark.parametrize("language", ["python", "cpp"])
-@pytest.mark.parametrize(
-    "goals", [pytest.param(10, marks=pytest.mark.check), pytest.param(250, marks=pytest.mark.thorough)]
-)
-@pytest.mark.parametrize("where", ["model", "hardware"])
-def test_four_clients_at_once_get_their_own_results(place: Place, goals: int, language: str, where: str) -> None:
+def goals_of_each(language: str, where: str, goals: int) -> Any:
+    """A run of four clients: 1,000 goals if it is asked for, and otherwise each language and each kind of hardware."""
+    is_short = goals == FEW and (language, where) in (("python", "hardware"), ("cpp", "model"))
+    return pytest.param(language, where, goals, marks=pytest.mark.check if is_short else pytest.mark.thorough)
+
+
+FEW, MANY = 10, 250
+RUNS = product(("python", "cpp"), ("model", "hardware"), (FEW, MANY))
+
+
+@pytest.mark.parametrize(("language", "where", "goals"), [goals_of_each(*run) for run in RUNS])
+def test_four_clients_at_once_get_their_own_results(place: Place, language: str, where: str, goals: int) -> None:
     """Each goal has its own number, feedback and result; some are canceled while the hardware holds them."""
     with place.node(language, getattr(place, where)) as node:
         seeds = [random.randrange(2**32) for _ in range(CLIENTS)]

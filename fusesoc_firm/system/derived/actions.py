@@ -16,10 +16,16 @@ from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived.model import Action
 from fusesoc_firm.system.derived.partition import Parts
-from fusesoc_firm.system.derived.services import converter, interface_blocks, interface_of, limit_of, with_entries
+from fusesoc_firm.system.derived.services import (
+    converter,
+    interface_blocks,
+    interface_of,
+    limit_of,
+    ros_name_of,
+    with_entries,
+)
 from fusesoc_firm.system.written.specification import PUBLISHER, SERVER, SERVICE_MODES, SUBSCRIBER, Block, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics
-from fusesoc_firm.text.naming import identifier
 
 _ACCEPT_LIMIT = Fraction(1)
 _ENDS = {"goal": SUBSCRIBER, "cancel": SUBSCRIBER, "feedback": PUBLISHER, "result": PUBLISHER}
@@ -39,7 +45,10 @@ def with_actions(
     for block in specification.blocks:
         if block.type is None and block.mode in SERVICE_MODES and block.action is not None:
             messages = _messages_of(block, libraries, faults)
-            made = {end: converter(block, f"{block.name}_{end}", mode, messages[end]) for end, mode in _ENDS.items()}
+            made = {
+                end: converter(block, f"{block.name}_{end}", mode, messages[end], _topic(block, end))
+                for end, mode in _ENDS.items()
+            }
             # Cancellations are short.
             made["cancel"] = replace(made["cancel"], max_length=None)
             entries[block.name] = tuple(item.name for item in made.values() if item.mode == PUBLISHER)
@@ -66,6 +75,15 @@ def action_messages(name: MessageName, ros: Middleware) -> dict[str, MessageName
     return {**found, "cancel": parse_name(cancel)}
 
 
+def _topic(block: Block, end: str) -> str | None:
+    """Return the topic on which ROS sends one of the messages of an action, if it is not a call."""
+    if block.middleware is None or not block.name:
+        return None
+    if MIDDLEWARES[block.middleware] is ROS1:
+        return f"{ros_name_of(block)}/{end}"
+    return f"{ros_name_of(block)}/_action/{end}" if end == "feedback" else None
+
+
 def _messages_of(
     block: Block, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Mapping[str, MessageName | None]:
@@ -76,6 +94,7 @@ def _messages_of(
     if block.mode and block.mode != SERVER:
         message = f"'{block.name}' cannot be a {block.mode} of an action"
         faults.error(message, block.mode.source, f"legal here: {SERVER}; hardware cannot send goals to other nodes")
+        return _NONE
     found = interface_of(block, InterfaceKind.ACTION, libraries, faults)
     return action_messages(found.name, found.ros) if found else _NONE
 
@@ -87,7 +106,7 @@ def _action(block: Block) -> Action:
         str(block.name),
         parse_name(block.action),
         MIDDLEWARES[block.middleware],
-        str(block.topic or identifier(block.name, avoid=())),
+        ros_name_of(block),
         goal,
         cancel,
         feedback,

@@ -190,10 +190,11 @@ class Wiring:
             for side in self.outputs.get(block.name, ()):
                 is_excused = not block.is_sound or block.name in self.broken_sources
                 if not is_excused and End(str(block.name), side.prefix) not in self.sinks:
+                    written = block.service_block or block
                     self.faults.error(
                         f"{_words('output', side)} of '{block.name}' ({side.frame.message}) has no destination",
                         block.name.source,
-                        f"add a block that takes {side.frame.message} to 'outgoing' of '{block.name}'",
+                        f"add a block that takes {side.frame.message} to 'outgoing' of '{written.name}'",
                     )
 
     def _check_cycles(self) -> None:

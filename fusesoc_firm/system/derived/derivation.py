@@ -297,7 +297,7 @@ class _Analysis:
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)
             return
         assert block.middleware is not None and block.message is not None
-        if block.topic is not None:
+        if block.topic is not None and block.service_block is None:
             check_topic_name(block.topic, self.faults)
         check_quality(block, self.faults)
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)

@@ -37,7 +37,7 @@ from fusesoc_firm.text.yaml_text import Text
 
 _DEFAULT_LIMIT = Fraction(5)
 _SHORTEST_LIMIT, _LONGEST_LIMIT = Fraction(1, 1000), Fraction(3600)
-_FORM = "a server or client is a block with 'middleware', 'mode' and 'service'"
+_FORM = "a server or client is a block with 'middleware', 'mode', and 'service' or 'action'"
 _PLACES = "add places with 'paths' in the specification or core, or with --path"
 # For each kind of interface, the key with its type and the suffix of its files.
 _KEYS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
@@ -95,7 +95,7 @@ def interface_of(
     missing = [name for name in ("middleware", key) if getattr(block, name) is None]
     if missing and block.is_sound:
         words = ", ".join(f"'{name}'" for name in missing)
-        faults.error(f"block '{block.name}' needs {words}", block.name.source, _FORM.replace("service", key))
+        faults.error(f"block '{block.name}' needs {words}", block.name.source, _FORM)
     _check_keys(block, key, faults)
     written = getattr(block, key)
     if block.middleware is None or written is None:
@@ -113,15 +113,21 @@ def interface_of(
     return found
 
 
+def ros_name_of(block: Block) -> str:
+    """Return the name of the service or action of a block."""
+    return str(block.topic or identifier(block.name, avoid=()))
+
+
 def limit_of(written: Text | None, default: Fraction = _DEFAULT_LIMIT) -> float:
     """Return a legal limit in seconds."""
     return float((written and seconds_of(written)) or default)
 
 
-def converter(block: Block, name: str, mode: str, message: MessageName | None) -> Block:
+def converter(block: Block, name: str, mode: str, message: MessageName | None, topic: str | None = None) -> Block:
     """Return a converter of a server or client; `message` is None if it is unknown.
 
-    The keys of `mode` are those of the block, whose `maxLength` limits the messages to the hardware.
+    In bags, the messages have the `topic`, if there is one. The keys of `mode` are those of the block, whose
+    `maxLength` limits the messages to the hardware.
     """
     keys: dict[str, Any] = {key: getattr(block, key) for key in keys_only_of(Block, mode)}
     if mode == SUBSCRIBER:
@@ -132,6 +138,7 @@ def converter(block: Block, name: str, mode: str, message: MessageName | None) -
         middleware=block.middleware,
         mode=Text(mode),
         message=Text(str(message), written.source) if message and written else None,
+        topic=Text(topic) if topic else None,
         service_block=block,
         source=block.source,
         places=block.places,
@@ -165,7 +172,7 @@ def _service(block: Block) -> Service:
         ServiceEnd(str(block.mode)),
         parse_name(block.service),
         MIDDLEWARES[block.middleware],
-        str(block.topic or identifier(block.name, avoid=())),
+        ros_name_of(block),
         *_names(block),
         limit_of(block.time_limit),
     )

@@ -60,7 +60,7 @@ def _converters(system: DerivedSystem) -> Table:
         (
             way,
             item["block"],
-            item.get("topic", item.get("service", "")),
+            next((item[end] for end in ("topic", "service", "action") if end in item), ""),
             item["nameMW"],
             item["ROS"],
             item["id"],
@@ -69,7 +69,7 @@ def _converters(system: DerivedSystem) -> Table:
         for way, items in (("in", converters["AXIS_to_msg"]), ("out", converters["msg_to_AXIS"]))
         for item in items
     ]
-    return Table("Topics", ("", "block", "topic or service", "message", "ROS", "id", "bytes of payload"), rows)
+    return Table("Topics", ("", "block", "topic, service or action", "message", "ROS", "id", "bytes of payload"), rows)
 
 
 def _ports(system: DerivedSystem) -> Table:

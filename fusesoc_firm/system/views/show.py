@@ -49,10 +49,10 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
         },
         "Converters": {
             "AXIS_to_msg": [
-                _converter(item, subscriber_entity(item.frame, item.suffix)) for item in system.subscribers
+                _converter(item, subscriber_entity(item.frame, item.suffix), system) for item in system.subscribers
             ],
             "msg_to_AXIS": [
-                _converter(item, publisher_entity(item.frame, item.suffix))
+                _converter(item, publisher_entity(item.frame, item.suffix), system)
                 | _length(item, system.length_to(item))
                 | _times(times)
                 | _bound(bound)
@@ -198,24 +198,27 @@ def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> 
     return {"converter": end.block, "id": crossing[0].id} if crossing else {"topic": end.block}
 
 
-def _converter(converter: Converter, entity: str) -> dict[str, Any]:
+def _converter(converter: Converter, entity: str, system: DerivedSystem) -> dict[str, Any]:
     return {
         "nameBD": entity,
         "nameMW": str(converter.frame.message),
         "ROS": converter.frame.ros.number,
         "block": converter.block,
-        **_host_end(converter),
+        **_host_end(converter, system),
         "id": converter.id,
         "payloadBytes": _payload_bytes(converter.frame),
         **_queue(converter.queue),
     }
 
 
-def _host_end(converter: Converter) -> dict[str, Any]:
-    """Return the other end of a converter's messages: a block in software, a service, or a topic."""
+def _host_end(converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return the other end of a converter's messages: a block in software, a service, an action, or a topic."""
     if converter.software:
         return {"software": converter.software.block}
-    return {"service": converter.service} if converter.service else {"topic": converter.name}
+    if converter.service:
+        is_action = any(action.block == converter.service for action in system.actions)
+        return {"action" if is_action else "service": converter.service}
+    return {"topic": converter.name}
 
 
 def _queue(queue: Queue | None) -> dict[str, Any]:

@@ -92,6 +92,8 @@ SELECTIONS = [
     (ROS2, "awkward_msgs/Halves", ["words"], []),
     (ROS1, "awkward_msgs/Wide", ["cells.pair", "first"], []),
     (ROS2, "awkward_msgs/Fixtures", ["names"], []),
+    # Without any count.
+    (ROS1, "actionlib_msgs/GoalID", ["stamp"], []),
 ]
 
 
