@@ -24,7 +24,8 @@ from fusesoc_firm.frame.model import COUNT_BYTES, LENGTH_BYTES, Data, Loop
 from fusesoc_firm.text.render import Context
 
 _WORD_BITS = 32
-_DIGITS_IN_A_ROW = 64
+# No multiple of 32, so no row is a constant that GHDL may lose (`is_lossy`).
+_DIGITS_IN_A_ROW = 60
 _NUMBERS_IN_A_ROW = 16
 
 

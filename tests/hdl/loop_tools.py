@@ -14,7 +14,7 @@ from pathlib import Path
 from fusesoc_firm.netlist.model import NetlistError
 
 # A memory becomes registers and multiplexers, so that its address is seen.
-_CELLS = "proc -noopt; flatten; memory_map"
+_CELLS = "proc; flatten; memory_map"
 _LOOPS = re.compile(r"ERROR: (Found \d+ SCCs) but expected 0")
 _WAIVER = "// verilator lint_off UNOPTFLAT"
 _UNOPTFLAT = re.compile(r"^%Warning-UNOPTFLAT: \S+ (.*)", re.MULTILINE)

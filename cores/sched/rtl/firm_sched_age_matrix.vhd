@@ -31,6 +31,7 @@ architecture rtl of firm_sched_age_matrix is
   type matrix_t is array (0 to REQUESTERS-1) of row_t;
 
   -- Bit j of row i: i has waited longer than j. Only those with i < j are registers; the others are their opposites.
+  -- Their bits of longer_r are constant, since a netlist lacks signals without a value.
   signal longer   : matrix_t;
   signal longer_r : matrix_t;
 
@@ -74,6 +75,10 @@ begin
       oneself : if i = j generate
         longer(i)(j) <= '1';
       end generate oneself;
+
+      no_register : if i >= j generate
+        longer_r(i)(j) <= '0';
+      end generate no_register;
     end generate columns;
 
     chosen(i) <= eligible(i) and not any_of(eligible and not longer(i));

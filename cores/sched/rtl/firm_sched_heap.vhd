@@ -74,8 +74,8 @@ architecture rtl of firm_sched_heap is
   signal up_valid    : std_logic_vector(0 to LEVELS);
   signal up_id       : ids_t(0 to LEVELS);
   signal up_key      : keys_t(0 to LEVELS);
-  signal hole_r      : std_logic_vector(0 to LEVELS);
-  signal hole_right  : std_logic_vector(0 to LEVELS);
+  signal hole_r      : std_logic_vector(1 to LEVELS);
+  signal hole_right  : std_logic_vector(1 to LEVELS);
 
 begin
 

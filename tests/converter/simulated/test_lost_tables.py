@@ -39,3 +39,8 @@ def test_a_table_has_a_bit_more(entries: int, bits: int) -> None:
     rows = "".join(digit_rows("1" * entries))
     assert len(rows) == bits
     assert is_lossy(entries) == (bits > entries) == rows.startswith("0")
+
+
+def test_no_row_of_a_table_is_a_constant_that_may_be_lost() -> None:
+    """GHDL evaluates each literal of a table on its own."""
+    assert not [entries for entries in range(1, 400) for row in digit_rows("1" * entries) if is_lossy(len(row))]
