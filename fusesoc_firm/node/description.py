@@ -139,7 +139,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         None if system.clock is None else float(system.clock),
         identity(loaded).digest if system.status else "",
         tuple(node_service(item, loaded) for item in system.services),
-        system.status is StatusAccess.AXI_LITE,
+        has_status_registers=system.status is StatusAccess.AXI_LITE,
     )
 
 
