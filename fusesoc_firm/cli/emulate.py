@@ -30,6 +30,12 @@ def add_emulate(commands: Any) -> None:
     )
     emulate.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
     emulate.add_argument(
+        "--processor",
+        choices=("zynq7000", "zynqmp"),
+        default="zynq7000",
+        help="a Cortex-A9 of a Zynq-7000 or a Cortex-A53 of a Zynq UltraScale+ (default: %(default)s)",
+    )
+    emulate.add_argument(
         "--freertos", type=Path, metavar="DIR", help="run FreeRTOS, whose kernel is in DIR (default: bare metal)"
     )
     emulate.add_argument("--stimuli", type=Path, metavar="F", help="messages to send (default: those of the core)")
@@ -52,18 +58,19 @@ def add_emulate(commands: Any) -> None:
 
 def _emulate(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.emulation.messages import emulated_traffic, load_emulated
-    from fusesoc_firm.emulation.program import COMPILER, Kernel, compile_player
-    from fusesoc_firm.emulation.run import EMULATOR, Emulation
+    from fusesoc_firm.emulation.program import PROCESSORS, Kernel, compile_player
+    from fusesoc_firm.emulation.run import Emulation
     from fusesoc_firm.node.transport.simulator import Simulator
     from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
     from fusesoc_firm.system.message_sources import sources_of
     from fusesoc_firm.system.scaffold.core_file import EMULATING
     from fusesoc_firm.tools.programs import missing, ways
 
-    if absent := missing([COMPILER, EMULATOR]):
+    processor = PROCESSORS[arguments.processor]
+    if absent := missing([processor.compiler, processor.emulator]):
         fail(f"missing programs: {', '.join(absent)}", hint="; ".join(map(ways, absent)))
     kernel = Kernel(arguments.freertos)
-    kernel.check()
+    kernel.check(processor)
     spec: Path = arguments.spec
     loaded = load_emulated(spec, sources_of(spec, arguments.path, arguments.distro, core_folders), core_folders)
     print_warnings(loaded.warnings)
@@ -73,7 +80,8 @@ def _emulate(arguments: argparse.Namespace) -> None:
     sources = CoreSources(arguments.path, arguments.distro or "", core_folders=core_folders)
     built = build_simulator(spec, EMULATING, build_root=arguments.build_root, sources=sources, target="emulate")
     emulation = Emulation(
-        compile_player(loaded.system, kernel, built.folder),
+        compile_player(loaded.system, kernel, processor, built.folder),
+        processor,
         lambda: Simulator([*built.command(), "+RAW=true"], built.folder),
         traffic,
         loaded.system,
@@ -84,7 +92,11 @@ def _emulate(arguments: argparse.Namespace) -> None:
     report = emulation.run()
     detail.tell("")
     if not arguments.quiet:
-        _print_counts(report, emulation, f"{loaded.system.name} on {kernel.title}, in {time.monotonic() - begin:.1f} s")
+        _print_counts(
+            report,
+            emulation,
+            f"{loaded.system.name} on {kernel.title} ({processor.name}), in {time.monotonic() - begin:.1f} s",
+        )
     _print_verdict(report, emulation)
 
 

@@ -1,4 +1,4 @@
-"""Compile the program that plays messages to a system: for a Zynq-7000, on bare metal or with FreeRTOS.
+"""Compile the program that plays messages to a system, for a Zynq on bare metal or a Zynq-7000 with FreeRTOS.
 
 The program is an example of a node without Linux (docs/how-to/emulate.md); its sources are in `node/c`.
 """
@@ -15,11 +15,65 @@ from fusesoc_firm.system.derived.link import longest_payload_of
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.text.diagnostics import fail
 
-COMPILER = "arm-none-eabi-gcc"
 _C = Path(fusesoc_firm.node.__file__).resolve().parent / "c"
-_BOARD = _C / "boards" / "zynq7000"
-_MACHINE = ("-mcpu=cortex-a9", "-mfpu=vfpv3", "-mfloat-abi=hard", "-marm")
-_OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", *_MACHINE, "-nostartfiles", "-T", str(_BOARD / "zynq7000.ld"))
+_BOARDS = _C / "boards"
+# The emulator's clock does not wait for the simulated hardware; `firm emulate` has a limit of its own.
+_OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-nostartfiles", "-DFIRM_UART_PATIENCE_MS=600000u")
+
+
+@dataclass(frozen=True)
+class Processor:
+    """A processor that is emulated: its compiler, and its emulator with the options that choose the machine.
+
+    `files` are those of its folder in `node/c/boards` beside the start-up code. `package` has the library that the
+    compiler needs.
+    """
+
+    name: str
+    compiler: str
+    options: tuple[str, ...]
+    files: tuple[str, ...]
+    emulator: str
+    machine: tuple[str, ...]
+    package: str
+
+    @property
+    def folder(self) -> Path:
+        """The folder of its files."""
+        return _BOARDS / self.name
+
+    @property
+    def sources(self) -> list[Path]:
+        """The files that differ between processors."""
+        return [self.folder / name for name in ("start.S", "firm_processor.c", *self.files)]
+
+
+_ZYNQ = Processor(
+    "zynq7000",
+    "arm-none-eabi-gcc",
+    ("-mcpu=cortex-a9", "-mfpu=vfpv3", "-mfloat-abi=hard", "-marm"),
+    (),
+    "qemu-system-arm",
+    ("-machine", "xilinx-zynq-a9", "-m", "512"),
+    "libnewlib-arm-none-eabi",
+)
+_ZYNQMP = Processor(
+    "zynqmp",
+    "aarch64-linux-gnu-gcc",
+    # Without a library for bare metal, whose functions are among the files.
+    (
+        *("-mcpu=cortex-a53", "-mstrict-align", "-ffreestanding", "-fno-tree-loop-distribute-patterns"),
+        *("-fno-pic", "-no-pie", "-fno-stack-protector", "-mno-outline-atomics", "-nostdlib", "-static"),
+    ),
+    ("firm_memory.c",),
+    "qemu-system-aarch64",
+    # The program starts at level 3, as after AMD's FSBL. The display controller would look for a sound card.
+    ("-machine", "xlnx-zcu102,secure=on", "-m", "1024", "-audiodev", "none,id=none"),
+    "libc6-dev-arm64-cross",
+)
+PROCESSORS = {item.name: item for item in (_ZYNQ, _ZYNQMP)}
+"""The processors by name, the default first."""
+
 _FREERTOS_SOURCES = ("tasks.c", "list.c", "queue.c", "portable/MemMang/heap_4.c")
 _FREERTOS_PORT = "portable/GCC/ARM_CA9"
 
@@ -35,10 +89,12 @@ class Kernel:
         """The name for people."""
         return "FreeRTOS" if self.freertos else "bare metal"
 
-    def check(self) -> None:
-        """Raise `InputError` if the folder does not have the kernel."""
+    def check(self, processor: Processor) -> None:
+        """Raise `InputError` if the folder does not have the kernel, or the kernel no port for the processor."""
         if self.freertos is None:
             return
+        if processor is not _ZYNQ:
+            fail(f"FreeRTOS is not emulated on {processor.name}", hint=f"legal: --processor {_ZYNQ.name}")
         for name in (*_FREERTOS_SOURCES, f"{_FREERTOS_PORT}/port.c"):
             if not (self.freertos / name).is_file():
                 fail(
@@ -63,18 +119,20 @@ class Kernel:
         return ["-std=gnu99", "-DFIRM_FREERTOS", *(f"-I{folder}" for folder in folders)]
 
 
-def compile_player(system: DerivedSystem, kernel: Kernel, folder: Path) -> Path:
+def compile_player(system: DerivedSystem, kernel: Kernel, processor: Processor, folder: Path) -> Path:
     """Compile the program for a system into a folder, and return its ELF file. May raise `InputError`.
 
     The kernel was checked before.
     """
-    program = folder / "player.elf"
+    program = folder / f"player_{processor.name}.elf"
     firm = [_C / "firm" / f"firm_{name}.c" for name in ("frame", "limit", "link", "queues", "uart")]
-    board = [_BOARD / "start.S", _BOARD / "firm_board.c", _C / "ports" / "zynq.c"]
-    folders = [_C / "firm", _C / "player", _BOARD]
+    board = [*processor.sources, _BOARDS / "firm_board.c", _C / "ports" / "zynq.c"]
+    folders = [_C / "firm", _C / "player", _BOARDS, processor.folder]
     command = [
-        shutil.which(COMPILER) or COMPILER,
+        shutil.which(processor.compiler) or processor.compiler,
         *_OPTIONS,
+        *processor.options,
+        *("-T", str(processor.folder / f"{processor.name}.ld")),
         *kernel.options(),
         *(f"-I{item}" for item in folders),
         *(f"-D{name}={value}" for name, value in sizes(system).items()),
@@ -85,8 +143,8 @@ def compile_player(system: DerivedSystem, kernel: Kernel, folder: Path) -> Path:
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
         is_without_library = "string.h: No such file" in done.stderr
-        hint = "apt-get install libnewlib-arm-none-eabi" if is_without_library else ""
-        fail(f"{COMPILER} cannot compile the program for {kernel.title}:\n{done.stderr.rstrip()}", hint=hint)
+        hint = f"apt-get install {processor.package}" if is_without_library else ""
+        fail(f"{processor.compiler} cannot compile the program for {kernel.title}:\n{done.stderr.rstrip()}", hint=hint)
     return program
 
 

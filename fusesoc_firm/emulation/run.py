@@ -1,4 +1,4 @@
-"""Run a program on an emulated Zynq-7000 in front of a simulated system, and compare what returns with the model.
+"""Run a program on an emulated Zynq in front of a simulated system, and compare what returns with the model.
 
 The program gets the messages in memory, and writes each received frame to its console (node/c/player/firm_player.h).
 QEMU emulates the processor and its peripherals; its UART is connected to the pins of the simulated hardware.
@@ -18,6 +18,7 @@ from pathlib import Path
 from types import TracebackType
 
 from fusesoc_firm.emulation.line import Line
+from fusesoc_firm.emulation.program import Processor
 from fusesoc_firm.frame.codec import CodecError, decode, pack_frame, used_bytes
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.frame.values import shown
@@ -27,11 +28,12 @@ from fusesoc_firm.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem
 from fusesoc_firm.text.diagnostics import fail
 
-EMULATOR = "qemu-system-arm"
-_MACHINE = ("-machine", "xilinx-zynq-a9", "-m", "512", "-nographic", "-monitor", "none")
+_OPTIONS = ("-nographic", "-monitor", "none")
 # FIRM_PLAYER_MESSAGES of the program.
 _MESSAGES = 0x10000000
 _LARGEST = 2**28 - 2**20
+# What QEMU 7 says of the sound of the machine's display, whatever its options are.
+_REMARK = "audiodev default parameter is deprecated"
 # After the last expected frame, for frames that nobody expects.
 _SETTLE_SECONDS = 0.5
 _WAIT_SECONDS = 0.05
@@ -69,6 +71,7 @@ class Emulation:
     """
 
     program: Path
+    processor: Processor
     start: Callable[[], Simulator]
     traffic: Traffic
     system: DerivedSystem
@@ -84,7 +87,15 @@ class Emulation:
             if (size := messages.stat().st_size) > _LARGEST:
                 fail(f"the messages have {size:,} bytes; the emulated memory has room for {_LARGEST:,}")
             with Line(self.start(), folder / "line") as line:
-                command = [EMULATOR, *_MACHINE, "-kernel", str(self.program), "-serial", "stdio"]
+                command = [
+                    self.processor.emulator,
+                    *self.processor.machine,
+                    *_OPTIONS,
+                    "-kernel",
+                    str(self.program),
+                    "-serial",
+                    "stdio",
+                ]
                 command += ["-chardev", f"socket,id=line,path={folder / 'line'}", "-serial", "chardev:line"]
                 command += ["-device", f"loader,file={messages},addr={_MESSAGES:#x},force-raw=on"]
                 with Console(command) as console:
@@ -136,12 +147,16 @@ class Console:
 
     def __init__(self, command: Sequence[str]) -> None:
         """Start the emulator. May raise `InputError`."""
+        self._name = command[0]
         try:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
             )
         except OSError as error:
-            fail(f"{EMULATOR} cannot be started: {error.strerror}")
+            fail(f"{command[0]} cannot be started: {error.strerror}")
         self._lines: queue.Queue[str] = queue.Queue()
         self._thread = threading.Thread(target=self._read, name="console", daemon=True)
         self._thread.start()
@@ -157,7 +172,7 @@ class Console:
     def error(self) -> str:
         """Why the emulator has ended, if it has."""
         status = self._process.poll()
-        return "" if status is None else f"{EMULATOR} ended with status {status}"
+        return "" if status is None else f"{self._name} ended with status {status}"
 
     def __enter__(self) -> Console:
         return self
@@ -173,7 +188,9 @@ class Console:
         assert self._process.stdout
         with self._process.stdout as rows:
             for row in rows:
-                self._lines.put(row.decode(errors="replace").strip())
+                line = row.decode(errors="replace").strip()
+                if _REMARK not in line:
+                    self._lines.put(line)
 
 
 def memory_of(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter]) -> bytes:

@@ -124,7 +124,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         identity(loaded).digest if system.status else "",
         tuple(node_service(item, loaded) for item in system.services),
         tuple(node_action(item, loaded) for item in system.actions),
-        system.status is StatusAccess.AXI_LITE,
+        has_status_registers=system.status is StatusAccess.AXI_LITE,
     )
 
 

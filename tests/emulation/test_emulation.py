@@ -13,26 +13,39 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.emulation.program import COMPILER
-from fusesoc_firm.emulation.run import EMULATOR
+from fusesoc_firm.emulation.program import PROCESSORS
 from tests.hdl.ghdl import REPOSITORY
 
 SPECS = REPOSITORY / "specs"
 SEED = 20261126
 KERNEL = os.environ.get("FREERTOS_KERNEL", "")
 
-pytestmark = [
-    pytest.mark.skipif(not all(map(shutil.which, (COMPILER, EMULATOR))), reason=f"no {COMPILER} or {EMULATOR}"),
-    # The tests of a system share its build.
-    pytest.mark.xdist_group("emulation"),
-]
+# The tests of a system share its build.
+pytestmark = pytest.mark.xdist_group("emulation")
+
+
+def _missing(processor: str) -> str:
+    """Why a processor is not emulated here, or nothing."""
+    programs = (PROCESSORS[processor].compiler, PROCESSORS[processor].emulator)
+    absent = [name for name in programs if not shutil.which(name)]
+    return f"no {' and no '.join(absent)}" if absent else ""
+
+
+def _emulated_by(processor: str) -> pytest.MarkDecorator:
+    return pytest.mark.skipif(bool(_missing(processor)), reason=_missing(processor) or "is not missing")
+
+
 KERNELS = [
-    pytest.param([], id="bare-metal"),
+    pytest.param([], id="bare-metal", marks=_emulated_by("zynq7000")),
     pytest.param(
         ["--freertos", KERNEL],
         id="freertos",
-        marks=pytest.mark.skipif(not KERNEL, reason="FREERTOS_KERNEL names no folder"),
+        marks=[
+            _emulated_by("zynq7000"),
+            pytest.mark.skipif(not KERNEL, reason="FREERTOS_KERNEL names no folder"),
+        ],
     ),
+    pytest.param(["--processor", "zynqmp"], id="zynqmp", marks=_emulated_by("zynqmp")),
 ]
 
 
@@ -96,13 +109,14 @@ def _written(folder: Path, stimuli: Sequence[dict[str, Any]]) -> list[str]:
 def test_all_messages_return(
     build_root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, messages: Any, kernel: list[str]
 ) -> None:
-    """1,000 random messages."""
+    """1,000 random messages; fewer with the second processor, which runs the same program."""
     print(f"seed {SEED}")
-    stimuli = messages(random.Random(f"{SEED} {name}"), 1000)
+    count = 200 if "zynqmp" in kernel else 1000
+    stimuli = messages(random.Random(f"{SEED} {name}"), count)
     assert emulated(build_root, name, *_written(tmp_path, stimuli), *kernel) == 0
     said = capsys.readouterr().out
-    assert "PASS 1000/1000" in said
-    assert "counts of the program: sent 1000, lost 0, good 1000, broken 0, refused 0, overruns 0" in said
+    assert f"PASS {count}/{count}" in said
+    assert f"counts of the program: sent {count}, lost 0, good {count}, broken 0, refused 0, overruns 0" in said
 
 
 @pytest.mark.check

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.emulation.messages import emulated_traffic, load_emulated
-from fusesoc_firm.emulation.program import sizes
+from fusesoc_firm.emulation.program import PROCESSORS, sizes
 from fusesoc_firm.emulation.run import Emulation, Report, memory_of
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.request.request import no_core_folders
@@ -26,7 +26,7 @@ def emulation() -> Emulation:
     def start() -> None:
         raise AssertionError("nothing is simulated here")
 
-    return Emulation(Path("player.elf"), start, traffic, loaded.system)  # type: ignore[arg-type]
+    return Emulation(Path("player.elf"), PROCESSORS["zynq7000"], start, traffic, loaded.system)  # type: ignore[arg-type]
 
 
 def right(emulation: Emulation) -> list[bytes]:

@@ -55,7 +55,7 @@ reset:
     strlo r2, [r0], #4
     blo 1b
 
-    bl firm_board_map_memory
+    bl firm_processor_map_memory
     bl main
     b stop
 

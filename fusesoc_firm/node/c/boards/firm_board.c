@@ -10,23 +10,17 @@
 #include "task.h"
 #endif
 
-/* The interrupt controller (ARM's GIC, appendix B.24 of UG585) and the processor's own timer. */
-#define GIC_CONTROL 0xF8F00100u
-#define GIC_PRIORITY_MASK 0xF8F00104u
-#define GIC_ACKNOWLEDGE 0xF8F0010Cu
-#define GIC_END 0xF8F00110u
-#define GIC_DISTRIBUTOR 0xF8F01000u
-#define GIC_ENABLE 0xF8F01100u
-#define GIC_PRIORITY 0xF8F01400u
-#define GIC_TARGET 0xF8F01800u
-#define TIMER_LOAD 0xF8F00600u
-#define TIMER_CONTROL 0xF8F00608u
-#define TIMER_STATUS 0xF8F0060Cu
+/* The interrupt controller, ARM's GIC (version 1 or 2). */
+#define GIC_CONTROL (FIRM_PROCESSOR_GIC + 0x00u)
+#define GIC_PRIORITY_MASK (FIRM_PROCESSOR_GIC + 0x04u)
+#define GIC_ACKNOWLEDGE (FIRM_PROCESSOR_GIC + 0x0Cu)
+#define GIC_END (FIRM_PROCESSOR_GIC + 0x10u)
+#define GIC_DISTRIBUTOR (FIRM_PROCESSOR_GIC_DISTRIBUTOR + 0x000u)
+#define GIC_ENABLE (FIRM_PROCESSOR_GIC_DISTRIBUTOR + 0x100u)
+#define GIC_PRIORITY (FIRM_PROCESSOR_GIC_DISTRIBUTOR + 0x400u)
+#define GIC_TARGET (FIRM_PROCESSOR_GIC_DISTRIBUTOR + 0x800u)
 
-#define TIMER_INTERRUPT 29u
 #define SPURIOUS 1023u
-/* Counts down, repeats and interrupts. */
-#define TIMER_ON 7u
 #define LOWEST_ENABLED 0xFFu
 /* Below the highest priority from which FreeRTOS may be called, and the lowest there is. */
 #define DEVICE_PRIORITY (24u << 3)
@@ -38,32 +32,12 @@
 #define CONSOLE_ON 0x14u
 #define CONSOLE_FULL 0x10u
 
-/* Sections of 1 MB in the first-level table of the ARMv7-A architecture, with all access. */
-#define SECTIONS 4096u
-#define SECTION 0x00000C02u
-#define NOT_CACHED 0x00001000u
-#define DEVICE 0x00000014u
-#define RAM_SECTIONS 1024u
-
 typedef struct {
     void (*handler)(void *context);
     void *context;
 } connection_t;
 
 static connection_t connections[FIRM_BOARD_INTERRUPTS];
-static uint32_t table[SECTIONS] __attribute__((aligned(4 * SECTIONS)));
-
-void firm_board_map_memory(void) {
-    uint32_t control;
-    for (uint32_t place = 0; place < SECTIONS; ++place) {
-        table[place] = (place << 20) | SECTION | (place < RAM_SECTIONS ? NOT_CACHED : DEVICE);
-    }
-    __asm__ volatile("mcr p15, 0, %0, c2, c0, 0" ::"r"(table));   /* the table */
-    __asm__ volatile("mcr p15, 0, %0, c3, c0, 0" ::"r"(1u));      /* domain 0 is checked */
-    __asm__ volatile("mcr p15, 0, %0, c8, c7, 0" ::"r"(0u));      /* forget older translations */
-    __asm__ volatile("dsb\n isb\n mrc p15, 0, %0, c1, c0, 0" : "=r"(control));
-    __asm__ volatile("mcr p15, 0, %0, c1, c0, 0\n isb" ::"r"(control | 1u));
-}
 
 static void write_byte(uintptr_t address, unsigned value) { *(volatile uint8_t *)address = (uint8_t)value; }
 
@@ -85,7 +59,7 @@ static void finish(uint32_t acknowledged) { (void)acknowledged; }
 extern volatile uint32_t firm_ticks;
 
 static void tick(void) {
-    firm_write(TIMER_STATUS, 1);
+    firm_processor_clear_tick();
     ++firm_ticks;
 }
 
@@ -94,9 +68,8 @@ static void finish(uint32_t acknowledged) { firm_write(GIC_END, acknowledged); }
 #endif
 
 void firm_board_start_tick(void) {
-    firm_write(TIMER_LOAD, FIRM_BOARD_CLOCK_HZ / 2000u - 1u);
-    firm_write(TIMER_CONTROL, TIMER_ON);
-    enable(TIMER_INTERRUPT, TICK_PRIORITY);
+    firm_processor_start_tick();
+    enable(FIRM_PROCESSOR_TICK_INTERRUPT, TICK_PRIORITY);
 }
 
 void firm_board_start(void) {
@@ -106,7 +79,7 @@ void firm_board_start(void) {
     firm_write(GIC_CONTROL, 1);
 #ifndef FIRM_FREERTOS
     firm_board_start_tick();
-    __asm__ volatile("cpsie i" ::: "memory");
+    firm_processor_enable_interrupts();
 #endif
 }
 
@@ -123,7 +96,7 @@ static void answer(uint32_t acknowledged) {
     if (interrupt == SPURIOUS) {
         return;
     }
-    if (interrupt == TIMER_INTERRUPT) {
+    if (interrupt == FIRM_PROCESSOR_TICK_INTERRUPT) {
         tick();
     } else if (interrupt < FIRM_BOARD_INTERRUPTS && connections[interrupt].handler != NULL) {
         connections[interrupt].handler(connections[interrupt].context);
@@ -139,7 +112,7 @@ void vApplicationFPUSafeIRQHandler(uint32_t acknowledged);
 void vApplicationFPUSafeIRQHandler(uint32_t acknowledged) { answer(acknowledged); }
 #endif
 
-void firm_board_wait(void) { __asm__ volatile("dsb\n wfi" ::: "memory"); }
+void firm_board_wait(void) { __asm__ volatile("dsb sy\n wfi" ::: "memory"); }
 
 void firm_board_say(const char *text) {
     for (; *text != '\0'; ++text) {
