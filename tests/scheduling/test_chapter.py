@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from pathlib import Path
 
 import pytest
@@ -181,6 +182,32 @@ def test_every_area_of_the_tables_is_measured() -> None:
         assert not any("-" in row for row in table(number, area.measured()).rows), number
     for design in (*POLICIES, area.MANAGER, area.MANAGER_PREEMPTIVE):
         assert {number for name, number in area.measured() if name == design} == set(REQUESTERS), design
+
+
+def test_areas_are_shown_for_the_evaluated_numbers() -> None:
+    def numbers(*asked: int) -> tuple[int, ...]:
+        means = {Key("large", "lru", number): dict.fromkeys(METRICS, 1.0) for number in asked}
+        (found,) = [each for each in figures(Evaluation(means, {})) if each.number == "4.5"]
+        assert all(len(values) == len(found.requesters) for panel in found.panels for values in panel.series.values())
+        return found.requesters
+
+    assert numbers(4, 8, 24) == (4, 8)
+    assert numbers(24) == REQUESTERS
+
+
+@pytest.mark.parametrize(
+    ("series", "scale"),
+    [
+        ([[1.0, 19.0]], {"value": "linear"}),
+        ([[0.0, 5.0], [5.0, 5.0]], {"value": "linear"}),
+        ([[math.nan]], {"value": "linear"}),
+        ([[1.0, 100.0], [math.nan, 7.0]], {"value": "log"}),
+        ([[-2.0, 1000.0]], {"value": "symlog", "linthresh": 2.0}),
+        ([[0.0, 0.001, 1000.0]], {"value": "symlog", "linthresh": 1.0}),
+    ],
+)
+def test_the_scale_shows_small_values(series: list[list[float]], scale: dict[str, object]) -> None:
+    assert pictures._scale(series) == scale
 
 
 @pytest.mark.skipif(not pictures.are_possible(), reason="matplotlib is not installed")

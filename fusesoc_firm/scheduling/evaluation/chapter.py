@@ -57,8 +57,13 @@ def tables(evaluation: Evaluation) -> Iterator[Table]:
 
 
 def figures(evaluation: Evaluation) -> Iterator[Figure]:
-    """Yield figures 4.5 to 4.7 and 4.10 to 4.18 with all evaluated values."""
-    yield _area_figure(evaluation.areas)
+    """Yield figures 4.5 to 4.7 and 4.10 to 4.18 with all evaluated values.
+
+    Areas are those of the evaluated numbers of accelerators, or all if none of these is measured.
+    """
+    evaluated = {key.requesters for key in evaluation.means}
+    shown = tuple(number for number in REQUESTERS if number in evaluated)
+    yield _area_figure(evaluation.areas, shown or REQUESTERS)
     if numbers := evaluation.requesters(LARGE):
         yield from _large_figures(evaluation, numbers)
     cases = [name for name in CORNER_CASES if evaluation.requesters(name)]
@@ -183,16 +188,16 @@ def _names(policies: Sequence[str]) -> str:
 # --- Figures -----------------------------------------------------------------------------------------------------
 
 
-def _area_figure(areas: Areas) -> Figure:
+def _area_figure(areas: Areas, numbers: tuple[int, ...]) -> Figure:
     panels = []
     for index, (title, part) in enumerate((("LUTs", "lut"), ("FFs", "ff"))):
         ours, theirs = {}, {}
         for policy in EVALUATED:
-            found = [areas.get((policy, number)) for number in REQUESTERS]
+            found = [areas.get((policy, number)) for number in numbers]
             ours[POLICIES[policy].short] = [float(getattr(each, part)) if each else math.nan for each in found]
-            theirs[POLICIES[policy].short] = [dissertation().area[policy][number][index] for number in REQUESTERS]
+            theirs[POLICIES[policy].short] = [dissertation().area[policy][number][index] for number in numbers]
         panels.append(Panel(title, ours, theirs))
-    return Figure("4.5", "resource utilisation", "cells", REQUESTERS, tuple(panels))
+    return Figure("4.5", "resource utilisation", "cells", numbers, tuple(panels))
 
 
 def _large_figures(evaluation: Evaluation, numbers: tuple[int, ...]) -> Iterator[Figure]:

@@ -18,6 +18,8 @@ _PANEL_INCHES = (6.0, 4.0)
 _TIMELINE_INCHES = (9.0, 3.0)
 # An axis is logarithmic if the values differ by this factor.
 _WIDE = 20
+# The ratio between the largest value and the smallest that has its own place beside zero.
+_MOST_SHOWN = 1000
 _MARKERS = "osv^DPX"
 # Without the date and the random names that matplotlib writes, equal values result in equal bytes.
 _SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
@@ -40,6 +42,8 @@ def draw_figure(figure: Figure, folder: Path) -> None:
     draw_panel = _draw_lines if len(figure.requesters) > 1 else _draw_bars
     for panel, axis in zip(figure.panels, axes.flat, strict=False):
         draw_panel(axis, figure, panel)
+    if names := {name: line for axis in axes.flat for line, name in zip(*_legend(axis), strict=True)}:
+        drawing.legend(names.values(), names.keys(), loc="outside right upper")
     for axis in axes.flat[len(figure.panels) :]:
         axis.set_visible(False)
     _save(drawing, folder / figure.file_name)
@@ -80,6 +84,8 @@ def _draw_bars(axis: Any, figure: Figure, panel: Panel) -> None:
 
 def _draw_lines(axis: Any, figure: Figure, panel: Panel) -> None:
     places = range(len(figure.requesters))
+    # Margins are relative to the scale at the time of a plot.
+    axis.set_yscale(**_scale([*panel.series.values(), *panel.dissertation.values()]))
     for index, (name, values) in enumerate(panel.series.items()):
         style = {"color": f"C{index}", "marker": _MARKERS[index % len(_MARKERS)], "markersize": 4}
         axis.plot(places, values, label=name, **style)
@@ -89,16 +95,28 @@ def _draw_lines(axis: Any, figure: Figure, panel: Panel) -> None:
     axis.set_xticks(places, [str(number) for number in figure.requesters])
     axis.set_xlabel("accelerators")
     axis.set_ylabel(figure.unit)
-    if _is_wide([*panel.series.values(), *panel.dissertation.values()]):
-        axis.set_yscale("log")
     axis.grid(visible=True, alpha=0.3)
-    axis.legend()
 
 
-def _is_wide(series: Iterable[Sequence[float]]) -> bool:
-    """Return whether small values would look like zero beside the largest one."""
+def _legend(axis: Any) -> tuple[list[Any], list[str]]:
+    """Return the lines of an axis, and their names."""
+    lines, names = axis.get_legend_handles_labels()
+    return lines, names
+
+
+def _scale(series: Iterable[Sequence[float]]) -> dict[str, Any]:
+    """Return a logarithmic scale if small values would look like zero beside the largest one, else a linear one.
+
+    Zero and negative values need a scale that is linear around zero, up to the smallest other value.
+    """
     values = [value for row in series for value in row if not isnan(value)]
-    return bool(values) and 0 < min(values) * _WIDE < max(values)
+    sizes = [abs(value) for value in values if value]
+    if not sizes or min(sizes) * _WIDE >= max(sizes):
+        return {"value": "linear"}
+    if min(values) > 0:
+        return {"value": "log"}
+    # Sizes far below the largest one are not worth their space.
+    return {"value": "symlog", "linthresh": max(min(sizes), max(sizes) / _MOST_SHOWN)}
 
 
 def _save(drawing: Any, path: Path) -> None:
