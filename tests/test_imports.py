@@ -28,7 +28,7 @@ ALLOWED: dict[str, str] = {
     "action": "store text tools",
     "building": "action request store text tools",
     "system": "converter frame message request scheduling store text tools",
-    "fabric": "message system",
+    "fabric": "message system text",
     "accelerator": "converter system text tools",
     "verify": "converter frame message request text tools",
     "bags": "frame message system text",

@@ -16,6 +16,7 @@ from itertools import chain
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.rtps import Kind, Parameter
+from fusesoc_firm.text.render import Rendering
 
 # Bytes of a sample in each fragment but the last.
 FRAGMENT_BYTES = 1344
@@ -288,3 +289,28 @@ def _nack_frag() -> Submessage:
 
 def _gap() -> Submessage:
     return _submessage(Kind.GAP, _LITTLE, Field.READER, Field.WRITER, Field.FIRST, Field.LAST, bytes(4))
+
+
+# --- hardware --------------------------------------------------------------------------------------------------------
+
+_WORDS_IN_ROW = 8
+
+
+def memory_of(node: Node, entity: str) -> Rendering:
+    """Return the memory of a node's programs, as an entity for `firm_packet_builder`."""
+    programs = programs_of(node)
+    words = [f'"{word:011b}"' for word in programs.words]
+    return Rendering(
+        "vhdl/packets.vhd",
+        {
+            "entity": entity,
+            "node": node.network.name,
+            "address_bits": programs.address_bits,
+            "packets": [
+                {"name": name, "number": number, "entry": entry}
+                for number, (name, entry) in enumerate(programs.entries.items())
+            ],
+            "word_count": len(words),
+            "rows": [", ".join(words[at : at + _WORDS_IN_ROW]) for at in range(0, len(words), _WORDS_IN_ROW)],
+        },
+    )

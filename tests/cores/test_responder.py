@@ -138,7 +138,7 @@ def _can_make_a_network() -> bool:
 @pytest.mark.skipif(not _can_make_a_network(), reason="no network namespaces with TAP devices here, or no Verilator")
 def test_the_kernel_finds_the_board_and_its_echoes(tmp_path: Path) -> None:
     verilog = netlist("net_board", tmp_path, [HERE / "net_board.vhd"], HARDWARE).read_text(encoding="utf-8")
-    program = compiled(verilog, "net_board", (HERE / "net_board.cpp").read_text(encoding="ascii"), tmp_path)
+    program = compiled(verilog, "net_board", (HERE / "net_board.cpp").read_text(encoding="ascii"), tmp_path, [HERE])
     command = [*NAMESPACE, sys.executable, str(HERE / "net_peer.py"), str(program)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -13,7 +13,7 @@ from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
 SEED = 20261127
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/rtps")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/rtps")
 
 
 @pytest.fixture(scope="module")
@@ -72,5 +72,5 @@ def test_it_has_no_latch(library: Library) -> None:
 
 
 def test_it_has_no_combinational_loop(tmp_path: Path) -> None:
-    *package, walker = core_files("net/rtps")
-    assert loops("firm_rtps_walker", tmp_path, [walker], package) == []
+    package, walker, _ = core_files("net/rtps")
+    assert loops("firm_rtps_walker", tmp_path, [walker], [package]) == []

@@ -25,7 +25,8 @@ from tests.fabric.test_messages import random_packets
 
 # The record of firm_rtps_pkg.
 READER, NUMBER, SECOND, FRAGMENT, COUNT, FRAGMENTS, SET_SIZE = 0, 8, 16, 24, 28, 32, 44
-DESTINATION, STATUS, SET, KEY_HASH, SOURCE = 48, 60, 64, 96, 112
+DESTINATION, STATUS, SET, KEY_HASH, KIND, SOURCE_MAC, SOURCE = 48, 60, 64, 96, 112, 128, 144
+_SENDER = bytes.fromhex("020000000001")
 Record = dict[int, int]
 
 
@@ -37,7 +38,7 @@ def walked(packet: bytes, *, is_aborted: bool = False) -> list[str]:
     if message is None:
         return ["foreign"]
     heads = _heads(packet)
-    rows, source = [], _at(SOURCE, message.prefix)
+    rows, source = [], {**_at(SOURCE_MAC, _SENDER), **_at(SOURCE, message.prefix)}
     for item in message.submessages:
         kind, flags = next(heads)
         assert kind == item.kind
@@ -59,7 +60,7 @@ def _heads(packet: bytes) -> Iterator[tuple[int, int]]:
 
 
 def _row(item: Submessage, flags: int, source: Record) -> str:
-    record = sorted({**source, **_record(item)}.items())
+    record = sorted({**source, **_at(KIND, bytes([item.kind, flags])), **_record(item)}.items())
     key = _first(item, Parameter.KEY_HASH, 16)
     status = _first(item, Parameter.STATUS_INFO, 4)
     payload = getattr(item, "payload", None) or b""

@@ -7,7 +7,7 @@ from typing import Any
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float64
+from cyclonedds.idl.types import float64, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -29,13 +29,18 @@ class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
     data: str
 
 
-CLASSES: dict[str, type[IdlStruct]] = {"Quaternion": Quaternion, "String": String}
+@dataclass
+class UInt32(IdlStruct, typename="std_msgs::msg::dds_::UInt32_"):
+    data: uint32
+
+
+CLASSES: dict[str, type[IdlStruct]] = {"Quaternion": Quaternion, "String": String, "UInt32": UInt32}
 
 
 class CyclonePeer:
     """A participant with types of its own, which have no hash."""
 
-    def __init__(self, types: dict[str, str], is_reliable: bool) -> None:
+    def __init__(self, types: dict[str, str], is_reliable: bool, only_listens: bool) -> None:
         self.types = types
         participant = DomainParticipant(0)
         kind = Policy.Reliability.Reliable(duration(seconds=10)) if is_reliable else Policy.Reliability.BestEffort
@@ -44,7 +49,8 @@ class CyclonePeer:
         self.readers: dict[str, Any] = {}
         for name, type_ in types.items():
             topics = [Topic(participant, f"rt/{name}_{end}", CLASSES[type_], qos=quality) for end in ("in", "out")]
-            self.writers[name] = DataWriter(participant, topics[0], qos=quality)
+            if not only_listens:
+                self.writers[name] = DataWriter(participant, topics[0], qos=quality)
             self.readers[name] = DataReader(participant, topics[1], qos=quality)
 
     def is_matched(self) -> bool:

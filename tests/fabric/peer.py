@@ -1,11 +1,11 @@
 """What the peers of a node in fabric have in common: they speak to a test by lines of JSON.
 
-    python ros_peer.py|cyclone_peer.py RELIABILITY TYPES
+    python ros_peer.py|cyclone_peer.py RELIABILITY TYPES [listen]
 
-TYPES is `{topic: type}`; the peer publishes on `<topic>_in` and subscribes to `<topic>_out`. Types are `Quaternion` and
-`String`. The first line on its output, `{"matched": seconds}`, says after which time all topics had a match. A line
-`[topic, values]` on its input is published, `"graph"` asks for what the peer's graph knows, and `"farewell"` ends it.
-What comes is `[topic, values]`. It needs nothing but its own middleware.
+TYPES is `{topic: type}`; the peer publishes on `<topic>_in` and subscribes to `<topic>_out`. Types are `Quaternion`,
+`String` and `UInt32`. With `listen`, it publishes nothing. The first line on its output, `{"matched": seconds}`, says
+after which time all topics had a match. A line `[topic, values]` on its input is published, `"graph"` asks for what the
+peer's graph knows, and `"farewell"` ends it. What comes is `[topic, values]`. It needs nothing but its own middleware.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-FIELDS = {"Quaternion": ["x", "y", "z", "w"], "String": ["data"]}
+FIELDS = {"Quaternion": ["x", "y", "z", "w"], "String": ["data"], "UInt32": ["data"]}
 DEPTH = 1000
 
 
@@ -49,10 +49,10 @@ def obey(peer: Peer, line: str) -> bool:
     return True
 
 
-def run(make: Callable[[dict[str, str], bool], Peer]) -> None:
+def run(make: Callable[[dict[str, str], bool, bool], Peer]) -> None:
     """Run a peer until its input ends or says so."""
-    reliability, types = sys.argv[1:]
-    peer = make(json.loads(types), reliability == "reliable")
+    reliability, types, *others = sys.argv[1:]
+    peer = make(json.loads(types), reliability == "reliable", others == ["listen"])
     begun = time.monotonic()
     while not peer.is_matched():
         peer.poll()

@@ -9,14 +9,14 @@ import rclpy
 from peer import DEPTH, FIELDS, run
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-PACKAGES = {"Quaternion": "geometry_msgs", "String": "std_msgs"}
+PACKAGES = {"Quaternion": "geometry_msgs", "String": "std_msgs", "UInt32": "std_msgs"}
 BOARD = "board"
 
 
 class RosPeer:
     """A node of rclpy, which also waits for the name of the node in fabric."""
 
-    def __init__(self, types: dict[str, str], is_reliable: bool) -> None:
+    def __init__(self, types: dict[str, str], is_reliable: bool, only_listens: bool) -> None:
         self.types = types
         rclpy.init()
         self.node = rclpy.create_node("peer")
@@ -27,7 +27,9 @@ class RosPeer:
             name: getattr(importlib.import_module(f"{PACKAGES[kind]}.msg"), kind) for name, kind in types.items()
         }
         self.writers = {
-            name: self.node.create_publisher(made, f"/{name}_in", quality) for name, made in self.classes.items()
+            name: self.node.create_publisher(made, f"/{name}_in", quality)
+            for name, made in self.classes.items()
+            if not only_listens
         }
         for name, made in self.classes.items():
             self.node.create_subscription(made, f"/{name}_out", lambda text, name=name: self.take(name, text), quality)
@@ -36,9 +38,10 @@ class RosPeer:
         self.came.append((name, [getattr(message, field) for field in FIELDS[self.types[name]]]))
 
     def is_matched(self) -> bool:
-        return BOARD in self.node.get_node_names() and all(
-            writer.get_subscription_count() and self.node.count_publishers(f"/{name}_out")
-            for name, writer in self.writers.items()
+        return (
+            BOARD in self.node.get_node_names()
+            and all(writer.get_subscription_count() for writer in self.writers.values())
+            and all(self.node.count_publishers(f"/{name}_out") for name in self.types)
         )
 
     def write(self, name: str, values: list[Any]) -> None:

@@ -10,18 +10,19 @@ use firm.firm_axis_pkg.all;
 
 entity firm_mac_store is
   generic (
-    DEPTH : integer := 2048  -- bytes, a power of two; one of them is never used
+    DEPTH     : integer := 2048;  -- beats, a power of two; one of them is never used
+    DATA_BITS : integer := 8      -- of a beat, 1 to 64
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    s_axis_tdata  : in std_logic_vector(7 downto 0);
+    s_axis_tdata  : in std_logic_vector(DATA_BITS-1 downto 0);
     s_axis_tuser  : in std_logic_vector(0 downto 0);
     s_axis_tvalid : in std_logic;
     s_axis_tlast  : in std_logic;
 
-    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tdata  : out std_logic_vector(DATA_BITS-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
@@ -36,7 +37,7 @@ architecture rtl of firm_mac_store is
 
   subtype place_t is unsigned(PLACE_BITS-1 downto 0);
 
-  type memory_t is array (natural range 0 to 2**PLACE_BITS-1) of std_logic_vector(8 downto 0);
+  type memory_t is array (natural range 0 to 2**PLACE_BITS-1) of std_logic_vector(DATA_BITS downto 0);
   signal memory : memory_t;
 
   -- Known in simulation before the first reset, for numeric_std would warn.
@@ -50,13 +51,16 @@ architecture rtl of firm_mac_store is
   signal ends     : std_logic;
   signal commit   : std_logic;
   signal fetch    : std_logic;
-  signal word_r   : std_logic_vector(8 downto 0);
+  signal word_r   : std_logic_vector(DATA_BITS downto 0);
   signal valid_r  : std_logic;
 
 begin
 
   assert DEPTH >= 4 and 2**clog2(DEPTH) = DEPTH
     report "firm_mac_store: DEPTH is " & integer'image(DEPTH) & "; legal: powers of two, 4 or more"
+    severity failure;
+  assert DATA_BITS >= 1 and DATA_BITS <= 64
+    report "firm_mac_store: DATA_BITS is " & integer'image(DATA_BITS) & "; legal: 1 to 64"
     severity failure;
 
   has_room <= '0' when next_r = read_r else not full_r;
@@ -113,8 +117,8 @@ begin
     end if;
   end process move;
 
-  m_axis_tdata  <= word_r(7 downto 0);
-  m_axis_tlast  <= word_r(8);
+  m_axis_tdata  <= word_r(DATA_BITS-1 downto 0);
+  m_axis_tlast  <= word_r(DATA_BITS);
   m_axis_tvalid <= valid_r;
 
 end architecture rtl;

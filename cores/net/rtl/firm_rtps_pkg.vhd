@@ -34,7 +34,7 @@ package firm_rtps_pkg is
 
   -- The record. Numbers are little-endian, and entities and prefixes as on the line. A sequence number has 8 bytes. The
   -- first number of a set is the highest bit of its first byte.
-  constant RECORD_BITS        : positive := 7;   -- of an address
+  constant RECORD_BITS        : positive := 8;   -- of an address
   constant RECORD_READER      : natural  := 0;   -- 4 bytes
   constant RECORD_WRITER      : natural  := 4;   -- 4 bytes
   constant RECORD_NUMBER      : natural  := 8;   -- of the sample; a heartbeat's first; a set's base; a gap's start
@@ -47,7 +47,11 @@ package firm_rtps_pkg is
   constant RECORD_STATUS      : natural  := 60;  -- 4 bytes
   constant RECORD_SET         : natural  := 64;  -- up to 32 bytes
   constant RECORD_KEY_HASH    : natural  := 96;  -- 16 bytes
-  constant RECORD_SOURCE      : natural  := 112; -- 12 bytes: the sender's prefix, from the packet's header
+  constant RECORD_KIND        : natural  := 112; -- 1 byte
+  constant RECORD_FLAGS       : natural  := 113; -- 1 byte
+  -- Of the packet: written once. Between these two is room for what a participant tells of its addresses.
+  constant RECORD_SOURCE_MAC  : natural  := 128; -- 6 bytes, as on the line
+  constant RECORD_SOURCE      : natural  := 144; -- 12 bytes: the sender's prefix
 
   constant MOST_SET_BITS : positive := 256;
 

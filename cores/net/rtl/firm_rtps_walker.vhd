@@ -20,6 +20,7 @@ entity firm_rtps_walker is
     s_axis_tuser  : in std_logic_vector(0 downto 0);
     s_axis_tvalid : in std_logic;
     s_axis_tlast  : in std_logic;
+    source_mac    : in std_logic_vector(47 downto 0);
 
     -- A byte of the record, at an address of firm_rtps_pkg.
     field_valid   : out std_logic;
@@ -59,6 +60,7 @@ architecture rtl of firm_rtps_walker is
 
   constant SET_WORDS      : positive := MOST_SET_BITS/32;
   constant PROTOCOL_BYTES : positive := 8;
+  constant MAC_BYTES      : positive := 6;
   constant PREFIX_BYTES   : positive := 12;
   constant HEAD_BYTES     : positive := 4;
   constant WORD_BYTES     : positive := 4;
@@ -164,6 +166,18 @@ architecture rtl of firm_rtps_walker is
     end if;
     return REST;
   end function next_of;
+
+  -- A byte of a MAC address.
+  function selected(mac : std_logic_vector(47 downto 0); place : unsigned(4 downto 0)) return std_logic_vector is
+    variable found : std_logic_vector(7 downto 0) := mac(7 downto 0);
+  begin
+    for index in 0 to MAC_BYTES-2 loop
+      if place = index then
+        found := mac(47-8*index downto 40-8*index);
+      end if;
+    end loop;
+    return found;
+  end function selected;
 
   -- Of a step with a fixed size.
   function bytes_of(step : step_t) return size_t is
@@ -387,6 +401,7 @@ begin
 
     variable written : std_logic;
     variable base    : natural range 0 to 2**RECORD_BITS-1;
+    variable data    : std_logic_vector(7 downto 0);
     variable big     : address_t;  -- bits of the place that differ from those in the record, if it is big-endian
     variable little  : address_t;
 
@@ -394,11 +409,26 @@ begin
     if rising_edge(clk) then
       written := '1';
       base    := 0;
+      data    := s_axis_tdata;
       big     := to_unsigned(WORD_BYTES-1, RECORD_BITS);
       little  := (others => '0');
-      if step_r = SOURCE then
+      if step_r = PROTOCOL then
+        -- Nothing of the packet is noted here, so that there is time for its sender.
+        base := RECORD_SOURCE_MAC;
+        big  := (others => '0');
+        data := selected(source_mac, place_r);
+        if place_r >= MAC_BYTES then
+          written := '0';
+        end if;
+      elsif step_r = SOURCE then
         base := RECORD_SOURCE;
         big  := (others => '0');
+      elsif step_r = HEAD then
+        base := RECORD_KIND;
+        big  := (others => '0');
+        if place_r >= 2 then
+          written := '0';
+        end if;
       elsif step_r = ENDS then
         base := RECORD_READER;
         big  := (others => '0');
@@ -437,12 +467,12 @@ begin
       else
         written := '0';
       end if;
-      if is_little = '1' then
+      if is_little = '1' and step_r /= PROTOCOL and step_r /= SOURCE and step_r /= HEAD then
         big := little;
       end if;
       field_valid   <= written and s_axis_tvalid and rst_n;
       field_address <= std_logic_vector(to_unsigned(base, RECORD_BITS) or (resize(place_r, RECORD_BITS) xor big));
-      field_data    <= s_axis_tdata;
+      field_data    <= data;
     end if;
   end process write_record;
 

@@ -59,6 +59,7 @@ begin
       s_axis_tuser  => s_tuser,
       s_axis_tvalid => s_tvalid,
       s_axis_tlast  => s_tlast,
+      source_mac    => x"020000000001",
       field_valid   => field_valid,
       field_address => field_address,
       field_data    => field_data,

@@ -1,0 +1,332 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- A node in fabric at a GMII that publishes numbers: found by ARP, pings and ROS 2, in the domain 0, at 192.0.2.9 and
+-- 02:00:00:00:00:02. Every hundredth `tick` a sample of std_msgs/UInt32 is sent, which counts from 0.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+
+entity net_node is
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+    tick  : in std_logic;
+
+    rx_dv : in  std_logic;
+    rxd   : in  std_logic_vector(7 downto 0);
+    tx_en : out std_logic;
+    txd   : out std_logic_vector(7 downto 0);
+
+    peers_known : out std_logic_vector(7 downto 0)
+  );
+end entity net_node;
+
+architecture rtl of net_node is
+
+  constant MAC          : std_logic_vector(47 downto 0) := x"020000000002";
+  constant ADDRESS      : std_logic_vector(31 downto 0) := x"c0000209";
+  constant SAMPLE_BYTES : positive := 8;
+  constant PERIOD       : positive := 100;
+
+  signal received_tdata  : std_logic_vector(7 downto 0);
+  signal received_tuser  : std_logic_vector(0 downto 0);
+  signal received_tvalid : std_logic;
+  signal received_tlast  : std_logic;
+
+  signal udp_tdata  : std_logic_vector(7 downto 0);
+  signal udp_tuser  : std_logic_vector(0 downto 0);
+  signal udp_tvalid : std_logic;
+  signal udp_tlast  : std_logic;
+  signal source_mac : std_logic_vector(47 downto 0);
+
+  signal field_valid   : std_logic;
+  signal field_address : std_logic_vector(7 downto 0);
+  signal field_data    : std_logic_vector(7 downto 0);
+  signal payload_valid : std_logic;
+  signal payload_data  : std_logic_vector(7 downto 0);
+  signal is_submessage : std_logic;
+  signal is_whole      : std_logic;
+  signal is_faulty     : std_logic;
+  signal is_foreign    : std_logic;
+  signal is_aborted    : std_logic;
+
+  signal start           : std_logic;
+  signal packet          : std_logic_vector(7 downto 0);
+  signal entry           : std_logic_vector(11 downto 0);
+  signal payload_bytes   : std_logic_vector(15 downto 0);
+  signal is_busy         : std_logic;
+  signal build_valid     : std_logic;
+  signal build_address   : std_logic_vector(6 downto 0);
+  signal build_data      : std_logic_vector(7 downto 0);
+  signal program_enable  : std_logic;
+  signal program_address : std_logic_vector(11 downto 0);
+  signal program_word    : std_logic_vector(10 downto 0);
+
+  signal payload_tdata  : std_logic_vector(7 downto 0);
+  signal payload_tvalid : std_logic;
+  signal payload_tready : std_logic;
+
+  signal sample_tdata  : std_logic_vector(7 downto 0);
+  signal sample_tvalid : std_logic;
+  signal sample_tlast  : std_logic;
+  signal sample_tready : std_logic;
+  signal place_r       : unsigned(2 downto 0);
+  signal sends_r       : std_logic;
+  signal number_r      : unsigned(31 downto 0);
+  signal wait_r        : natural range 0 to PERIOD-1;
+
+  -- Replies, then packets.
+  signal sources_tdata  : std_logic_vector(15 downto 0);
+  signal sources_tvalid : std_logic_vector(1 downto 0);
+  signal sources_tlast  : std_logic_vector(1 downto 0);
+  signal sources_tready : std_logic_vector(1 downto 0);
+  signal inside_r       : std_logic;
+  signal second_r       : std_logic;
+  signal second         : std_logic;
+  signal sent_tdata     : std_logic_vector(7 downto 0);
+  signal sent_tvalid    : std_logic;
+  signal sent_tlast     : std_logic;
+  signal sent_tready    : std_logic;
+
+begin
+
+  u_receiver : entity firm.firm_mac_receiver
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      rx_dv         => rx_dv,
+      rxd           => rxd,
+      m_axis_tdata  => received_tdata,
+      m_axis_tuser  => received_tuser,
+      m_axis_tvalid => received_tvalid,
+      m_axis_tlast  => received_tlast,
+      is_good       => open,
+      is_broken     => open,
+      is_long       => open
+    );
+
+  u_responder : entity firm.firm_net_responder
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      mac           => MAC,
+      address       => ADDRESS,
+      s_axis_tdata  => received_tdata,
+      s_axis_tuser  => received_tuser,
+      s_axis_tvalid => received_tvalid,
+      s_axis_tlast  => received_tlast,
+      m_axis_tdata  => sources_tdata(7 downto 0),
+      m_axis_tvalid => sources_tvalid(0),
+      m_axis_tlast  => sources_tlast(0),
+      m_axis_tready => sources_tready(0),
+      is_lost       => open
+    );
+
+  u_udp : entity firm.firm_udp_receiver
+    generic map (
+      PORTS => 3
+    )
+    port map (
+      clk            => clk,
+      rst_n          => rst_n,
+      mac            => MAC,
+      address        => ADDRESS,
+      group_ip       => x"efff0001",
+      udp_ports      => x"1cf31cf21ce8",
+      s_axis_tdata   => received_tdata,
+      s_axis_tuser   => received_tuser,
+      s_axis_tvalid  => received_tvalid,
+      s_axis_tlast   => received_tlast,
+      m_axis_tdata   => udp_tdata,
+      m_axis_tuser   => udp_tuser,
+      m_axis_tvalid  => udp_tvalid,
+      m_axis_tlast   => udp_tlast,
+      source_mac     => source_mac,
+      source_address => open,
+      source_port    => open,
+      port_match     => open,
+      is_fragment    => open,
+      is_broken      => open
+    );
+
+  u_walker : entity firm.firm_rtps_walker
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => udp_tdata,
+      s_axis_tuser  => udp_tuser,
+      s_axis_tvalid => udp_tvalid,
+      s_axis_tlast  => udp_tlast,
+      source_mac    => source_mac,
+      field_valid   => field_valid,
+      field_address => field_address,
+      field_data    => field_data,
+      payload_valid => payload_valid,
+      payload_data  => payload_data,
+      kind          => open,
+      flags         => open,
+      has_key       => open,
+      has_status    => open,
+      is_submessage => is_submessage,
+      is_whole      => is_whole,
+      is_faulty     => is_faulty,
+      is_foreign    => is_foreign,
+      is_aborted    => is_aborted
+    );
+
+  u_control : entity firm.firm_rtps_control
+    generic map (
+      PEERS   => 8,
+      WRITERS => 2,
+      READERS => 0,
+      DEPTH   => 4096
+    )
+    port map (
+      clk                 => clk,
+      rst_n               => rst_n,
+      tick                => tick,
+      prefix              => x"0000" & MAC & x"00000000",
+      sample_writer       => x"00000303",
+      field_valid         => field_valid,
+      field_address       => field_address,
+      field_data          => field_data,
+      payload_valid       => payload_valid,
+      payload_data        => payload_data,
+      is_submessage       => is_submessage,
+      is_whole            => is_whole,
+      is_faulty           => is_faulty,
+      is_foreign          => is_foreign,
+      is_aborted          => is_aborted,
+      s_axis_tdata        => sample_tdata,
+      s_axis_tvalid       => sample_tvalid,
+      s_axis_tlast        => sample_tlast,
+      s_axis_tready       => sample_tready,
+      start               => start,
+      packet              => packet,
+      payload_bytes       => payload_bytes,
+      is_busy             => is_busy,
+      build_field_valid   => build_valid,
+      build_field_address => build_address,
+      build_field_data    => build_data,
+      m_axis_tdata        => payload_tdata,
+      m_axis_tvalid       => payload_tvalid,
+      m_axis_tready       => payload_tready,
+      peers_known         => peers_known,
+      is_full             => open,
+      is_lost             => open
+    );
+
+  u_packets : entity work.net_node_packets
+    port map (
+      clk     => clk,
+      packet  => packet,
+      entry   => entry,
+      enable  => program_enable,
+      address => program_address,
+      word    => program_word
+    );
+
+  u_builder : entity firm.firm_packet_builder
+    generic map (
+      ADDRESS_BITS => 12
+    )
+    port map (
+      clk             => clk,
+      rst_n           => rst_n,
+      start           => start,
+      entry           => entry,
+      payload_bytes   => payload_bytes,
+      is_busy         => is_busy,
+      field_valid     => build_valid,
+      field_address   => build_address,
+      field_data      => build_data,
+      program_enable  => program_enable,
+      program_address => program_address,
+      program_word    => program_word,
+      s_axis_tdata    => payload_tdata,
+      s_axis_tvalid   => payload_tvalid,
+      s_axis_tready   => payload_tready,
+      m_axis_tdata    => sources_tdata(15 downto 8),
+      m_axis_tvalid   => sources_tvalid(1),
+      m_axis_tlast    => sources_tlast(1),
+      m_axis_tready   => sources_tready(1)
+    );
+
+  -- ------------------------------------------------------------------ samples
+
+  sample_tvalid <= sends_r;
+  sample_tlast  <= '1' when place_r = SAMPLE_BYTES-1 else '0';
+  -- The header of little-endian XCDR 1, then the number.
+  sample_tdata  <= x"01" when place_r = 1 else
+                   std_logic_vector(number_r(7 downto 0)) when place_r = 4 else
+                   std_logic_vector(number_r(15 downto 8)) when place_r = 5 else
+                   std_logic_vector(number_r(23 downto 16)) when place_r = 6 else
+                   std_logic_vector(number_r(31 downto 24)) when place_r = 7 else
+                   x"00";
+
+  count : process (clk)
+  begin
+    if rising_edge(clk) then
+      if sends_r = '1' and sample_tready = '1' then
+        place_r <= place_r + 1;
+        if sample_tlast = '1' then
+          sends_r  <= '0';
+          number_r <= number_r + 1;
+        end if;
+      end if;
+      if tick = '1' then
+        wait_r <= wait_r - 1;
+        if wait_r = 0 then
+          wait_r  <= PERIOD-1;
+          sends_r <= '1';
+        end if;
+      end if;
+      if rst_n = '0' then
+        place_r  <= (others => '0');
+        sends_r  <= '0';
+        number_r <= (others => '0');
+        wait_r   <= PERIOD-1;
+      end if;
+    end if;
+  end process count;
+
+  -- ------------------------------------------------------------------ frames of two sources
+
+  second <= second_r when inside_r = '1' else not sources_tvalid(0);
+
+  sent_tdata  <= sources_tdata(15 downto 8) when second = '1' else sources_tdata(7 downto 0);
+  sent_tvalid <= sources_tvalid(1) when second = '1' else sources_tvalid(0);
+  sent_tlast  <= sources_tlast(1) when second = '1' else sources_tlast(0);
+
+  sources_tready(0) <= sent_tready and not second;
+  sources_tready(1) <= sent_tready and second;
+
+  choose : process (clk)
+  begin
+    if rising_edge(clk) then
+      second_r <= second;
+      if sent_tvalid = '1' then
+        inside_r <= not (sent_tlast and sent_tready);
+      end if;
+      if rst_n = '0' then
+        inside_r <= '0';
+      end if;
+    end if;
+  end process choose;
+
+  u_transmitter : entity firm.firm_mac_transmitter
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => sent_tdata,
+      s_axis_tvalid => sent_tvalid,
+      s_axis_tlast  => sent_tlast,
+      s_axis_tready => sent_tready,
+      tx_en         => tx_en,
+      tx_er         => open,
+      txd           => txd,
+      is_sent       => open,
+      is_spoiled    => open
+    );
+
+end architecture rtl;
