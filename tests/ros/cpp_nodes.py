@@ -97,12 +97,12 @@ def _libpython() -> str:
 
 
 @contextmanager
-def ros1(folder: Path) -> Iterator[Ros]:
-    """ROS 1 as Debian has it, with a master of its own."""
+def ros1(folder: Path, port: int | None = None) -> Iterator[Ros]:
+    """ROS 1 as Debian has it, with a master of its own, at a free port unless one is given."""
     words = subprocess.run(
         ["pkg-config", "--cflags", "--libs", "roscpp"], capture_output=True, text=True, check=True
     ).stdout.split()
-    port = _free_port()
+    port = port or _free_port()
     environment = {
         **os.environ,
         "ROS_MASTER_URI": f"http://127.0.0.1:{port}",

@@ -33,8 +33,8 @@ _HARDWARE = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
 _IDLE_BYTES = 5  # of a turn without news
 _LONGEST_SECONDS = 60
-# The bench plays milliseconds while the header of an SPI frame is sent.
-_MOST_MS = 32
+# More at once is not the board's time, but the machine's. The bench plays them during the header of an SPI frame.
+_MOST_MS = 5
 
 
 def endpoint(topic: str, package: str, name: str) -> Endpoint:
@@ -149,14 +149,13 @@ def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
     chip = CHIPS[chip_number]()
 
     def run(running: Board) -> None:
-        access = ACCESSES[chip_number](chip)
-        sequencer = Sequencer(
-            image(board, chip_number), access, lambda: time.monotonic_ns() // (1_000_000 * _MS_PER_UNIT)
-        )
+        access, clock = ACCESSES[chip_number](chip), Clock()
+        sequencer = Sequencer(image(board, chip_number), access, lambda: clock.milliseconds // _MS_PER_UNIT)
         while running.is_running:
             before = access.bytes
             sequencer.turn()
             running.turns.append(access.bytes - before)
+            clock.pass_time()
             if running.turns[-1] <= _IDLE_BYTES:
                 chip.poll(0.002)
             while sequencer.given:
@@ -164,6 +163,21 @@ def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
             sequencer.offered.extend(running.offered())
 
     return Board(run, chip, manager)
+
+
+@dataclass
+class Clock:
+    """The board's time. It stands still while a busy machine lets the board wait."""
+
+    milliseconds: int = 0
+    _latest: int = field(default_factory=time.monotonic_ns)
+
+    def pass_time(self) -> int:
+        """Go on by the time since the last call, which is returned in ms."""
+        passed = (time.monotonic_ns() - self._latest) // 1_000_000
+        self._latest += passed * 1_000_000
+        self.milliseconds += min(passed, _MOST_MS)
+        return min(passed, _MOST_MS)
 
 
 @dataclass(frozen=True)
@@ -196,7 +210,7 @@ def clocked(
     chip = CHIPS[chip_number]()
 
     def run(running: Board) -> None:
-        begin, told, answers = time.monotonic_ns(), 0, b""
+        clock, answers = Clock(), b""
         with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
             assert process.stdin
             assert process.stdout
@@ -204,10 +218,8 @@ def clocked(
                 match process.stdout.read(1):
                     case b"s":
                         chip.select()
-                        passed = (time.monotonic_ns() - begin) // 1_000_000 - told
                         offered, answers = answers + running.offered(), b""
-                        log.append(Frame(min(passed, _MOST_MS), offered))
-                        told += log[-1].milliseconds
+                        log.append(Frame(clock.pass_time(), offered))
                         process.stdin.write(bytes([log[-1].milliseconds]) + len(offered).to_bytes(2, "big") + offered)
                         process.stdin.flush()
                     case b"a":

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import random
 import shutil
 import signal
+import socket
 import subprocess
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +23,8 @@ from fusesoc_firm.fabric.ros1 import Node, image
 from tests.ros.cpp_nodes import Ros, missing_ros1, ros1
 from tests.ros.live_nodes import paced
 from tests.wiznet.chips import CHIPS
-from tests.wiznet.ros1 import Board, Frame, Manager, clocked, endpoint, hardware, interpreted, node
+from tests.wiznet.ros1 import Board, Frame, Manager, clocked, endpoint, framed, hardware, interpreted, node
+from tests.wiznet.ros1_peers import LONGEST_SECONDS, header, header_of, read
 from tests.wiznet.sequencer import ACCESSES, Sequencer
 
 SEED = 20261126
@@ -79,6 +83,7 @@ def running(program: tuple[int, Path], tmp_path: Path) -> Iterator[Clocked]:
     with ros1(tmp_path) as ros:
         made, manager, log = _node(ros), Manager(_first_three), list[Frame]()
         board = clocked(made, program[0], manager, program[1], 20, SEED, log)
+        board.wait_until_listening()
         yield Clocked(ros, made, board, manager, log, program[0])
         board.close()
 
@@ -196,3 +201,34 @@ def test_a_killed_peer_disturbs_nobody(running: Clocked) -> None:
             time.sleep(0.05)
         peer.send_signal(signal.SIGKILL)
     _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
+
+
+@pytest.mark.thorough
+def test_a_thousand_points_at_100_hz_reach_three_subscribers(running: Clocked) -> None:
+    rng = random.Random(SEED)
+    own = running.node
+    with ExitStack() as stack:
+        peers = []
+        for _ in range(3):
+            address = str(own.network.address), own.port
+            peers.append(stack.enter_context(socket.create_connection(address, LONGEST_SECONDS)))
+            peers[-1].sendall(header("callerid=/me", "md5sum=*", "topic=/place"))
+            assert "error" not in header_of(peers[-1])
+        sent, begin = [rng.randbytes(24) for _ in range(1000)], time.monotonic()
+        for index, payload in enumerate(sent):
+            time.sleep(max(0, begin + index / 100 - time.monotonic()))
+            running.board.send(0, payload)
+        for peer in peers:
+            assert read(peer, 28 * 1000) == b"".join(framed(0, payload)[1:] for payload in sent)
+
+
+def test_a_new_master_is_found(program: tuple[int, Path], tmp_path: Path) -> None:
+    (tmp_path / "first").mkdir()
+    (tmp_path / "second").mkdir()
+    with ros1(tmp_path / "first") as ros:
+        board = clocked(_node(ros), program[0], Manager(_first_three), program[1], 20, SEED, [])
+        _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
+        port = int(_node(ros).master[1])
+    with ros1(tmp_path / "second", port) as ros:
+        _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
+    board.close()
