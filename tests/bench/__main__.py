@@ -33,6 +33,7 @@ from tests.bench import (
     systems,
     timing,
     use,
+    watching,
 )
 from tests.bench.areas import write_areas
 from tests.bench.nextpnr import SEEDS, Nextpnr
@@ -97,7 +98,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "replay": lambda: replay.measure(seed, _tell),
         "live": lambda: live.measure(_tell),
         "store": lambda: store.measure(_tell),
-        "studio": lambda: studio.measure(seed, _tell),
+        "studio": lambda: [*studio.measure(seed, _tell), *watching.measure(_tell)],
     }
     return measures[part]()
 

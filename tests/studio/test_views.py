@@ -143,7 +143,7 @@ def test_a_system_without_times_is_told_what_is_missing(studio: Studio, timed: P
 def test_a_run_shows_its_bursts_and_numbers(tmp_path: Path) -> None:
     spec = write_system(tmp_path)
     with served(spec, modelled()) as studio:
-        for name in "grants", "status", "series?block=point":
+        for name in "grants", "status", "series?block=point", "wave?number=0":
             assert ask(studio, "GET", f"api/{name}")[0] == 404
         begin(studio)
         news = until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
@@ -153,6 +153,13 @@ def test_a_run_shows_its_bursts_and_numbers(tmp_path: Path) -> None:
         assert [last - first + 1 for _, first, last in grants] == [-(-(sizes[name] + 5) // 8) for name, _, _ in grants]
         assert [name for name, _, _ in grants] == ["point_out", "text_out", "image_out"]
         assert all(before[2] < after[1] for before, after in pairwise(grants))
+        number = next(row[0] for row in news["messages"] if row[1] == "point_out")
+        wave = ask(studio, "GET", f"api/wave?number={number}")[2]
+        # The id 0 and the length 28, then the payload, which begins with the encapsulation.
+        assert (wave["beats"][0], wave["count"]) == ("00 1c 00 00 00 00 01 00", 5)
+        payload = bytes.fromhex("".join(wave["beats"]))[5:]
+        assert struct.unpack_from("<3d", payload, 4) == (1.5, -2.0, 1e300)
+        assert wave["cycles"] == grants[0][1:]
         assert ask(studio, "GET", "api/status")[2] == {"access": None, "counts": {}}
         latency = ask(studio, "GET", "api/series?block=point_out")[2]
         assert [value for _, value in latency["points"]] == [19]
