@@ -6,6 +6,7 @@ import json
 import re
 import struct
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.studio.byte_map import byte_map
 from fusesoc_firm.studio.server import Studio
 from fusesoc_firm.system.system_core import artifacts
@@ -169,3 +171,24 @@ def test_a_run_shows_its_bursts_and_numbers(tmp_path: Path) -> None:
         assert ask(studio, "GET", "api/series?block=image_out&field=data[1]")[2]["points"][0][1] is None
         assert ask(studio, "GET", "api/series?block=image_out&field=header.stamp.sec")[2]["points"][0][1] == 1
         assert ask(studio, "GET", "api/series?block=nobody")[0] == 404
+
+
+@pytest.mark.check
+def test_what_the_hardware_counts_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "tilt", "--in", "geometry_msgs/Vector3", "--out", "geometry_msgs/Vector3"]) == 0
+    spec = tmp_path / "tilt" / "tilt.yaml"
+    text = spec.read_text(encoding="utf-8")
+    spec.write_text(text.replace("project:\n", "project:\n  status: frames\n"), encoding="utf-8")
+    with served(spec, partial(build_simulator, build_root=tmp_path / "simulators")) as studio:
+        begin(studio, file="tilt.yaml", rate=20, isEndless=True)
+        counts: dict[str, int] = {}
+
+        def is_counted(news: dict[str, Any]) -> bool:
+            assert not news["run"] or news["run"]["state"] in ("building", "running"), news
+            counts.update(ask(studio, "GET", "api/status")[2]["counts"] if news["run"] else {})
+            return counts.get("pub frames", 0) > 5
+
+        news = until(studio, is_counted)
+        assert 5 < counts["sub frames"] <= news["counts"]["sub"]["messages"] + 1
+        assert counts["pub longest wait in cycles"] >= 0
