@@ -503,7 +503,7 @@ class Node:
         if cause:
             taken = cycles[1] - cause.cycles[0] if cause.cycles and cycles else None
             latency = Latency(cause.seen, taken, now - cause.received_ns)
-        watch.saw(block, payload, now - watch.start_ns, latency)
+        watch.saw(block, payload, now - watch.start_ns, latency, cycles)
 
     def _has_carrier(self, block: str) -> bool:
         return block in self._topics and self._topics[block][1].ros in self._carriers

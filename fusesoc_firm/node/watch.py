@@ -40,7 +40,8 @@ class Latency:
 class Seen:
     """A message at a subscriber or publisher; `number` counts all messages of the run.
 
-    `time_ns` is the time since the begin of the record, or in the replayed bag.
+    `time_ns` is the time since the begin of the record, or in the replayed bag. `cycles` are those of the first and the
+    last beat of a response from simulated hardware.
     """
 
     number: int
@@ -48,6 +49,7 @@ class Seen:
     time_ns: int
     payload: bytes
     latency: Latency = Latency()
+    cycles: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -140,10 +142,17 @@ class Watch:
         """Name the source of the inputs' loads, by block; readers call it."""
         self._loads = loads
 
-    def saw(self, block: str, payload: bytes, time_ns: int, latency: Latency = Latency()) -> int:
+    def saw(
+        self,
+        block: str,
+        payload: bytes,
+        time_ns: int,
+        latency: Latency = Latency(),
+        cycles: tuple[int, int] | None = None,
+    ) -> int:
         """Record a message, and return its number."""
         with self._lock:
-            seen = Seen(self._next, block, time_ns, payload, latency)
+            seen = Seen(self._next, block, time_ns, payload, latency, cycles)
             self._next += 1
             self._messages.append(seen)
             self._bytes += len(payload)

@@ -10,25 +10,32 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from math import inf
 from typing import Any
 
 from aiohttp import WSMsgType, web
 
+from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.node.watch import Seen
 from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, numbers_of, picture_of
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
-from fusesoc_firm.studio.run import Run, SimulatedRun, Wishes
+from fusesoc_firm.studio.run import RUNNING, Run, SimulatedRun, Wishes
 from fusesoc_firm.studio.workspace import Workspace
+from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Topic
 from fusesoc_firm.tools.simulators import fitting
 
 # The least time between two news, and the number of messages in one and in an answer about the record.
 _SECONDS = 0.05
+# The time for which counts and percentiles of a run are sent again, since these sort all latencies.
+_COUNT_SECONDS = 0.25
 _MOST_NEW, _MOST_ROWS = 50, 200
 # The number of bursts and of points in an answer.
 _MOST_GRANTS, _MOST_POINTS = 500, 500
+# The number of beats in a wave.
+_MOST_BEATS = 24
 # What can be plotted of each message beside its own numbers.
 LATENCY, BYTES = "latency", "bytes"
 # The highest rate of messages a second that the page may ask for.
@@ -44,6 +51,8 @@ class Live:
         self._workspace = workspace
         self._count = 0
         self._sockets: set[web.WebSocketResponse] = set()
+        self._counts: dict[str, Any] = {}
+        self._counted = -inf
         self.run: Run | None = None
 
     def take(self, run: Run) -> None:
@@ -52,6 +61,7 @@ class Live:
             self.run.stop()
         self.run = run
         self._count += 1
+        self._counted = -inf
 
     def requests(self) -> Requests:
         """Return the requests."""
@@ -60,6 +70,7 @@ class Live:
             "GET record": self._record,
             "GET message": self._message,
             "GET picture": self._picture,
+            "GET wave": self._wave,
             "GET grants": self._grants,
             "GET status": self._status,
             "GET series": self._series,
@@ -80,7 +91,8 @@ class Live:
 
     async def _watch(self, request: web.Request) -> web.WebSocketResponse:
         """Send news each time that the page asks with the number of the last message it knows."""
-        socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024)
+        # Compression would cost more than loopback saves.
+        socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024, compress=False)
         await socket.prepare(request)
         self._sockets.add(socket)
         asked: asyncio.Queue[int] = asyncio.Queue()
@@ -131,6 +143,10 @@ class Live:
         if not run:
             return {"run": None}
         watch, clock = run.watch, run.system.clock
+        is_paused = run.control is not None and not run.control.is_open
+        if run.state != RUNNING or is_paused or time.monotonic() >= self._counted + _COUNT_SECONDS:
+            self._counts = {block: asdict(count) for block, count in watch.counts().items()}
+            self._counted = time.monotonic()
         news = watch.since(after, _MOST_NEW)
         return {
             "run": {
@@ -139,14 +155,14 @@ class Live:
                 "title": run.title,
                 "state": run.state,
                 "text": run.text,
-                "isPaused": run.control is not None and not run.control.is_open,
+                "isPaused": is_paused,
                 "isControlled": run.control is not None,
                 "clock": None if clock is None else float(clock),
                 "first": watch.first,
                 "last": news.last,
             },
             "seconds": time.monotonic() - watch.start_ns / 1e9,
-            "counts": {block: asdict(count) for block, count in watch.counts().items()},
+            "counts": self._counts,
             "loads": {block: asdict(load) for block, load in watch.loads().items()},
             "messages": [*map(_row, news.messages)],
             "skipped": news.skipped,
@@ -171,6 +187,11 @@ class Live:
         if not found:
             raise web.HTTPNotFound(reason="this message has no picture that a browser shows")
         return web.Response(body=found[0], content_type=found[1])
+
+    async def _wave(self, request: web.Request) -> web.Response:
+        """Return the beats of a message's frame on the stream of the system."""
+        run, seen = self._seen(request)
+        return in_json(wave(run.system, run.topics[seen.block], seen))
 
     async def _grants(self, _: web.Request) -> web.Response:
         """Return the latest bursts of the hardware."""
@@ -227,6 +248,18 @@ class Live:
         if not seen:
             raise web.HTTPNotFound(reason="this message is not in the record any more")
         return run, seen
+
+
+def wave(system: DerivedSystem, topic: Topic, seen: Seen) -> dict[str, Any]:
+    """Return the frame of a message in beats: the bytes of the first ones, how many there are, and their cycles.
+
+    A message of software has no frame, and so no beats.
+    """
+    if not isinstance(topic, Converter):
+        return {"beats": [], "count": 0, "cycles": None}
+    frame, size = pack_frame(topic.id, seen.payload, system.id_bytes), system.width // 8
+    beats = [frame[at : at + size].hex(" ") for at in range(0, min(len(frame), size * _MOST_BEATS), size)]
+    return {"beats": beats, "count": -(-len(frame) // size), "cycles": seen.cycles}
 
 
 def series(frame: Frame, messages: Sequence[Seen], field: str) -> dict[str, Any]:

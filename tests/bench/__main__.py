@@ -34,6 +34,7 @@ from tests.bench import (
     systems,
     timing,
     use,
+    watching,
 )
 from tests.bench.areas import write_areas
 from tests.bench.nextpnr import SEEDS, Nextpnr
@@ -99,7 +100,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "live": lambda: live.measure(_tell, figures.written(), arguments.row),
         "resize": lambda: resize.measure(seed, _tell),
         "store": lambda: store.measure(_tell),
-        "studio": lambda: studio.measure(seed, _tell),
+        "studio": lambda: [*studio.measure(seed, _tell), *watching.measure(_tell)],
     }
     return measures[part]()
 

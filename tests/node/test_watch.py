@@ -155,3 +155,21 @@ def test_a_step_that_nobody_took_is_forgotten_when_all_pass() -> None:
     control.end()
     assert passed.wait(60)
     assert not control.passes()
+
+
+def test_bursts_and_the_messages_of_a_block_are_kept_within_bounds() -> None:
+    watch = Watch(most_messages=10)
+    for number in range(6000):
+        watch.granted("ab"[number % 2], 10 * number, 10 * number + 4)
+        watch.saw("ab"[number % 2], bytes([number % 251]), number)
+    grants = watch.grants(3)
+    assert [(grant.block, grant.first, grant.last) for grant in grants] == [
+        ("b", 59970, 59974),
+        ("a", 59980, 59984),
+        ("b", 59990, 59994),
+    ]
+    assert len(watch.grants(10_000)) == 5000
+    assert [seen.number for seen in watch.of("a", 3)] == [5994, 5996, 5998]
+    # Only ten messages are in the record.
+    assert [seen.number for seen in watch.of("b", 100)] == [5991, 5993, 5995, 5997, 5999]
+    assert watch.of("c", 5) == []

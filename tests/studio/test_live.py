@@ -52,7 +52,7 @@ def following(studio: Studio, steps: Callable[[Callable[[int], Awaitable[News]]]
 
             async def news(after: int) -> News:
                 await socket.send_str(str(after))
-                return dict(await socket.receive_json(timeout=60))
+                return dict(await socket.receive_json(timeout=600))
 
             await steps(news)
 

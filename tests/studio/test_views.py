@@ -6,6 +6,7 @@ import json
 import re
 import struct
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.studio.byte_map import byte_map
 from fusesoc_firm.studio.server import Studio
 from fusesoc_firm.system.system_core import artifacts
@@ -143,7 +145,7 @@ def test_a_system_without_times_is_told_what_is_missing(studio: Studio, timed: P
 def test_a_run_shows_its_bursts_and_numbers(tmp_path: Path) -> None:
     spec = write_system(tmp_path)
     with served(spec, modelled()) as studio:
-        for name in "grants", "status", "series?block=point":
+        for name in "grants", "status", "series?block=point", "wave?number=0":
             assert ask(studio, "GET", f"api/{name}")[0] == 404
         begin(studio)
         news = until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
@@ -153,6 +155,13 @@ def test_a_run_shows_its_bursts_and_numbers(tmp_path: Path) -> None:
         assert [last - first + 1 for _, first, last in grants] == [-(-(sizes[name] + 5) // 8) for name, _, _ in grants]
         assert [name for name, _, _ in grants] == ["point_out", "text_out", "image_out"]
         assert all(before[2] < after[1] for before, after in pairwise(grants))
+        number = next(row[0] for row in news["messages"] if row[1] == "point_out")
+        wave = ask(studio, "GET", f"api/wave?number={number}")[2]
+        # The id 0 and the length 28, then the payload, which begins with the encapsulation.
+        assert (wave["beats"][0], wave["count"]) == ("00 1c 00 00 00 00 01 00", 5)
+        payload = bytes.fromhex("".join(wave["beats"]))[5:]
+        assert struct.unpack_from("<3d", payload, 4) == (1.5, -2.0, 1e300)
+        assert wave["cycles"] == grants[0][1:]
         assert ask(studio, "GET", "api/status")[2] == {"access": None, "counts": {}}
         latency = ask(studio, "GET", "api/series?block=point_out")[2]
         assert [value for _, value in latency["points"]] == [19]
@@ -162,3 +171,24 @@ def test_a_run_shows_its_bursts_and_numbers(tmp_path: Path) -> None:
         assert ask(studio, "GET", "api/series?block=image_out&field=data[1]")[2]["points"][0][1] is None
         assert ask(studio, "GET", "api/series?block=image_out&field=header.stamp.sec")[2]["points"][0][1] == 1
         assert ask(studio, "GET", "api/series?block=nobody")[0] == 404
+
+
+@pytest.mark.check
+def test_what_the_hardware_counts_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "tilt", "--in", "geometry_msgs/Vector3", "--out", "geometry_msgs/Vector3"]) == 0
+    spec = tmp_path / "tilt" / "tilt.yaml"
+    text = spec.read_text(encoding="utf-8")
+    spec.write_text(text.replace("project:\n", "project:\n  status: frames\n"), encoding="utf-8")
+    with served(spec, partial(build_simulator, build_root=tmp_path / "simulators")) as studio:
+        begin(studio, file="tilt.yaml", rate=20, isEndless=True)
+        counts: dict[str, int] = {}
+
+        def is_counted(news: dict[str, Any]) -> bool:
+            assert not news["run"] or news["run"]["state"] in ("building", "running"), news
+            counts.update(ask(studio, "GET", "api/status")[2]["counts"] if news["run"] else {})
+            return counts.get("pub frames", 0) > 5
+
+        news = until(studio, is_counted)
+        assert 5 < counts["sub frames"] <= news["counts"]["sub"]["messages"] + 1
+        assert counts["pub longest wait in cycles"] >= 0

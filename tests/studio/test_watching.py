@@ -179,6 +179,10 @@ def test_people_with_impairments_can_watch(tmp_path: Path, scheme: str) -> None:
         await press(page, "run")
         await open_message(page, "image_out")
         await page.until("document.querySelector('.message img')?.naturalWidth === 3")
+        await page.evaluate("document.querySelector('.message details').open = true")
+        # The frame of an image has 137 bytes, 8 in a beat.
+        await page.until("document.querySelector('.message details').innerText.includes('18 beats')")
+        await page.until("document.querySelectorAll('.wavedrom svg text').length > 18")
         assert await violations(page) == []
         for view, shown in VIEWS.items():
             await press(page, view, VIEW_BUTTONS)

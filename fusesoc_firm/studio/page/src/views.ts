@@ -50,6 +50,13 @@ export interface Schedulers {
 /** A burst: block, first and last cycle. */
 export type Grant = [string, number, number];
 
+/** The first beats of a frame, how many there are, and the cycles of the first and the last one. */
+export interface Wave {
+  beats: string[];
+  count: number;
+  cycles: [number, number] | null;
+}
+
 export interface Series {
   fields: string[];
   points: [number, number | null][];
@@ -62,6 +69,8 @@ export const schedulers = (file: string) => get<Schedulers | { missing: string }
 export const grants = () => get<{ grants: Grant[] }>("grants");
 export const status = () => get<{ access: string | null; counts: Record<string, number> }>("status");
 export const series = (block: string, field: string) => get<Series>("series", { block, field });
+
+export const wave = (number: number) => get<Wave>("wave", { number: String(number) });
 
 /** Do something at once and then at intervals, one after the other, until the returned function is called. */
 export function repeat(milliseconds: number, action: () => Promise<void>): () => void {
