@@ -22,7 +22,7 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
 from tests.ros.action_simulator import HELD, Goal, in_ros2
-from tests.ros.cpp_nodes import Node, NodeProcess, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Client, Node, NodeProcess, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import REPOSITORY, LiveNode
 
 HERE = Path(__file__).resolve().parent
@@ -101,28 +101,6 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         if done.returncode:
             pytest.skip(f"{ros.python} lacks {module}")
         yield Place(ros, folder)
-
-
-class Client:
-    """A client (action_peer.py) in a process of its own."""
-
-    def __init__(self, ros: Ros, command: Sequence[str]) -> None:
-        self.process = subprocess.Popen(
-            command, env=dict(ros.environment), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-
-    def line(self) -> str:
-        assert self.process.stdout
-        return self.process.stdout.readline()
-
-    def begin(self) -> None:
-        assert self.process.stdin
-        self.process.stdin.write("\n")
-        self.process.stdin.flush()
-
-    def end(self) -> None:
-        self.process.kill()
-        self.process.wait()
 
 
 def run_at_once(place: Place, node: NodeProcess, clients: Sequence[Client]) -> list[list[Any]]:
