@@ -50,6 +50,7 @@ SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET)))
 # ROS 1 for a node and its peers, from Debian: programs, libraries, and modules of Debian's own Python.
 DEBIAN_MODULES := /usr/lib/python3/dist-packages
 ROS1 := pkg-config rosmaster:python3-rosmaster roslaunch:python3-roslaunch /usr/include/ros/ros.h:libroscpp-dev \
+  /usr/include/actionlib/client/simple_action_client.h:libactionlib-dev \
   $(foreach name,rospy std_msgs geometry_msgs sensor_msgs actionlib,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
 
 # The number of designs for make fuzz-netlist, and further options, such as FUZZ_OPTIONS='--judges icarus'.
