@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,7 +48,9 @@ def test_goals_of_a_bag_are_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyP
         Settings({}, 1000),
         lambda: Simulator(command),
     )
-    found = [(topic, store.deserialize_ros1(data, kind)) for topic, kind, _, data in read(target)]
+    found: list[tuple[str, Any]] = [
+        (topic, store.deserialize_ros1(data, kind)) for topic, kind, _, data in read(target)
+    ]
     told = [
         (topic, message.feedback.feedback if topic == "/count/feedback" else message.result.result)
         for topic, message in found
