@@ -51,6 +51,7 @@ SIM_FLAGS = $(if $(filter sim_%,$(TARGET)),--tool $(patsubst sim_%,%,$(TARGET)))
 DEBIAN_MODULES := /usr/lib/python3/dist-packages
 ROS1 := pkg-config rosmaster:python3-rosmaster roslaunch:python3-roslaunch \
   rosnode:python3-rosnode rostopic:python3-rostopic /usr/include/ros/ros.h:libroscpp-dev \
+  /usr/include/actionlib/client/simple_action_client.h:libactionlib-dev \
   $(foreach name,rospy std_msgs geometry_msgs sensor_msgs actionlib,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
 
 # The number of designs for make fuzz-netlist, and further options, such as FUZZ_OPTIONS='--judges icarus'.

@@ -53,6 +53,7 @@ PROGRAMS: Mapping[str, str] = {
     "tshark": "reads packets, in tests",
     "verilator": "simulates Verilog",
     "yosys": "synthesises for iCE40, ECP5 and Gowin",
+    "libactionlib-dev": "ROS 1, in tests",
     "libroscpp-dev": "nodes in C++ for ROS 1",
     "python3-actionlib": "ROS 1, in tests",
     "python3-geometry-msgs": "ROS 1, in tests",

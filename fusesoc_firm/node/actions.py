@@ -83,6 +83,9 @@ class _Goal:
         return Status(self.reference, self.state, self.was_taken, self.text)
 
 
+# Sends a payload to a block of the hardware; may raise `ClosedError`. Tells the user.
+Put = Callable[[str, bytes], None]
+Report = Callable[[str], None]
 # Publishes a message on the topic of an action with this number; answers the call, with a number, of a service.
 Publish = Callable[[int, bytes], None]
 Reply = Callable[[int, int, bytes], None]
@@ -101,14 +104,7 @@ class ActionServer(ABC):
     _accepts_waiting: bool
     messages: Messages
 
-    def __init__(
-        self,
-        action: NodeAction,
-        counts: GoalCounts,
-        put: Callable[[str, bytes], None],
-        report: Callable[[str], None],
-    ) -> None:
-        """Prepare the goals; `put` sends a payload to a block of the hardware, and may raise `ClosedError`."""
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
         self.action = action
         self.counts = counts
         self._put = put
@@ -359,13 +355,7 @@ class Ros1Server(ActionServer):
     _kept_seconds = 5.0
     _accepts_waiting = False
 
-    def __init__(
-        self,
-        action: NodeAction,
-        counts: GoalCounts,
-        put: Callable[[str, bytes], None],
-        report: Callable[[str], None],
-    ) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
         self.messages: Ros1Messages = Ros1Messages()
         # Goals and cancellations have topics of their own, so a cancellation may arrive first.
         self._early: dict[bytes, None] = {}
@@ -431,13 +421,7 @@ class Ros2Server(ActionServer):
     _kept_seconds = 60.0
     _accepts_waiting = True
 
-    def __init__(
-        self,
-        action: NodeAction,
-        counts: GoalCounts,
-        put: Callable[[str, bytes], None],
-        report: Callable[[str], None],
-    ) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
         self.messages: Ros2Messages = Ros2Messages()
         super().__init__(action, counts, put, report)
 
@@ -501,10 +485,7 @@ _SERVERS: Mapping[int, type[Ros1Server | Ros2Server]] = {1: Ros1Server, 2: Ros2S
 class NodeActions:
     """The goals of all actions of a node, between carriers and hardware; any thread may call the methods."""
 
-    def __init__(
-        self, description: NodeDescription, put: Callable[[str, bytes], None], report: Callable[[str], None]
-    ) -> None:
-        """Prepare the goals; `put` sends a payload to a block of the hardware, and may raise `ClosedError`."""
+    def __init__(self, description: NodeDescription, put: Put, report: Report) -> None:
         self.counts = {action.block: GoalCounts() for action in description.actions}
         self._servers = [
             _SERVERS[action.ros](action, self.counts[action.block], put, report) for action in description.actions

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 import struct
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -364,3 +365,20 @@ def test_the_generated_file_has_the_actions(tmp_path: Path, version: int) -> Non
     names: dict[str, object] = {"__name__": "generated"}
     exec(compile(source, "arm_node.py", "exec"), names)
     assert names["NODE"] == describe(loaded)
+
+
+@pytest.mark.check
+def test_feedback_extends_the_time_limit(peer: Make) -> None:
+    """A goal takes longer than the limit, but the hardware is never silent for so long."""
+    client = peer(time_limit=2.0)
+    client.send(HELD)
+    hardware = client.counter.hardware
+    assert hardware
+    begin = time.monotonic()
+    while time.monotonic() - begin < 3:
+        until(lambda: client.published(FEEDBACK))
+        hardware._bursts.put(Burst(pack_frame(0, feedback_of(client.version, HELD + 1))))
+        time.sleep(0.1)
+    client.cancel(HELD)
+    assert client.result(HELD) == (client.number(CANCELED), HELD)
+    client.run.stop()

@@ -276,3 +276,26 @@ class Peer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.kill()
+
+
+class Client:
+    """A client of a service or an action, which prints that it is ready, begins after a line, and prints results."""
+
+    def __init__(self, ros: Ros, command: Sequence[str]) -> None:
+        self.process = subprocess.Popen(
+            command, env=dict(ros.environment), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def line(self) -> str:
+        assert self.process.stdout
+        return self.process.stdout.readline()
+
+    def begin(self) -> None:
+        assert self.process.stdin
+        self.process.stdin.write("\n")
+        self.process.stdin.flush()
+
+    def end(self) -> None:
+        """Let it die without a word."""
+        self.process.kill()
+        self.process.wait()

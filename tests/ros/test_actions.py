@@ -22,7 +22,7 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
 from tests.ros.action_simulator import HELD, Goal, in_ros2
-from tests.ros.cpp_nodes import Node, NodeProcess, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Client, Node, NodeProcess, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import REPOSITORY, LiveNode
 
 HERE = Path(__file__).resolve().parent
@@ -79,6 +79,18 @@ class Place:
         build_root = self.folder / "simulators"
         return f"pipe:{build_simulator(self.specification(), 'ghdl', build_root=build_root).script()}"
 
+    def cpp_client(self, goals: int, seed: int) -> Client:
+        """A client of actionlib for roscpp."""
+        program = self.folder / "client"
+        if not program.exists():
+            words = subprocess.run(
+                ["pkg-config", "--cflags", "--libs", "actionlib", "roscpp"], capture_output=True, text=True, check=True
+            )
+            source = str(HERE / "action_client.cpp")
+            libraries = [*words.stdout.split(), "-lboost_thread"]
+            subprocess.run(["g++", "-std=c++17", "-pthread", source, "-o", str(program), *libraries], check=True)
+        return Client(self.ros, [str(program), "/count", str(goals), str(seed)])
+
     def client(self, *words: str) -> Client:
         script = [self.ros.python, str(HERE / "action_peer.py"), str(self.version), "/count"]
         return Client(self.ros, [*script, *words])
@@ -100,29 +112,9 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         )
         if done.returncode:
             pytest.skip(f"{ros.python} lacks {module}")
+        if request.param == 1 and subprocess.run(["pkg-config", "--exists", "actionlib"], check=False).returncode:
+            pytest.skip("actionlib is not installed (libactionlib-dev)")
         yield Place(ros, folder)
-
-
-class Client:
-    """A client (action_peer.py) in a process of its own."""
-
-    def __init__(self, ros: Ros, command: Sequence[str]) -> None:
-        self.process = subprocess.Popen(
-            command, env=dict(ros.environment), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-
-    def line(self) -> str:
-        assert self.process.stdout
-        return self.process.stdout.readline()
-
-    def begin(self) -> None:
-        assert self.process.stdin
-        self.process.stdin.write("\n")
-        self.process.stdin.flush()
-
-    def end(self) -> None:
-        self.process.kill()
-        self.process.wait()
 
 
 def run_at_once(place: Place, node: NodeProcess, clients: Sequence[Client]) -> list[list[Any]]:
@@ -171,11 +163,15 @@ RUNS = product(("python", "cpp"), ("model", "hardware"), (FEW, MANY))
 
 @pytest.mark.parametrize(("language", "where", "goals"), [goals_of_each(*run) for run in RUNS])
 def test_four_clients_at_once_get_their_own_results(place: Place, language: str, where: str, goals: int) -> None:
-    """Each goal has its own number, feedback and result; some are canceled while the hardware holds them."""
+    """Each goal has its own number, feedback and result; some are canceled while the hardware holds them.
+
+    In ROS 1, two of the clients are of roscpp.
+    """
     with place.node(language, getattr(place, where)) as node:
         seeds = [random.randrange(2**32) for _ in range(CLIENTS)]
         print(f"seeds {seeds}")
-        clients = [place.client("--random", str(goals), str(seed)) for seed in seeds]
+        clients = [place.client("--random", str(goals), str(seed)) for seed in seeds[: 2 if place.version == 1 else 4]]
+        clients += [place.cpp_client(goals, seed) for seed in seeds[len(clients) :]]
         found = [item for goals_of_client in run_at_once(place, node, clients) for item in goals_of_client]
         assert faults(place.version, found) == []
         assert len({item[0] for item in found}) == CLIENTS * goals

@@ -20,7 +20,7 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
-from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Client, Node, NodeProcess, Peer, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import REPOSITORY, LiveNode
 
 HERE = Path(__file__).resolve().parent
@@ -119,24 +119,6 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         yield Place(ros, folder)
 
 
-class Client:
-    """A client (service_peer.py, service_client.cpp) in a process of its own."""
-
-    def __init__(self, ros: Ros, command: Sequence[str]) -> None:
-        self.process = subprocess.Popen(
-            command, env=dict(ros.environment), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-
-    def line(self) -> str:
-        assert self.process.stdout
-        return self.process.stdout.readline()
-
-    def begin(self) -> None:
-        assert self.process.stdin
-        self.process.stdin.write("\n")
-        self.process.stdin.flush()
-
-
 def call_at_once(
     place: Place, node: NodeProcess, kinds: Sequence[str], calls: int, texts: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
@@ -151,8 +133,7 @@ def call_at_once(
         return [json.loads(client.line()) for client in clients]
     finally:
         for client in clients:
-            client.process.kill()
-            client.process.wait()
+            client.end()
 
 
 def check_counts(node: NodeProcess, answered: int, failed: int) -> None:
@@ -205,8 +186,7 @@ def test_a_client_that_dies_harms_nobody(place: Place, language: str) -> None:
             assert json.loads(other.line()) == {"wrong": [], "failed": []}
         finally:
             for client in (dying, other):
-                client.process.kill()
-                client.process.wait()
+                client.end()
         assert node.stop() == 0
 
 

@@ -56,7 +56,7 @@ architecture rtl of counter is
 
 begin
 
-  core : entity work.counting
+  u_core : entity work.counting
     port map (
       clk            => clk,
       rst_n          => rst_n,
