@@ -15,7 +15,7 @@ const LINE = 17;
 // The space between the Manager and the blocks beside it.
 const GAP = 110;
 // The width that the derived facts of a converter need, so that the picture stays when they arrive.
-const FACTS_WIDTH = 215;
+const FACTS_WIDTH = 260;
 const FACTS = "...";
 // The two converters of a service; the first one's messages come to a server and go from a client.
 const SIDES = ["request", "response"] as const;
