@@ -398,7 +398,7 @@ def test_the_request_covers_inputs_names_and_versions(monkeypatch: pytest.Monkey
         request_digest({"width": 8}, {"a.yaml": b"1"}, "bb"),
     ]
     with monkeypatch.context() as patch:
-        patch.setattr(store_module, "_version", lambda name: f"{name} 99")
+        patch.setattr(store_module, "version", lambda name: f"{name} 99")
         others.append(request_digest({"width": 8}, {"a.yaml": b"1"}, "aa"))
     with monkeypatch.context() as patch:
         patch.setattr(platform, "machine", lambda: "abacus")
