@@ -50,11 +50,11 @@ end entity firm_rtps_walker;
 
 architecture rtl of firm_rtps_walker is
 
-  -- A step is a field or several ones. SKIP, SET, PARAMETER and VALUE may be missing.
+  -- A step is a field or several ones; ITEM is the head of a parameter. SKIP, SET, ITEM and VALUE may be missing.
   type step_t is (
     PROTOCOL, SOURCE, HEAD,
     EXTRA, ENDS, NUMBER, SECOND, FRAGMENT, FRAGMENTS, SET_SIZE, SET, COUNT, DESTINATION,
-    SKIP, PARAMETER, VALUE,
+    SKIP, ITEM, VALUE,
     PAYLOAD, REST, FOREIGN, FAULTY
   );
 
@@ -160,7 +160,7 @@ architecture rtl of firm_rtps_walker is
     elsif step = SECOND or step = FRAGMENT or ((step = SET_SIZE or step = SET) and name /= RTPS_GAP) then
       return COUNT;
     elsif step = VALUE then
-      return PARAMETER;
+      return ITEM;
     elsif step = PAYLOAD then
       return PAYLOAD;
     end if;
@@ -230,7 +230,7 @@ begin
       if step_r /= SKIP and few_r = '0' then
         next_step <= SKIP;
       elsif flags_r(RTPS_INLINE) = '1' then
-        next_step <= PARAMETER;
+        next_step <= ITEM;
       end if;
     elsif step_r = SET_SIZE then
       next_bytes <= words(13 downto 0) & "00";
@@ -240,12 +240,12 @@ begin
       if unsigned(word) > MOST_SET_BITS then
         wrong <= '1';
       end if;
-    elsif step_r = PARAMETER then
+    elsif step_r = ITEM then
       next_bytes <= unsigned(half);
       if id = RTPS_SENTINEL then
         next_step <= after_parameters;
       elsif half = x"0000" then
-        next_step <= PARAMETER;
+        next_step <= ITEM;
       else
         next_step <= VALUE;
       end if;
@@ -379,7 +379,7 @@ begin
         if further_r = 0 then
           few_r <= '1';
         end if;
-      elsif step_r = PARAMETER then
+      elsif step_r = ITEM then
         hash_r   <= '0';
         status_r <= '0';
         if id = RTPS_KEY_HASH and unsigned(half) >= HASH_BYTES then
