@@ -107,6 +107,15 @@ def test_messages_of_all_sizes_cross_both_ways(running: Running, size: int) -> N
             assert running.board.manager.taken.pop() == (0, payload)
 
 
+@pytest.mark.parametrize("size", [2045, 65_532, 66_000])
+def test_a_longer_message_of_the_manager_is_dropped(running: Running, size: int) -> None:
+    with ExitStack() as stack:
+        peer = _subscribe(running, stack)
+        running.board.send(0, bytes(size))
+        running.board.send(0, bytes(POINT_BYTES))
+        assert read(peer, 4 + POINT_BYTES) == framed(0, bytes(POINT_BYTES))[1:]
+
+
 class Publisher:
     """A publisher of a topic: its XML-RPC server and its TCPROS server. It accepts one connection at a time."""
 
