@@ -134,7 +134,7 @@ class Publisher:
         """The URI of its XML-RPC server."""
         return f"http://127.0.0.1:{self._calls.server_address[1]}/"
 
-    def _request_topic(self, _: str, topic: str, protocols: Any) -> Any:
+    def _request_topic(self, _: Any, topic: Any, protocols: Any) -> Any:
         assert topic == self._endpoint.topic
         assert protocols == [["TCPROS"]]
         return [1, "ready", ["TCPROS", "127.0.0.1", self._server.getsockname()[1]]]
