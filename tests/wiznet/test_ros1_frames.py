@@ -107,6 +107,15 @@ def test_messages_of_all_sizes_cross_both_ways(running: Running, size: int) -> N
             assert running.board.manager.taken.pop() == (0, payload)
 
 
+@pytest.mark.parametrize("size", [2045, 65_532, 66_000])
+def test_a_longer_message_of_the_manager_is_dropped(running: Running, size: int) -> None:
+    with ExitStack() as stack:
+        peer = _subscribe(running, stack)
+        running.board.send(0, bytes(size))
+        running.board.send(0, bytes(POINT_BYTES))
+        assert read(peer, 4 + POINT_BYTES) == framed(0, bytes(POINT_BYTES))[1:]
+
+
 class Publisher:
     """A publisher of a topic: its XML-RPC server and its TCPROS server. It accepts one connection at a time."""
 
@@ -125,7 +134,7 @@ class Publisher:
         """The URI of its XML-RPC server."""
         return f"http://127.0.0.1:{self._calls.server_address[1]}/"
 
-    def _request_topic(self, _: str, topic: str, protocols: Any) -> Any:
+    def _request_topic(self, _: Any, topic: Any, protocols: Any) -> Any:
         assert topic == self._endpoint.topic
         assert protocols == [["TCPROS"]]
         return [1, "ready", ["TCPROS", "127.0.0.1", self._server.getsockname()[1]]]
