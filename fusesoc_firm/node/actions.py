@@ -7,6 +7,7 @@ topics (ROS 2).
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -39,14 +40,19 @@ from fusesoc_firm.node.carrier import Answer, Call, Called, Carrier, Taken
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.queues import ClosedError
 
-# Goals of one action that have ended, with their results, and clients that wait for the result of one goal.
+# Goals of one action that have ended, with their results (ROS 2) or only their states (ROS 1), and clients that wait
+# for the result of one goal. A client of actionlib gives up a goal that it has not seen end, so in ROS 1 as many are
+# kept as may wait.
 MOST_KEPT = 100
+MOST_KEPT_ROS1 = 1000
 MOST_ASKERS = 100
 # Early cancellations of actionlib: those of goals that have not arrived yet.
 MOST_EARLY = 100
 # s; the interval of actionlib's states is 0.2 s.
 _TICK_SECONDS = 0.1
 _STATES_SECONDS = 0.2
+# s; changes that follow sooner are published together, since each message has all goals.
+_TOGETHER_SECONDS = 0.02
 # Return codes of action_msgs/CancelGoal.
 _NO_ERROR, _UNKNOWN_GOAL, _ENDED_GOAL = 0, 2, 3
 
@@ -100,6 +106,7 @@ class ActionServer(ABC):
 
     # s
     _kept_seconds: float
+    _most_kept: int
     # Whether a goal is accepted even before the hardware has it.
     _accepts_waiting: bool
     messages: Messages
@@ -293,7 +300,7 @@ class ActionServer(ABC):
         ended = [goal for goal in self._goals.values() if goal.state.has_ended]
         latest = time.monotonic() - self._kept_seconds
         for number, goal in enumerate(reversed(ended)):
-            if number >= MOST_KEPT or goal.changed < latest:
+            if number >= self._most_kept or goal.changed < latest:
                 del self._goals[goal.reference.id]
 
     def tick(self) -> None:
@@ -353,6 +360,7 @@ class Ros1Server(ActionServer):
 
     # actionlib's own.
     _kept_seconds = 5.0
+    _most_kept = MOST_KEPT_ROS1
     _accepts_waiting = False
 
     def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
@@ -360,7 +368,8 @@ class Ros1Server(ActionServer):
         # Goals and cancellations have topics of their own, so a cancellation may arrive first.
         self._early: dict[bytes, None] = {}
         self._canceled_until = (0, 0)
-        self._told = 0.0
+        self._told = -math.inf
+        self._has_news = False
         super().__init__(action, counts, put, report)
 
     def taken(self, topic: int, payload: bytes) -> None:
@@ -384,13 +393,25 @@ class Ros1Server(ActionServer):
     def tick(self) -> None:
         """Publish the states."""
         super().tick()
-        if time.monotonic() - self._told >= _STATES_SECONDS:
-            with self._lock:
+        self._tell_news(_STATES_SECONDS)
+
+    def close(self) -> None:
+        """Let all goals fail that have not ended, and publish their states."""
+        super().close()
+        self._tell_news()
+
+    def _tell_news(self, seconds: float = math.inf) -> None:
+        """Publish states that have changed, or that were published so long ago."""
+        with self._lock:
+            if self._has_news or time.monotonic() - self._told >= seconds:
+                self._told = -math.inf
                 self._tell_states()
 
     def _tell_states(self) -> None:
-        self._told = time.monotonic()
-        super()._tell_states()
+        self._has_news = time.monotonic() - self._told < _TOGETHER_SECONDS
+        if not self._has_news:
+            self._told = time.monotonic()
+            super()._tell_states()
 
     def _reference(self, payload: bytes) -> Reference:
         found = self.messages.goal(payload)
@@ -419,6 +440,7 @@ class Ros2Server(ActionServer):
     """An action of ROS 2. Clients ask for the result of a goal, also after its end."""
 
     _kept_seconds = 60.0
+    _most_kept = MOST_KEPT
     _accepts_waiting = True
 
     def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:

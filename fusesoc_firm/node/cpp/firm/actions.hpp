@@ -63,8 +63,11 @@ class ActionServer {
   using Publish = std::function<void(const Bytes&)>;
   using Time = std::chrono::steady_clock::time_point;
 
-  // The goals of an action that have ended, with their results, and the clients that wait for the result of one goal.
+  // The goals of an action that have ended, with their results (ROS 2) or only their states (ROS 1), and the clients that
+  // wait for the result of one goal. A client of actionlib gives up a goal that it has not seen end, so in ROS 1 as
+  // many are kept as may wait.
   static constexpr std::size_t kMostKept = 100;
+  static constexpr std::size_t kMostKeptRos1 = 1000;
   static constexpr std::size_t kMostAskers = 100;
   // Early cancellations of actionlib: those of goals that have not arrived yet.
   static constexpr std::size_t kMostEarly = 100;
@@ -185,7 +188,11 @@ class ActionServer {
   // Take no more goals, and wait until all have ended, or until this time.
   void drain(Time latest) { line_.drain(latest); }
   // Let all goals fail that have not ended.
-  void close() { line_.close(); }
+  void close() {
+    line_.close();
+    const Lock lock(mutex_);
+    if (has_news_) publish_states();
+  }
 
   // Accept goals in time, forget old results, and publish the states of ROS 1; to be called several times a second.
   void tick() {
@@ -196,7 +203,7 @@ class ActionServer {
       if (is_ready && !has_ended(goal->state) && now - goal->changed > action_.accept_limit) accept(goal);
     }
     forget_old();
-    if (is_first_ && now - told_ > kStatesInterval) tell_states();
+    if (is_first_ && (has_news_ || now - told_ > kStatesInterval)) publish_states();
   }
 
   GoalStatistics statistics() const {
@@ -212,6 +219,8 @@ class ActionServer {
   // The numbers of the publishers.
   static constexpr std::size_t kStates = 0, kFeedback = 1, kResult = 2;
   static constexpr std::chrono::milliseconds kStatesInterval{200};
+  // In ROS 1, changes that follow sooner are published together, since each message has all goals.
+  static constexpr std::chrono::milliseconds kTogether{20};
   static constexpr std::chrono::seconds kKeptRos1{5};  // actionlib's own
   static constexpr std::chrono::seconds kKeptRos2{60};
   static constexpr unsigned kMostReports = 20;
@@ -423,16 +432,23 @@ class ActionServer {
 
   void forget_old() {
     const auto kept = is_first_ ? kKeptRos1 : kKeptRos2;
+    const auto most = is_first_ ? kMostKeptRos1 : kMostKept;
     const auto now = std::chrono::steady_clock::now();
     std::size_t count = 0;
     for (auto goal = goals_.end(); goal != goals_.begin();) {
       --goal;
       if (!has_ended((*goal)->state)) continue;
-      if (++count > kMostKept || now - (*goal)->changed > kept) goal = goals_.erase(goal);
+      if (++count > most || now - (*goal)->changed > kept) goal = goals_.erase(goal);
     }
   }
 
   void tell_states() {
+    has_news_ = is_first_ && std::chrono::steady_clock::now() - told_ < kTogether;
+    if (!has_news_) publish_states();
+  }
+
+  void publish_states() {
+    has_news_ = false;
     std::vector<GoalStatus> known;
     for (const auto& goal : goals_) {
       if (goal->is_accepted || is_first_) known.push_back(goal->status());
@@ -466,6 +482,7 @@ class ActionServer {
   std::list<std::string> early_;
   Stamp canceled_until_;
   Time told_{};
+  bool has_news_ = false;
   GoalStatistics statistics_;
   unsigned reported_ = 0;
   CallLine line_;  // the last member, as its thread uses the others
