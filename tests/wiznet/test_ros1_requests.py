@@ -173,6 +173,7 @@ def _garbage(running: Running, count: int) -> None:
     rng = random.Random(SEED)
     valid = [_rospy("getPid", "/me"), header("callerid=/me", "md5sum=*", "topic=/place")]
     for _ in range(count):
+        running.board.wait_until(lambda: running.board.listening() > 0)  # else the chip refuses, as it must
         with running.connect() as peer:
             data = bytearray(rng.choice([*valid, rng.randbytes(40), b"POST" + rng.randbytes(60)]))
             for _ in range(rng.randrange(4)):
