@@ -26,12 +26,17 @@ import yaml
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.converter.pipeline import PIPELINES
+from fusesoc_firm.fabric.node import node_of
+from fusesoc_firm.fabric.packets import memory_of
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.hardware.registers import registers_configuration
 from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, status_map
+from fusesoc_firm.system.written.specification import read_specification
+from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.loop import loop_text
 
@@ -141,6 +146,26 @@ def write_registers() -> None:
     (SAMPLES / "registers.vhd").write_text(render(REGISTERS_TEMPLATE, configuration), encoding="ascii")
 
 
+# A node on Ethernet; no system contains its hardware yet.
+NODE = """\
+project: {name: robot, width: 8, interconnect: ethernet, network: {mac: "02:00:00:00:00:01", address: 10.0.0.2}}
+blocks:
+  - {name: pose, middleware: ROS2, mode: subscriber, message: geometry_msgs/Pose, outgoing: [{name: copy}]}
+  - {name: copy, middleware: ROS2, mode: publisher, message: geometry_msgs/Pose}
+"""
+
+
+def write_packets() -> None:
+    """Write the programs of the packets of a node in fabric."""
+    path = SAMPLES / "node.yaml"
+    path.write_text(NODE, encoding="utf-8")
+    faults, known = Diagnostics(), libraries((), None, None)
+    system = derive(read_specification(path, path.name, faults), SAMPLES, known, faults)
+    faults.raise_if_any()
+    memory = memory_of(node_of(system, known), "node_packets")
+    (SAMPLES / "packets.vhd").write_text(render(memory.template, memory.context), encoding="ascii")
+
+
 def run(*command: str | Path, cwd: Path) -> None:
     """Run a program. Ends this one, with its output, if it fails."""
     done = subprocess.run(command, cwd=cwd, text=True, capture_output=True, check=False)
@@ -158,6 +183,7 @@ def samples() -> list[Path]:
     write_converters()
     write_loop()
     write_registers()
+    write_packets()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]
     return sorted([*made, *GOLDEN.glob("*.vhd")])
 

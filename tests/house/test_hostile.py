@@ -326,6 +326,7 @@ struct System {
   unsigned width, subscriber_count, publisher_count;
   std::size_t queue_depth;
   std::string digest;
+  bool has_status_registers;
   std::vector<Topic> subscribers, publishers;
   Topic diagnostics;
   std::vector<std::string> channels{};
