@@ -123,6 +123,8 @@ class Simulation:
         code = "import sys; from fusesoc.main import main; sys.exit(main())"
         command = [sys.executable, "-c", code, "--monochrome", "run", f"--target={self.build.target}"]
         report = Report()
+        # Frames of an earlier run must not be read as received in this one.
+        (self.build.work_root / "received.txt").unlink(missing_ok=True)
         with (
             self.build.log.open("w", encoding="utf-8") as log,
             subprocess.Popen(

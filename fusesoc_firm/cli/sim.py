@@ -24,6 +24,7 @@ from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
     from fusesoc_firm.building.simulation import Report, Simulation
+    from fusesoc_firm.simulation.answers import Answer
     from fusesoc_firm.system.system_core import LoadedSystem
     from fusesoc_firm.text.diagnostics import SourceRef
 
@@ -33,8 +34,6 @@ _NARROWEST = 60
 _WRONG = "!"
 # GHDL's errors begin with a place only.
 _ERROR = re.compile(r"(?:\b|:)error\b|\(assertion failure\)|^Traceback|^\S+:\d+:\d+: ", re.IGNORECASE)
-# The block's name, or a field with its value.
-_WORD = re.compile(r'[^\s="]+=(?:"(?:[^"\\]|\\.)*"|\S+)|\S+')
 # Lines of FuseSoC, Edalize and make around the message of the tool that failed.
 _NOISE = re.compile(
     r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|Setup failed|.* exited with an error)|far: "
@@ -198,63 +197,58 @@ def _origin(copy: re.Match[str], work_root: Path, loaded: LoadedSystem) -> Sourc
 
 
 def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | None) -> None:
+    from fusesoc_firm.simulation.answers import read_answers
     from fusesoc_firm.tools.simulators import SIMULATORS
 
+    answers: Sequence[Answer] = []
+    if loaded:
+        system = loaded.system
+        answers = read_answers(chosen.build.work_root, system.subscribers, system.publishers, system.id_bytes)
     print(f"{chosen.build.core} in {SIMULATORS[chosen.simulator].title}, {report.title}")
-    _print_messages(report)
-    for line in _with_fields(chosen, report.faults, loaded):
+    _print_messages(report, answers)
+    for line in _with_fields(chosen, report.faults, answers, loaded):
         print(coloured(line, is_good=False))
     for line in report.summary:
         print(line)
 
 
-def _with_fields(chosen: Simulation, faults: Sequence[str], loaded: LoadedSystem | None) -> list[str]:
-    """Return the faults with the names of the fields of wrong bytes, if the system is known."""
+def _with_fields(
+    chosen: Simulation, faults: Sequence[str], answers: Sequence[Answer], loaded: LoadedSystem | None
+) -> list[str]:
+    """Return the faults with the fields of wrong bytes and, if they are known, with the values."""
+    from fusesoc_firm.simulation.answers import with_values
     from fusesoc_firm.simulation.host_files import with_field
 
     path = chosen.build.work_root / "expected.txt"
     if loaded is None or not path.is_file():
         return [*faults]
-    expected = path.read_text(encoding="ascii")
-    return [with_field(fault, expected, loaded.system.publishers, loaded.system.id_bytes) for fault in faults]
+    expected, system = path.read_text(encoding="ascii"), loaded.system
+    lines = with_values(faults, answers, system.id_bytes)
+    return [with_field(line, expected, system.publishers, system.id_bytes) for line in lines]
 
 
-def _print_messages(report: Report) -> None:
+def _print_messages(report: Report, answers: Sequence[Answer]) -> None:
     """Print a table of messages: cycles from the first beat in, latency, message and responses.
 
-    The table contains the first messages, and the first ones with a wrong response, which have a mark. The host reports
-    each response as the model expects it; a difference is one of the faults.
+    The table contains the first messages, and the first ones with a wrong response, which have a mark. The responses
+    are those that the model expects; a wrong value is followed by the received one.
     """
-    messages = report.messages
-    wrong = [item for item in messages[_MOST_MESSAGES:] if item.is_wrong][:_MOST_MESSAGES]
+    from fusesoc_firm.cli.message_table import row, with_answers
+
+    messages = [*with_answers(report.messages, answers)]
+    wrong = [(item, own) for item, own in messages[_MOST_MESSAGES:] if item.is_wrong][:_MOST_MESSAGES]
     width = max((terminal_width() - 26) // 2, _NARROWEST // 2)
     responses = "received" if report.is_good else "expected"
     print(f"{'message':>7}  {'cycles':>6}  {'latency':>7}  {'sent':{width}}  {responses}")
-    for item in (*messages[:_MOST_MESSAGES], *wrong):
+    for item, own in (*messages[:_MOST_MESSAGES], *wrong):
         cycles, latency = (
             "" if value < 0 and not item.received else str(value) for value in (item.cycles, item.latency)
         )
-        texts = [item.sent, *(item.received or ["-"])]
-        sent, *received = texts if max(map(len, texts)) <= width else _telling(texts)
+        sent, *received = row(item, own, width)
         number = f"{_WRONG if item.is_wrong else ''}{item.number}"
-        line = f"{number:>7}  {cycles:>6}  {latency:>7}  {_cut(sent, width):{width}}  {_cut(received[0], width)}"
+        line = f"{number:>7}  {cycles:>6}  {latency:>7}  {sent:{width}}  {received[0]}"
         print(coloured(line, is_good=False) if item.is_wrong else line)
         for further in received[1:]:
-            print(f"{'':{26 + width}}{_cut(further, width)}")
+            print(f"{'':{26 + width}}{further}")
     if (more := len(messages) - _MOST_MESSAGES - len(wrong)) > 0:
         print(f"    ... {more} more in the log")
-
-
-def _telling(messages: Sequence[str]) -> list[str]:
-    """Return the texts of a message and its responses, each without the fields that all of them have.
-
-    A text that has no other field is kept. The host cuts long texts, so their last words may be incomplete.
-    """
-    found = [_WORD.findall(message) for message in messages]
-    copied = set(found[0]).intersection(*found[1:])
-    kept = [[word for word in words if word not in copied and not word.endswith("...")] for words in found]
-    return [" ".join(words) if len(words) > 1 else message for words, message in zip(kept, messages, strict=True)]
-
-
-def _cut(text: str, width: int) -> str:
-    return text if len(text) <= width else f"{text[: width - 3]}..."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Path
@@ -34,8 +34,16 @@ def field_at(frame: Frame, payload: bytes, offset: int) -> str:
 
     Raise `CodecError` like `decode`.
     """
-    ranges = _read(frame, payload)[1]
-    return next((dotted(names) for first, end, names in ranges if first <= offset < end), "")
+    return next((name for first, end, name in field_ranges(frame, payload) if first <= offset < end), "")
+
+
+def field_ranges(frame: Frame, payload: bytes) -> Iterator[tuple[int, int, str]]:
+    """Yield the (first, end) ranges of the bytes that carry values, with the field's dotted name, "" for the prefix.
+
+    Raise `CodecError` like `decode`.
+    """
+    for first, end, names in _read(frame, payload)[1]:
+        yield first, end, dotted(names)
 
 
 def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int, tuple[str, ...]]]]:

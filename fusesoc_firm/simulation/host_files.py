@@ -78,7 +78,7 @@ def _label(topic: Topic, message: dict[str, Any]) -> str:
 
     A long line has no zeros and nothing empty; if it is still long, it is truncated.
     """
-    values = [*_values(message)]
+    values = [(name, value_text(value)) for name, value in leaves(message)]
     label = _line(topic, values)
     if len(label) > _LABEL_WIDTH:
         label = _line(topic, [item for item in values if item[1] not in _ZEROS])
@@ -90,22 +90,23 @@ def _line(topic: Topic, values: Iterable[tuple[str, str]]) -> str:
     return " ".join((topic.block, str(topic.frame.message), *words)).encode("ascii", "replace").decode()
 
 
-def _values(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
+def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values in a message with their dotted names; arrays are not divided."""
     if isinstance(value, dict):
         for key, inner in value.items():
-            yield from _values(inner, f"{name}.{key}" if name else key)
+            yield from leaves(inner, f"{name}.{key}" if name else key)
     else:
-        yield name, _shown(value)
+        yield name, value
 
 
-def _shown(value: Any) -> str:
+def value_text(value: Any) -> str:
     """Return a value without blanks, except in quoted texts; arrays are truncated to the length of a label."""
     match value:
         case str():
             return json.dumps(value, ensure_ascii=False)
         case Mapping():
-            return f"{{{','.join(f'{name}={_shown(inner)}' for name, inner in value.items())}}}"
+            return f"{{{','.join(f'{name}={value_text(inner)}' for name, inner in value.items())}}}"
         case list() | bytes():
-            return f"[{','.join(map(_shown, islice(value, _LABEL_WIDTH)))}]"
+            return f"[{','.join(map(value_text, islice(value, _LABEL_WIDTH)))}]"
         case _:
             return str(value)

@@ -11,7 +11,7 @@ from fusesoc_firm.building.build import Build
 from fusesoc_firm.building.simulation import Simulation
 from fusesoc_firm.cli import main
 from fusesoc_firm.cli.common import coloured
-from fusesoc_firm.cli.sim import _print_errors, _telling
+from fusesoc_firm.cli.sim import _print_errors
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import artifacts
 
@@ -65,13 +65,6 @@ def test_a_tools_messages_name_the_users_files(capsys: Captured) -> None:
         f'src/robot_sys_img-system_0.1.0/img_system.vhd:{line}:5: no declaration for "in_x"',
         f"      = this generated line belongs to {place}",
     ]
-
-
-def test_what_was_copied_is_left_out_of_a_row() -> None:
-    texts = ['sub s=1 id="a b" x=0.5 y=...', 'pub s=1 id="a b" x=1.5', 'pub s=1 id="a c" x=1.5']
-    assert _telling(texts[:2]) == ["sub x=0.5", "pub x=1.5"]
-    assert _telling(texts) == ['sub id="a b" x=0.5', 'pub id="a b" x=1.5', 'pub id="a c" x=1.5']
-    assert _telling(["sub s=1", "pub s=1"]) == ["sub s=1", "pub s=1"]
 
 
 def test_a_violated_rule_of_a_stream_is_told(capsys: Captured) -> None:
