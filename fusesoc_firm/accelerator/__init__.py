@@ -1,1 +1,1 @@
-"""Accelerators as GHDL and Yosys read them, compared with the interface of the specification."""
+"""Accelerators as GHDL, Yosys and `cpp` read them, compared with the interface of the specification."""

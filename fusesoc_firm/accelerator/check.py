@@ -1,17 +1,20 @@
-"""All accelerators of a system, read by GHDL or Yosys and compared with their interfaces."""
+"""All accelerators of a system, read by GHDL, Yosys or `cpp`, and compared with their interfaces."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from fusesoc_firm.accelerator.cpp import read_function
+from fusesoc_firm.accelerator.cpp_interface import compare_function
 from fusesoc_firm.accelerator.interface import compare
 from fusesoc_firm.accelerator.unit import Libraries, Reader
 from fusesoc_firm.accelerator.verilog import VerilogReader
 from fusesoc_firm.accelerator.vhdl import VhdlReader
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
+from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.system_core import LoadedSystem, artifacts
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics
@@ -28,8 +31,9 @@ def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries])
     """
     faults = Diagnostics()
     with tempfile.TemporaryDirectory(prefix="firm_") as name:
-        for language, types in _by_language(loaded):
-            program = _PROGRAMS[language]
+        for language, program in _PROGRAMS.items():
+            if not (types := _written_in(language, loaded)):
+                continue
             if path := find(program):
                 read = _reader(loaded, types, path, Path(name), libraries)
                 for type_ in types:
@@ -37,14 +41,17 @@ def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries])
             else:
                 names = ", ".join(str(type_.accelerator.name) for type_ in types)
                 faults.warn(f"not read, since {program} is not installed: {names}", hint=ways(program))
+    for type_ in _written_in("HLS", loaded):
+        if function := read_function(loaded.folder / type_.accelerator.sources[0], function_name(type_)):
+            compare_function(type_, function, faults)
     faults.raise_if_any()
     return faults.warnings
 
 
-def _by_language(loaded: LoadedSystem) -> Iterator[tuple[str, list[AcceleratorType]]]:
-    for language in _PROGRAMS:
-        if types := [item.own for item in loaded.system.accelerator_types if item.accelerator.type == language]:
-            yield language, types
+def _written_in(language: str, loaded: LoadedSystem) -> list[AcceleratorType]:
+    """Return the accelerators in a language whose sources exist; `load_system` reports missing ones."""
+    types = [item.own for item in loaded.system.accelerator_types if item.accelerator.type == language]
+    return [type_ for type_ in types if all(path.is_file() for path in _sources(type_, loaded.folder))]
 
 
 def _reader(

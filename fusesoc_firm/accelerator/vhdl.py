@@ -23,6 +23,8 @@ from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.tools.library_path import library_root
 
 _MESSAGE = re.compile(r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?!warning|note)(?P<text>.+)")
+# Of GHDL's synthesis; the place is the signal's declaration.
+_TWO_SOURCES = re.compile(r'(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*multiple assignments for "(?P<name>.+?)"')
 _MISSING_UNIT = re.compile(r'unit "(\w+)" not found in library|cannot find resource library')
 # The name of a core of this package, without its version.
 _CORE = re.compile(r"^name: (\w+:\w+:\w+)", re.MULTILINE)
@@ -59,7 +61,7 @@ class VhdlReader:
     _known: Libraries = field(default_factory=Libraries)
     _is_prepared: bool = False
 
-    def read(self, paths: Sequence[Path], _: str, generics: Mapping[str, int], faults: Diagnostics) -> list[Unit]:
+    def read(self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics) -> list[Unit]:
         """Return the entities of the files with the values of generics; add the faults of the first faulty file."""
         messages = [] if self._is_faultless else self._analysed(paths)
         if messages and not self._is_prepared:
@@ -70,6 +72,8 @@ class VhdlReader:
         if not absent or (self._known.is_complete and not any(name in self._known.generated for name in absent)):
             for text, source in messages:
                 faults.error(text, source, _hint(text))
+        if not messages:
+            self._report_sources(paths, top, generics, faults)
         tree = self._all_entities or self._tree(paths) or self._tree(paths[-1:])
         return [unit for path in paths for unit in tree.units(path, generics)] if tree else []
 
@@ -97,6 +101,23 @@ class VhdlReader:
                 return [(text, place(path, line, column)) for text, line, column in messages]
         return []
 
+    def _report_sources(
+        self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics
+    ) -> None:
+        """Add the signals with more than one source; other messages of GHDL's synthesis are no faults of this check.
+
+        A file with the value 'Z' may have such signals.
+        """
+        if any("'Z'" in path.read_text(encoding="utf-8", errors="replace").upper() for path in paths):
+            return
+        # All names of a generic differ only in case.
+        options = ["--out=none", *(f"-g{name}={value}" for name, value in list(generics.items())[:1])]
+        for match in map(_TWO_SOURCES.match, self._run("--synth", [*options, top]).stderr.splitlines()):
+            if match and Path(match["file"]) in paths:
+                source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
+                hint = "keep one source: an assignment, a process or an output of an instance; remove the others"
+                faults.error(f"'{match['name']}' has more than one source", source, hint)
+
     def _packages(self) -> list[Path]:
         return [self._written(f"package_{number}.vhd", text) for number, text in enumerate(self._known.packages)]
 
@@ -119,12 +140,16 @@ class VhdlReader:
         text = path.read_text(encoding="utf-8", errors="replace")
         return self._written(f"entities_{number}.vhd", _declarations(text))
 
-    def _run(self, command: str, paths: Sequence[Path], library: str = "work") -> subprocess.CompletedProcess[str]:
+    def _run(
+        self, command: str, arguments: Sequence[Path | str], library: str = "work"
+    ) -> subprocess.CompletedProcess[str]:
         places = [f"--workdir={self.folder}", f"-P{self.folder}", f"--work={library}"]
-        return self._started(command, places, paths)
+        return self._started(command, places, arguments)
 
-    def _started(self, command: str, places: Sequence[str], paths: Sequence[Path]) -> subprocess.CompletedProcess[str]:
-        arguments: list[str | Path] = [self.ghdl, command, *self._known.options, *places, *paths]
+    def _started(
+        self, command: str, places: Sequence[str], others: Sequence[Path | str]
+    ) -> subprocess.CompletedProcess[str]:
+        arguments: list[str | Path] = [self.ghdl, command, *self._known.options, *places, *others]
         return subprocess.run(
             arguments, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False
         )

@@ -120,6 +120,7 @@ def _start(arguments: argparse.Namespace) -> None:
     folder = Path(project.name)
     _print_files(folder, create(project, folder, known, library_root(), arguments.path))
     source = LANGUAGES[project.language].source.format(project.name)
+    print(f"ROS {project.ros}: {project.input} in, {project.output} out")
     print(f"edit: {folder / source} (the computation), {folder / 'model.py'} (the responses that it must give)")
     print(f"next: cd {folder} && firm sim")
 

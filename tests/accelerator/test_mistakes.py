@@ -110,6 +110,9 @@ VHDL = [
     ("begin\n\n", "begin\n  u : entity work.adder;\n", "work.adder", 'unit "adder" not found'),
     ("use ieee.std_logic_1164.all;", "use ieee.std_logic_1146.all;", "1146", 'unit "std_logic_1146" not found'),
     ("architecture rtl of img", "architecture rtl of image", "of image", "entity 'image' was not analysed"),
+    # two sources of a signal
+    ("begin\n\n", "begin\n  out_data <= in_step;\n", "out_data   ", "'out_data' has more than one source"),
+    ("begin\n\n", "begin\n  is_there <= clk when rst_n = '0' else 'Z';\n", "", ""),
 ]
 VERILOG = [
     ("module img ", "module image ", "module image", "the module is 'image'"),

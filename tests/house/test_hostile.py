@@ -72,7 +72,10 @@ entity copy is
   port (clk, rst_n : in std_logic);
 end entity;
 """
-CPP = "#include <cstdint>\nvoid gain(double x, double y, double z, double *a, double *b, double *c) {}\n"
+CPP = """\
+#include <cstdint>
+void gain(double x_in, double y_in, double z_in, double *x_out, double *y_out, double *z_out) {}
+"""
 
 
 def sides(message: str, ros: str = "ROS") -> dict[str, list[dict[str, str]]]:

@@ -79,6 +79,33 @@ class Argument:
         return self.elements[-1].word + self.elements[-1].words
 
 
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A parameter that the function must have; `count` is the number of elements of an array."""
+
+    name: str
+    cpp_type: str
+    count: int | None = None
+    is_output: bool
+    is_stream: bool = False
+
+    @property
+    def declaration(self) -> str:
+        """The declaration in C++; an output may be a reference instead of a pointer."""
+        if self.is_stream:
+            return f"hls::stream<{self.cpp_type}> &{self.name}"
+        if self.count:
+            return f"{self.cpp_type} {self.name}[{self.count}]"
+        return f"{self.cpp_type} {'*' if self.is_output else ''}{self.name}"
+
+    @property
+    def mode(self) -> str:
+        """The mode of the interface from which an HLS tool makes the kernel's ports."""
+        if self.is_stream:
+            return "ap_fifo"
+        return "ap_vld" if self.is_output else "ap_none"
+
+
 def function_name(accelerator: AcceleratorType) -> str:
     """Return the C++ function's name: the name of the first source file without its suffix."""
     return PurePosixPath(accelerator.accelerator.sources[0]).stem
@@ -134,22 +161,22 @@ def _elements(name: str, signal: str, field: FieldPort, word: int) -> tuple[Elem
 
 def prototype(accelerator: AcceleratorType) -> str:
     """Return the required declaration of the function."""
+    return f"void {function_name(accelerator)}({', '.join(item.declaration for item in parameters(accelerator))})"
+
+
+def parameters(accelerator: AcceleratorType) -> list[Parameter]:
+    """Return the required parameters of the function; the accelerator must have passed `check_kernel`."""
     if is_streamed(accelerator):
-        inputs, outputs = streams(accelerator)
-        listed = ", ".join(f"hls::stream<{item.cpp_type}> &{item.port}" for item in inputs + outputs)
-        return f"void {function_name(accelerator)}({listed})"
-    return f"void {function_name(accelerator)}({', '.join(_parameters(accelerator))})"
-
-
-def _parameters(accelerator: AcceleratorType) -> list[str]:
-    """Return the declarations of the parameters of a function without streams."""
-    inputs, outputs = arguments(accelerator)
-    parameters = [f"{cpp_type(item)} {item.port}{_size(item)}" for item in inputs]
-    return parameters + [f"{cpp_type(item)} {'' if item.count else '*'}{item.port}{_size(item)}" for item in outputs]
-
-
-def _size(argument: Argument) -> str:
-    return f"[{argument.count}]" if argument.count else ""
+        return [
+            Parameter(name=item.port, cpp_type=item.cpp_type, is_output=is_output, is_stream=True)
+            for is_output, items in zip((False, True), streams(accelerator), strict=True)
+            for item in items
+        ]
+    return [
+        Parameter(name=item.port, cpp_type=cpp_type(item), count=item.count, is_output=is_output)
+        for is_output, items in zip((False, True), arguments(accelerator), strict=True)
+        for item in items
+    ]
 
 
 def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:

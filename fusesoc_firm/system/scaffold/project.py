@@ -160,12 +160,22 @@ def create(project: Project, folder: Path, known: Libraries, library: Path, path
     """
     if fault := name_fault(project.name):
         fail(fault)
-    if project.include and (project.input != project.output or LANGUAGES[project.language].type == SOFTWARE):
-        fail("fields can only pass between equal messages, and not by software", hint="omit --out, or omit --include")
+    if project.include:
+        _check_include(project)
     with new_folder(folder) as inner:
         _write_all(project, inner, known, [os.path.relpath(path, folder) for path in paths])
         write_surroundings(inner, project.name, library)
     return files_of(folder)
+
+
+def _check_include(project: Project) -> None:
+    """Raise `InputError` if the other fields cannot pass beside the accelerator."""
+    if project.input != project.output:
+        message = "with --include, all other fields of the message pass, so input and output must be the same message"
+        fail(f"{message}, not {project.input} and {project.output}", hint="omit --out, or omit --include")
+    if LANGUAGES[project.language].type == SOFTWARE:
+        hint = "omit --include, or choose vhdl, verilog or hls"
+        fail("an accelerator in Python receives whole messages, so it cannot have --include", hint=hint)
 
 
 @contextmanager

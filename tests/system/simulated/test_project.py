@@ -91,6 +91,7 @@ def test_the_command_writes_a_whole_project(tmp_path: Path, monkeypatch: pytest.
     names = ["fusesoc.conf", "model.py", "rtl/turn.v", "stimuli.yaml", "turn.core", "turn.yaml"]
     assert capsys.readouterr().out.splitlines() == [
         *(f"turn/{name}" for name in names),
+        "ROS 1: geometry_msgs/Point in, geometry_msgs/Vector3 out",
         "edit: turn/rtl/turn.v (the computation), turn/model.py (the responses that it must give)",
         "next: cd turn && firm sim",
     ]
