@@ -92,7 +92,15 @@ package body probes is
   end function firm_bits;
 {"".join(map(_PER_VECTOR.format, _VECTORS))}end package body probes;
 """
-_ARRAY = """
+_SEEN = """
+function firm_seen (v : {0}; n : natural) return {0} is
+  constant is_seen : boolean := firm_is_lost(firm_bits(v), n);
+begin
+  return v;
+end function firm_seen;
+"""
+_ARRAY = (
+    """
 function firm_bits (v : {0}) return std_logic_vector is
   constant first : std_logic_vector := firm_bits(v(v'left));
   variable found : std_logic_vector(0 to v'length * first'length - 1);
@@ -105,12 +113,17 @@ begin
   return found;
 end function firm_bits;
 """
-_RECORD = """
+    + _SEEN
+)
+_RECORD = (
+    """
 function firm_bits (v : {0}) return std_logic_vector is
 begin
   return {1};
 end function firm_bits;
 """
+    + _SEEN
+)
 _USE = f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; use {LIBRARY}.probes.all; "
 
 _HIDDEN = re.compile(r'--[^\n]*|\b[box]"[^"\n]*"|"[^"\n]*"', re.IGNORECASE)
@@ -125,14 +138,19 @@ _NAMES = r"\b(\w+(?:\s*,\s*\w+)*)\s*:(?!=)"
 _FIELDS = re.compile(_NAMES)
 _OBJECT = re.compile(rf"\b(constant|signal|variable)\s+{_NAMES}([^;]*?)(?::=([^;]*))?;", re.IGNORECASE)
 _PORT = re.compile(rf"{_NAMES}\s*(?:out|inout|buffer)\s+(\w+(?:\s*\((?:[^()]|\([^()]*\))*\))?)", re.IGNORECASE)
-_DYNAMIC = re.compile(rf"\b(?:signal|variable)\s+{_NAMES}", re.IGNORECASE)
+_SIGNAL, _VARIABLE = (re.compile(rf"\b{kind}\s+{_NAMES}", re.IGNORECASE) for kind in ("signal", "variable"))
 _INTERFACE = re.compile(r"\b(generic|port|function|procedure)\b[^()]*\(", re.IGNORECASE)
+_MAP = re.compile(r"\b(?:generic|port)\s+map\s*\(", re.IGNORECASE)
 _COMMA = r"\s*,\s*"
 # The text after a constant that is used as a whole, or of which an element is used.
 _NO_SLICE = r"(?P<index>)(?!\s*(?:'|\(\s*\d+(?:\s+(?:downto|to)\s+\d+)?\s*\)))"
 _OF_ELEMENT = r"\s*\((?P<index>[^();]*)\)"
 _SCALAR = re.compile(
     r"\s*(?:integer|natural|positive|boolean|std_u?logic|bit|time|real|string|character)\b", re.IGNORECASE
+)
+# The text before the default value of a vector.
+_INITIAL = re.compile(
+    rf"\s*(?:(?:constant|signal)\s+)?{_NAMES}(?!\s*(?:in\b)?{_SCALAR.pattern})[^:]*:=", re.IGNORECASE
 )
 _ASSIGNMENT = re.compile(
     r"(?:;|=>|\b(?:begin|then|else|loop|generate)\b|\w\s*:)\s*(\w+)\s*(?:<=|:=)([^;]*)(?=;)",
@@ -147,6 +165,7 @@ _CALL = re.compile(
 _RANGE = re.compile(r"\b(?:downto|to|range)\b", re.IGNORECASE)
 _NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
 _LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
+_SCALAR_VALUE = re.compile(r"open|true|false|'.'", re.IGNORECASE)
 _OF_ZEROS = re.compile(r"""(?:'0'|[xb]?"[0_]*"|\b(?:others|downto|to|\d+)\b|[\s(),=>|])*""", re.IGNORECASE)
 _REPORT = re.compile(r"firm lost (\d+) (\d+)")
 
@@ -169,12 +188,16 @@ class Source:
         self.text = Path(name).read_bytes().decode("latin-1")
         # Comments and the contents of literals are replaced by blanks, so that all positions remain valid.
         self.code = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), self.text)
+        self._with_literals = _HIDDEN.sub(
+            lambda found: " " * len(found[0]) if found[0].startswith("--") else found[0], self.text
+        )
         self.units = [
             (found.start(), found.end(), (found[1] or found[2] or found[4] or found[3]).lower())
             for found in _UNIT.finditer(self.code)
         ]
-        found = [*_DYNAMIC.findall(self.code), *self._parameters()]
-        self.dynamic = {name.strip().lower() for names in found for name in names.split(",")}
+        self.signals = _split([*_SIGNAL.findall(self.code), *self._parameters({"port"})])
+        parameters = self._parameters({"function", "procedure"})
+        self.dynamic = self.signals | _split([*_VARIABLE.findall(self.code), *parameters])
         self.constants = [item for item in _OBJECT.finditer(self.code) if item[1].lower() == "constant"]
         self._begins = [start for start, _, _ in self.units]
         # The number of open parentheses before each parenthesis, and the positions of the parentheses.
@@ -184,9 +207,9 @@ class Source:
             self._parentheses.append(parenthesis.start())
             self._depths.append(self._depths[-1] + (1 if parenthesis[0] == "(" else -1))
 
-    def _parameters(self) -> Iterator[str]:
+    def _parameters(self, kinds: set[str]) -> Iterator[str]:
         for found in _INTERFACE.finditer(self.code):
-            if found[1].lower() != "generic":
+            if found[1].lower() in kinds:
                 yield from _FIELDS.findall(self.code, found.end(), _closed(self.code, found.end()))
 
     def place(self, position: int) -> str:
@@ -218,8 +241,7 @@ class Source:
 
     def literals(self) -> Iterator[tuple[int, int]]:
         """Yield the position and width of each literal that GHDL loses."""
-        code = re.sub(r"--[^\n]*", lambda found: " " * len(found[0]), self.text)
-        for found in _LITERAL.finditer(code):
+        for found in _LITERAL.finditer(self._with_literals):
             digits = (found[1] or found[2]).replace("_", "")
             width, value = (4 * len(digits), int(digits, 16)) if found[1] else (len(digits), int(digits, 2))
             if width > _WORD and width % _WORD == 0 and value and value % (1 << width - _WORD) == 0:
@@ -227,7 +249,7 @@ class Source:
 
     def probes(self, types: Mapping[str, str]) -> Iterator[_Probe]:
         """Yield the probes of a file; `types` maps each package type to the function that returns its bits."""
-        yield from (_Probe(start, start, _USE) for start, _, kind in self.units if kind != "entity")
+        yield from (_Probe(start, start, _USE) for start, _, _ in self.units)
         yield from (_Probe(end, end, text) for _, end, text in self.types(of_packages=False))
         ends = [*self._begins[1:], len(self.code)]
         for (_, head, kind), end in zip(self.units, ends, strict=True):
@@ -243,8 +265,9 @@ class Source:
         yield from filter(None, map(self._first_value, declarations))
         spans = [found.span() for found in declarations]
         assigned = list(self._assigned(declared, spans))
-        yield from assigned
-        yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in assigned)]))
+        associated = list(self._associated())
+        yield from (*assigned, *associated)
+        yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in (*assigned, *associated))]))
 
     def _first_value(self, found: re.Match[str]) -> _Probe | None:
         """Return the probe of a declaration, or None if the value depends on a function's parameters.
@@ -273,6 +296,41 @@ class Source:
     def _joined(self, start: int, end: int) -> _Probe | None:
         """Return a probe of concatenated vectors; function calls have separate probes."""
         return self._seen(start, end) if "&" in self.code[start:end] else None
+
+    def _associated(self) -> Iterator[_Probe]:
+        """Yield the probes of actual and default values of ports and generics, each on a line of its own.
+
+        GHDL rejects a probe of a scalar.
+        """
+        lost = {position for position, _ in self.literals()}
+        for begin, start, end in chain(self._actuals(), self._defaults()):
+            value = self._with_literals[start:end]
+            is_kept = _SCALAR_VALUE.fullmatch(value) or (_LITERAL.fullmatch(value) and start not in lost)
+            if not is_kept and self.signals.isdisjoint(_NAME.findall(self.code[start:end].lower())):
+                for probe in filter(None, [self._seen(start, end)]):
+                    text = f"\n{_escaped(self.text[begin:start])}{probe.text}\n"
+                    yield _Probe(begin, end, text, probe.constant)
+
+    def _actuals(self) -> Iterator[tuple[int, int, int]]:
+        """Yield the start, the start of the value and the end of each association in a port or generic map."""
+        for found in _MAP.finditer(self.code):
+            for start, end in _parts(self.code, found.end(), ","):
+                _, arrow = next(_parts(self.code, start, "="))
+                has_name = arrow < end and self.code.startswith("=>", arrow)
+                yield self._trimmed(start, arrow + 2 if has_name else start, end)
+
+    def _defaults(self) -> Iterator[tuple[int, int, int]]:
+        """Yield the same positions for the default value of each vector among ports and generics."""
+        for found in _INTERFACE.finditer(self.code):
+            for start, end in _parts(self.code, found.end(), ";") if found[1].lower() in {"generic", "port"} else ():
+                if initial := _INITIAL.match(self.code, start, end):
+                    yield self._trimmed(initial.end(), initial.end(), end)
+
+    def _trimmed(self, begin: int, start: int, end: int) -> tuple[int, int, int]:
+        """Return the positions without the blanks and comments around the value."""
+        value = self._with_literals[start:end]
+        first = start + len(value) - len(value.lstrip())
+        return (begin if begin < start else first), first, start + len(value.rstrip())
 
     def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
         """Yield the probes for the results of functions that expressions apply to constants."""
@@ -331,6 +389,22 @@ def _closed(code: str, start: int) -> int:
         if not depth:
             return position + 1
     return len(code)
+
+
+def _parts(code: str, start: int, separator: str) -> Iterator[tuple[int, int]]:
+    """Yield the start and end of each part of a text from `start` to the parenthesis that closes it."""
+    depth = 0
+    for position in range(start, len(code)):
+        if not depth and code[position] in {separator, ")"}:
+            yield start, position
+            start = position + 1
+        depth += {"(": 1, ")": -1}.get(code[position], 0)
+        if depth < 0:
+            break
+
+
+def _split(lists: Iterable[str]) -> set[str]:
+    return {name.strip().lower() for names in lists for name in names.split(",")}
 
 
 def widths(modules: Modules) -> set[int]:
