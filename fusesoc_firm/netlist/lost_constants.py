@@ -12,7 +12,7 @@ import re
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
@@ -21,19 +21,23 @@ from fusesoc_firm.netlist.model import Modules, NetlistError
 LIBRARY = "firm_probes"
 _WORD = 32
 _VECTORS = ("std_logic_vector", "unsigned", "signed")
-_PER_VECTOR = """
+_SEEN = """
+function firm_seen{1} (v : {0}{2}; n : natural) return {0} is
+  constant is_seen : boolean := firm_is_lost(firm_bits(v), n);
+begin
+  return v;
+end function firm_seen{1};
+"""
+_PER_VECTOR = (
+    """
   function firm_bits (v : {0}) return std_logic_vector is
   begin
     return std_logic_vector(v);
   end function firm_bits;
-
-  function firm_seen (v : {0}; n : natural) return {0} is
-    constant is_seen : boolean := firm_is_lost(std_logic_vector(v), n);
-  begin
-    return v;
-  end function firm_seen;
 """
-PACKAGE = f"""library ieee;
+    + _SEEN
+)
+_PACKAGE = f"""library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 
@@ -90,14 +94,7 @@ package body probes is
   begin
     return bits;
   end function firm_bits;
-{"".join(map(_PER_VECTOR.format, _VECTORS))}end package body probes;
-"""
-_SEEN = """
-function firm_seen (v : {0}; n : natural) return {0} is
-  constant is_seen : boolean := firm_is_lost(firm_bits(v), n);
-begin
-  return v;
-end function firm_seen;
+{"".join(_PER_VECTOR.format(name, "", "") for name in _VECTORS)}end package body probes;
 """
 _ARRAY = (
     """
@@ -119,12 +116,24 @@ _RECORD = (
     """
 function firm_bits (v : {0}) return std_logic_vector is
 begin
-  return {1};
+  return {3};
 end function firm_bits;
 """
     + _SEEN
 )
-_USE = f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; use {LIBRARY}.probes.all; "
+# Functions for aggregates, whose width and direction only a constrained parameter determines.
+_OF_WIDTHS = """library ieee, {0};
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use {0}.probes.all;
+
+package of_widths is
+{1}end package of_widths;
+
+package body of_widths is
+{2}end package body of_widths;
+"""
+_USE = f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; use {LIBRARY}.probes.all; use {LIBRARY}.of_widths.all; "
 
 _HIDDEN = re.compile(r'--[^\n]*|\b[box]"[^"\n]*"|"[^"\n]*"', re.IGNORECASE)
 _UNIT = re.compile(
@@ -172,19 +181,29 @@ _REPORT = re.compile(r"firm lost (\d+) (\d+)")
 
 @dataclass(frozen=True)
 class _Probe:
-    """A text that replaces a part of a file; `constant` is the span of the examined expression, if any."""
+    """A text that replaces a part of a file; `constant` is the span of the examined expression, if any.
+
+    If GHDL rejects the text, the first text in `others` takes its place.
+    """
 
     start: int
     end: int
     text: str
     constant: tuple[int, int] | None = None
+    others: tuple[str, ...] = ()
+
+    @property
+    def other(self) -> _Probe | None:
+        """The probe that replaces this one after GHDL has rejected it, if any."""
+        return replace(self, text=self.others[0], others=self.others[1:]) if self.others else None
 
 
 class Source:
     """A source file with the probes for its constants."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, widths: Iterable[int]) -> None:
         self.name = name
+        self._widths = sorted(widths)
         self.text = Path(name).read_bytes().decode("latin-1")
         # Comments and the contents of literals are replaced by blanks, so that all positions remain valid.
         self.code = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), self.text)
@@ -237,7 +256,7 @@ class Source:
             if kind and (kind == "package") == of_packages:
                 fields = [name.strip() for names in _FIELDS.findall(found[2] or "") for name in names.split(",")]
                 bits = " & ".join(f"firm_bits(v.{name})" for name in reversed(fields))
-                yield found[1], found.end(), (_RECORD if fields else _ARRAY).format(found[1], bits)
+                yield found[1], found.end(), (_RECORD if fields else _ARRAY).format(found[1], "", "", bits)
 
     def literals(self) -> Iterator[tuple[int, int]]:
         """Yield the position and width of each literal that GHDL loses."""
@@ -251,11 +270,17 @@ class Source:
         """Yield the probes of a file; `types` maps each package type to the function that returns its bits."""
         yield from (_Probe(start, start, _USE) for start, _, _ in self.units)
         yield from (_Probe(end, end, text) for _, end, text in self.types(of_packages=False))
+        associated = list(self._associated())
+        aggregates = [probe.start for probe in associated if probe.others]
         ends = [*self._begins[1:], len(self.code)]
         for (_, head, kind), end in zip(self.units, ends, strict=True):
             if kind in {"architecture", "body"}:
                 words = set(_NAME.findall(self.code[head:end].lower()))
-                yield from (_Probe(head, head, text) for name, text in types.items() if name.lower() in words)
+                # The code does not name the type of an aggregate that is an actual value.
+                has_aggregates = any(head < start < end for start in aggregates)
+                yield from (
+                    _Probe(head, head, text) for name, text in types.items() if has_aggregates or name.lower() in words
+                )
         declarations = [found for found in _OBJECT.finditer(self.code) if self.unit(found.start())]
         declared = {
             (self._index(found.start()), name.strip().lower()): found
@@ -265,7 +290,6 @@ class Source:
         yield from filter(None, map(self._first_value, declarations))
         spans = [found.span() for found in declarations]
         assigned = list(self._assigned(declared, spans))
-        associated = list(self._associated())
         yield from (*assigned, *associated)
         yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in (*assigned, *associated))]))
 
@@ -307,9 +331,11 @@ class Source:
             value = self._with_literals[start:end]
             is_kept = _SCALAR_VALUE.fullmatch(value) or (_LITERAL.fullmatch(value) and start not in lost)
             if not is_kept and self.signals.isdisjoint(_NAME.findall(self.code[start:end].lower())):
-                for probe in filter(None, [self._seen(start, end)]):
-                    text = f"\n{_escaped(self.text[begin:start])}{probe.text}\n"
-                    yield _Probe(begin, end, text, probe.constant)
+                names = [f"firm_seen_{width}" for width in self._widths] if value.startswith("(") else []
+                if probe := self._seen(start, end, *names, "firm_seen"):
+                    formal = _escaped(self.text[begin:start])
+                    texts = [f"\n{formal}{text}\n" for text in (probe.text, *probe.others)]
+                    yield _Probe(begin, end, texts[0], probe.constant, tuple(texts[1:]))
 
     def _actuals(self) -> Iterator[tuple[int, int, int]]:
         """Yield the start, the start of the value and the end of each association in a port or generic map."""
@@ -342,11 +368,12 @@ class Source:
                 last = end
                 yield from filter(None, [self._seen(start, end)])
 
-    def _seen(self, start: int, end: int) -> _Probe | None:
+    def _seen(self, start: int, end: int, *functions: str) -> _Probe | None:
         value = self.text[start:end]
         if _OF_ZEROS.fullmatch(value) or self.unit(start) == "entity":
             return None
-        return _Probe(start, end, f"firm_seen({_escaped(value)}, {{0}})", (start, end))
+        first, *others = (f"{name}({_escaped(value)}, {{0}})" for name in functions or ("firm_seen",))
+        return _Probe(start, end, first, (start, end), tuple(others))
 
     def _value(self, target: re.Match[str], start: int, end: int) -> _Probe | None:
         value, type_ = self.text[start:end], self.text[slice(*target.span(3))]
@@ -418,11 +445,20 @@ def widths(modules: Modules) -> set[int]:
     }
 
 
+def package(widths: Iterable[int]) -> str:
+    """Return the packages with the functions of the probes, for constants of these widths."""
+    functions = [
+        _SEEN.format(name, f"_{width}", f"({width - 1} downto 0)") for width in sorted(widths) for name in _VECTORS
+    ]
+    heads = (text.partition(" is\n")[0] + ";" for text in functions)
+    return _PACKAGE + _OF_WIDTHS.format(LIBRARY, "".join(heads), "".join(functions))
+
+
 class Copies:
     """Copies of the source files with probes."""
 
-    def __init__(self, files: Iterable[str], folder: Path) -> None:
-        self.sources = {name: Source(name) for name in files}
+    def __init__(self, files: Iterable[str], folder: Path, widths: Iterable[int]) -> None:
+        self.sources = {name: Source(name, widths) for name in files}
         types = [type_ for source in self.sources.values() for type_ in source.types(of_packages=True)]
         functions = {name: text for name, _, text in types}
         self.folder = folder
@@ -470,7 +506,8 @@ class Copies:
                 index = bisect_right(lines, line)
                 wrong |= self._lines[copy][lines[index - 1]] if index else set()
             dropped = dropped or bool(wrong)
-            self.probes[name] = [probe for probe in probes if probe not in wrong]
+            kept = (probe.other if probe in wrong else probe for probe in probes)
+            self.probes[name] = [probe for probe in kept if probe]
         return dropped
 
     def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:

@@ -244,12 +244,12 @@ class _Ghdl:
             return ""
         folder = self.folder / "probes"
         folder.mkdir(exist_ok=True)
-        copies = lost_constants.Copies(chain.from_iterable(self.translation.libraries.values()), folder)
+        copies = lost_constants.Copies(chain.from_iterable(self.translation.libraries.values()), folder, widths)
         messages = doubt = ""
         if copies.has_probes:
             ghdl = replace(self, folder=folder)
             package = folder / "probes.vhd"
-            package.write_text(lost_constants.PACKAGE, encoding="latin-1")
+            package.write_text(lost_constants.package(widths), encoding="latin-1")
             ghdl.run("-a", f"--work={lost_constants.LIBRARY}", str(package))
             try:
                 messages = ghdl.probed(copies)
