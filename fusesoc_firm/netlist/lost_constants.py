@@ -23,7 +23,7 @@ _WORD = 32
 _VECTORS = ("std_logic_vector", "unsigned", "signed")
 _SEEN = """
 function firm_seen{1} (v : {0}{2}; n : natural) return {0} is
-  constant is_seen : boolean := firm_is_lost(firm_bits(v), n);
+  constant is_seen : boolean := firm_is_seen(firm_bits(v), n);
 begin
   return v;
 end function firm_seen{1};
@@ -42,7 +42,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 
 package probes is
-  function firm_is_lost (v : std_logic_vector; n : natural) return boolean;
+  function firm_is_seen (v : std_logic_vector; n : natural) return boolean;
   function firm_bits (v : std_ulogic) return std_logic_vector;
 {
     "".join(
@@ -54,7 +54,7 @@ package probes is
 }end package probes;
 
 package body probes is
-  function level (v : std_ulogic) return std_ulogic is
+  function level (v : std_ulogic) return character is
   begin
     case v is
       when '0' | 'L' => return '0';
@@ -64,30 +64,28 @@ package body probes is
     end case;
   end function level;
 
-  function firm_is_lost (v : std_logic_vector; n : natural) return boolean is
+  -- Report the levels of the highest bits and of all others if these are equal and not '1'.
+  function firm_is_seen (v : std_logic_vector; n : natural) return boolean is
     constant bits : std_logic_vector(0 to v'length - 1) := v;
-    variable lowest : std_ulogic;
+    variable levels : string(1 to {_WORD + 1});
   begin
     if v'length <= {_WORD} or v'length mod {_WORD} /= 0 then
       return false;
     end if;
-    lowest := level(bits(bits'right));
-    if lowest = '1' then
+    for i in levels'range loop
+      levels(i) := level(bits(i - 1));
+    end loop;
+    if levels(levels'right) = '1' then
       return false;
     end if;
     for i in {_WORD} to bits'right loop
-      if level(bits(i)) /= lowest then
+      if level(bits(i)) /= levels(levels'right) then
         return false;
       end if;
     end loop;
-    for i in 0 to {_WORD - 1} loop
-      if level(bits(i)) /= lowest then
-        report "firm lost " & integer'image(n) & " " & integer'image(v'length) severity warning;
-        return true;
-      end if;
-    end loop;
-    return false;
-  end function firm_is_lost;
+    report "firm seen " & integer'image(n) & " " & integer'image(v'length) & " " & levels severity warning;
+    return true;
+  end function firm_is_seen;
 
   function firm_bits (v : std_ulogic) return std_logic_vector is
     constant bits : std_logic_vector(0 to 0) := (others => v);
@@ -176,7 +174,8 @@ _NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
 _LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
 _SCALAR_VALUE = re.compile(r"open|true|false|'.'", re.IGNORECASE)
 _OF_ZEROS = re.compile(r"""(?:'0'|[xb]?"[0_]*"|\b(?:others|downto|to|\d+)\b|[\s(),=>|])*""", re.IGNORECASE)
-_REPORT = re.compile(r"firm lost (\d+) (\d+)")
+_REPORT = re.compile(rf"firm seen (\d+) (\d+) ([01XZ]{{{_WORD + 1}}})")
+_PLACE = re.compile(r"(.*):(\d+):(\d+)")
 
 
 @dataclass(frozen=True)
@@ -381,7 +380,7 @@ class Source:
             return None
         text = (
             f"\nconstant firm_v{{0}} :{_escaped(type_)} :={_escaped(value)};"
-            "\nconstant firm_n{0} : boolean := firm_is_lost(firm_bits(firm_v{0}), {0});\n"
+            "\nconstant firm_n{0} : boolean := firm_is_seen(firm_bits(firm_v{0}), {0});\n"
         )
         return _Probe(target.end(), target.end(), text, (start, end))
 
@@ -512,7 +511,11 @@ class Copies:
 
     def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:
         """Yield the place and the width of each lost constant that GHDL reports with a width in `among`."""
-        reported = ((*self._seen[int(number)], int(width)) for number, width in _REPORT.findall(messages))
+        reported = (
+            (*self._seen[int(number)], int(width))
+            for number, width, levels in _REPORT.findall(messages)
+            if len(set(levels)) > 1
+        )
         literals = ((name, *found) for name in self.sources for found in self._literals(name))
         for name, position, width in chain(reported, literals):
             declaration = self.sources[name].constant(position)
