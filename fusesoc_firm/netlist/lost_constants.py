@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-from fusesoc_firm.netlist.model import Modules, NetlistError
+from fusesoc_firm.netlist.model import Instance, Modules, NetlistError
 
 LIBRARY = "firm_probes"
-_WORD = 32
+WORD = 32
 _VECTORS = ("std_logic_vector", "unsigned", "signed")
 _SEEN = """
 function firm_seen{1} (v : {0}{2}; n : natural) return {0} is
@@ -67,9 +67,9 @@ package body probes is
   -- Report the levels of the highest bits and of all others if these are equal and not '1'.
   function firm_is_seen (v : std_logic_vector; n : natural) return boolean is
     constant bits : std_logic_vector(0 to v'length - 1) := v;
-    variable levels : string(1 to {_WORD + 1});
+    variable levels : string(1 to {WORD + 1});
   begin
-    if v'length <= {_WORD} or v'length mod {_WORD} /= 0 then
+    if v'length <= {WORD} or v'length mod {WORD} /= 0 then
       return false;
     end if;
     for i in levels'range loop
@@ -78,7 +78,7 @@ package body probes is
     if levels(levels'right) = '1' then
       return false;
     end if;
-    for i in {_WORD} to bits'right loop
+    for i in {WORD} to bits'right loop
       if level(bits(i)) /= levels(levels'right) then
         return false;
       end if;
@@ -174,7 +174,7 @@ _NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
 _LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
 _SCALAR_VALUE = re.compile(r"open|true|false|'.'", re.IGNORECASE)
 _OF_ZEROS = re.compile(r"""(?:'0'|[xb]?"[0_]*"|\b(?:others|downto|to|\d+)\b|[\s(),=>|])*""", re.IGNORECASE)
-_REPORT = re.compile(rf"firm seen (\d+) (\d+) ([01XZ]{{{_WORD + 1}}})")
+_REPORT = re.compile(rf"firm seen (\d+) (\d+) ([01XZ]{{{WORD + 1}}})")
 _PLACE = re.compile(r"(.*):(\d+):(\d+)")
 
 
@@ -262,7 +262,7 @@ class Source:
         for found in _LITERAL.finditer(self._with_literals):
             digits = (found[1] or found[2]).replace("_", "")
             width, value = (4 * len(digits), int(digits, 16)) if found[1] else (len(digits), int(digits, 2))
-            if width > _WORD and width % _WORD == 0 and value and value % (1 << width - _WORD) == 0:
+            if width > WORD and width % WORD == 0 and value and value % (1 << width - WORD) == 0:
                 yield found.start(), width
 
     def probes(self, types: Mapping[str, str]) -> Iterator[_Probe]:
@@ -336,13 +336,20 @@ class Source:
                     texts = [f"\n{formal}{text}\n" for text in (probe.text, *probe.others)]
                     yield _Probe(begin, end, texts[0], probe.constant, tuple(texts[1:]))
 
-    def _actuals(self) -> Iterator[tuple[int, int, int]]:
+    def _actuals(self, begin: int = 0, end: int | None = None) -> Iterator[tuple[int, int, int]]:
         """Yield the start, the start of the value and the end of each association in a port or generic map."""
-        for found in _MAP.finditer(self.code):
-            for start, end in _parts(self.code, found.end(), ","):
+        for found in _MAP.finditer(self.code, begin, len(self.code) if end is None else end):
+            for start, stop in _parts(self.code, found.end(), ","):
                 _, arrow = next(_parts(self.code, start, "="))
-                has_name = arrow < end and self.code.startswith("=>", arrow)
-                yield self._trimmed(start, arrow + 2 if has_name else start, end)
+                has_name = arrow < stop and self.code.startswith("=>", arrow)
+                yield self._trimmed(start, arrow + 2 if has_name else start, stop)
+
+    def port_map(self, line: int, column: int) -> Iterator[tuple[str, int]]:
+        """Yield the port and the value's start of each association in the instance with this place."""
+        begin = sum(map(len, self.text.splitlines(keepends=True)[: line - 1])) + column - 1
+        end = self.code.find(";", begin)
+        for start, value, _ in self._actuals(begin, end):
+            yield self.code[start:value].partition("=>")[0].strip().lower(), value
 
     def _defaults(self) -> Iterator[tuple[int, int, int]]:
         """Yield the same positions for the default value of each vector among ports and generics."""
@@ -433,14 +440,18 @@ def _split(lists: Iterable[str]) -> set[str]:
     return {name.strip().lower() for names in lists for name in names.split(",")}
 
 
+def is_zero(gate: Instance) -> bool:
+    """Return whether a gate is a constant zero, or has the level X or Z in all bits."""
+    return (gate.kind == "$const_UB32" and not any(gate.numbers)) or gate.kind in {"$const_X", "$const_Z"}
+
+
 def widths(modules: Modules) -> set[int]:
     """Return the widths, in bits, of the constants that GHDL may have lost."""
     return {
         gate.outputs[0].width
         for module in modules.values()
         for gate in module.instances
-        if (gate.kind == "$const_UB32" and not any(gate.numbers)) or gate.kind in {"$const_X", "$const_Z"}
-        if gate.outputs[0].width > _WORD and gate.outputs[0].width % _WORD == 0
+        if is_zero(gate) and gate.outputs[0].width > WORD and gate.outputs[0].width % WORD == 0
     }
 
 
@@ -465,6 +476,7 @@ class Copies:
         # The probes in each line of a copy.
         self._lines: dict[str, dict[int, set[_Probe]]] = {}
         self._seen: list[tuple[str, int]] = []
+        self._right: set[tuple[str, int]] = set()
 
     @property
     def has_probes(self) -> bool:
@@ -509,12 +521,23 @@ class Copies:
             self.probes[name] = [probe for probe in kept if probe]
         return dropped
 
-    def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:
-        """Yield the place and the width of each lost constant that GHDL reports with a width in `among`."""
+    def values(self, messages: str) -> dict[tuple[str, int], set[str]]:
+        """Return the values in GHDL's reports by file and position."""
+        values: dict[tuple[str, int], set[str]] = defaultdict(set)
+        for number, _, levels in _REPORT.findall(messages):
+            values[self._seen[int(number)]].add(levels)
+        return values
+
+    def lost(self, messages: str, among: set[int], right: set[tuple[str, int]]) -> Iterator[tuple[str, int]]:
+        """Yield the place and the width of each lost constant that GHDL reports with a width in `among`.
+
+        The constants at the places in `right` are not lost in the netlist.
+        """
+        self._right = right
         reported = (
             (*self._seen[int(number)], int(width))
             for number, width, levels in _REPORT.findall(messages)
-            if len(set(levels)) > 1
+            if len(set(levels)) > 1 and self._seen[int(number)] not in right
         )
         literals = ((name, *found) for name in self.sources for found in self._literals(name))
         for name, position, width in chain(reported, literals):
@@ -534,10 +557,15 @@ class Copies:
     def _is_used(self, declaration: re.Match[str], how: str) -> bool:
         """Return whether a constant is used outside its declaration in a form that matches `how`."""
         uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
+        right = {
+            name: sorted(probe.constant for probe in probes if probe.constant and (name, probe.constant[0]) in self._right)
+            for name, probes in self.probes.items()
+        }
         found = (
             not source.dynamic & set(_NAME.findall((use["index"] or "").lower()))
             for source in self.sources.values()
             for use in uses.finditer(source.code)
+            if not _is_within(use.start(), right[source.name])
         )
         return sum(found) > len(uses.findall(declaration[0]))
 
@@ -547,7 +575,7 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
     if lost:
         raise NetlistError(
             "\n".join(
-                f"{place}: error: GHDL turns a {width}-bit constant into zero if only its highest {_WORD} bits are "
+                f"{place}: error: GHDL turns a {width}-bit constant into zero if only its highest {WORD} bits are "
                 "not zero; make it a signal that is assigned in two slices, or an array element by element"
                 for place, width in dict.fromkeys(lost)
             )
@@ -558,5 +586,5 @@ def doubt(widths: Iterable[int], message: str) -> str:
     """Return a warning that constants of some widths were not examined, with GHDL's reason."""
     return (
         f"warning: GHDL turns constants with {', '.join(map(str, sorted(widths)))} bits into zero if only their "
-        f"highest {_WORD} bits are not zero; the search for such constants failed: {message.splitlines()[0]}"
+        f"highest {WORD} bits are not zero; the search for such constants failed: {message.splitlines()[0]}"
     )
