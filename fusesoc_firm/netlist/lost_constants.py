@@ -9,7 +9,7 @@ other than 0 and 1.
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +17,7 @@ from itertools import chain
 from pathlib import Path
 
 from fusesoc_firm.netlist.model import Instance, Modules, NetlistError
+from fusesoc_firm.netlist.sources import TAB
 
 LIBRARY = "firm_probes"
 WORD = 32
@@ -131,7 +132,10 @@ package of_widths is
 package body of_widths is
 {2}end package body of_widths;
 """
-_USE = f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; use {LIBRARY}.probes.all; use {LIBRARY}.of_widths.all; "
+_USE = (
+    f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; "
+    f"use {LIBRARY}.probes.all; use {LIBRARY}.of_widths.all; "
+)
 
 _HIDDEN = re.compile(r'--[^\n]*|\b[box]"[^"\n]*"|"[^"\n]*"', re.IGNORECASE)
 _UNIT = re.compile(
@@ -156,9 +160,7 @@ _SCALAR = re.compile(
     r"\s*(?:integer|natural|positive|boolean|std_u?logic|bit|time|real|string|character)\b", re.IGNORECASE
 )
 # The text before the default value of a vector.
-_INITIAL = re.compile(
-    rf"\s*(?:(?:constant|signal)\s+)?{_NAMES}(?!\s*(?:in\b)?{_SCALAR.pattern})[^:]*:=", re.IGNORECASE
-)
+_INITIAL = re.compile(rf"\s*(?:(?:constant|signal)\s+)?{_NAMES}(?!\s*(?:in\b)?{_SCALAR.pattern})[^:]*:=", re.IGNORECASE)
 _ASSIGNMENT = re.compile(
     r"(?:;|=>|\b(?:begin|then|else|loop|generate)\b|\w\s*:)\s*(\w+)\s*(?:<=|:=)([^;]*)(?=;)",
     re.IGNORECASE,
@@ -346,7 +348,10 @@ class Source:
 
     def port_map(self, line: int, column: int) -> Iterator[tuple[str, int]]:
         """Yield the port and the value's start of each association in the instance with this place."""
-        begin = sum(map(len, self.text.splitlines(keepends=True)[: line - 1])) + column - 1
+        lines = self.text.split("\n")
+        widths = (len(lines[line - 1][:length].expandtabs(TAB)) for length in range(column))
+        before = bisect_left(list(widths), column - 1)
+        begin = sum(len(text) + 1 for text in lines[: line - 1]) + before
         end = self.code.find(";", begin)
         for start, value, _ in self._actuals(begin, end):
             yield self.code[start:value].partition("=>")[0].strip().lower(), value
@@ -558,7 +563,9 @@ class Copies:
         """Return whether a constant is used outside its declaration in a form that matches `how`."""
         uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
         right = {
-            name: sorted(probe.constant for probe in probes if probe.constant and (name, probe.constant[0]) in self._right)
+            name: sorted(
+                probe.constant for probe in probes if probe.constant and (name, probe.constant[0]) in self._right
+            )
             for name, probes in self.probes.items()
         }
         found = (

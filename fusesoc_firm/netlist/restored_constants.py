@@ -44,9 +44,7 @@ def restore(modules: Modules, sources: Mapping[str, Source], values: Mapping[Act
     return right - wrong
 
 
-def _inputs(
-    module: Module, modules: Modules, sources: Mapping[str, Source]
-) -> Iterator[tuple[Instance, int, Actual]]:
+def _inputs(module: Module, modules: Modules, sources: Mapping[str, Source]) -> Iterator[tuple[Instance, int, Actual]]:
     """Yield each input of an instance that a port map names: the instance, the input's index and the actual."""
     for instance in module.instances:
         file, line, column = [*instance.location.rsplit(":", 2), "", "", ""][:3]
