@@ -445,19 +445,15 @@ def _split(lists: Iterable[str]) -> set[str]:
     return {name.strip().lower() for names in lists for name in names.split(",")}
 
 
-def is_zero(gate: Instance) -> bool:
-    """Return whether a gate is a constant zero, or has the level X or Z in all bits."""
-    return (gate.kind == "$const_UB32" and not any(gate.numbers)) or gate.kind in {"$const_X", "$const_Z"}
+def may_be_lost(gate: Instance) -> bool:
+    """Return whether a gate is a constant that GHDL may have lost: the same level, other than 1, in all bits."""
+    is_equal = (gate.kind == "$const_UB32" and not any(gate.numbers)) or gate.kind in {"$const_X", "$const_Z"}
+    return is_equal and gate.outputs[0].width > WORD and gate.outputs[0].width % WORD == 0
 
 
 def widths(modules: Modules) -> set[int]:
     """Return the widths, in bits, of the constants that GHDL may have lost."""
-    return {
-        gate.outputs[0].width
-        for module in modules.values()
-        for gate in module.instances
-        if is_zero(gate) and gate.outputs[0].width > WORD and gate.outputs[0].width % WORD == 0
-    }
+    return {gate.outputs[0].width for module in modules.values() for gate in module.instances if may_be_lost(gate)}
 
 
 def package(widths: Iterable[int]) -> str:
@@ -527,25 +523,28 @@ class Copies:
         return dropped
 
     def values(self, messages: str) -> dict[tuple[str, int], set[str]]:
-        """Return the values in GHDL's reports by file and position."""
-        values: dict[tuple[str, int], set[str]] = defaultdict(set)
+        """Return the values in GHDL's reports by file and position, for all constants that GHDL evaluates."""
+        values: dict[tuple[str, int], set[str]] = {place: set() for place in self._seen}
         for number, _, levels in _REPORT.findall(messages):
             values[self._seen[int(number)]].add(levels)
         return values
 
-    def lost(self, messages: str, among: set[int], right: set[tuple[str, int]]) -> Iterator[tuple[str, int]]:
+    def lost(
+        self, messages: str, among: set[int], at_ports: Mapping[tuple[str, int], int]
+    ) -> Iterator[tuple[str, int]]:
         """Yield the place and the width of each lost constant that GHDL reports with a width in `among`.
 
-        The constants at the places in `right` are not lost in the netlist.
+        `at_ports` has the width of each constant that instances read at a port if it is lost there, and otherwise 0.
         """
-        self._right = right
+        self._right = {place for place, width in at_ports.items() if not width}
+        shown = ((*place, width) for place, width in at_ports.items() if width)
         reported = (
             (*self._seen[int(number)], int(width))
             for number, width, levels in _REPORT.findall(messages)
-            if len(set(levels)) > 1 and self._seen[int(number)] not in right
+            if len(set(levels)) > 1 and self._seen[int(number)] not in self._right
         )
         literals = ((name, *found) for name in self.sources for found in self._literals(name))
-        for name, position, width in chain(reported, literals):
+        for name, position, width in chain(reported, shown, literals):
             declaration = self.sources[name].constant(position)
             if width in among and (not declaration or self._is_used(declaration, _NO_SLICE)):
                 yield self.sources[name].place(position), width

@@ -6,42 +6,46 @@ zero directly. GHDL computes the constant's value (`lost_constants.py`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
-from fusesoc_firm.netlist.lost_constants import WORD, Source, is_zero
+from fusesoc_firm.netlist.lost_constants import WORD, Source, may_be_lost
 from fusesoc_firm.netlist.model import Instance, Module, Modules, Net
 
 # An actual value: the name of its file, and its position in the file.
 Actual = tuple[str, int]
 
 
-def restore(modules: Modules, sources: Mapping[str, Source], values: Mapping[Actual, set[str]]) -> set[Actual]:
-    """Restore constants in place; return those that are right now, or that GHDL has not lost.
+def restore(
+    modules: Modules, sources: Mapping[str, Source], values: Mapping[Actual, Collection[str]]
+) -> dict[Actual, int]:
+    """Restore constants in place; return 0 for those that are right now, and the width of the others.
 
-    `values` are the levels of the highest bits of each constant whose other bits are equal, and one of the other bits.
-    If an actual has several values, which depend on generics or a loop, the netlist does not show which one belongs to
-    an instance.
+    `values` has the levels of the highest bits of each constant whose other bits are equal, and of one other bit; it
+    has no levels for another constant. If a constant has several values, which depend on generics or a loop, the
+    netlist does not show which one belongs to an instance.
     """
-    right: set[Actual] = set()
-    wrong: set[Actual] = set()
+    widths: dict[Actual, int] = {}
     for module in modules.values():
         gates = {net.number: gate for gate in module.instances for net in gate.outputs}
         for instance, index, actual in list(_inputs(module, modules, sources)):
             net = instance.inputs[index]
             gate = gates.get(net.number) if net else None
-            if len(values.get(actual, ())) != 1 or not net or not gate:
-                wrong.add(actual)
-            else:
-                (levels,) = values[actual]
-                if not is_zero(gate):
-                    right.add(actual)
-                elif set(levels) == {"0", "1"}:
-                    instance.inputs[index] = _constant(module, gate, int(levels[:-1], 2), net.width)
-                    right.add(actual)
+            if not net or not gate or actual not in values:
+                continue
+            widths.setdefault(actual, 0)
+            if may_be_lost(gate):
+                if highest := _highest(values[actual]):
+                    instance.inputs[index] = _constant(module, gate, int(highest, 2), net.width)
                 else:
-                    wrong.add(actual)
-    return right - wrong
+                    widths[actual] = net.width
+    return widths
+
+
+def _highest(values: Collection[str]) -> str:
+    """Return the highest bits, or an empty string if there are several values or levels other than 0 and 1."""
+    (levels,) = values if len(values) == 1 else ("",)
+    return levels[:-1] if set(levels) <= {"0", "1"} else ""
 
 
 def _inputs(module: Module, modules: Modules, sources: Mapping[str, Source]) -> Iterator[tuple[Instance, int, Actual]]:

@@ -256,8 +256,8 @@ class _Ghdl:
                 messages = ghdl.probed(copies)
             except NetlistError as error:
                 doubt = lost_constants.doubt(widths, str(error))
-        right = restore(modules, copies.sources, copies.values(messages))
-        lost_constants.refuse(list(copies.lost(messages, widths, right)))
+        at_ports = restore(modules, copies.sources, copies.values(messages))
+        lost_constants.refuse(list(copies.lost(messages, widths, at_ports)))
         return doubt
 
     def probed(self, copies: lost_constants.Copies) -> str:

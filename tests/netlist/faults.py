@@ -367,6 +367,9 @@ COMPUTED += [
     ),
     _instances("a_default", 1, "part : entity work.a_default_part port map (a => r(0), y => r(1));", default=_JOINED),
     _instances("by_position", 1, f"part : entity work.by_position_part port map (r(0), {_JOINED}, y => r(1));"),
+    _instances(
+        "upwards", 1, "part : entity work.upwards_part port map (r(0), c => (0 => '1', others => '0'), y => r(1));"
+    ),
     # The value depends on the iteration, and so the zeros are ambiguous.
     _instances(
         "iterations",
@@ -380,7 +383,8 @@ KEPT += [
     _instances(
         "ascending",
         1,
-        "part : entity work.ascending_part port map (a => r(0), b => r(0), c => (62 => '1', others => '0'), y => r(1));",
+        "part : entity work.ascending_part\n"
+        "port map (a => r(0), b => r(0), c => (62 => '1', others => '0'), y => r(1));",
         default=_JOINED,
     )
 ]
