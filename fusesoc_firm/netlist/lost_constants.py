@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_left, bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -159,8 +159,7 @@ _OF_ELEMENT = r"\s*\((?P<index>[^();]*)\)"
 _SCALAR = re.compile(
     r"\s*(?:integer|natural|positive|boolean|std_u?logic|bit|time|real|string|character)\b", re.IGNORECASE
 )
-# The text before the default value of a vector.
-_INITIAL = re.compile(rf"\s*(?:(?:constant|signal)\s+)?{_NAMES}(?!\s*(?:in\b)?{_SCALAR.pattern})[^:]*:=", re.IGNORECASE)
+_FORMAL = re.compile(rf"\s*(?:(?:constant|signal)\s+)?{_NAMES}\s*(?:(?:in|out|inout|buffer)\b)?", re.IGNORECASE)
 _ASSIGNMENT = re.compile(
     r"(?:;|=>|\b(?:begin|then|else|loop|generate)\b|\w\s*:)\s*(\w+)\s*(?:<=|:=)([^;]*)(?=;)",
     re.IGNORECASE,
@@ -174,7 +173,8 @@ _CALL = re.compile(
 _RANGE = re.compile(r"\b(?:downto|to|range)\b", re.IGNORECASE)
 _NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
 _LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
-_SCALAR_VALUE = re.compile(r"open|true|false|'.'", re.IGNORECASE)
+# Values that are not lost: scalars, and vectors with the same level in all bits.
+_KEPT = re.compile(r"open|true|false|'.'|\(\s*others\s*=>\s*'.'\s*\)", re.IGNORECASE)
 _OF_ZEROS = re.compile(r"""(?:'0'|[xb]?"[0_]*"|\b(?:others|downto|to|\d+)\b|[\s(),=>|])*""", re.IGNORECASE)
 _REPORT = re.compile(rf"firm seen (\d+) (\d+) ([01XZ]{{{WORD + 1}}})")
 _PLACE = re.compile(r"(.*):(\d+):(\d+)")
@@ -267,11 +267,14 @@ class Source:
             if width > WORD and width % WORD == 0 and value and value % (1 << width - WORD) == 0:
                 yield found.start(), width
 
-    def probes(self, types: Mapping[str, str]) -> Iterator[_Probe]:
-        """Yield the probes of a file; `types` maps each package type to the function that returns its bits."""
+    def probes(self, types: Mapping[str, str], scalars: Collection[str]) -> Iterator[_Probe]:
+        """Yield the probes of a file; `types` maps each package type to the function that returns its bits.
+
+        `scalars` are the ports and generics without probes.
+        """
         yield from (_Probe(start, start, _USE) for start, _, _ in self.units)
         yield from (_Probe(end, end, text) for _, end, text in self.types(of_packages=False))
-        associated = list(self._associated())
+        associated = list(self._associated(scalars))
         aggregates = [probe.start for probe in associated if probe.others]
         ends = [*self._begins[1:], len(self.code)]
         for (_, head, kind), end in zip(self.units, ends, strict=True):
@@ -322,15 +325,13 @@ class Source:
         """Return a probe of concatenated vectors; function calls have separate probes."""
         return self._seen(start, end) if "&" in self.code[start:end] else None
 
-    def _associated(self) -> Iterator[_Probe]:
-        """Yield the probes of actual and default values of ports and generics, each on a line of its own.
-
-        GHDL rejects a probe of a scalar.
-        """
+    def _associated(self, scalars: Collection[str]) -> Iterator[_Probe]:
+        """Yield the probes of actual and default values of ports and generics, each on a line of its own."""
         lost = {position for position, _ in self.literals()}
         for begin, start, end in chain(self._actuals(), self._defaults()):
             value = self._with_literals[start:end]
-            is_kept = _SCALAR_VALUE.fullmatch(value) or (_LITERAL.fullmatch(value) and start not in lost)
+            is_kept = _KEPT.fullmatch(value) or (_LITERAL.fullmatch(value) and start not in lost)
+            is_kept = is_kept or self._formal(begin, start) in scalars
             if not is_kept and self.signals.isdisjoint(_NAME.findall(self.code[start:end].lower())):
                 names = [f"firm_seen_{width}" for width in self._widths] if value.startswith("(") else []
                 if probe := self._seen(start, end, *names, "firm_seen"):
@@ -354,14 +355,30 @@ class Source:
         begin = sum(len(text) + 1 for text in lines[: line - 1]) + before
         end = self.code.find(";", begin)
         for start, value, _ in self._actuals(begin, end):
-            yield self.code[start:value].partition("=>")[0].strip().lower(), value
+            yield self._formal(start, value), value
+
+    def _formal(self, start: int, value: int) -> str:
+        return self.code[start:value].partition("=>")[0].strip().lower()
 
     def _defaults(self) -> Iterator[tuple[int, int, int]]:
         """Yield the same positions for the default value of each vector among ports and generics."""
+        for _, start, end in self._formals():
+            initial = self.code.find(":=", start, end)
+            if initial >= 0 and not _SCALAR.match(self.code, start):
+                yield self._trimmed(initial + 2, initial + 2, end)
+
+    def _formals(self) -> Iterator[tuple[str, int, int]]:
+        """Yield the names, the start of the type and the end of each declaration of ports or generics."""
         for found in _INTERFACE.finditer(self.code):
             for start, end in _parts(self.code, found.end(), ";") if found[1].lower() in {"generic", "port"} else ():
-                if initial := _INITIAL.match(self.code, start, end):
-                    yield self._trimmed(initial.end(), initial.end(), end)
+                if formal := _FORMAL.match(self.code, start, end):
+                    yield formal[1], formal.end(), end
+
+    def formals(self, *, are_scalar: bool) -> set[str]:
+        """Return the names of ports and generics with scalar types, or of all others."""
+        return _split(
+            names for names, start, _ in self._formals() if bool(_SCALAR.match(self.code, start)) == are_scalar
+        )
 
     def _trimmed(self, begin: int, start: int, end: int) -> tuple[int, int, int]:
         """Return the positions without the blanks and comments around the value."""
@@ -473,7 +490,11 @@ class Copies:
         types = [type_ for source in self.sources.values() for type_ in source.types(of_packages=True)]
         functions = {name: text for name, _, text in types}
         self.folder = folder
-        self.probes = {name: list(source.probes(functions)) for name, source in self.sources.items()}
+        scalars, others = (
+            {name for source in self.sources.values() for name in source.formals(are_scalar=are_scalar)}
+            for are_scalar in (True, False)
+        )
+        self.probes = {name: list(source.probes(functions, scalars - others)) for name, source in self.sources.items()}
         # The probes in each line of a copy.
         self._lines: dict[str, dict[int, set[_Probe]]] = {}
         self._seen: list[tuple[str, int]] = []
