@@ -22,6 +22,8 @@ from fusesoc_firm.netlist.sources import TAB
 LIBRARY = "firm_probes"
 WORD = 32
 _VECTORS = ("std_logic_vector", "unsigned", "signed")
+_DOWN = "({} downto 0)"
+_ARROW = "=>"
 _SEEN = """
 function firm_seen{1} (v : {0}{2}; n : natural) return {0} is
   constant is_seen : boolean := firm_is_seen(firm_bits(v), n);
@@ -344,8 +346,8 @@ class Source:
         for found in _MAP.finditer(self.code, begin, len(self.code) if end is None else end):
             for start, stop in _parts(self.code, found.end(), ","):
                 _, arrow = next(_parts(self.code, start, "="))
-                has_name = arrow < stop and self.code.startswith("=>", arrow)
-                yield self._trimmed(start, arrow + 2 if has_name else start, stop)
+                has_name = arrow < stop and self.code.startswith(_ARROW, arrow)
+                yield self._trimmed(start, arrow + len(_ARROW) if has_name else start, stop)
 
     def port_map(self, line: int, column: int) -> Iterator[tuple[str, int]]:
         """Yield the port and the value's start of each association in the instance with this place."""
@@ -358,7 +360,7 @@ class Source:
             yield self._formal(start, value), value
 
     def _formal(self, start: int, value: int) -> str:
-        return self.code[start:value].partition("=>")[0].strip().lower()
+        return self.code[start:value].partition(_ARROW)[0].strip().lower()
 
     def _defaults(self) -> Iterator[tuple[int, int, int]]:
         """Yield the same positions for the default value of each vector among ports and generics."""
@@ -476,7 +478,7 @@ def widths(modules: Modules) -> set[int]:
 def package(widths: Iterable[int]) -> str:
     """Return the packages with the functions of the probes, for constants of these widths."""
     functions = [
-        _SEEN.format(name, f"_{width}", f"({width - 1} downto 0)") for width in sorted(widths) for name in _VECTORS
+        _SEEN.format(name, f"_{width}", _DOWN.format(width - 1)) for width in sorted(widths) for name in _VECTORS
     ]
     heads = (text.partition(" is\n")[0] + ";" for text in functions)
     return _PACKAGE + _OF_WIDTHS.format(LIBRARY, "".join(heads), "".join(functions))
