@@ -172,6 +172,9 @@ _CALL = re.compile(
     r"\b(?:shift_left|shift_right|rotate_left|rotate_right|resize|(?:std_logic_vector|unsigned|signed)\b'?)\s*\(",
     re.IGNORECASE,
 )
+_GROUP = r"\((?:[^()]|\([^()]*\))*\)"
+_OPERAND = rf"""(?:[xb]?"[\da-f_]*"|'.'|\b[a-z][\w.]*(?:'?\s*{_GROUP})?(?![\w.]|\s*')|{_GROUP})"""
+_CONCATENATION = re.compile(rf"{_OPERAND}(?:\s*&\s*{_OPERAND})+", re.IGNORECASE)
 _RANGE = re.compile(r"\b(?:downto|to|range)\b", re.IGNORECASE)
 _NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
 _LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
@@ -389,14 +392,16 @@ class Source:
         return (begin if begin < start else first), first, start + len(value.rstrip())
 
     def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
-        """Yield the probes for the results of functions that expressions apply to constants."""
+        """Yield the probes for concatenated constants and for functions of constants within expressions."""
         last = 0
-        for found in _CALL.finditer(self.code):
-            start, end = found.start(), _closed(self.code, found.end())
+        calls = ((found.start(), _closed(self.code, found.end()), found.end()) for found in _CALL.finditer(self.code))
+        joined = ((*found.span(), found.start()) for found in _CONCATENATION.finditer(self._with_literals))
+        for start, end, argument in sorted([*joined, *calls]):
             is_apart = start >= last and not _is_within(start, spans)
-            if is_apart and not _RANGE.search(self.code, found.end(), end) and self._is_constant(found.end(), end):
+            if is_apart and not _RANGE.search(self.code, argument, end) and self._is_constant(argument, end):
                 last = end
-                yield from filter(None, [self._seen(start, end)])
+                if probe := self._seen(start, end):
+                    yield replace(probe, text=f"\n{probe.text}\n")
 
     def _seen(self, start: int, end: int, *functions: str) -> _Probe | None:
         value = self.text[start:end]
