@@ -175,6 +175,8 @@ _CALL = re.compile(
 _GROUP = r"\((?:[^()]|\([^()]*\))*\)"
 _OPERAND = rf"""(?:[xb]?"[\da-f_]*"|'.'|\b[a-z][\w.]*(?:'?\s*{_GROUP})?(?![\w.]|\s*')|{_GROUP})"""
 _CONCATENATION = re.compile(rf"{_OPERAND}(?:\s*&\s*{_OPERAND})+", re.IGNORECASE)
+_FUNCTION = re.compile(r"\bfunction\s+(\w+)\s*(\()?", re.IGNORECASE)
+_RETURN = re.compile(r"\s*return\b", re.IGNORECASE)
 _RANGE = re.compile(r"\b(?:downto|to|range)\b", re.IGNORECASE)
 _NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
 _LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
@@ -272,10 +274,12 @@ class Source:
             if width > WORD and width % WORD == 0 and value and value % (1 << width - WORD) == 0:
                 yield found.start(), width
 
-    def probes(self, types: Mapping[str, str], scalars: Collection[str]) -> Iterator[_Probe]:
+    def probes(
+        self, types: Mapping[str, str], functions: Collection[str], scalars: Collection[str]
+    ) -> Iterator[_Probe]:
         """Yield the probes of a file; `types` maps each package type to the function that returns its bits.
 
-        `scalars` are the ports and generics without probes.
+        `functions` are those whose calls have probes; `scalars` are the ports and generics without probes.
         """
         yield from (_Probe(start, start, _USE) for start, _, _ in self.units)
         yield from (_Probe(end, end, text) for _, end, text in self.types(of_packages=False))
@@ -300,7 +304,9 @@ class Source:
         spans = [found.span() for found in declarations]
         assigned = list(self._assigned(declared, spans))
         yield from (*assigned, *associated)
-        yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in (*assigned, *associated))]))
+        yield from self._calls(
+            sorted([*spans, *((probe.start, probe.end) for probe in (*assigned, *associated))]), functions
+        )
 
     def _first_value(self, found: re.Match[str]) -> _Probe | None:
         """Return the probe of a declaration, or None if the value depends on a function's parameters.
@@ -391,12 +397,23 @@ class Source:
         first = start + len(value) - len(value.lstrip())
         return (begin if begin < start else first), first, start + len(value.rstrip())
 
-    def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
+    def functions(self) -> Iterator[str]:
+        """Yield the names of the functions that return no scalar."""
+        for found in _FUNCTION.finditer(self.code):
+            end = _closed(self.code, found.end()) if found[2] else found.end()
+            result = _RETURN.match(self.code, end)
+            if result and not _SCALAR.match(self.code, result.end()):
+                yield found[1].lower()
+
+    def _calls(self, spans: Sequence[tuple[int, int]], functions: Collection[str]) -> Iterator[_Probe]:
         """Yield the probes for concatenated constants and for functions of constants within expressions."""
         last = 0
-        calls = ((found.start(), _closed(self.code, found.end()), found.end()) for found in _CALL.finditer(self.code))
+        call = re.compile(
+            rf"{_CALL.pattern}|\b(?:{'|'.join(functions)})\s*\(" if functions else _CALL.pattern, re.IGNORECASE
+        )
+        calls = ((found.start(), _closed(self.code, found.end()), found.end()) for found in call.finditer(self.code))
         joined = ((*found.span(), found.start()) for found in _CONCATENATION.finditer(self._with_literals))
-        for start, end, argument in sorted([*joined, *calls]):
+        for start, end, argument in sorted([*joined, *calls], key=lambda span: (span[0], -span[1])):
             is_apart = start >= last and not _is_within(start, spans)
             if is_apart and not _RANGE.search(self.code, argument, end) and self._is_constant(argument, end):
                 last = end
@@ -495,13 +512,16 @@ class Copies:
     def __init__(self, files: Iterable[str], folder: Path, widths: Iterable[int]) -> None:
         self.sources = {name: Source(name, widths) for name in files}
         types = [type_ for source in self.sources.values() for type_ in source.types(of_packages=True)]
-        functions = {name: text for name, _, text in types}
+        bits = {name: text for name, _, text in types}
+        functions = {name for source in self.sources.values() for name in source.functions()}
         self.folder = folder
         scalars, others = (
             {name for source in self.sources.values() for name in source.formals(are_scalar=are_scalar)}
             for are_scalar in (True, False)
         )
-        self.probes = {name: list(source.probes(functions, scalars - others)) for name, source in self.sources.items()}
+        self.probes = {
+            name: list(source.probes(bits, functions, scalars - others)) for name, source in self.sources.items()
+        }
         # The probes in each line of a copy.
         self._lines: dict[str, dict[int, set[_Probe]]] = {}
         self._seen: list[tuple[str, int]] = []

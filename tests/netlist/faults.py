@@ -360,6 +360,15 @@ RESTORED = [
     ),
 ]
 COMPUTED += [
+    _design("an_operand", 64, f"x(63 downto 0) xor ({_JOINED})"),
+    _design(
+        "a_compared_constant",
+        1,
+        "r",
+        "signal r : unsigned(0 downto 0);",
+        f'r <= "1" when x(63 downto 0) = {_JOINED} else "0";',
+    ),
+    _design("a_result", 64, "x(63 downto 0) xor shifted(40)", _CONSTANTS),
     _instances(
         "of_a_generic",
         1,
