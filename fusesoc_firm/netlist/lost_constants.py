@@ -4,6 +4,8 @@ In the netlist, a lost constant looks like any other zero. If the netlist contai
 of the sources with probes is therefore synthesised; a probe is a function that reports the value of a constant
 expression. GHDL evaluates the probes during synthesis, because all arguments are constant. The same applies to levels
 other than 0 and 1.
+
+Constants at ports are restored (`restored_constants`); all others are refused.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 
@@ -373,23 +376,25 @@ class Source:
 
     def _defaults(self) -> Iterator[tuple[int, int, int]]:
         """Yield the same positions for the default value of each vector among ports and generics."""
-        for _, start, end in self._formals():
+        for _, start, end in self._formals:
             initial = self.code.find(":=", start, end)
             if initial >= 0 and not _SCALAR.match(self.code, start):
                 yield self._trimmed(initial + 2, initial + 2, end)
 
-    def _formals(self) -> Iterator[tuple[str, int, int]]:
-        """Yield the names, the start of the type and the end of each declaration of ports or generics."""
-        for found in _INTERFACE.finditer(self.code):
-            for start, end in _parts(self.code, found.end(), ";") if found[1].lower() in {"generic", "port"} else ():
-                if formal := _FORMAL.match(self.code, start, end):
-                    yield formal[1], formal.end(), end
+    @cached_property
+    def _formals(self) -> list[tuple[str, int, int]]:
+        """The names, the start of the type and the end of each declaration of ports or generics."""
+        return [
+            (formal[1], formal.end(), end)
+            for found in _INTERFACE.finditer(self.code)
+            if found[1].lower() in {"generic", "port"}
+            for start, end in _parts(self.code, found.end(), ";")
+            if (formal := _FORMAL.match(self.code, start, end))
+        ]
 
     def formals(self, *, are_scalar: bool) -> set[str]:
         """Return the names of ports and generics with scalar types, or of all others."""
-        return _split(
-            names for names, start, _ in self._formals() if bool(_SCALAR.match(self.code, start)) == are_scalar
-        )
+        return _split(names for names, start, _ in self._formals if bool(_SCALAR.match(self.code, start)) == are_scalar)
 
     def _trimmed(self, begin: int, start: int, end: int) -> tuple[int, int, int]:
         """Return the positions without the blanks and comments around the value."""
@@ -473,11 +478,11 @@ def _closed(code: str, start: int) -> int:
 def _parts(code: str, start: int, separator: str) -> Iterator[tuple[int, int]]:
     """Yield the start and end of each part of a text from `start` to the parenthesis that closes it."""
     depth = 0
-    for position in range(start, len(code)):
-        if not depth and code[position] in {separator, ")"}:
-            yield start, position
-            start = position + 1
-        depth += {"(": 1, ")": -1}.get(code[position], 0)
+    for found in re.compile(rf"[(){separator}]").finditer(code, start):
+        if not depth and found[0] != "(":
+            yield start, found.start()
+            start = found.end()
+        depth += {"(": 1, ")": -1}.get(found[0], 0)
         if depth < 0:
             break
 
