@@ -256,7 +256,7 @@ class _Ghdl:
                 messages = ghdl.probed(copies)
             except NetlistError as error:
                 doubt = lost_constants.doubt(widths, str(error))
-        at_ports = restore(modules, copies.sources, copies.values(messages))
+        at_ports = restore(modules, copies.sources, {} if doubt else copies.values(messages))
         lost_constants.refuse(list(copies.lost(messages, widths, at_ports)))
         return doubt
 
