@@ -4,41 +4,51 @@ In the netlist, a lost constant looks like any other zero. If the netlist contai
 of the sources with probes is therefore synthesised; a probe is a function that reports the value of a constant
 expression. GHDL evaluates the probes during synthesis, because all arguments are constant. The same applies to levels
 other than 0 and 1.
+
+Constants at ports are restored (`restored_constants`); all others are refused.
 """
 
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 
-from fusesoc_firm.netlist.model import Modules, NetlistError
+from fusesoc_firm.netlist.model import Instance, Modules, NetlistError
+from fusesoc_firm.netlist.sources import TAB
 
 LIBRARY = "firm_probes"
-_WORD = 32
+WORD = 32
 _VECTORS = ("std_logic_vector", "unsigned", "signed")
-_PER_VECTOR = """
+_DOWN = "({} downto 0)"
+_ARROW = "=>"
+_SEEN = """
+function firm_seen{1} (v : {0}{2}; n : natural) return {0} is
+  constant is_seen : boolean := firm_is_seen(firm_bits(v), n);
+begin
+  return v;
+end function firm_seen{1};
+"""
+_PER_VECTOR = (
+    """
   function firm_bits (v : {0}) return std_logic_vector is
   begin
     return std_logic_vector(v);
   end function firm_bits;
-
-  function firm_seen (v : {0}; n : natural) return {0} is
-    constant is_seen : boolean := firm_is_lost(std_logic_vector(v), n);
-  begin
-    return v;
-  end function firm_seen;
 """
-PACKAGE = f"""library ieee;
+    + _SEEN
+)
+_PACKAGE = f"""library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 
 package probes is
-  function firm_is_lost (v : std_logic_vector; n : natural) return boolean;
+  function firm_is_seen (v : std_logic_vector; n : natural) return boolean;
   function firm_bits (v : std_ulogic) return std_logic_vector;
 {
     "".join(
@@ -50,7 +60,7 @@ package probes is
 }end package probes;
 
 package body probes is
-  function level (v : std_ulogic) return std_ulogic is
+  function level (v : std_ulogic) return character is
   begin
     case v is
       when '0' | 'L' => return '0';
@@ -60,39 +70,38 @@ package body probes is
     end case;
   end function level;
 
-  function firm_is_lost (v : std_logic_vector; n : natural) return boolean is
+  -- Report the levels of the highest bits and of all others if these are equal and not '1'.
+  function firm_is_seen (v : std_logic_vector; n : natural) return boolean is
     constant bits : std_logic_vector(0 to v'length - 1) := v;
-    variable lowest : std_ulogic;
+    variable levels : string(1 to {WORD + 1});
   begin
-    if v'length <= {_WORD} or v'length mod {_WORD} /= 0 then
+    if v'length <= {WORD} or v'length mod {WORD} /= 0 then
       return false;
     end if;
-    lowest := level(bits(bits'right));
-    if lowest = '1' then
+    for i in levels'range loop
+      levels(i) := level(bits(i - 1));
+    end loop;
+    if levels(levels'right) = '1' then
       return false;
     end if;
-    for i in {_WORD} to bits'right loop
-      if level(bits(i)) /= lowest then
+    for i in {WORD} to bits'right loop
+      if level(bits(i)) /= levels(levels'right) then
         return false;
       end if;
     end loop;
-    for i in 0 to {_WORD - 1} loop
-      if level(bits(i)) /= lowest then
-        report "firm lost " & integer'image(n) & " " & integer'image(v'length) severity warning;
-        return true;
-      end if;
-    end loop;
-    return false;
-  end function firm_is_lost;
+    report "firm seen " & integer'image(n) & " " & integer'image(v'length) & " " & levels severity warning;
+    return true;
+  end function firm_is_seen;
 
   function firm_bits (v : std_ulogic) return std_logic_vector is
     constant bits : std_logic_vector(0 to 0) := (others => v);
   begin
     return bits;
   end function firm_bits;
-{"".join(map(_PER_VECTOR.format, _VECTORS))}end package body probes;
+{"".join(_PER_VECTOR.format(name, "", "") for name in _VECTORS)}end package body probes;
 """
-_ARRAY = """
+_ARRAY = (
+    """
 function firm_bits (v : {0}) return std_logic_vector is
   constant first : std_logic_vector := firm_bits(v(v'left));
   variable found : std_logic_vector(0 to v'length * first'length - 1);
@@ -105,13 +114,33 @@ begin
   return found;
 end function firm_bits;
 """
-_RECORD = """
+    + _SEEN
+)
+_RECORD = (
+    """
 function firm_bits (v : {0}) return std_logic_vector is
 begin
-  return {1};
+  return {3};
 end function firm_bits;
 """
-_USE = f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; use {LIBRARY}.probes.all; "
+    + _SEEN
+)
+# Functions for aggregates, whose width and direction only a constrained parameter determines.
+_OF_WIDTHS = """library ieee, {0};
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use {0}.probes.all;
+
+package of_widths is
+{1}end package of_widths;
+
+package body of_widths is
+{2}end package body of_widths;
+"""
+_USE = (
+    f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; "
+    f"use {LIBRARY}.probes.all; use {LIBRARY}.of_widths.all; "
+)
 
 _HIDDEN = re.compile(r'--[^\n]*|\b[box]"[^"\n]*"|"[^"\n]*"', re.IGNORECASE)
 _UNIT = re.compile(
@@ -125,8 +154,9 @@ _NAMES = r"\b(\w+(?:\s*,\s*\w+)*)\s*:(?!=)"
 _FIELDS = re.compile(_NAMES)
 _OBJECT = re.compile(rf"\b(constant|signal|variable)\s+{_NAMES}([^;]*?)(?::=([^;]*))?;", re.IGNORECASE)
 _PORT = re.compile(rf"{_NAMES}\s*(?:out|inout|buffer)\s+(\w+(?:\s*\((?:[^()]|\([^()]*\))*\))?)", re.IGNORECASE)
-_DYNAMIC = re.compile(rf"\b(?:signal|variable)\s+{_NAMES}", re.IGNORECASE)
+_SIGNAL, _VARIABLE = (re.compile(rf"\b{kind}\s+{_NAMES}", re.IGNORECASE) for kind in ("signal", "variable"))
 _INTERFACE = re.compile(r"\b(generic|port|function|procedure)\b[^()]*\(", re.IGNORECASE)
+_MAP = re.compile(r"\b(?:generic|port)\s+map\s*\(", re.IGNORECASE)
 _COMMA = r"\s*,\s*"
 # The text after a constant that is used as a whole, or of which an element is used.
 _NO_SLICE = r"(?P<index>)(?!\s*(?:'|\(\s*\d+(?:\s+(?:downto|to)\s+\d+)?\s*\)))"
@@ -134,6 +164,7 @@ _OF_ELEMENT = r"\s*\((?P<index>[^();]*)\)"
 _SCALAR = re.compile(
     r"\s*(?:integer|natural|positive|boolean|std_u?logic|bit|time|real|string|character)\b", re.IGNORECASE
 )
+_FORMAL = re.compile(rf"\s*(?:(?:constant|signal)\s+)?{_NAMES}\s*(?:(?:in|out|inout|buffer)\b)?", re.IGNORECASE)
 _ASSIGNMENT = re.compile(
     r"(?:;|=>|\b(?:begin|then|else|loop|generate)\b|\w\s*:)\s*(\w+)\s*(?:<=|:=)([^;]*)(?=;)",
     re.IGNORECASE,
@@ -144,37 +175,59 @@ _CALL = re.compile(
     r"\b(?:shift_left|shift_right|rotate_left|rotate_right|resize|(?:std_logic_vector|unsigned|signed)\b'?)\s*\(",
     re.IGNORECASE,
 )
+_GROUP = r"\((?:[^()]|\([^()]*\))*\)"
+_OPERAND = rf"""(?:[xb]?"[\da-f_]*"|'.'|\b[a-z][\w.]*(?:'?\s*{_GROUP})?(?![\w.]|\s*')|{_GROUP})"""
+_CONCATENATION = re.compile(rf"{_OPERAND}(?:\s*&\s*{_OPERAND})+", re.IGNORECASE)
+_FUNCTION = re.compile(r"\bfunction\s+(\w+)\s*(\()?", re.IGNORECASE)
+_RETURN = re.compile(r"\s*return\b", re.IGNORECASE)
 _RANGE = re.compile(r"\b(?:downto|to|range)\b", re.IGNORECASE)
 _NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
 _LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
+# Values that are not lost: scalars, and vectors with the same level in all bits.
+_KEPT = re.compile(r"open|true|false|'.'|\(\s*others\s*=>\s*'.'\s*\)", re.IGNORECASE)
 _OF_ZEROS = re.compile(r"""(?:'0'|[xb]?"[0_]*"|\b(?:others|downto|to|\d+)\b|[\s(),=>|])*""", re.IGNORECASE)
-_REPORT = re.compile(r"firm lost (\d+) (\d+)")
+_REPORT = re.compile(rf"firm seen (\d+) (\d+) ([01XZ]{{{WORD + 1}}})")
+_PLACE = re.compile(r"(.*):(\d+):(\d+)")
 
 
 @dataclass(frozen=True)
 class _Probe:
-    """A text that replaces a part of a file; `constant` is the span of the examined expression, if any."""
+    """A text that replaces a part of a file; `constant` is the span of the examined expression, if any.
+
+    If GHDL rejects the text, the first text in `others` takes its place.
+    """
 
     start: int
     end: int
     text: str
     constant: tuple[int, int] | None = None
+    others: tuple[str, ...] = ()
+
+    @property
+    def other(self) -> _Probe | None:
+        """The probe that replaces this one after GHDL has rejected it, if any."""
+        return replace(self, text=self.others[0], others=self.others[1:]) if self.others else None
 
 
 class Source:
     """A source file with the probes for its constants."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, widths: Iterable[int]) -> None:
         self.name = name
+        self._widths = sorted(widths)
         self.text = Path(name).read_bytes().decode("latin-1")
         # Comments and the contents of literals are replaced by blanks, so that all positions remain valid.
         self.code = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), self.text)
+        self._with_literals = _HIDDEN.sub(
+            lambda found: " " * len(found[0]) if found[0].startswith("--") else found[0], self.text
+        )
         self.units = [
             (found.start(), found.end(), (found[1] or found[2] or found[4] or found[3]).lower())
             for found in _UNIT.finditer(self.code)
         ]
-        found = [*_DYNAMIC.findall(self.code), *self._parameters()]
-        self.dynamic = {name.strip().lower() for names in found for name in names.split(",")}
+        self.signals = _split([*_SIGNAL.findall(self.code), *self._parameters({"port"})])
+        parameters = self._parameters({"function", "procedure"})
+        self.dynamic = self.signals | _split([*_VARIABLE.findall(self.code), *parameters])
         self.constants = [item for item in _OBJECT.finditer(self.code) if item[1].lower() == "constant"]
         self._begins = [start for start, _, _ in self.units]
         # The number of open parentheses before each parenthesis, and the positions of the parentheses.
@@ -184,9 +237,9 @@ class Source:
             self._parentheses.append(parenthesis.start())
             self._depths.append(self._depths[-1] + (1 if parenthesis[0] == "(" else -1))
 
-    def _parameters(self) -> Iterator[str]:
+    def _parameters(self, kinds: set[str]) -> Iterator[str]:
         for found in _INTERFACE.finditer(self.code):
-            if found[1].lower() != "generic":
+            if found[1].lower() in kinds:
                 yield from _FIELDS.findall(self.code, found.end(), _closed(self.code, found.end()))
 
     def place(self, position: int) -> str:
@@ -214,26 +267,36 @@ class Source:
             if kind and (kind == "package") == of_packages:
                 fields = [name.strip() for names in _FIELDS.findall(found[2] or "") for name in names.split(",")]
                 bits = " & ".join(f"firm_bits(v.{name})" for name in reversed(fields))
-                yield found[1], found.end(), (_RECORD if fields else _ARRAY).format(found[1], bits)
+                yield found[1], found.end(), (_RECORD if fields else _ARRAY).format(found[1], "", "", bits)
 
     def literals(self) -> Iterator[tuple[int, int]]:
         """Yield the position and width of each literal that GHDL loses."""
-        code = re.sub(r"--[^\n]*", lambda found: " " * len(found[0]), self.text)
-        for found in _LITERAL.finditer(code):
+        for found in _LITERAL.finditer(self._with_literals):
             digits = (found[1] or found[2]).replace("_", "")
             width, value = (4 * len(digits), int(digits, 16)) if found[1] else (len(digits), int(digits, 2))
-            if width > _WORD and width % _WORD == 0 and value and value % (1 << width - _WORD) == 0:
+            if width > WORD and width % WORD == 0 and value and value % (1 << width - WORD) == 0:
                 yield found.start(), width
 
-    def probes(self, types: Mapping[str, str]) -> Iterator[_Probe]:
-        """Yield the probes of a file; `types` maps each package type to the function that returns its bits."""
-        yield from (_Probe(start, start, _USE) for start, _, kind in self.units if kind != "entity")
+    def probes(
+        self, types: Mapping[str, str], functions: Collection[str], scalars: Collection[str]
+    ) -> Iterator[_Probe]:
+        """Yield the probes of a file; `types` maps each package type to the function that returns its bits.
+
+        `functions` are those whose calls have probes; `scalars` are the ports and generics without probes.
+        """
+        yield from (_Probe(start, start, _USE) for start, _, _ in self.units)
         yield from (_Probe(end, end, text) for _, end, text in self.types(of_packages=False))
+        associated = list(self._associated(scalars))
+        aggregates = [probe.start for probe in associated if probe.others]
         ends = [*self._begins[1:], len(self.code)]
         for (_, head, kind), end in zip(self.units, ends, strict=True):
             if kind in {"architecture", "body"}:
                 words = set(_NAME.findall(self.code[head:end].lower()))
-                yield from (_Probe(head, head, text) for name, text in types.items() if name.lower() in words)
+                # The code does not name the type of an aggregate that is an actual value.
+                has_aggregates = any(head < start < end for start in aggregates)
+                yield from (
+                    _Probe(head, head, text) for name, text in types.items() if has_aggregates or name.lower() in words
+                )
         declarations = [found for found in _OBJECT.finditer(self.code) if self.unit(found.start())]
         declared = {
             (self._index(found.start()), name.strip().lower()): found
@@ -243,8 +306,10 @@ class Source:
         yield from filter(None, map(self._first_value, declarations))
         spans = [found.span() for found in declarations]
         assigned = list(self._assigned(declared, spans))
-        yield from assigned
-        yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in assigned)]))
+        yield from (*assigned, *associated)
+        yield from self._calls(
+            sorted([*spans, *((probe.start, probe.end) for probe in (*assigned, *associated))]), functions
+        )
 
     def _first_value(self, found: re.Match[str]) -> _Probe | None:
         """Return the probe of a declaration, or None if the value depends on a function's parameters.
@@ -274,21 +339,98 @@ class Source:
         """Return a probe of concatenated vectors; function calls have separate probes."""
         return self._seen(start, end) if "&" in self.code[start:end] else None
 
-    def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
-        """Yield the probes for the results of functions that expressions apply to constants."""
-        last = 0
-        for found in _CALL.finditer(self.code):
-            start, end = found.start(), _closed(self.code, found.end())
-            is_apart = start >= last and not _is_within(start, spans)
-            if is_apart and not _RANGE.search(self.code, found.end(), end) and self._is_constant(found.end(), end):
-                last = end
-                yield from filter(None, [self._seen(start, end)])
+    def _associated(self, scalars: Collection[str]) -> Iterator[_Probe]:
+        """Yield the probes of actual and default values of ports and generics, each on a line of its own."""
+        lost = {position for position, _ in self.literals()}
+        for begin, start, end in chain(self._actuals(), self._defaults()):
+            value = self._with_literals[start:end]
+            is_kept = _KEPT.fullmatch(value) or (_LITERAL.fullmatch(value) and start not in lost)
+            is_kept = is_kept or self._formal(begin, start) in scalars
+            if not is_kept and self.signals.isdisjoint(_NAME.findall(self.code[start:end].lower())):
+                names = [f"firm_seen_{width}" for width in self._widths] if value.startswith("(") else []
+                if probe := self._seen(start, end, *names, "firm_seen"):
+                    formal = _escaped(self.text[begin:start])
+                    texts = [f"\n{formal}{text}\n" for text in (probe.text, *probe.others)]
+                    yield _Probe(begin, end, texts[0], probe.constant, tuple(texts[1:]))
 
-    def _seen(self, start: int, end: int) -> _Probe | None:
+    def _actuals(self, begin: int = 0, end: int | None = None) -> Iterator[tuple[int, int, int]]:
+        """Yield the start, the start of the value and the end of each association in a port or generic map."""
+        for found in _MAP.finditer(self.code, begin, len(self.code) if end is None else end):
+            for start, stop in _parts(self.code, found.end(), ","):
+                _, arrow = next(_parts(self.code, start, "="))
+                has_name = arrow < stop and self.code.startswith(_ARROW, arrow)
+                yield self._trimmed(start, arrow + len(_ARROW) if has_name else start, stop)
+
+    def port_map(self, line: int, column: int) -> Iterator[tuple[str, int]]:
+        """Yield the port and the value's start of each association in the instance with this place."""
+        lines = self.text.split("\n")
+        widths = (len(lines[line - 1][:length].expandtabs(TAB)) for length in range(column))
+        before = bisect_left(list(widths), column - 1)
+        begin = sum(len(text) + 1 for text in lines[: line - 1]) + before
+        end = self.code.find(";", begin)
+        for start, value, _ in self._actuals(begin, end):
+            yield self._formal(start, value), value
+
+    def _formal(self, start: int, value: int) -> str:
+        return self.code[start:value].partition(_ARROW)[0].strip().lower()
+
+    def _defaults(self) -> Iterator[tuple[int, int, int]]:
+        """Yield the same positions for the default value of each vector among ports and generics."""
+        for _, start, end in self._formals:
+            initial = self.code.find(":=", start, end)
+            if initial >= 0 and not _SCALAR.match(self.code, start):
+                yield self._trimmed(initial + 2, initial + 2, end)
+
+    @cached_property
+    def _formals(self) -> list[tuple[str, int, int]]:
+        """The names, the start of the type and the end of each declaration of ports or generics."""
+        return [
+            (formal[1], formal.end(), end)
+            for found in _INTERFACE.finditer(self.code)
+            if found[1].lower() in {"generic", "port"}
+            for start, end in _parts(self.code, found.end(), ";")
+            if (formal := _FORMAL.match(self.code, start, end))
+        ]
+
+    def formals(self, *, are_scalar: bool) -> set[str]:
+        """Return the names of ports and generics with scalar types, or of all others."""
+        return _split(names for names, start, _ in self._formals if bool(_SCALAR.match(self.code, start)) == are_scalar)
+
+    def _trimmed(self, begin: int, start: int, end: int) -> tuple[int, int, int]:
+        """Return the positions without the blanks and comments around the value."""
+        value = self._with_literals[start:end]
+        first = start + len(value) - len(value.lstrip())
+        return (begin if begin < start else first), first, start + len(value.rstrip())
+
+    def functions(self) -> Iterator[str]:
+        """Yield the names of the functions that return no scalar."""
+        for found in _FUNCTION.finditer(self.code):
+            end = _closed(self.code, found.end()) if found[2] else found.end()
+            result = _RETURN.match(self.code, end)
+            if result and not _SCALAR.match(self.code, result.end()):
+                yield found[1].lower()
+
+    def _calls(self, spans: Sequence[tuple[int, int]], functions: Collection[str]) -> Iterator[_Probe]:
+        """Yield the probes for concatenated constants and for functions of constants within expressions."""
+        last = 0
+        call = re.compile(
+            rf"{_CALL.pattern}|\b(?:{'|'.join(functions)})\s*\(" if functions else _CALL.pattern, re.IGNORECASE
+        )
+        calls = ((found.start(), _closed(self.code, found.end()), found.end()) for found in call.finditer(self.code))
+        joined = ((*found.span(), found.start()) for found in _CONCATENATION.finditer(self._with_literals))
+        for start, end, argument in sorted([*joined, *calls], key=lambda span: (span[0], -span[1])):
+            is_apart = start >= last and not _is_within(start, spans)
+            if is_apart and not _RANGE.search(self.code, argument, end) and self._is_constant(argument, end):
+                last = end
+                if probe := self._seen(start, end):
+                    yield replace(probe, text=f"\n{probe.text}\n")
+
+    def _seen(self, start: int, end: int, *functions: str) -> _Probe | None:
         value = self.text[start:end]
         if _OF_ZEROS.fullmatch(value) or self.unit(start) == "entity":
             return None
-        return _Probe(start, end, f"firm_seen({_escaped(value)}, {{0}})", (start, end))
+        first, *others = (f"{name}({_escaped(value)}, {{0}})" for name in functions or ("firm_seen",))
+        return _Probe(start, end, first, (start, end), tuple(others))
 
     def _value(self, target: re.Match[str], start: int, end: int) -> _Probe | None:
         value, type_ = self.text[start:end], self.text[slice(*target.span(3))]
@@ -296,7 +438,7 @@ class Source:
             return None
         text = (
             f"\nconstant firm_v{{0}} :{_escaped(type_)} :={_escaped(value)};"
-            "\nconstant firm_n{0} : boolean := firm_is_lost(firm_bits(firm_v{0}), {0});\n"
+            "\nconstant firm_n{0} : boolean := firm_is_seen(firm_bits(firm_v{0}), {0});\n"
         )
         return _Probe(target.end(), target.end(), text, (start, end))
 
@@ -333,29 +475,62 @@ def _closed(code: str, start: int) -> int:
     return len(code)
 
 
+def _parts(code: str, start: int, separator: str) -> Iterator[tuple[int, int]]:
+    """Yield the start and end of each part of a text from `start` to the parenthesis that closes it."""
+    depth = 0
+    for found in re.compile(rf"[(){separator}]").finditer(code, start):
+        if not depth and found[0] != "(":
+            yield start, found.start()
+            start = found.end()
+        depth += {"(": 1, ")": -1}.get(found[0], 0)
+        if depth < 0:
+            break
+
+
+def _split(lists: Iterable[str]) -> set[str]:
+    return {name.strip().lower() for names in lists for name in names.split(",")}
+
+
+def may_be_lost(gate: Instance) -> bool:
+    """Return whether a gate is a constant that GHDL may have lost: the same level, other than 1, in all bits."""
+    is_equal = (gate.kind == "$const_UB32" and not any(gate.numbers)) or gate.kind in {"$const_X", "$const_Z"}
+    return is_equal and gate.outputs[0].width > WORD and gate.outputs[0].width % WORD == 0
+
+
 def widths(modules: Modules) -> set[int]:
     """Return the widths, in bits, of the constants that GHDL may have lost."""
-    return {
-        gate.outputs[0].width
-        for module in modules.values()
-        for gate in module.instances
-        if (gate.kind == "$const_UB32" and not any(gate.numbers)) or gate.kind in {"$const_X", "$const_Z"}
-        if gate.outputs[0].width > _WORD and gate.outputs[0].width % _WORD == 0
-    }
+    return {gate.outputs[0].width for module in modules.values() for gate in module.instances if may_be_lost(gate)}
+
+
+def package(widths: Iterable[int]) -> str:
+    """Return the packages with the functions of the probes, for constants of these widths."""
+    functions = [
+        _SEEN.format(name, f"_{width}", _DOWN.format(width - 1)) for width in sorted(widths) for name in _VECTORS
+    ]
+    heads = (text.partition(" is\n")[0] + ";" for text in functions)
+    return _PACKAGE + _OF_WIDTHS.format(LIBRARY, "".join(heads), "".join(functions))
 
 
 class Copies:
     """Copies of the source files with probes."""
 
-    def __init__(self, files: Iterable[str], folder: Path) -> None:
-        self.sources = {name: Source(name) for name in files}
+    def __init__(self, files: Iterable[str], folder: Path, widths: Iterable[int]) -> None:
+        self.sources = {name: Source(name, widths) for name in files}
         types = [type_ for source in self.sources.values() for type_ in source.types(of_packages=True)]
-        functions = {name: text for name, _, text in types}
+        bits = {name: text for name, _, text in types}
+        functions = {name for source in self.sources.values() for name in source.functions()}
         self.folder = folder
-        self.probes = {name: list(source.probes(functions)) for name, source in self.sources.items()}
+        scalars, others = (
+            {name for source in self.sources.values() for name in source.formals(are_scalar=are_scalar)}
+            for are_scalar in (True, False)
+        )
+        self.probes = {
+            name: list(source.probes(bits, functions, scalars - others)) for name, source in self.sources.items()
+        }
         # The probes in each line of a copy.
         self._lines: dict[str, dict[int, set[_Probe]]] = {}
         self._seen: list[tuple[str, int]] = []
+        self._right: set[tuple[str, int]] = set()
 
     @property
     def has_probes(self) -> bool:
@@ -396,14 +571,33 @@ class Copies:
                 index = bisect_right(lines, line)
                 wrong |= self._lines[copy][lines[index - 1]] if index else set()
             dropped = dropped or bool(wrong)
-            self.probes[name] = [probe for probe in probes if probe not in wrong]
+            kept = (probe.other if probe in wrong else probe for probe in probes)
+            self.probes[name] = [probe for probe in kept if probe]
         return dropped
 
-    def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:
-        """Yield the place and the width of each lost constant that GHDL reports with a width in `among`."""
-        reported = ((*self._seen[int(number)], int(width)) for number, width in _REPORT.findall(messages))
+    def values(self, messages: str) -> dict[tuple[str, int], set[str]]:
+        """Return the values in GHDL's reports by file and position, for all constants that GHDL evaluates."""
+        values: dict[tuple[str, int], set[str]] = {place: set() for place in self._seen}
+        for number, _, levels in _REPORT.findall(messages):
+            values[self._seen[int(number)]].add(levels)
+        return values
+
+    def lost(
+        self, messages: str, among: set[int], at_ports: Mapping[tuple[str, int], int]
+    ) -> Iterator[tuple[str, int]]:
+        """Yield the place and the width of each lost constant that GHDL reports with a width in `among`.
+
+        `at_ports` has the width of each constant that instances read at a port if it is lost there, and otherwise 0.
+        """
+        self._right = {place for place, width in at_ports.items() if not width}
+        shown = ((*place, width) for place, width in at_ports.items() if width)
+        reported = (
+            (*self._seen[int(number)], int(width))
+            for number, width, levels in _REPORT.findall(messages)
+            if len(set(levels)) > 1 and self._seen[int(number)] not in self._right
+        )
         literals = ((name, *found) for name in self.sources for found in self._literals(name))
-        for name, position, width in chain(reported, literals):
+        for name, position, width in chain(reported, shown, literals):
             declaration = self.sources[name].constant(position)
             if width in among and (not declaration or self._is_used(declaration, _NO_SLICE)):
                 yield self.sources[name].place(position), width
@@ -420,10 +614,17 @@ class Copies:
     def _is_used(self, declaration: re.Match[str], how: str) -> bool:
         """Return whether a constant is used outside its declaration in a form that matches `how`."""
         uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
+        right = {
+            name: sorted(
+                probe.constant for probe in probes if probe.constant and (name, probe.constant[0]) in self._right
+            )
+            for name, probes in self.probes.items()
+        }
         found = (
             not source.dynamic & set(_NAME.findall((use["index"] or "").lower()))
             for source in self.sources.values()
             for use in uses.finditer(source.code)
+            if not _is_within(use.start(), right[source.name])
         )
         return sum(found) > len(uses.findall(declaration[0]))
 
@@ -433,7 +634,7 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
     if lost:
         raise NetlistError(
             "\n".join(
-                f"{place}: error: GHDL turns a {width}-bit constant into zero if only its highest {_WORD} bits are "
+                f"{place}: error: GHDL turns a {width}-bit constant into zero if only its highest {WORD} bits are "
                 "not zero; make it a signal that is assigned in two slices, or an array element by element"
                 for place, width in dict.fromkeys(lost)
             )
@@ -444,5 +645,5 @@ def doubt(widths: Iterable[int], message: str) -> str:
     """Return a warning that constants of some widths were not examined, with GHDL's reason."""
     return (
         f"warning: GHDL turns constants with {', '.join(map(str, sorted(widths)))} bits into zero if only their "
-        f"highest {_WORD} bits are not zero; the search for such constants failed: {message.splitlines()[0]}"
+        f"highest {WORD} bits are not zero; the search for such constants failed: {message.splitlines()[0]}"
     )

@@ -129,7 +129,7 @@ _BODY = re.compile(r"\b(?:architecture\s+\w+\s+of\s+\w+|package\s+body\s+\w+)\s+
 # An alias does not hide a function that is called by its full name.
 _FULL_NAME = re.compile(r'\b(?:ieee\s*\.\s*)?numeric_std\s*\.\s*(?=(?:resize|"[^"]+")\s*\()', re.IGNORECASE)
 _TYPES = re.compile(r"\b(?:un)?signed\b", re.IGNORECASE)
-_TAB = 8  # as GHDL counts columns
+TAB = 8  # as GHDL counts columns
 
 
 def _aliases() -> Iterator[str]:
@@ -146,7 +146,7 @@ def _full(type_: str) -> str:
 
 def _padded(text: str) -> str:
     """Return a text padded to a multiple of the tab width, so that tabs after the text keep their widths."""
-    return text + " " * (-len(text) % _TAB)
+    return text + " " * (-len(text) % TAB)
 
 
 _CONTEXT = _padded(f"library ieee, {LIBRARY};")
@@ -227,7 +227,7 @@ class Copies:
             parts += [text[last:start], new]
             last = end
             if start == end:
-                line = "".join(parts[:-1]).rpartition("\n")[2].expandtabs(_TAB)
+                line = "".join(parts[:-1]).rpartition("\n")[2].expandtabs(TAB)
                 added[text.count("\n", 0, start) + 1].append((len(line) + 1, len(new)))
         return "".join([*parts, text[last:]]), added
 

@@ -26,6 +26,7 @@ from fusesoc_firm.netlist.corrections import correct, doubts
 from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.netlist.model import GrownTableError, LostMemoryError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.padding import Padding
+from fusesoc_firm.netlist.restored_constants import restore
 from fusesoc_firm.netlist.sources import LIBRARY, Copies, use_numbers
 from fusesoc_firm.tools.launcher import starts_everything
 from fusesoc_firm.tools.programs import explanation, missing
@@ -198,7 +199,7 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     components = _components(modules, ghdl.translation.verilog)
     # The second netlist supplies the generics, which the dump lacks.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
-    doubt = ghdl.check_constants(lost_constants.widths(modules))
+    doubt = ghdl.check_constants(modules)
     correct(modules)
     return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(
         filter(None, [_other_warnings(warnings), doubt, *doubts(modules)])
@@ -235,27 +236,28 @@ class _Ghdl:
             raise _kind(error)(error)
         return self.copies.original(printed), self.copies.original(said)
 
-    def check_constants(self, widths: set[int]) -> str:
-        """Check the constants; return a warning if GHDL cannot evaluate them.
+    def check_constants(self, modules: Modules) -> str:
+        """Restore constants that GHDL turns into zero; return a warning if GHDL cannot evaluate the constants.
 
-        Raise `NetlistError` if GHDL turns a constant with one of these widths (in bits) into zero.
+        Raise `NetlistError` if some cannot be restored.
         """
-        if not widths:
+        if not (widths := lost_constants.widths(modules)):
             return ""
         folder = self.folder / "probes"
         folder.mkdir(exist_ok=True)
-        copies = lost_constants.Copies(chain.from_iterable(self.translation.libraries.values()), folder)
+        copies = lost_constants.Copies(chain.from_iterable(self.translation.libraries.values()), folder, widths)
         messages = doubt = ""
         if copies.has_probes:
             ghdl = replace(self, folder=folder)
             package = folder / "probes.vhd"
-            package.write_text(lost_constants.PACKAGE, encoding="latin-1")
+            package.write_text(lost_constants.package(widths), encoding="latin-1")
             ghdl.run("-a", f"--work={lost_constants.LIBRARY}", str(package))
             try:
                 messages = ghdl.probed(copies)
             except NetlistError as error:
                 doubt = lost_constants.doubt(widths, str(error))
-        lost_constants.refuse(list(copies.lost(messages, widths)))
+        at_ports = restore(modules, copies.sources, {} if doubt else copies.values(messages))
+        lost_constants.refuse(list(copies.lost(messages, widths, at_ports)))
         return doubt
 
     def probed(self, copies: lost_constants.Copies) -> str:

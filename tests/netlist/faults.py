@@ -302,6 +302,102 @@ KEPT = [
     ),
 ]
 
+
+def _instances(
+    name: str, last: int, statements: str, declarations: str = "", default: str = "(others => '1')"
+) -> Design:
+    """A design with a chain of instances that read the input `r(0)` and compute `r(1)` to `r(last)`.
+
+    Each instance computes `a xor (b and c and G)`.
+    """
+    part = f"""library ieee;
+use ieee.std_logic_1164.all;
+
+entity {name}_part is
+  generic (G : std_logic_vector(63 downto 0) := (others => '1'));
+  port (a : in std_logic_vector(63 downto 0); b : in std_logic_vector(63 downto 0) := {default};
+    c : in std_logic_vector(0 to 63) := (others => '1'); y : out std_logic_vector(63 downto 0));
+end entity {name}_part;
+
+architecture rtl of {name}_part is
+begin
+  y <= a xor (b and c and G);
+end architecture rtl;
+"""
+    rows = f"type rows is array (0 to {last}) of std_logic_vector(63 downto 0);\nsignal r : rows;\n"
+    whole = _design(name, 64, f"r({last})", rows + declarations, f"r(0) <= x(63 downto 0);\n{statements}")
+    return Design(name, name, part + whole.text)
+
+
+_JOINED = 'X"3fe00000" & X"00000000"'
+_ACTUALS = [
+    'X"3fe0000000000000"',
+    _JOINED,
+    'X"8000000000000000" or K',
+    "shifted(40)",
+    "std_logic_vector(to_signed(-5, 32)) & std_logic_vector(to_signed(0, 32))",
+    "(62 downto 53 | 33 => '1', others => '0')",
+    "K",
+]
+_CONSTANTS = f"""constant K : std_logic_vector(63 downto 0) := {_JOINED};
+function shifted (places : natural) return std_logic_vector is
+begin
+  return std_logic_vector(shift_left(to_unsigned(1, 64), places));
+end function shifted;
+"""
+# Lost constants that the netlist has nevertheless, as it shows where they belong.
+RESTORED = [
+    _instances(
+        "actuals",
+        9,
+        "\n".join(
+            f"\tu{row} : entity work.actuals_part port map (a => r({row - 1}), b => {actual}, y => r({row}));"
+            for row, actual in enumerate(_ACTUALS, 1)
+        )
+        + "g : for i in 8 to 9 generate part : entity work.actuals_part\n"
+        "port map (a => r(i - 1), b => shifted(5 * i - 10), y => r(i)); end generate;",
+        _CONSTANTS,
+    ),
+]
+COMPUTED += [
+    _design("an_operand", 64, f"x(63 downto 0) xor ({_JOINED})"),
+    _design(
+        "a_compared_constant",
+        1,
+        "r",
+        "signal r : unsigned(0 downto 0);",
+        f'r <= "1" when x(63 downto 0) = {_JOINED} else "0";',
+    ),
+    _design("a_result", 64, "x(63 downto 0) xor shifted(40)", _CONSTANTS),
+    _instances(
+        "of_a_generic",
+        1,
+        f"part : entity work.of_a_generic_part generic map (G => {_JOINED}) port map (a => r(0), y => r(1));",
+    ),
+    _instances("a_default", 1, "part : entity work.a_default_part port map (a => r(0), y => r(1));", default=_JOINED),
+    _instances("by_position", 1, f"part : entity work.by_position_part port map (r(0), {_JOINED}, y => r(1));"),
+    _instances(
+        "upwards", 1, "part : entity work.upwards_part port map (r(0), c => (0 => '1', others => '0'), y => r(1));"
+    ),
+    # The value depends on the iteration, and so the zeros are ambiguous.
+    _instances(
+        "iterations",
+        2,
+        "g : for i in 1 to 2 generate\npart : entity work.iterations_part\n"
+        "port map (a => r(i - 1), b => shifted(40 + i), y => r(i)); end generate;",
+        _CONSTANTS,
+    ),
+]
+KEPT += [
+    _instances(
+        "ascending",
+        1,
+        "part : entity work.ascending_part\n"
+        "port map (a => r(0), b => r(0), c => (62 => '1', others => '0'), y => r(1));",
+        default=_JOINED,
+    )
+]
+
 # An integer without bits.
 CRASH = _design(
     "crash", 8, "to_unsigned(j, 8)", "signal j : integer range 0 to 0 := 0;", "j <= to_integer(u(7 downto 0)) mod 1;"

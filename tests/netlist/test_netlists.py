@@ -13,7 +13,7 @@ from fusesoc_firm.netlist.translation import Translation, translate
 from tests.netlist import comparison, simulators
 from tests.netlist.comparison import differences
 from tests.netlist.designs import Design
-from tests.netlist.faults import COMPUTED, CRASH, FAULTS, KEPT, LOST, MIXED, WITHOUT_MEMORIES, growing
+from tests.netlist.faults import COMPUTED, CRASH, FAULTS, KEPT, LOST, MIXED, RESTORED, WITHOUT_MEMORIES, growing
 
 SEED = 20260214
 DESIGNS, BATCH = 200, 25
@@ -104,6 +104,10 @@ def test_a_constant_that_ghdl_loses_is_refused(designs: list[Design]) -> None:
         (found,) = differences([design], ["icarus"])
         assert re.match(r"\S+\.vhd:\d+:\d+: error: GHDL turns a (64|96)-bit constant into zero", found.message)
         assert found.kind == comparison.REFUSAL
+
+
+def test_a_lost_constant_at_a_port_is_restored() -> None:
+    assert not differences(RESTORED, ["icarus"])
 
 
 def test_constants_that_ghdl_does_not_lose_are_not_refused() -> None:
