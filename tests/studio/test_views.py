@@ -189,6 +189,8 @@ def test_what_the_hardware_counts_is_shown(tmp_path: Path, monkeypatch: pytest.M
             counts.update(ask(studio, "GET", "api/status")[2]["counts"] if news["run"] else {})
             return counts.get("pub frames", 0) > 5
 
-        news = until(studio, is_counted)
-        assert 5 < counts["sub frames"] <= news["counts"]["sub"]["messages"] + 1
+        until(studio, is_counted)
+        assert counts["sub frames"] > 5
+        # The node's own count is that of an earlier moment.
+        until(studio, lambda news: news["counts"]["sub"]["messages"] >= counts["sub frames"])
         assert counts["pub longest wait in cycles"] >= 0
