@@ -104,7 +104,7 @@ class VhdlReader:
     def _report_sources(
         self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics
     ) -> None:
-        """Add the signals with more than one source; other messages of GHDL's synthesis are no faults of this check.
+        """Add the signals with more than one source; other messages of GHDL's synthesis are ignored.
 
         A file with the value 'Z' may have such signals.
         """

@@ -39,7 +39,7 @@ def bits_of_bool(port: str) -> str:
 
 
 def between(number: str, first: int, last: int | None) -> str:
-    """Return the condition that a natural number is in the range `first` to `last`; None is no limit."""
+    """Return the condition that a natural number is in the range `first` to `last`; None means no limit."""
     if first == last:
         return f"{number} = {first}"
     lower, upper = f"{number} >= {first}", f"{number} <= {last}"

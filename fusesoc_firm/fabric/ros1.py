@@ -244,7 +244,7 @@ def _texts(node: Node) -> dict[str, Text]:
 
 
 def _calls(node: Node) -> Iterable[Text]:
-    """Calls of the master: all that unregister, so that nobody waits for a former life, then all that register."""
+    """Return the calls to the master: first those that unregister the node from before a reset, then the others."""
     name, uri = node.name.encode(), node.uri().encode()
     for kind, items in ((b"Publisher", node.publishers), (b"Subscriber", node.subscribers)):
         for item in items:

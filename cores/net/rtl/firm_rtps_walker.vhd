@@ -92,7 +92,7 @@ architecture rtl of firm_rtps_walker is
   signal open_r       : std_logic;                  -- it ends with the packet
   signal known_r      : std_logic;                  -- its kind is one of those that are read
   signal further_r    : size_t := (others => '0');  -- bytes before the inline parameters
-  signal few_r        : std_logic;                  -- there is no such byte
+  signal few_r        : std_logic;                  -- further_r is zero
   signal has_key_r    : std_logic;
   signal has_status_r : std_logic;
   signal hash_r       : std_logic;  -- the parameter is the first key hash

@@ -105,7 +105,7 @@ class Ros(ABC):
 
     @abstractmethod
     def answer_asker(self, service: int, asker: Any, payload: bytes | None, reason: str) -> None:
-        """Answer a call, which has failed if there is no payload."""
+        """Answer a call; without a payload, the call fails."""
 
     @abstractmethod
     def call(self, service: int, number: int, payload: bytes) -> None:
