@@ -38,7 +38,7 @@ REASONS = {
     "converter/variable_publisher.py": {"_count": _OPERAND},
     "verify/loop.py": dict.fromkeys(("_element_gates", "_message_gate", "_segment_gate", "_gate_of"), _CONDITION),
     "netlist/padding.py": {"text": "a statement on one line, whose length is taken off the columns of messages"},
-    "netlist/lost_constants.py": {"types": _OPERAND},
+    "netlist/probed_source.py": {"types": _OPERAND},
     "netlist/verilog.py": {
         **dict.fromkeys(("_either", "_modulus"), "an expression"),
         **dict.fromkeys(

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
-from fusesoc_firm.netlist.lost_constants import WORD, Source, may_be_lost
+from fusesoc_firm.netlist.lost_constants import may_be_lost
 from fusesoc_firm.netlist.model import Instance, Module, Modules, Net
+from fusesoc_firm.netlist.probe_functions import WORD
+from fusesoc_firm.netlist.probed_source import Source
 
 # An actual value: the name of its file, and its position in the file.
 Actual = tuple[str, int]

@@ -21,7 +21,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fusesoc_firm.netlist import dump, lost_constants, verilog
+from fusesoc_firm.netlist import dump, lost_constants, probe_functions, verilog
 from fusesoc_firm.netlist.corrections import correct, doubts
 from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.netlist.model import GrownTableError, LostMemoryError, Module, Modules, NetlistError
@@ -250,8 +250,8 @@ class _Ghdl:
         if copies.has_probes:
             ghdl = replace(self, folder=folder)
             package = folder / "probes.vhd"
-            package.write_text(lost_constants.package(widths), encoding="latin-1")
-            ghdl.run("-a", f"--work={lost_constants.LIBRARY}", str(package))
+            package.write_text(probe_functions.package(widths), encoding="latin-1")
+            ghdl.run("-a", f"--work={probe_functions.LIBRARY}", str(package))
             try:
                 messages = ghdl.probed(copies)
             except NetlistError as error:

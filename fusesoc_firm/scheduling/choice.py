@@ -10,11 +10,9 @@ import yaml
 from fusesoc_firm.scheduling.analysis import Analysis, Choice, end_of
 from fusesoc_firm.scheduling.tables import UNKNOWN, grid
 
-FORMATS = ("text", "yaml", "json")
-
 
 def show(choice: Choice, form: str) -> str:
-    """Return the choice in one of `FORMATS`, with a final newline."""
+    """Return the choice as "text", "yaml" or "json", with a final newline."""
     if form == "text":
         return _text(choice)
     data = as_data(choice)

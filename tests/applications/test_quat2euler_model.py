@@ -22,7 +22,6 @@ VECTORS = 10_000
 QUIET_NAN = bytes.fromhex("7ff8000000000000")
 SMALLEST_NORMAL = 2.0**-1022
 SMALLEST = 2.0**-1074
-ROOT_HALF = math.sqrt(0.5)
 
 Quaternion = tuple[float, float, float, float]
 Angles = tuple[float, float, float]

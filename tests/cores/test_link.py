@@ -17,7 +17,7 @@ LINKS = ("uart", "spi")
 WIDTHS = [8, 16, 64]
 # Cycles of the bench: per bit, and per byte on the line.
 BIT = 10
-UART_BYTE, SPI_BYTE = 10 * BIT, 8 * BIT
+UART_BYTE = 10 * BIT
 FAULTS = Path(__file__).with_name("link_faults.vhd")
 
 

@@ -69,10 +69,6 @@ class Oracle:
             return parsed(self._texts, self.ros)
         return self._library.closure(parse_name(name))
 
-    def definition_text(self, name: str) -> str:
-        """The joint text of a message, in the form of ROS 1's `gendeps --cat`."""
-        return str(self._store.generate_msgdef(_long_name(name), ros_version=self.ros.number)[0])
-
     def frame(self, name: str) -> Frame:
         """Our frame of a message, which is under test."""
         return frame_of(parse_name(name), self.closure(name))

@@ -64,7 +64,6 @@ float32 a inf
 float64[2] b [nan, -inf]
 bool c true
 """
-FUNCTION = "def {}(message):\n    return dict(message)\n"
 COPY = """\
 library ieee;
 use ieee.std_logic_1164.all;
