@@ -109,6 +109,8 @@ architecture rtl of firm_sched_engine is
   signal may_take_a  : std_logic;
   signal next_id     : id_t;
   signal next_key    : key_t;
+  signal available   : std_logic;  -- there is a next task
+  signal grant_moves : std_logic;  -- the grant moves to it
   signal given       : std_logic;  -- the choice finds a task
   signal pop         : std_logic;
   signal may_leave   : std_logic;
@@ -309,6 +311,7 @@ begin
   next_key <= first_key when first_valid = '1' else
               b_key_r when b_valid_r = '1' else
               a_key;
+  available <= first_valid or may_take_b or may_take_a;
   -- The task that finishes may be first of the arrivals.
   given    <= choose and (first_valid or may_take_b or (may_take_a and not (finished and a_is_own)));
 
@@ -411,6 +414,19 @@ begin
                    a_key when gets_key = '1' else
                    key_after_beat;
 
+  -- `moves and available`, prepared for each beat: the enable of the grant's many bits. If the task that finishes is
+  -- the only one left, it is also the next.
+  move_grant : process (beat, last, available, may_preempt, running_r)
+  begin
+    if beat = '0' then
+      grant_moves <= available and (may_preempt or not running_r);
+    elsif last = '0' then
+      grant_moves <= available and may_preempt;
+    else
+      grant_moves <= available;
+    end if;
+  end process move_grant;
+
   grant : process (clk)
   begin
     if rising_edge(clk) then
@@ -420,8 +436,7 @@ begin
         running_r      <= '0';
         keyed_r        <= '0';
       else
-        -- If the task that finishes is the only one left, this is the index that has the grant.
-        if moves = '1' and (first_valid = '1' or may_take_b = '1' or may_take_a = '1') then
+        if grant_moves = '1' then
           grant_select_r <= next_id;
         end if;
         if given = '1' then
