@@ -26,7 +26,10 @@ def add_status(commands: Any) -> None:
         "with AXI4-Lite, such as axi:/dev/uio1",
     )
     status.add_argument(
-        "--system", type=Path, metavar="SPEC", help="the system's specification, for names and to compare the digest"
+        "--system",
+        type=Path,
+        metavar="SPEC",
+        help="the system's specification, for names and to compare the digest; needed if it has 'idBytes: 2'",
     )
     add_sources(status)
     registers = command(
@@ -42,23 +45,24 @@ def add_status(commands: Any) -> None:
 
 
 def _print_status(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.frame.model import ID_BYTES
     from fusesoc_firm.node.status import check_digest, read_status, status_text
     from fusesoc_firm.node.status_socket import open_status
     from fusesoc_firm.node.transport.transport import TransportError
     from fusesoc_firm.system.system_core import identity
 
     names: list[str] = []
-    expected = ""
+    expected, id_bytes = "", ID_BYTES
     if arguments.system:
         arguments.spec = arguments.system
         loaded = load(arguments, needs_sources=False)
         names = [item.block for item in (*loaded.system.subscribers, *loaded.system.publishers)]
-        expected = identity(loaded).digest
+        expected, id_bytes = identity(loaded).digest, loaded.system.id_bytes
     try:
         with open_status(arguments.address) as transport:
             if expected:
-                check_digest(transport, expected, loaded.system.name)
-            print(status_text(read_status(transport), names))
+                check_digest(transport, expected, loaded.system.name, id_bytes)
+            print(status_text(read_status(transport, id_bytes), names))
     except TransportError as error:
         fail(str(error))
 

@@ -13,6 +13,11 @@ def vhdl_type(width: int | None) -> str:
     return "std_logic" if width is None else f"std_logic_vector({width - 1} downto 0)"
 
 
+def index_bits(values: int) -> int:
+    """Return the bits of an index of so many values, like `index_bits` of firm_axis_pkg."""
+    return max(1, (values - 1).bit_length())
+
+
 def bit(vector: str, number: int) -> str:
     """Return the expression for a bit of a vector."""
     return f"{vector}({number})"

@@ -14,6 +14,7 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.frame.model import ID_BYTES
 from fusesoc_firm.message.middleware import Middleware, middleware_of
 from fusesoc_firm.node.action_types import NodeAction
 from fusesoc_firm.node.description import NodeDescription, channel_names, describe
@@ -117,7 +118,7 @@ def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
     system = loaded.system
     topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
     spoken = {item.frame.ros.number for item in topics}
-    if len(spoken) != 1 or not spoken <= {*_DIALECTS}:
+    if system.id_bytes > ID_BYTES or len(spoken) != 1 or not spoken <= {*_DIALECTS}:
         return {}
     return {f"node/{path}": GeneratedFile(text, "user") for path, text in cpp_package(loaded).items()}
 

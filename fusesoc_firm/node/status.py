@@ -3,7 +3,8 @@
     status = read_status(transport)
     print(status_text(status))
 
-The hardware tells its dimensions, from which its register map follows, so no specification is needed.
+The hardware tells its dimensions, from which its register map follows, so no specification is needed. Only whether ids
+have one byte or two must be known: `id_bytes`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from functools import partial
 from itertools import cycle, islice
 
 from fusesoc_firm.frame.faults import Fault
+from fusesoc_firm.frame.model import ID_BYTES
 from fusesoc_firm.node.status_exchange import NO_ANSWER
 from fusesoc_firm.node.transport.transport import Transport, TransportError
 from fusesoc_firm.system.hardware.registers import Register
@@ -70,24 +72,24 @@ def access(transport: Transport, request: bytes) -> int:
     raise TransportError(NO_ANSWER)
 
 
-def read_word(transport: Transport, address: int) -> int:
+def read_word(transport: Transport, address: int, id_bytes: int = ID_BYTES) -> int:
     """Return the word of the register at an address. May raise `TransportError`."""
-    return access(transport, read_request(address))
+    return access(transport, read_request(address, id_bytes))
 
 
-def write_word(transport: Transport, address: int, word: int) -> None:
+def write_word(transport: Transport, address: int, word: int, id_bytes: int = ID_BYTES) -> None:
     """Write a word to the register at an address. May raise `TransportError`."""
-    access(transport, write_request(address, word))
+    access(transport, write_request(address, word, id_bytes))
 
 
-def read_digest(transport: Transport) -> str:
+def read_digest(transport: Transport, id_bytes: int = ID_BYTES) -> str:
     """Return the digest of the hardware's system. May raise `TransportError`."""
-    return "".join(f"{read_word(transport, address):08x}" for address in _DIGEST_ADDRESSES)
+    return "".join(f"{read_word(transport, address, id_bytes):08x}" for address in _DIGEST_ADDRESSES)
 
 
-def read_status(transport: Transport) -> Status:
+def read_status(transport: Transport, id_bytes: int = ID_BYTES) -> Status:
     """Read all registers. Raise `TransportError` if the hardware does not answer, or if its map is unknown."""
-    read = partial(read_word, transport)
+    read = partial(read_word, transport, id_bytes=id_bytes)
     registers = status_registers(read)
     words = {register.name: read(register.address) for register in registers}
     return Status({register.name: register for register in registers}, words)
@@ -203,9 +205,9 @@ def _events(status: Status, shown: Mapping[str, str], channels: Sequence[str]) -
     return f"last fault: {last}; {counts}"
 
 
-def check_digest(transport: Transport, expected: str, system: str) -> None:
+def check_digest(transport: Transport, expected: str, system: str, id_bytes: int = ID_BYTES) -> None:
     """Raise `TransportError` if the hardware is not that of a system, whose digest is `expected`."""
-    found = read_digest(transport)
+    found = read_digest(transport, id_bytes)
     if found != expected:
         raise TransportError(
             f"the hardware is not that of '{system}': its digest is {found}, and the specification's is {expected}"

@@ -118,10 +118,10 @@ def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None
             f"{simulator} cannot simulate a system with several clocks",
             hint=f"the additional clocks are generated in VHDL; use --target={target}",
         )
-    if system.id_bytes > 1 and (target == "live" or not known.reads_vhdl):
+    if system.id_bytes > 1 and not known.reads_vhdl:
         fail(
-            f"{simulator} cannot simulate a system with 'idBytes: {system.id_bytes}' here",
-            hint="only the simulated host in VHDL has ids of two bytes; use --target=sim",
+            f"{simulator} cannot simulate a system with 'idBytes: {system.id_bytes}'",
+            hint=f"only the simulated host in VHDL has ids of two bytes; use --target={target}",
         )
     for type_ in system.accelerator_types:
         accelerator = type_.accelerator

@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.system.derived.status import STATUS_ID
+from fusesoc_firm.frame.model import ID_BYTES
+from fusesoc_firm.system.derived.ids import ONE_BYTE, TWO_BYTES
+from fusesoc_firm.system.derived.status import status_id
 
 # The bit of an address that makes an access a write.
 WRITE = 1 << 31
 _WORD_BYTES = 4
 
 
-def read_request(address: int) -> bytes:
+def read_request(address: int, id_bytes: int = ID_BYTES) -> bytes:
     """Return the frame that reads the register at an address."""
-    return _frame(address, 0)
+    return _frame(address, 0, id_bytes)
 
 
-def write_request(address: int, word: int) -> bytes:
+def write_request(address: int, word: int, id_bytes: int = ID_BYTES) -> bytes:
     """Return the frame that writes a word to the register at an address."""
-    return _frame(address | WRITE, word)
+    return _frame(address | WRITE, word, id_bytes)
 
 
-def status_answer(address: int, word: int) -> bytes:
+def status_answer(address: int, word: int, id_bytes: int = ID_BYTES) -> bytes:
     """Return the answer to a request: its address, and the register's word before the access."""
-    return _frame(address, word)
+    return _frame(address, word, id_bytes)
 
 
-def _frame(address: int, word: int) -> bytes:
-    return pack_frame(STATUS_ID, b"".join(item.to_bytes(_WORD_BYTES, "little") for item in (address, word)))
+def _frame(address: int, word: int, id_bytes: int) -> bytes:
+    payload = b"".join(item.to_bytes(_WORD_BYTES, "little") for item in (address, word))
+    return pack_frame(status_id(id_bytes), payload, id_bytes)
 
 
 def answered(frame: bytes) -> tuple[int, int] | None:
-    """Return the address and the word of an answer, or None for another frame."""
-    start = pack_frame(STATUS_ID, bytes(2 * _WORD_BYTES))[: -2 * _WORD_BYTES]
-    if len(frame) != len(start) + 2 * _WORD_BYTES or not frame.startswith(start):
-        return None
-    address, word = frame[len(start) : -_WORD_BYTES], frame[-_WORD_BYTES:]
-    return int.from_bytes(address, "little"), int.from_bytes(word, "little")
+    """Return the address and the word of an answer, whatever the size of its id, or None for another frame."""
+    address, word = frame[-2 * _WORD_BYTES : -_WORD_BYTES], frame[-_WORD_BYTES:]
+    found = int.from_bytes(address, "little"), int.from_bytes(word, "little")
+    return found if frame in [_frame(*found, id_bytes) for id_bytes in (ONE_BYTE, TWO_BYTES)] else None

@@ -56,6 +56,7 @@ from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, re
 from fusesoc_firm.system.hardware.status import (
     REGISTERS_TEMPLATE,
     Identity,
+    address_bits,
     identity_of,
     status_description,
     status_entity,
@@ -295,7 +296,8 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
         if type_.inner:
             yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, BYPASS_TEMPLATE, bypass_configuration(type_))
     if system.status:
-        configuration = registers_configuration(status_registers(loaded), identity(loaded).signatures)
+        signatures = identity(loaded).signatures
+        configuration = registers_configuration(status_registers(loaded), signatures, address_bits(system))
         yield Artifact(f"{status_entity(system)}.vhd", Part.COMPONENTS, REGISTERS_TEMPLATE, configuration)
     yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
 

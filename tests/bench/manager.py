@@ -12,9 +12,10 @@ from fusesoc_firm.scheduling.evaluation.workloads import REQUESTERS
 from fusesoc_firm.scheduling.policies import POLICIES
 from tests.bench import schedulers
 from tests.bench.area import WIDTHS, Bar, Row, Subject, of_core, tables_of
+from tests.bench.designs import CORES
 from tests.bench.tables import Table, Tell
 from tests.bench.yosys import Yosys
-from tests.hdl.ghdl import Generic
+from tests.hdl.ghdl import Generic, Library, core_files
 
 # The sum of table 3.3, LUT/FF.
 DISSERTATION = {
@@ -40,13 +41,37 @@ _SCHEDULER_BARS = {
     ("lst", 256): Bar(2000, 650),
 }
 
+_TREE_ENTITY = "manager_tree"
+# Of the Manager of Managers: groups, each with as many publishers.
+_TREE_SIDE = 32
+TREE_PUBLISHERS = _TREE_SIDE**2
+# The default of a system.
+WATCHDOG = 2**20
+# 10 LUT6 a channel.
+_TREE_BAR = Bar(10 * TREE_PUBLISHERS)
+# 16 LUT6 and 12 FF for a subscriber and a publisher, and 600 of each.
+_STATUS_BAR = Bar(16 * TREE_PUBLISHERS + 600, 12 * TREE_PUBLISHERS + 600)
+_TREE_CORES = (
+    "axis/package",
+    "axis/axis",
+    "sched/package",
+    *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
+    *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
+    "manager/tree",
+)
+
 _MANAGER_TITLE, _SCHEDULERS_TITLE, _COMBINED_TITLE = "Manager without scheduler", "Schedulers", "Combined schedulers"
+_TREE_TITLE = "Manager of Managers"
 _NOTES = {
     _MANAGER_TITLE: f"""There are as many subscribers as publishers. {MANAGER_PREEMPTIVE} is the Manager for
         preemptive schedulers, which sends bursts. The dissertation's value is the sum in table 3.3.""",
     _SCHEDULERS_TITLE: f"""Times have {schedulers.TIME_BITS} bits; periods and transfer times are
         {schedulers.SHORTEST_TIME} to {schedulers.LONGEST_TIME} cycles. For a bar, LUTs as RAM count as LUTs. The
         dissertation's values are from table 4.1.""",
+    _TREE_TITLE: f"""Round robin in and among {_TREE_SIDE} groups of {_TREE_SIDE} publishers, with all schedulers and
+        one subscriber. The bar of 10 LUT per channel includes the LUTs as RAM. The status is that of {TREE_PUBLISHERS}
+        subscribers and as many publishers, all of which may report faults; its budget was 16 LUT and 12 FF for each
+        subscriber and publisher together, and 600 of each.""",
     _COMBINED_TITLE: """The times are the same as for the schedulers above. The dissertation's values are from
         table 4.5.""",
 }
@@ -58,6 +83,7 @@ def rows() -> dict[str, list[Row]]:
         _MANAGER_TITLE: [*_managers()],
         _SCHEDULERS_TITLE: [*_schedulers()],
         _COMBINED_TITLE: [*_combined()],
+        _TREE_TITLE: [*_trees()],
     }
 
 
@@ -113,6 +139,25 @@ def _combined() -> Iterator[Row]:
 
 def _combination(name: str) -> Callable[[Path], Subject]:
     return lambda folder: Subject(*schedulers.combined(folder, COMBINATIONS[name], COMBINED_REQUESTERS))
+
+
+def _trees() -> Iterator[Row]:
+    for name, watchdog in (("without watchdog", 0), ("with watchdog", WATCHDOG)):
+        yield Row(label(f"round_robin, {name}", TREE_PUBLISHERS), "", None, tree(watchdog), bar=_TREE_BAR)
+    channels: dict[str, Generic] = {"SUBSCRIBERS": TREE_PUBLISHERS, "PUBLISHERS": TREE_PUBLISHERS}
+    counters = of_core("firm_status_tree_counters", channels, (*CORES, "sched/package", "status/status"))
+    yield Row(label("firm_status_tree_counters", TREE_PUBLISHERS), "", None, counters, bar=_STATUS_BAR)
+
+
+def tree(watchdog: int) -> Callable[[Path], Subject]:
+    """Return the Manager of Managers with `TREE_PUBLISHERS`, and watchdogs with this limit in cycles, or none."""
+
+    def make(folder: Path) -> Subject:
+        library = Library("firm", folder)
+        library.analyse([*core_files(*_TREE_CORES), Path(__file__).with_name(f"{_TREE_ENTITY}.vhd")])
+        return Subject(library, _TREE_ENTITY, {"WIDTH": WIDTHS[0], "SIDE": _TREE_SIDE, "WATCHDOG": watchdog})
+
+    return make
 
 
 def _lut_ff(area: list[float]) -> str:

@@ -7,8 +7,9 @@ use firm.firm_sched_pkg.all;
 
 entity manager_tree is
   generic (
-    WIDTH : integer := 8;
-    SIDE  : integer := 32
+    WIDTH    : integer := 8;
+    SIDE     : integer := 32;
+    WATCHDOG : integer := 0
   );
   port (
     clk             : in  std_logic;
@@ -38,7 +39,8 @@ entity manager_tree is
     pub_axis_tvalid : in  std_logic_vector(SIDE*SIDE-1 downto 0);
     pub_axis_tlast  : in  std_logic_vector(SIDE*SIDE-1 downto 0);
     pub_axis_tready : out std_logic_vector(SIDE*SIDE-1 downto 0);
-    id_error        : out std_logic
+    id_error        : out std_logic;
+    expired         : out std_logic_vector(SIDE*SIDE-1 downto 0)
   );
 end entity manager_tree;
 
@@ -67,7 +69,8 @@ begin
       SIZES       => SIZES,
       POLICIES    => POLICIES,
       TOP_POLICY  => ROUND_ROBIN,
-      HIGHS       => highs_of_places
+      HIGHS       => highs_of_places,
+      WATCHDOG    => WATCHDOG
     )
     port map (
       clk             => clk,
@@ -97,7 +100,8 @@ begin
       pub_axis_tvalid => pub_axis_tvalid,
       pub_axis_tlast  => pub_axis_tlast,
       pub_axis_tready => pub_axis_tready,
-      id_error        => id_error
+      id_error        => id_error,
+      expired         => expired
     );
 
 end architecture rtl;

@@ -19,6 +19,7 @@ from tests.bench import schedulers
 from tests.bench.applications import NotBuiltError, netlist_of
 from tests.bench.area import Subject
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, generate
+from tests.bench.manager import TREE_PUBLISHERS, WATCHDOG, tree
 from tests.bench.nextpnr import SEEDS, Nextpnr, Placement
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.bench.yosys import SynthesisError
@@ -70,18 +71,8 @@ _DEMOS = {
     **dict.fromkeys(("mobile_robot", "sobel", "image_pipeline", "robotic_arm"), (100.0, 125.0)),
 }
 _LOOP_ENTITY = "manager_loop"
-_TREE_ENTITY = "manager_tree"
-# Groups, publishers of each group, and the bar in MHz.
-_TREE_SIDE = 32
+# In MHz.
 _TREE_BAR = 100.0
-_TREE_CORES = (
-    "axis/package",
-    "axis/axis",
-    "sched/package",
-    *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
-    *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
-    "manager/tree",
-)
 # EXPONENT_BITS and MANTISSA_BITS by the bits of a number.
 _FLOATS = {64: (11, 52), 32: (8, 23)}
 _ARITHMETIC = (
@@ -296,13 +287,8 @@ def _loop(policy: str, channels: int) -> Callable[[Path], Design]:
 
 
 def _trees() -> Iterator[Row]:
-    yield Row(_label("Manager of Managers, round_robin", _TREE_SIDE**2), None, _tree, _TREE_BAR)
-
-
-def _tree(folder: Path) -> Design:
-    library = Library("firm", folder)
-    library.analyse([*core_files(*_TREE_CORES), Path(__file__).with_name(f"{_TREE_ENTITY}.vhd")])
-    return _synthesised(Subject(library, _TREE_ENTITY, {"WIDTH": MANAGER_WIDTH, "SIDE": _TREE_SIDE}))
+    label = _label("Manager of Managers, round_robin", TREE_PUBLISHERS)
+    yield Row(label, None, lambda folder: _synthesised(tree(WATCHDOG)(folder)), _TREE_BAR)
 
 
 def _arithmetic() -> Iterator[Row]:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads the status. The transport is standard output and input: a frame is a line of hexadecimal digits. Each word that
-// is not zero is printed, after '='. The argument is the digest.
+// is not zero is printed, after '='. The arguments are the bytes of an id, and the digest.
 #include <iostream>
 #include <string>
 
@@ -59,9 +59,9 @@ void show(const firm::Status& status) {
   }
 }
 
-bool accepts(firm::Transport& transport, const std::string& digest) {
+bool accepts(firm::Transport& transport, std::size_t id_bytes, const std::string& digest) {
   try {
-    firm::StatusAccess access(transport);
+    firm::StatusAccess access(transport, std::chrono::seconds(20), id_bytes);
     firm::check_digest(access, digest, "robot");
     return true;
   } catch (const firm::TransportError&) {
@@ -73,6 +73,7 @@ bool accepts(firm::Transport& transport, const std::string& digest) {
 
 int main(int, char** arguments) {
   LineTransport transport;
-  show(firm::read_status(transport));
-  return accepts(transport, arguments[1]) && !accepts(transport, "00") ? 0 : 1;
+  const std::size_t id_bytes = std::stoul(arguments[1]);
+  show(firm::read_status(transport, id_bytes));
+  return accepts(transport, id_bytes, arguments[2]) && !accepts(transport, id_bytes, "00") ? 0 : 1;
 }

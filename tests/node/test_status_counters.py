@@ -26,7 +26,8 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.faults import Fault
-from fusesoc_firm.node.status import read_status, read_word, write_word
+from fusesoc_firm.node.status import Status, read_status, read_word, write_word
+from fusesoc_firm.node.status_socket import StatusServer
 from fusesoc_firm.node.transport.link_code import LinkDecoder, encode
 from fusesoc_firm.node.transport.simulator import Simulator, SimulatorTransport, Taken
 from fusesoc_firm.node.transport.transport import Transport
@@ -44,7 +45,7 @@ QUEUED = 2
 WATCHDOG = 32
 POINT, TEXT, QUEUE, WATCHED, BUFFERED, NOBODY = 0, 1, 2, 3, 4, 7
 SPECIFICATION = f"""\
-project: {{name: robot, width: 32, status: frames, timeStamps: added, watchdog: {WATCHDOG}}}
+project: {{name: robot, width: 32, idBytes: ID_BYTES, status: frames, timeStamps: added, watchdog: {WATCHDOG}}}
 accelerators:
   - {{name: deaf, type: VHDL, sources: deaf.vhd, interface: {{
      input: [{{middleware: ROS2, message: geometry_msgs/Vector3}}],
@@ -128,18 +129,25 @@ class Injection:
     `faults` has the frames with a fault of the stream.
     """
 
+    id_bytes: int = 1
+
     frames: list[bytes] = field(default_factory=list)
     faults: dict[bytes, Fault] = field(default_factory=dict)
     words: Counter[str] = field(default_factory=Counter)
 
     def add(self, id_: int, frame: bytes, fault: Fault | None) -> None:
         """Append a frame to a subscriber, which reports a fault or none."""
-        self.frames.append(frame)
+        frame = self.send(frame)
         self.words[f"subscriber[{id_}].frames"] += 1
         if fault:
             self.words[f"subscriber[{id_}].faults[{fault - 1}]"] += 1
         if fault in STREAM_FAULTS:
             self.faults[frame] = fault
+
+    def send(self, frame: bytes) -> bytes:
+        """Append a frame with an id of one byte, and return it with an id of `id_bytes`."""
+        self.frames.append(frame[:1] + bytes(self.id_bytes - 1) + frame[1:])
+        return self.frames[-1]
 
 
 class FaultySimulator(Simulator):
@@ -155,15 +163,15 @@ class FaultySimulator(Simulator):
         )
 
 
-def _injected(seed: int) -> Injection:
+def _injected(seed: int, id_bytes: int) -> Injection:
     """Return what is injected. The last frame is broken, and no publisher aborts a frame because of it."""
     print(f"seed {seed}")
     source = random.Random(seed)
-    injected = Injection()
+    injected = Injection(id_bytes)
     for _ in range(FRAMES):
         id_ = source.choice((POINT, TEXT, TEXT, QUEUE, WATCHED, BUFFERED, NOBODY))
         if id_ == NOBODY:
-            injected.frames.append(_refused(id_, source))
+            injected.send(_refused(id_, source))
             injected.words["id_errors"] += 1
         elif id_ in (POINT, TEXT):
             payload = _point(source) if id_ == POINT else _text(source)
@@ -192,10 +200,15 @@ def _refused(id_: int, source: random.Random) -> bytes:
     return pack_frame(id_, ENCODING + len(text).to_bytes(4, "little") + text)
 
 
+@pytest.fixture(scope="module", params=[1, 2], ids=["ids of one byte", "ids of two bytes"])
+def id_bytes(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
+
+
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> BuiltSimulator:
+def built(id_bytes: int, tmp_path_factory: pytest.TempPathFactory) -> BuiltSimulator:
     folder = tmp_path_factory.mktemp("robot")
-    (folder / "robot.yaml").write_text(SPECIFICATION)
+    (folder / "robot.yaml").write_text(SPECIFICATION.replace("ID_BYTES", str(id_bytes)))
     (folder / "deaf.vhd").write_text((DATA / "deaf.vhd").read_text())
     return build_simulator(folder / "robot.yaml", build_root=folder / "build")
 
@@ -243,29 +256,35 @@ class Faulty:
 
     transport: SimulatorTransport
     words: Words
+    id_bytes: int
+
+    @property
+    def status(self) -> Status:
+        """The status now."""
+        return read_status(self.transport, self.id_bytes)
+
+    @property
+    def now(self) -> Words:
+        """The words of the status now."""
+        return {**self.status.words, "digest": self.status.digest}
 
 
 @pytest.fixture(scope="module")
-def faulty(built: BuiltSimulator) -> Iterator[Faulty]:
-    injected = _injected(SEED)
+def faulty(id_bytes: int, built: BuiltSimulator) -> Iterator[Faulty]:
+    injected = _injected(SEED, id_bytes)
     assert len({name for name in injected.words if "faults" in name}) == len(POINT_FAULTS) + len(TEXT_FAULTS) + 3
     with _hardware(built, injected.faults) as transport:
         received = _exchange(transport, injected.frames)
         assert received[f"publisher[{TEXT}].{ABORTED}"]
-        yield Faulty(transport, {**+injected.words, **+received, "digest": _digest(built)})
+        yield Faulty(transport, {**+injected.words, **+received, "digest": _digest(built)}, id_bytes)
 
 
 def counted(words: Words) -> Words:
     return {name: word for name, word in words.items() if COUNTED.fullmatch(name) and word}
 
 
-def _in_python(transport: SimulatorTransport) -> Words:
-    status = read_status(transport)
-    return {**status.words, "digest": status.digest}
-
-
 def test_python_reads_what_was_injected(faulty: Faulty) -> None:
-    status = read_status(faulty.transport)
+    status = faulty.status
     assert counted({**status.words, "digest": status.digest}) == faulty.words
     # The beat that is offered to the deaf accelerator waits until the watchdog acts.
     assert status.words[f"subscriber[{WATCHED}].longest_wait"] == WATCHDOG
@@ -275,8 +294,8 @@ def test_python_reads_what_was_injected(faulty: Faulty) -> None:
 def test_another_language_reads_the_same(language: str, faulty: Faulty, tmp_path: Path) -> None:
     sources = ["firm/firm_frame.c", "firm/firm_status.c"]
     driver = cpp_driver("status") if language == "cpp" else compile_c_driver("status", tmp_path, sources, [], {})
-    before = _in_python(faulty.transport)
-    found = told([driver.program, str(faulty.words["digest"])], faulty.transport)
+    before = faulty.now
+    found = told([driver.program, str(faulty.id_bytes), str(faulty.words["digest"])], faulty.transport)
     assert counted(found) == faulty.words
     # The cycle of the reading itself differs.
     moving = {"cycles": found["cycles"]}
@@ -304,23 +323,28 @@ def told(command: Sequence[str | Path], transport: Transport) -> Words:
 
 
 def test_interrupts_and_counting_can_be_switched(faulty: Faulty) -> None:
-    addresses = {register.name: register.address for register in read_status(faulty.transport).registers.values()}
+    addresses = {register.name: register.address for register in faulty.status.registers.values()}
 
     def word(name: str) -> int:
-        return read_word(faulty.transport, addresses[name])
+        return read_word(faulty.transport, addresses[name], faulty.id_bytes)
 
-    write_word(faulty.transport, addresses["interrupt_enable"], UNKNOWN_ID)
-    write_word(faulty.transport, addresses["control"], 0)
+    def write(name: str, word: int) -> None:
+        write_word(faulty.transport, addresses[name], word, faulty.id_bytes)
+
+    write("interrupt_enable", UNKNOWN_ID)
+    write("control", 0)
     before = word(f"subscriber[{POINT}].frames")
-    faulty.transport.send(pack_frame(POINT, bytes(3)))
+    faulty.transport.send(pack_frame(POINT, bytes(3), faulty.id_bytes))
     assert word("interrupt_enable") == UNKNOWN_ID
     assert word(f"subscriber[{POINT}].frames") == before
-    write_word(faulty.transport, addresses["control"], 1)
-    write_word(faulty.transport, addresses["interrupt_enable"], 0)
-    assert counted(_in_python(faulty.transport)) == faulty.words
+    write("control", 1)
+    write("interrupt_enable", 0)
+    assert counted(faulty.now) == faulty.words
 
 
-def test_time_stamps_are_the_cycles_of_the_first_beat_in_and_the_last_beat_out(built: BuiltSimulator) -> None:
+def test_time_stamps_are_the_cycles_of_the_first_beat_in_and_the_last_beat_out(
+    id_bytes: int, built: BuiltSimulator
+) -> None:
     """Between two messages, the stamps advance as the cycles at the host do, which the simulator reports."""
     print(f"seed {SEED}")
     source = random.Random(SEED)
@@ -330,14 +354,15 @@ def test_time_stamps_are_the_cycles_of_the_first_beat_in_and_the_last_beat_out(b
     with SimulatorTransport(
         start, observe=lambda event: taken.append(event) if isinstance(event, Taken) else None
     ) as transport:
-        addresses = {register.name: register.address for register in read_status(transport).registers.values()}
+        registers = read_status(transport, id_bytes).registers.values()
+        addresses = {register.name: register.address for register in registers}
         for id_ in (POINT, TEXT, TEXT, POINT, TEXT):
-            transport.send(pack_frame(id_, _point(source) if id_ == POINT else _text(source)))
+            transport.send(pack_frame(id_, _point(source) if id_ == POINT else _text(source), id_bytes))
             burst = transport.receive(20)
             first = taken[-1].first_cycle
             assert burst and burst.last_cycle
             names = (f"subscriber[{id_}].stamp", f"publisher[{id_}].stamp", "cycles")
-            entered, left, now = (read_word(transport, addresses[name]) for name in names)
+            entered, left, now = (read_word(transport, addresses[name], id_bytes) for name in names)
             assert 0 < left - entered <= burst.last_cycle - first
             assert left < now
             differences.add((entered - first, left - burst.last_cycle))
@@ -372,14 +397,39 @@ def _line(transport: SimulatorTransport) -> Iterator[str]:
         os.close(theirs)
 
 
+@contextmanager
+def _running_node(transport: SimulatorTransport) -> Iterator[str]:
+    """The address of a node that uses the hardware."""
+
+    def access(request: bytes) -> bytes:
+        transport.send(request)
+        answer = transport.receive(20)
+        assert answer
+        return answer.data
+
+    with StatusServer(("node:robot",), access, print):
+        yield "node:robot"
+
+
+@contextmanager
+def _address(faulty: Faulty) -> Iterator[str]:
+    """An address of the hardware: a link has ids of one byte."""
+    if faulty.id_bytes == 1:
+        with _line(faulty.transport) as device:
+            yield f"uart:{device}:1000000"
+    else:
+        with _running_node(faulty.transport) as address:
+            yield address
+
+
 def test_the_command_prints_what_was_injected(
     built: BuiltSimulator, faulty: Faulty, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A pseudo-terminal has no breaks.
     monkeypatch.setattr(termios, "tcsendbreak", lambda _line, _duration: None)
-    words = _in_python(faulty.transport)
-    with _line(faulty.transport) as device:
-        assert main(["status", f"uart:{device}:1000000", "--system", str(_specification(built))]) == 0
+    words = faulty.now
+    with _address(faulty) as address:
+        assert main(["status", address, "--system", str(_specification(built))]) == 0
     text = capsys.readouterr().out
     channels = ("point", "text", "queue", "watched", "buffered")
     names = {f"subscriber[{place}]": f"{name}_in" for place, name in enumerate(channels)}

@@ -51,7 +51,7 @@ def test_registers_do_not_overlap(subscribers: int, publishers: int) -> None:
 def test_no_converter_has_the_id_of_the_status(converters: int, faults: int) -> None:
     found = Diagnostics()
     project = replace(load_beside(SPEC, [], None).specification.project, status=Text("frames"))
-    assert status_of(project, None, converters, found) is StatusAccess.FRAMES
+    assert status_of(project, None, converters, 1, found) is StatusAccess.FRAMES
     assert len(found.found) == faults
 
 

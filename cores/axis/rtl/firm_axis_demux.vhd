@@ -39,6 +39,11 @@ entity firm_axis_demux is
     m_axis_tvalid : out std_logic_vector(DESTINATIONS-1 downto 0);
     m_axis_tready : in  std_logic_vector(DESTINATIONS-1 downto 0);
 
+    -- The same beats, for a part that listens: on offer, taken, and the number of their destination.
+    offered  : out std_logic;
+    beat     : out std_logic;
+    selected : out std_logic_vector(index_bits(DESTINATIONS)-1 downto 0);
+
     id_error : out std_logic
   );
 end entity firm_axis_demux;
@@ -120,6 +125,10 @@ begin
       end if;
     end if;
   end process remember_destination;
+
+  offered  <= valid;
+  beat     <= valid and ready(0);
+  selected <= index;
 
   s_axis_tready <= s_axis_tready_out;
   m_axis_tdata  <= s_axis_tdata;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Frees a stream of whole frames from a source that stops in the middle of a frame. After LIMIT cycles in which the
 -- receiver is ready and the source offers nothing, the frame ends with an abort (`tuser`) instead of its next beat, and
--- the scheduler is told that the frame is over. The source's late beats up to its `tlast` are taken and dropped; if
+-- the scheduler is told that the frame is over. Only cycles with `tick` count, so that many watchdogs share a timer. The source's late beats up to its `tlast` are taken and dropped; if
 -- the source stops among them, its grant ends after LIMIT cycles as well. Then its next frame is forwarded.
 --
 -- A memory with one bit per source records which sources are late. It is cleared in the 2**n cycles after reset, for an
@@ -16,12 +16,20 @@ entity firm_axis_watchdog is
   generic (
     WIDTH   : integer := 8;
     SOURCES : integer := 2;
-    -- Cycles without a beat within a frame, 1 or more.
-    LIMIT : integer := 1024
+    -- Cycles with `tick`, but without a beat, within a frame, 1 or more.
+    LIMIT : integer := 1024;
+    -- The memory is cleared by `clearing` and `cleared`, which several watchdogs share.
+    SHARED_CLEARING : boolean := false
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
+
+    -- A cycle that counts.
+    tick : in std_logic := '1';
+    -- With SHARED_CLEARING: from reset on, until each number of a source has been in `cleared`.
+    clearing : in std_logic                                        := '0';
+    cleared  : in std_logic_vector(index_bits(SOURCES)-1 downto 0) := (others => '0');
 
     -- The source of the offered beat; changes between frames only.
     source        : in  std_logic_vector(index_bits(SOURCES)-1 downto 0);
@@ -42,6 +50,8 @@ entity firm_axis_watchdog is
 
     -- For the scheduler: the frame ends without a beat of the source.
     cut : out std_logic;
+    -- In this cycle, the source that is ready to be taken is found to have stopped; its frame will be aborted.
+    expires : out std_logic;
     -- Pulses for each aborted frame, one bit for each source.
     expired : out std_logic_vector(SOURCES-1 downto 0)
   );
@@ -57,13 +67,14 @@ architecture rtl of firm_axis_watchdog is
   signal write_bit  : std_logic;
   signal late_next  : std_logic_vector(0 downto 0);
   signal late       : std_logic;
-  signal clearing_r : std_logic;
-  signal cleared_r  : unsigned(INDEX_BITS_USED-1 downto 0);  -- the next bit to clear
+  signal clears     : std_logic;
+  signal to_clear   : std_logic_vector(INDEX_BITS_USED-1 downto 0);  -- the next bit to clear
 
   signal inside_r : std_logic;                    -- a frame has begun
-  signal waited_r : natural range 0 to LIMIT-1;   -- cycles in a row without a beat
+  signal waited_r : natural range 0 to LIMIT-1;   -- such cycles in a row without a beat
   signal cut_r    : std_logic;                    -- the frame is to end
   signal ends     : std_logic;                    -- it ends in this cycle
+  signal stops    : std_logic;                    -- the source has been silent for LIMIT such cycles
 
   signal accepted : std_logic;                    -- a beat may leave, or be dropped
   signal ready    : std_logic;
@@ -82,14 +93,14 @@ begin
     severity failure;
 
   late     <= is_late(to_integer(unsigned(address)))(0);
-  accepted <= not clearing_r and (m_axis_tready or late);
+  accepted <= not clears and (m_axis_tready or late);
   ready    <= accepted and not cut_r;
   taken    <= s_axis_tvalid and ready;
   ends     <= cut_r and accepted;
 
-  address      <= std_logic_vector(cleared_r) when clearing_r = '1' else source;
-  write_bit    <= clearing_r or ends or (taken and s_axis_tlast);
-  late_next(0) <= ends and not clearing_r;
+  address      <= to_clear when clears = '1' else source;
+  write_bit    <= clears or ends or (taken and s_axis_tlast);
+  late_next(0) <= ends and not clears;
 
   remember_late : process (clk)
   begin
@@ -100,20 +111,35 @@ begin
     end if;
   end process remember_late;
 
-  clear_memory : process (clk)
+  shares_clearing : if SHARED_CLEARING generate
+    clears   <= clearing;
+    to_clear <= cleared;
+  end generate shares_clearing;
+
+  clears_itself : if not SHARED_CLEARING generate
+    signal clearing_r : std_logic;
+    signal cleared_r  : unsigned(INDEX_BITS_USED-1 downto 0);
   begin
-    if rising_edge(clk) then
-      if rst_n = '0' then
-        clearing_r <= '1';
-        cleared_r  <= (others => '0');
-      elsif clearing_r = '1' then
-        cleared_r <= cleared_r + 1;
-        if cleared_r = 2**INDEX_BITS_USED-1 then
-          clearing_r <= '0';
+    clear_memory : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          clearing_r <= '1';
+          cleared_r  <= (others => '0');
+        elsif clearing_r = '1' then
+          cleared_r <= cleared_r + 1;
+          if cleared_r = 2**INDEX_BITS_USED-1 then
+            clearing_r <= '0';
+          end if;
         end if;
       end if;
-    end if;
-  end process clear_memory;
+    end process clear_memory;
+
+    clears   <= clearing_r;
+    to_clear <= std_logic_vector(cleared_r);
+  end generate clears_itself;
+
+  stops <= inside_r and ready and tick and not s_axis_tvalid when waited_r = LIMIT-1 else '0';
 
   watch : process (clk)
   begin
@@ -128,8 +154,8 @@ begin
       elsif taken = '1' then
         inside_r <= not s_axis_tlast;
         waited_r <= 0;
-      elsif inside_r = '1' and ready = '1' then
-        if waited_r = LIMIT-1 then
+      elsif inside_r = '1' and ready = '1' and tick = '1' then
+        if stops = '1' then
           waited_r <= 0;
           cut_r    <= '1';
         else
@@ -160,8 +186,9 @@ begin
   end process end_frame;
 
   m_axis_tdata  <= s_axis_tdata;
-  m_axis_tvalid <= not clearing_r and not late and (s_axis_tvalid or cut_r);
+  m_axis_tvalid <= not clears and not late and (s_axis_tvalid or cut_r);
   s_axis_tready <= ready;
   cut           <= ends;
+  expires       <= stops and not late;
 
 end architecture rtl;

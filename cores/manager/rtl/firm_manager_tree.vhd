@@ -2,7 +2,8 @@
 -- A Manager of Managers, with ids of two bytes on the host's side: up to 65,536 subscribers and publishers. The
 -- converters are those of firm_manager, with ids of one byte, the lower one; the upper byte is removed and inserted
 -- here. Publishers form groups. In each group, a scheduler grants one publisher, and a register slice ends the paths;
--- a further scheduler chooses among the groups. Frames are sent whole (docs/reference/manager.md).
+-- a further scheduler chooses among the groups. Frames are sent whole (docs/reference/manager.md). With a WATCHDOG, each
+-- group cuts off a publisher that stops in the middle of a frame; the groups share the timer.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -21,7 +22,10 @@ entity firm_manager_tree is
     -- The policy among the groups.
     TOP_POLICY : policy_t := ROUND_ROBIN;
     -- The upper byte of the id of the publisher at each place; IMPLICIT if place and id are equal.
-    HIGHS : times_t := IMPLICIT
+    HIGHS : times_t := IMPLICIT;
+    -- Cycles after which a publisher that stops in the middle of a frame is cut off, and at most half as many more; 0:
+    -- never.
+    WATCHDOG : integer := 0
   );
   port (
     clk   : in std_logic;
@@ -52,6 +56,11 @@ entity firm_manager_tree is
     sub_axis_tvalid : out std_logic_vector(SUBSCRIBERS-1 downto 0);
     sub_axis_tready : in  std_logic_vector(SUBSCRIBERS-1 downto 0);
 
+    -- The same beats, for a part that listens: on offer, taken, and the subscriber's number.
+    sub_offered  : out std_logic;
+    sub_beat     : out std_logic;
+    sub_selected : out std_logic_vector(index_bits(SUBSCRIBERS)-1 downto 0);
+
     -- From the publishers, group by group; the first place has the lowest bits.
     pub_axis_tdata  : in  std_logic_vector(PUBLISHERS*WIDTH-1 downto 0);
     pub_axis_tkeep  : in  std_logic_vector(PUBLISHERS*(WIDTH/8)-1 downto 0);
@@ -61,7 +70,9 @@ entity firm_manager_tree is
     pub_axis_tready : out std_logic_vector(PUBLISHERS-1 downto 0);
 
     -- Pulses for a frame from the host that reaches no subscriber.
-    id_error : out std_logic
+    id_error : out std_logic;
+    -- Pulses for a publisher that a watchdog has cut off, by place.
+    expired : out std_logic_vector(PUBLISHERS-1 downto 0)
   );
 end entity firm_manager_tree;
 
@@ -70,6 +81,9 @@ architecture rtl of firm_manager_tree is
   constant MOST_PUBLISHERS : positive := 65536;
   constant GROUPS          : positive := max(1, SIZES'length);
   constant LANES           : positive := WIDTH/8;
+  -- A publisher is cut off at the third pulse in a row without a beat, so after two periods to three.
+  constant TICKS  : positive := 3;
+  constant PERIOD : positive := max(1, (WATCHDOG + TICKS - 2) / (TICKS - 1));
 
   function sends_whole_frames(policy : policy_t) return boolean is
   begin
@@ -90,6 +104,8 @@ architecture rtl of firm_manager_tree is
       return "PUBLISHERS is " & integer'image(PUBLISHERS) & "; legal: 1 to " & integer'image(MOST_PUBLISHERS);
     elsif SUBSCRIBERS < 1 or SUBSCRIBERS > MOST_PUBLISHERS then
       return "SUBSCRIBERS is " & integer'image(SUBSCRIBERS) & "; legal: 1 to " & integer'image(MOST_PUBLISHERS);
+    elsif WATCHDOG < 0 then
+      return "WATCHDOG is " & integer'image(WATCHDOG) & "; legal: 0 or more";
     elsif SIZES'length > MAX_REQUESTERS then
       return "SIZES has " & integer'image(SIZES'length) & " groups; legal: 1 to " & integer'image(MAX_REQUESTERS);
     elsif fault_of_groups(PUBLISHERS, SIZES, POLICIES, TOP_POLICY) /= "" then
@@ -107,6 +123,18 @@ architecture rtl of firm_manager_tree is
     end loop;
     return "";
   end function found_fault;
+
+  -- An index of the largest group.
+  function largest_index return positive is
+    variable bits : positive := 1;
+  begin
+    for place in SIZES'range loop
+      bits := max(bits, index_bits(SIZES(place)));
+    end loop;
+    return bits;
+  end function largest_index;
+
+  constant CLEAR_BITS : positive := largest_index;
 
   constant FAULT    : string  := found_fault;
   constant IS_LEGAL : boolean := FAULT = "";
@@ -126,6 +154,13 @@ architecture rtl of firm_manager_tree is
   signal narrow_tready : std_logic;
   signal high          : std_logic_vector(7 downto 0);
   signal has_high      : std_logic;
+
+  signal pub_ready : std_logic_vector(PUBLISHERS-1 downto 0);
+
+  -- The timer of the watchdogs, and the clearing of their memories after reset.
+  signal tick     : std_logic;
+  signal clearing : std_logic;
+  signal cleared  : std_logic_vector(CLEAR_BITS-1 downto 0);
 
   -- From the groups; `group_high` contains the upper bytes of the ids.
   signal group_tdata  : std_logic_vector(GROUPS*WIDTH-1 downto 0);
@@ -162,6 +197,8 @@ begin
   assert FAULT = ""
     report "firm_manager_tree: " & FAULT
     severity failure;
+
+  pub_axis_tready <= pub_ready;
 
   u_slice_in : entity firm.firm_axis_register_slice
     generic map (
@@ -230,8 +267,53 @@ begin
       m_axis_tlast  => sub_axis_tlast,
       m_axis_tvalid => sub_axis_tvalid,
       m_axis_tready => sub_axis_tready,
+      offered       => sub_offered,
+      beat          => sub_beat,
+      selected      => sub_selected,
       id_error      => id_error
     );
+
+  watched_frames : if WATCHDOG > 0 generate
+    signal counted_r  : natural range 0 to PERIOD-1;
+    signal clearing_r : std_logic;
+    signal cleared_r  : unsigned(CLEAR_BITS-1 downto 0);
+  begin
+    tick     <= '1' when counted_r = PERIOD-1 else '0';
+    clearing <= clearing_r;
+    cleared  <= std_logic_vector(cleared_r);
+
+    count_cycles : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' or tick = '1' then
+          counted_r <= 0;
+        else
+          counted_r <= counted_r + 1;
+        end if;
+      end if;
+    end process count_cycles;
+
+    clear_memories : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          clearing_r <= '1';
+          cleared_r  <= (others => '0');
+        elsif clearing_r = '1' then
+          cleared_r <= cleared_r + 1;
+          if cleared_r = 2**CLEAR_BITS-1 then
+            clearing_r <= '0';
+          end if;
+        end if;
+      end if;
+    end process clear_memories;
+  end generate watched_frames;
+
+  unwatched_frames : if WATCHDOG <= 0 generate
+    tick     <= '0';
+    clearing <= '0';
+    cleared  <= (others => '0');
+  end generate unwatched_frames;
 
   -- Ranges that do not fit would end the elaboration before an assert can report them.
   each_group : for group_index in 0 to GROUPS-1 generate
@@ -252,7 +334,15 @@ begin
       signal grant_valid   : std_logic;
       signal grant_select  : std_logic_vector(index_bits(SIZE)-1 downto 0);
       signal beat          : std_logic;
+      signal cut           : std_logic;  -- the watchdog ends the granted publisher's frame
+      signal ends          : std_logic;
       signal highs_in      : std_logic_vector(SIZE*8-1 downto 0);
+      signal granted_tdata  : std_logic_vector(WIDTH-1 downto 0);
+      signal granted_tkeep  : std_logic_vector(LANES-1 downto 0);
+      signal granted_tuser  : std_logic_vector(0 downto 0);
+      signal granted_tvalid : std_logic;
+      signal granted_tlast  : std_logic;
+      signal granted_tready : std_logic;
       signal chosen_tdata  : std_logic_vector(WIDTH-1 downto 0);
       signal chosen_tkeep  : std_logic_vector(LANES-1 downto 0);
       signal chosen_tuser  : std_logic_vector(8 downto 0);
@@ -271,7 +361,7 @@ begin
           rst_n        => rst_n,
           request      => pub_axis_tvalid(FIRST+SIZE-1 downto FIRST),
           beat         => beat,
-          last         => chosen_tlast,
+          last         => ends,
           grant_valid  => grant_valid,
           grant_select => grant_select
         );
@@ -289,17 +379,76 @@ begin
           s_axis_tuser  => pub_axis_tuser(FIRST+SIZE-1 downto FIRST),
           s_axis_tvalid => pub_axis_tvalid(FIRST+SIZE-1 downto FIRST),
           s_axis_tlast  => pub_axis_tlast(FIRST+SIZE-1 downto FIRST),
-          s_axis_tready => pub_axis_tready(FIRST+SIZE-1 downto FIRST),
-          m_axis_tdata  => chosen_tdata,
-          m_axis_tkeep  => chosen_tkeep,
-          m_axis_tuser  => chosen_tuser(0 downto 0),
-          m_axis_tvalid => chosen_tvalid,
-          m_axis_tlast  => chosen_tlast,
-          m_axis_tready => chosen_tready
+          s_axis_tready => pub_ready(FIRST+SIZE-1 downto FIRST),
+          m_axis_tdata  => granted_tdata,
+          m_axis_tkeep  => granted_tkeep,
+          m_axis_tuser  => granted_tuser,
+          m_axis_tvalid => granted_tvalid,
+          m_axis_tlast  => granted_tlast,
+          m_axis_tready => granted_tready
         );
 
+      unwatched : if WATCHDOG = 0 generate
+        chosen_tdata             <= granted_tdata;
+        chosen_tkeep             <= granted_tkeep;
+        chosen_tuser(0 downto 0) <= granted_tuser;
+        chosen_tvalid            <= granted_tvalid;
+        chosen_tlast             <= granted_tlast;
+        granted_tready           <= chosen_tready;
+        cut                      <= '0';
+
+        expired(FIRST+SIZE-1 downto FIRST) <= (others => '0');
+      end generate unwatched;
+
+      watched : if WATCHDOG > 0 generate
+        signal expires : std_logic;
+      begin
+        -- The granted publisher is the only one that is ready then.
+        report_publishers : process (clk)
+        begin
+          if rising_edge(clk) then
+            expired(FIRST+SIZE-1 downto FIRST) <= pub_ready(FIRST+SIZE-1 downto FIRST);
+            if rst_n = '0' or expires = '0' then
+              expired(FIRST+SIZE-1 downto FIRST) <= (others => '0');
+            end if;
+          end if;
+        end process report_publishers;
+
+        u_watchdog : entity firm.firm_axis_watchdog
+          generic map (
+            WIDTH           => WIDTH,
+            SOURCES         => SIZE,
+            LIMIT           => TICKS,
+            SHARED_CLEARING => true
+          )
+          port map (
+            clk           => clk,
+            rst_n         => rst_n,
+            tick          => tick,
+            clearing      => clearing,
+            cleared       => cleared(index_bits(SIZE)-1 downto 0),
+            source        => grant_select,
+            s_axis_tdata  => granted_tdata,
+            s_axis_tkeep  => granted_tkeep,
+            s_axis_tuser  => granted_tuser,
+            s_axis_tvalid => granted_tvalid,
+            s_axis_tlast  => granted_tlast,
+            s_axis_tready => granted_tready,
+            m_axis_tdata  => chosen_tdata,
+            m_axis_tkeep  => chosen_tkeep,
+            m_axis_tuser  => chosen_tuser(0 downto 0),
+            m_axis_tvalid => chosen_tvalid,
+            m_axis_tlast  => chosen_tlast,
+            m_axis_tready => chosen_tready,
+            cut           => cut,
+            expires       => expires,
+            expired       => open
+          );
+      end generate watched;
+
       highs_in <= highs_of_group;
-      beat     <= chosen_tvalid and chosen_tready;
+      beat     <= cut or (granted_tvalid and granted_tready);
+      ends     <= cut or granted_tlast;
 
       u_group_high : entity firm.firm_axis_select
         generic map (

@@ -17,6 +17,8 @@ use firm.firm_sim_pkg.all;
 entity firm_sim_pipe is
   generic (
     WIDTH : integer := 8;
+    -- Bytes of a frame's id, 1 or 2.
+    ID_BYTES : integer := 1;
     -- Bits of `frame_error`, one per converter.
     ERRORS : integer := 1;
     -- Determines all random choices.
@@ -40,7 +42,7 @@ entity firm_sim_pipe is
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
     s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
-    s_axis_tid    : in  std_logic_vector(7 downto 0);
+    s_axis_tid    : in  std_logic_vector(8*ID_BYTES-1 downto 0);
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
@@ -107,6 +109,9 @@ begin
   assert is_stream_width(WIDTH)
     report "firm_sim_pipe: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
+  assert ID_BYTES = 1 or ID_BYTES = 2
+    report "firm_sim_pipe: ID_BYTES is " & integer'image(ID_BYTES) & "; legal: 1, 2"
+    severity failure;
   assert ERRORS >= 1 and ERRORS <= MOST_ERRORS
     report "firm_sim_pipe: ERRORS is " & integer'image(ERRORS) & "; legal: 1 to 65534"
     severity failure;
@@ -138,7 +143,7 @@ begin
     -- The stream from the system: the incoming burst, as text that grows.
     variable burst        : line;
     variable burst_size   : natural := 0;
-    variable burst_tid    : byte_t;
+    variable burst_tid    : std_logic_vector(s_axis_tid'range);
     variable first_out    : cycle_t;
     variable is_accepting : boolean := false;
 
@@ -273,8 +278,12 @@ begin
     begin
       is_reported := true;
       write(reports, 'B');
-      write(reports, to_character(burst_tid));
-      write_number(0, 1);
+      write(reports, to_character(burst_tid(7 downto 0)));
+      if ID_BYTES = 1 then
+        write_number(0, 1);
+      else
+        write(reports, to_character(burst_tid(8*ID_BYTES-1 downto 8*ID_BYTES-8)));
+      end if;
       write_number(boolean'pos(s_axis_tuser = "1"), 1);
       write_cycle(first_out);
       write_cycle(cycle);

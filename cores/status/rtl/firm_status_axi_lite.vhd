@@ -5,11 +5,14 @@ library ieee;
 use ieee.std_logic_1164.all;
 
 entity firm_status_axi_lite is
+  generic (
+    ADDRESS_BITS : positive := 16
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    s_axi_awaddr  : in  std_logic_vector(15 downto 0);
+    s_axi_awaddr  : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
     s_axi_awprot  : in  std_logic_vector(2 downto 0);
     s_axi_awvalid : in  std_logic;
     s_axi_awready : out std_logic;
@@ -20,7 +23,7 @@ entity firm_status_axi_lite is
     s_axi_bresp   : out std_logic_vector(1 downto 0);
     s_axi_bvalid  : out std_logic;
     s_axi_bready  : in  std_logic;
-    s_axi_araddr  : in  std_logic_vector(15 downto 0);
+    s_axi_araddr  : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
     s_axi_arprot  : in  std_logic_vector(2 downto 0);
     s_axi_arvalid : in  std_logic;
     s_axi_arready : out std_logic;
@@ -32,7 +35,7 @@ entity firm_status_axi_lite is
     -- The registers: `bus_valid` pulses, and the rest is stable until `bus_done` pulses.
     bus_valid      : out std_logic;
     bus_write      : out std_logic;
-    bus_address    : out std_logic_vector(15 downto 0);
+    bus_address    : out std_logic_vector(ADDRESS_BITS-1 downto 0);
     bus_write_data : out std_logic_vector(31 downto 0);
     bus_read_data  : in  std_logic_vector(31 downto 0);
     bus_done       : in  std_logic
@@ -48,7 +51,7 @@ architecture rtl of firm_status_axi_lite is
 
   signal state_r       : state_t;
   signal is_write_r    : std_logic;
-  signal address_r     : std_logic_vector(15 downto 0) := (others => '0');
+  signal address_r     : std_logic_vector(ADDRESS_BITS-1 downto 0) := (others => '0');
   signal data_r        : std_logic_vector(31 downto 0);
   signal response_r    : std_logic_vector(1 downto 0);
   signal takes_read_r  : std_logic;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Reads and writes registers by frames, between the host and the Manager. A request is a frame from the host with the
--- id 255 and eight bytes: an address, with bit 31 to write, and data. The answer has the same form, with the register's
--- word before the access. It leaves between two frames of the Manager. A frame with this id that has another form or is
--- aborted is dropped. All other frames pass unchanged.
+-- highest id, 255 or 65,535, and eight bytes: an address, with bit 31 to write, and data. The answer has the same form,
+-- with the register's word before the access. It leaves between two frames of the Manager. A frame with this id that has
+-- another form or is aborted is dropped. All other frames pass unchanged.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -10,7 +10,11 @@ use firm.firm_axis_pkg.all;
 
 entity firm_status_frames is
   generic (
-    WIDTH : integer := 8
+    WIDTH : integer := 8;
+    -- Bytes of a frame's id, 1 or 2.
+    ID_BYTES : integer := 1;
+    -- At most 31.
+    ADDRESS_BITS : integer := 16
   );
   port (
     clk   : in std_logic;
@@ -29,7 +33,7 @@ entity firm_status_frames is
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tuser  : out std_logic_vector(0 downto 0);
-    m_axis_tid    : out std_logic_vector(7 downto 0);
+    m_axis_tid    : out std_logic_vector(8*ID_BYTES-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
@@ -44,7 +48,7 @@ entity firm_status_frames is
     inner_m_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     inner_m_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
     inner_m_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
-    inner_m_axis_tid    : in  std_logic_vector(7 downto 0);
+    inner_m_axis_tid    : in  std_logic_vector(8*ID_BYTES-1 downto 0);
     inner_m_axis_tvalid : in  std_logic;
     inner_m_axis_tlast  : in  std_logic;
     inner_m_axis_tready : out std_logic;
@@ -52,7 +56,7 @@ entity firm_status_frames is
     -- The registers: `bus_valid` pulses, and the rest is stable until `bus_done` pulses.
     bus_valid      : out std_logic;
     bus_write      : out std_logic;
-    bus_address    : out std_logic_vector(15 downto 0);
+    bus_address    : out std_logic_vector(ADDRESS_BITS-1 downto 0);
     bus_write_data : out std_logic_vector(31 downto 0);
     bus_read_data  : in  std_logic_vector(31 downto 0);
     bus_done       : in  std_logic
@@ -61,8 +65,14 @@ end entity firm_status_frames;
 
 architecture rtl of firm_status_frames is
 
-  constant STATUS_ID   : std_logic_vector(7 downto 0) := "11111111";
-  constant FRAME_BYTES : positive := 13;
+  constant STATUS_ID   : std_logic_vector(8*ID_BYTES-1 downto 0) := (others => '1');
+  constant FRAME_BYTES : positive := ID_BYTES + 12;
+  -- The first bits in a request.
+  constant LENGTH_BIT  : positive := 8*ID_BYTES;
+  constant ADDRESS_BIT : positive := LENGTH_BIT + 32;
+  constant DATA_BIT    : positive := ADDRESS_BIT + 32;
+  -- A beat is shorter than an id, whose first byte alone does not tell a request from another frame.
+  constant IS_SPLIT    : boolean  := WIDTH < 8*ID_BYTES;
   -- The payload's length, after the id.
   constant LENGTH      : std_logic_vector(31 downto 0) := (3 => '1', others => '0');
   constant LANES       : positive := max(1, WIDTH/8);
@@ -97,6 +107,10 @@ architecture rtl of firm_status_frames is
   signal is_first_r  : std_logic;
   signal is_status_r : std_logic;
   signal is_status   : std_logic;  -- this beat is part of a request
+  -- If beats are shorter than ids: the beat may be part of a request, and the beat before it was the first byte of one.
+  signal may_begin   : std_logic;
+  signal has_begun_r : std_logic;
+  signal returns     : std_logic;  -- it was not, so it is forwarded before this beat
   signal takes       : std_logic;
 
   signal state_r     : state_t;
@@ -118,6 +132,9 @@ begin
 
   assert is_stream_width(WIDTH)
     report "firm_status_frames: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+  assert ID_BYTES = 1 or ID_BYTES = 2
+    report "firm_status_frames: ID_BYTES is " & integer'image(ID_BYTES) & "; legal: 1, 2"
     severity failure;
 
   u_slice : entity firm.firm_axis_register_slice
@@ -142,18 +159,45 @@ begin
       m_axis_tready => in_tready
     );
 
-  is_status <= is_equal(in_tdata(7 downto 0), 255) when is_first_r = '1' else is_status_r;
-  in_tready <= '0' when is_clear = '0' else
-               '0' when is_status = '1' and state_r /= RECEIVES else
-               '1' when is_status = '1' else
+  whole_ids : if not IS_SPLIT generate
+    is_status   <= is_status_r when is_first_r = '0' else
+                   '0' when ID_BYTES = 2 and in_tkeep(ID_BYTES-1) = '0' else
+                   is_equal(in_tdata(8*ID_BYTES-1 downto 0), 256**ID_BYTES-1);
+    may_begin   <= '0';
+    returns     <= '0';
+    has_begun_r <= '0';
+  end generate whole_ids;
+
+  parts_of_ids : if IS_SPLIT generate
+    may_begin <= is_first_r and not has_begun_r and not in_tlast and is_equal(in_tdata(7 downto 0), 255);
+    is_status <= (has_begun_r and is_equal(in_tdata(7 downto 0), 255)) when is_first_r = '1' else is_status_r;
+    returns   <= has_begun_r and not is_status;
+
+    keep_first_byte : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          has_begun_r <= '0';
+        elsif takes = '1' then
+          has_begun_r <= may_begin;
+        elsif in_tvalid = '1' and returns = '1' and inner_s_axis_tready = '1' then
+          has_begun_r <= '0';
+        end if;
+      end if;
+    end process keep_first_byte;
+  end generate parts_of_ids;
+
+  in_tready <= '0' when is_clear = '0' or returns = '1' else
+               '0' when (is_status = '1' or may_begin = '1') and state_r /= RECEIVES else
+               '1' when is_status = '1' or may_begin = '1' else
                inner_s_axis_tready;
   takes     <= in_tvalid and in_tready;
 
-  inner_s_axis_tdata  <= in_tdata;
+  inner_s_axis_tdata  <= in_tdata when returns = '0' else (others => '1');
   inner_s_axis_tkeep  <= in_tkeep;
-  inner_s_axis_tuser  <= in_tuser;
-  inner_s_axis_tvalid <= in_tvalid and is_clear and not is_status;
-  inner_s_axis_tlast  <= in_tlast;
+  inner_s_axis_tuser  <= gated(in_tuser, not returns);
+  inner_s_axis_tvalid <= in_tvalid and is_clear and not is_status and not may_begin;
+  inner_s_axis_tlast  <= in_tlast and not returns;
 
   note_kind : process (clk)
   begin
@@ -161,9 +205,12 @@ begin
       if rst_n = '0' then
         is_first_r  <= '1';
         is_status_r <= '0';
-      elsif takes = '1' then
+      elsif takes = '1' and may_begin = '0' then
         is_first_r  <= in_tlast;
         is_status_r <= is_status;
+      elsif in_tvalid = '1' and returns = '1' and inner_s_axis_tready = '1' then
+        is_first_r  <= '0';
+        is_status_r <= '0';
       end if;
     end if;
   end process note_kind;
@@ -184,7 +231,10 @@ begin
   begin
     if rising_edge(clk) then
       if state_r = RECEIVES then
-        if takes = '1' and is_status = '1' then
+        if returns = '1' then
+          place_r    <= FIRST_PLACE;
+          is_wrong_r <= '0';
+        elsif takes = '1' and (is_status = '1' or may_begin = '1') then
           frame_r <= next_frame;
           place_r <= next_place;
           if in_tkeep /= ALL_KEPT then
@@ -194,7 +244,7 @@ begin
             place_r    <= FIRST_PLACE;
             is_wrong_r <= '0';
             if is_wrong_r = '0' and place_r(BEATS-1) = '1' and in_tkeep = LAST_KEPT and in_tuser = "0"
-               and next_frame(39 downto 8) = LENGTH then
+               and next_frame(ADDRESS_BIT-1 downto LENGTH_BIT) = LENGTH then
               state_r <= ASKS;
             end if;
           end if;
@@ -203,8 +253,8 @@ begin
         state_r <= AWAITS;
       elsif state_r = AWAITS then
         if bus_done = '1' then
-          frame_r(103 downto 72) <= bus_read_data;
-          state_r                <= ANSWERS;
+          frame_r(DATA_BIT+31 downto DATA_BIT) <= bus_read_data;
+          state_r                              <= ANSWERS;
         end if;
       elsif state_r = ANSWERS then
         -- The Manager's beat on offer must not be withdrawn, and its frame not be split.
@@ -231,9 +281,9 @@ begin
   end process serve;
 
   bus_valid      <= '1' when state_r = ASKS else '0';
-  bus_write      <= frame_r(71);
-  bus_address    <= frame_r(55 downto 40);
-  bus_write_data <= frame_r(103 downto 72);
+  bus_write      <= frame_r(DATA_BIT-1);
+  bus_address    <= frame_r(ADDRESS_BIT+ADDRESS_BITS-1 downto ADDRESS_BIT);
+  bus_write_data <= frame_r(DATA_BIT+31 downto DATA_BIT);
 
   note_place : process (clk)
   begin

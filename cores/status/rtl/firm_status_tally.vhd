@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A table of counters in memory, each with the longest of some durations: an operation adds `op_count` to the counter
 -- at `op_index`, and raises the duration there to `op_longest` if this is longer. Both stop at their highest value.
--- There may be an operation in every cycle. `read_word` follows `read_index` by one cycle.
+-- There may be an operation in every cycle. The words read follow `read_index` by one cycle. With SHARED_READ, a memory
+-- with one port to read suffices: the words follow after a cycle without an operation.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -10,7 +11,8 @@ entity firm_status_tally is
   generic (
     INDEX_BITS   : positive := 1;
     COUNT_BITS   : positive := 32;
-    LONGEST_BITS : positive := 16
+    LONGEST_BITS : positive := 16;
+    SHARED_READ  : boolean  := false
   );
   port (
     clk   : in std_logic;
@@ -54,7 +56,7 @@ architecture rtl of firm_status_tally is
   signal was_valid_r   : std_logic;
   signal was_index_r   : std_logic_vector(INDEX_BITS-1 downto 0);
   signal was_word_r    : std_logic_vector(WORD_BITS-1 downto 0);
-  signal read_word_r   : std_logic_vector(WORD_BITS-1 downto 0);
+  signal read_word     : std_logic_vector(WORD_BITS-1 downto 0);
 
   signal old_word      : std_logic_vector(WORD_BITS-1 downto 0);
   signal new_word      : std_logic_vector(WORD_BITS-1 downto 0);
@@ -91,10 +93,36 @@ begin
       if write_enable = '1' then
         memory(to_integer(unsigned(write_index))) <= write_word;
       end if;
-      word_r      <= memory(to_integer(unsigned(op_index)));
-      read_word_r <= memory(to_integer(unsigned(read_index)));
     end if;
   end process write_memory;
+
+  own_port : if not SHARED_READ generate
+    read_memory : process (clk)
+    begin
+      if rising_edge(clk) then
+        word_r    <= memory(to_integer(unsigned(op_index)));
+        read_word <= memory(to_integer(unsigned(read_index)));
+      end if;
+    end process read_memory;
+  end generate own_port;
+
+  shared_port : if SHARED_READ generate
+    signal index      : std_logic_vector(INDEX_BITS-1 downto 0);
+    signal was_read_r : std_logic;  -- the last cycle had no operation
+    signal kept_r     : std_logic_vector(WORD_BITS-1 downto 0);
+  begin
+    index     <= op_index when op_valid = '1' else read_index;
+    read_word <= word_r when was_read_r = '1' else kept_r;
+
+    read_memory : process (clk)
+    begin
+      if rising_edge(clk) then
+        word_r     <= memory(to_integer(unsigned(index)));
+        was_read_r <= not op_valid;
+        kept_r     <= read_word;
+      end if;
+    end process read_memory;
+  end generate shared_port;
 
   step : process (clk)
   begin
@@ -121,7 +149,7 @@ begin
   end process step;
 
   is_clear     <= is_clear_r;
-  read_count   <= read_word_r(WORD_BITS-1 downto LONGEST_BITS);
-  read_longest <= read_word_r(LONGEST_BITS-1 downto 0);
+  read_count   <= read_word(WORD_BITS-1 downto LONGEST_BITS);
+  read_longest <= read_word(LONGEST_BITS-1 downto 0);
 
 end architecture rtl;

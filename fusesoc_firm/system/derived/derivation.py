@@ -118,7 +118,7 @@ def derive(
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
     network = network_of(specification, scheduling, parts.software, faults)
-    tree = tree_of(project, scheduling, link, publishers, faults)
+    tree = tree_of(project, scheduling, link, faults)
     faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
@@ -134,12 +134,12 @@ def derive(
         software=parts.software,
         names=names,
         link=link,
-        status=status_of(project, link, max(len(subscribers), len(publishers)), faults),
+        status=status_of(project, link, len(subscribers), len(publishers), faults),
         has_time_stamps=has_time_stamps(project, faults),
         tree=tree,
         pipeline=None if project.pipeline is None else str(project.pipeline),
         network=network,
-        watchdog=0 if tree else watchdog_of(project, scheduling, publishers, faults),
+        watchdog=watchdog_of(project, scheduling, publishers, faults),
         services=services,
         actions=actions,
     )

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from fusesoc_firm.system.derived.ids import ONE_BYTE
 from fusesoc_firm.system.derived.model import Link, StatusAccess
 from fusesoc_firm.system.written.specification import ADDED, NO_STATUS, STATUS_AXI_LITE, STATUS_FRAMES, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# Frames of this id carry accesses in both directions, so no converter has it.
+# Frames of the highest id carry accesses in both directions, so no converter has it.
 STATUS_ID = 255
+TREE_CHANNELS = 4096
+"""The subscribers and publishers that the registers of a system with ids of two bytes have room for."""
 
 
-def status_of(project: Project, link: Link | None, converters: int, faults: Diagnostics) -> StatusAccess | None:
+def status_id(id_bytes: int) -> int:
+    """Return the id of the frames that access the status: the highest one."""
+    return int(256**id_bytes - 1)
+
+
+def status_of(
+    project: Project, link: Link | None, subscribers: int, publishers: int, faults: Diagnostics
+) -> StatusAccess | None:
     """Return the access to the status, or None without one; note faults.
 
-    `converters` is the number of subscribers or of publishers, whichever is greater.
+    The numbers are those of the system's converters.
     """
     if project.status == NO_STATUS:
         return None
@@ -24,8 +34,10 @@ def status_of(project: Project, link: Link | None, converters: int, faults: Diag
             project.status.source,
             f"use 'status: {STATUS_FRAMES}'",
         )
-    if access is StatusAccess.FRAMES:
-        _check_id(project, converters, faults)
+    if project.id_bytes > ONE_BYTE:
+        _check_channels(project, subscribers + publishers, faults)
+    elif access is StatusAccess.FRAMES:
+        _check_id(project, max(subscribers, publishers), faults)
     return access
 
 
@@ -39,6 +51,15 @@ def has_time_stamps(project: Project, faults: Diagnostics) -> bool:
             f"add 'status: {STATUS_FRAMES}' or 'status: {STATUS_AXI_LITE}'",
         )
     return is_wanted
+
+
+def _check_channels(project: Project, channels: int, faults: Diagnostics) -> None:
+    if channels > TREE_CHANNELS:
+        faults.error(
+            f"'status: {project.status}' has no registers for {channels} subscribers and publishers",
+            project.status.source,
+            f"at most {TREE_CHANNELS} together are possible with it",
+        )
 
 
 def _check_id(project: Project, converters: int, faults: Diagnostics) -> None:

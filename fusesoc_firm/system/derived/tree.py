@@ -6,13 +6,13 @@ other publishers go first, so publishers with short periods are in small groups.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import isqrt
 
 from fusesoc_firm.scheduling.policies import POLICIES
 from fusesoc_firm.system.derived.ids import ONE_BYTE, TWO_BYTES
-from fusesoc_firm.system.derived.model import Converter, Link, PublisherTimes, Scheduling, Tree
-from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, NO_STATUS, Project
+from fusesoc_firm.system.derived.model import Link, PublisherTimes, Scheduling, Tree
+from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 # The limit of the hardware: groups, and publishers of a group.
@@ -20,13 +20,7 @@ _MOST = 256
 _TURNS, _PRIORITY = "round_robin", "fixed_priority"
 
 
-def tree_of(
-    project: Project,
-    scheduling: Scheduling,
-    link: Link | None,
-    publishers: Iterable[Converter],
-    faults: Diagnostics,
-) -> Tree | None:
+def tree_of(project: Project, scheduling: Scheduling, link: Link | None, faults: Diagnostics) -> Tree | None:
     """Return the tree of a system whose ids have two bytes, or None; note faults."""
     if project.id_bytes == ONE_BYTE:
         return None
@@ -42,18 +36,6 @@ def tree_of(
             f"interconnect '{link.kind.value}' is not possible with 'idBytes: {TWO_BYTES}'",
             project.interconnect.source,
             "use 'axi_stream'",
-        )
-    if project.status != NO_STATUS:
-        faults.error(
-            f"'status: {project.status}' is not possible with 'idBytes: {TWO_BYTES}'",
-            project.status.source,
-            f"use 'status: {NO_STATUS}'",
-        )
-    if pausing := [item.block for item in publishers if item.may_pause]:
-        faults.warn(
-            f"no watchdog cuts off '{pausing[0]}' if it stops in the middle of a frame",
-            project.place("id_bytes"),
-            f"a Manager for 'idBytes: {TWO_BYTES}' has none; with 'buffer', a publisher sends only whole frames",
         )
     groups = groups_by_period(scheduling.times)
     if project.scheduler != AUTO_SCHEDULER:

@@ -7,7 +7,7 @@ Every block has a signal `<block>_<port>` for each port (`names`); `instances` c
 
 from __future__ import annotations
 
-from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.converter.vhdl import index_bits, vhdl_type
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.derived.sides import SidePort
 from fusesoc_firm.system.hardware.instances import (
@@ -189,7 +189,7 @@ def dimensions(system: DerivedSystem) -> Context:
         "pub_keep_bits": publishers * system.width // 8,
         "wide_ids": system.id_bytes > 1,
         "id_bits": 8 * system.id_bytes,
-        "select_bits": max(1, (publishers - 1).bit_length()),
+        "select_bits": index_bits(publishers),
         "error_count": len(system.error_blocks),
         "error_code_bits": ERROR_CODE_BITS * len(system.error_blocks),
     }

@@ -101,7 +101,7 @@ def _watched(names: Names, converter: Converter, system: DerivedSystem) -> dict[
     return {
         "block": converter.block,
         **{word: names.frame(converter.block, word) for word in ERROR_WORDS},
-        "id": converter.id,
+        "place": system.places[converter.id],
         "out": error_of(converter, system),
     }
 

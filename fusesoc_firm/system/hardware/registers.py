@@ -15,6 +15,7 @@ from pathlib import Path
 from systemrdl.compiler import RDLCompiler
 from systemrdl.node import AddrmapNode, FieldNode, RegfileNode, RegNode
 
+from fusesoc_firm.converter.vhdl import index_bits
 from fusesoc_firm.text.render import Context
 
 
@@ -124,11 +125,15 @@ def _kind(node: FieldNode) -> Kind:
     return Kind.STORAGE if node.is_sw_writable else Kind.CONSTANT
 
 
-def registers_configuration(registers: RegisterMap, signatures: Sequence[str]) -> Context:
+def registers_configuration(registers: RegisterMap, signatures: Sequence[str], address_bits: int = 16) -> Context:
     """Return the configuration of the block of registers; `signatures` are the channels', in hexadecimal digits.
 
-    External registers are not part of the block.
+    External registers are not part of the block. Many signatures, of addresses with more than 16 bits, are in memory.
     """
+    has_signature_memory = address_bits > 16
+    signature_bits = index_bits(len(signatures))
+    words = [*signatures, *["0" * 8] * (2**signature_bits - len(signatures))] if has_signature_memory else signatures
+    digits = address_bits // 4
     own = [register for register in registers.registers if not register.is_external]
     fields = [_field_configuration(register, field) for register in own for field in register.fields]
     kept = (Kind.STORAGE, Kind.STICKY, Kind.COUNTER)
@@ -137,14 +142,17 @@ def registers_configuration(registers: RegisterMap, signatures: Sequence[str]) -
     ]
     return {
         "map": registers.name,
-        "signature_count": len(signatures),
-        "signatures": [{"channel": number, "word": word} for number, word in enumerate(signatures)],
+        "address_bits": address_bits,
+        "has_signature_memory": has_signature_memory,
+        "signature_bits": signature_bits,
+        "last_signature": len(words) - 1,
+        "signatures": [{"channel": number, "word": word} for number, word in enumerate(words)],
         "reads": read,
         "resets": [field for field in fields if Kind(field["kind"]) in kept],
         "registers": [
             {
                 "name": register.name,
-                "address": f"{register.address:04x}",
+                "address": f"{register.address:0{digits}x}",
                 "fields": [_field_configuration(register, field) for field in register.fields],
             }
             for register in own
@@ -152,7 +160,7 @@ def registers_configuration(registers: RegisterMap, signatures: Sequence[str]) -
         "writable": [
             {
                 "name": register.name,
-                "address": f"{register.address:04x}",
+                "address": f"{register.address:0{digits}x}",
                 "fields": [_field_configuration(register, field) for field in register.fields if field.is_writable],
             }
             for register in own

@@ -40,7 +40,7 @@ def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
         of_groups = [("SIZES", "SIZES"), ("POLICIES", "POLICIES"), ("TOP_POLICY", _policy(scheduling.policy))]
         generics = [*of_groups, *(item for item in generics if item[0] != "PREEMPTIVE")]
     return {
-        "tree": _tree(system.tree) if system.tree else None,
+        "tree": _tree(system.tree, system) if system.tree else None,
         "groups": _groups(scheduling.groups) if scheduling.groups else None,
         "scheduler": entity,
         "scheduler_generics": port_map([("REQUESTERS", str(len(system.publishers))), *generics]),
@@ -68,7 +68,7 @@ def _groups(groups: Sequence[Group]) -> dict[str, Any]:
     return {"last_group": len(groups) - 1, "members": members}
 
 
-def _tree(tree: Tree) -> dict[str, Any]:
+def _tree(tree: Tree, system: DerivedSystem) -> dict[str, Any]:
     """Return the generics of the Manager of Managers."""
     return {
         "sizes": _runs(len(group) for group in tree.groups),
@@ -76,6 +76,8 @@ def _tree(tree: Tree) -> dict[str, Any]:
         "policy": _policy(tree.policy),
         "top_policy": _policy(tree.top_policy),
         "highs": _runs(number // 256 for group in tree.groups for number in group),
+        "watchdog": system.watchdog,
+        "has_status": bool(system.status),
     }
 
 

@@ -7,7 +7,9 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fusesoc_firm.converter.vhdl import index_bits
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, StatusAccess
+from fusesoc_firm.system.derived.status import TREE_CHANNELS
 from fusesoc_firm.system.hardware.instances import ERROR_CODE_BITS, INNER, error_of
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map
 from fusesoc_firm.text.render import Context, render
@@ -18,6 +20,12 @@ REGISTERS_TEMPLATE = "vhdl/registers.vhd"
 DIGEST_ADDRESS, DIGEST_WORDS = 0x30, 4
 _CHANNELS_ADDRESS, _CHANNEL_BYTES = 0x8000, 0x40
 _WORD_DIGITS = 8
+
+# The bits of addresses, and the channels that these reach: beside a Manager, and beside a Manager of Managers.
+ADDRESS_BITS, MOST_CHANNELS = 16, 512
+_TREE_ADDRESS_BITS = 20
+# Of the address of a word within a channel.
+_WORD_BITS = 4
 
 
 @dataclass(frozen=True)
@@ -95,7 +103,8 @@ def status_configuration(system: DerivedSystem) -> Context:
     is_frames = system.status is StatusAccess.FRAMES
     return {
         "scope": INNER if system.status else "",
-        "inner": INNER if is_frames else "",
+        "inner": INNER if _has_inner_streams(system) else "",
+        "address_bits": address_bits(system),
         "link_tid": f"{INNER}m_axis_tid" if is_frames else "open",
         "has_status": bool(system.status),
         "status_bus": system.status is StatusAccess.AXI_LITE,
@@ -103,9 +112,26 @@ def status_configuration(system: DerivedSystem) -> Context:
     }
 
 
+def address_bits(system: DerivedSystem) -> int:
+    """Return the bits of a register's address."""
+    return _TREE_ADDRESS_BITS if system.tree else ADDRESS_BITS
+
+
+def _has_inner_streams(system: DerivedSystem) -> bool:
+    """Return whether the Manager's streams are signals: the status is in between, or listens."""
+    return system.status is StatusAccess.FRAMES or bool(system.status and system.tree)
+
+
 def _instances(system: DerivedSystem) -> Context:
     channels = (*system.subscribers, *system.publishers)
     return {
+        "tree": bool(system.tree),
+        "waits": [{"id": number, "place": place} for number, place in sorted(system.places.items())],
+        "has_inner_streams": _has_inner_streams(system),
+        "address_bits": address_bits(system),
+        "word_bits": _WORD_BITS + index_bits(TREE_CHANNELS if system.tree else MOST_CHANNELS),
+        "id_bits": 8 * system.id_bytes,
+        "select_bits": index_bits(len(system.subscribers)),
         "entity": status_entity(system),
         "is_frames": system.status is StatusAccess.FRAMES,
         "has_link": bool(system.link),

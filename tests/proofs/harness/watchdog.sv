@@ -31,6 +31,7 @@ wire running = rst_n;
 firm_axis_watchdog dut (
     .clk(clk),
     .rst_n(rst_n),
+    .tick(1'b1),
     .source(source),
     .s_axis_tdata(s_axis_tdata),
     .s_axis_tkeep(1'b1),

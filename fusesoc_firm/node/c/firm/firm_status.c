@@ -30,6 +30,22 @@ void firm_status_write_request(uint8_t request[FIRM_STATUS_FRAME_BYTES], uint32_
     write_frame(request, address | WRITE_BIT, word);
 }
 
+/* The id of two bytes is the one-byte id twice. */
+void firm_status_wide_read_request(uint8_t request[FIRM_STATUS_WIDE_FRAME_BYTES], uint32_t address) {
+    request[0] = FIRM_STATUS_ID;
+    write_frame(request + 1, address, 0);
+}
+
+void firm_status_wide_write_request(uint8_t request[FIRM_STATUS_WIDE_FRAME_BYTES], uint32_t address, uint32_t word) {
+    request[0] = FIRM_STATUS_ID;
+    write_frame(request + 1, address | WRITE_BIT, word);
+}
+
+int firm_status_wide_answer(const uint8_t *frame, size_t size, uint32_t *address, uint32_t *word) {
+    return size == FIRM_STATUS_WIDE_FRAME_BYTES && frame[0] == FIRM_STATUS_ID &&
+           firm_status_answer(frame + 1, size - 1, address, word);
+}
+
 int firm_status_answer(const uint8_t *frame, size_t size, uint32_t *address, uint32_t *word) {
     if (size != FIRM_STATUS_FRAME_BYTES || frame[0] != FIRM_STATUS_ID || firm_frame_length(frame) != PAYLOAD_BYTES) {
         return 0;

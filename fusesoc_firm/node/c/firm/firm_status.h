@@ -14,6 +14,7 @@
 
 #define FIRM_STATUS_ID 255u
 #define FIRM_STATUS_FRAME_BYTES 13u
+#define FIRM_STATUS_WIDE_FRAME_BYTES 14u /* with ids of two bytes */
 
 /* Addresses of registers. */
 #define FIRM_STATUS_MAGIC 0x00u /* holds FIRM_STATUS_MARK */
@@ -46,5 +47,10 @@ void firm_status_write_request(uint8_t request[FIRM_STATUS_FRAME_BYTES], uint32_
 
 /* Return whether a frame is an answer; then `word` is the word of the register at `address` before the access. */
 int firm_status_answer(const uint8_t *frame, size_t size, uint32_t *address, uint32_t *word);
+
+/* The same for systems with ids of two bytes ('idBytes: 2'). */
+void firm_status_wide_read_request(uint8_t request[FIRM_STATUS_WIDE_FRAME_BYTES], uint32_t address);
+void firm_status_wide_write_request(uint8_t request[FIRM_STATUS_WIDE_FRAME_BYTES], uint32_t address, uint32_t word);
+int firm_status_wide_answer(const uint8_t *frame, size_t size, uint32_t *address, uint32_t *word);
 
 #endif

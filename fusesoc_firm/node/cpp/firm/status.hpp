@@ -65,9 +65,10 @@ struct Status {
 // Accesses registers one after the other.
 class StatusAccess {
  public:
-  // A simulator may have to start first, on a busy machine.
-  explicit StatusAccess(Transport& transport, std::chrono::nanoseconds patience = std::chrono::seconds(20))
-      : transport_(transport), patience_(patience) {}
+  // A simulator may have to start first, on a busy machine. Ids have one byte, or two with `idBytes: 2`.
+  explicit StatusAccess(Transport& transport, std::chrono::nanoseconds patience = std::chrono::seconds(20),
+                        std::size_t id_bytes = kIdBytes)
+      : transport_(transport), patience_(patience), id_bytes_(id_bytes) {}
 
   // Return the word of the register at an address. Throws TransportError if there is no answer.
   std::uint32_t read(std::uint32_t address) { return access(address, 0); }
@@ -78,19 +79,20 @@ class StatusAccess {
  private:
   // Frames other than the answer are dropped.
   std::uint32_t access(std::uint32_t address, std::uint32_t word) {
-    const Bytes request = status_request(address, word);
+    const Bytes request = status_request(address, word, id_bytes_);
     transport_.send(request.data(), request.size());
     const auto end = std::chrono::steady_clock::now() + patience_;
     for (auto left = patience_; left.count() > 0; left = end - std::chrono::steady_clock::now()) {
       const auto burst = transport_.receive(left);
       if (!burst) break;
-      if (status_address(burst->data) == address) return little_endian(burst->data, kFrameHeaderBytes + 4);
+      if (status_address(burst->data) == address) return status_word(burst->data);
     }
     throw TransportError(kNoStatusAnswer);
   }
 
   Transport& transport_;
   const std::chrono::nanoseconds patience_;
+  const std::size_t id_bytes_;
 };
 
 // Return the digest of the hardware's system, 32 hexadecimal digits. `access` reads registers: StatusAccess, or
@@ -118,10 +120,10 @@ void check_digest(Access& access, const std::string& expected, const std::string
 }
 
 // Return the status of hardware. Throws TransportError if it does not answer, or if its registers are unknown.
-inline Status read_status(Transport& transport) {
+inline Status read_status(Transport& transport, std::size_t id_bytes = kIdBytes) {
   constexpr std::uint32_t kMark = 0x4D524946, kVersion = 1;
   namespace at = status_register;
-  StatusAccess access(transport);
+  StatusAccess access(transport, std::chrono::seconds(20), id_bytes);
   const std::uint32_t mark = access.read(at::kMagic), shape = access.read(at::kShape);
   if (mark != kMark || shape >> 24 != kVersion) throw TransportError("the hardware has another kind of status");
   Status status;

@@ -32,22 +32,31 @@ inline std::uint32_t little_endian(const Bytes& bytes, std::size_t place) {
   return word;
 }
 
-// Return the frame that reads the register at an address, or, with bit 31 of the address, writes a word to it.
-inline Bytes status_request(std::uint32_t address, std::uint32_t word) {
+// Return the frame that reads the register at an address, or, with bit 31 of the address, writes a word to it. Ids have
+// one byte or two, which are equal in the status id.
+inline Bytes status_request(std::uint32_t address, std::uint32_t word, std::size_t id_bytes = kIdBytes) {
   Bytes payload;
   for (const std::uint32_t part : {address, word}) {
     for (unsigned shift = 0; shift < 32; shift += 8) payload.push_back(static_cast<std::uint8_t>(part >> shift));
   }
-  return pack_frame(kStatusId, payload.data(), payload.size());
+  Bytes frame = pack_frame(kStatusId, payload.data(), payload.size());
+  frame.insert(frame.begin(), id_bytes - kIdBytes, kStatusId);
+  return frame;
 }
 
-// Return the address in a request or an answer, or nothing for another frame.
+// Return the address in a request or an answer, whatever the size of its id, or nothing for another frame.
 inline std::optional<std::uint32_t> status_address(const Bytes& frame) {
-  const bool is_status = frame.size() == kFrameHeaderBytes + kStatusPayloadBytes && frame[0] == kStatusId &&
-                         payload_length(frame.data()) == kStatusPayloadBytes;
+  constexpr std::size_t kShort = kFrameHeaderBytes + kStatusPayloadBytes;
+  if (frame.size() != kShort && frame.size() != kShort + 1) return std::nullopt;
+  const std::size_t more = frame.size() - kShort;
+  const bool is_status = frame[0] == kStatusId && frame[more] == kStatusId &&
+                         payload_length(frame.data() + more) == kStatusPayloadBytes;
   if (!is_status) return std::nullopt;
-  return little_endian(frame, kFrameHeaderBytes);
+  return little_endian(frame, more + kFrameHeaderBytes);
 }
+
+// Return the word of an answer, which ends with it.
+inline std::uint32_t status_word(const Bytes& frame) { return little_endian(frame, frame.size() - 4); }
 
 // One access at a time, by any thread.
 class StatusExchange {
