@@ -25,6 +25,7 @@ def compare_function(type_: AcceleratorType, function: CppFunction, faults: Diag
         _compare_names(wanted, function, faults)
     for name in given.keys() & wanted.keys():
         _compare_type(given[name], wanted[name], faults)
+    _check_streams(wanted, function, faults)
     modes = {item.name: item.mode for item in wanted.values()} | {"return": "ap_ctrl_hs"}
     named = {pragma.port for pragma in function.pragmas}
     for pragma in function.pragmas:
@@ -68,6 +69,24 @@ def _compare_type(found: CppParameter, wanted: Parameter, faults: Diagnostics) -
     if is_wrong:
         message = f"the parameter is '{found.declaration}', and the interface needs '{wanted.declaration}'"
         faults.error(message, found.place)
+
+
+def _check_streams(wanted: dict[str, Parameter], function: CppFunction, faults: Diagnostics) -> None:
+    """Add every stream that the function does not use, except that of a string or an array that it sends empty.
+
+    The wrapper waits for values of such an output, and for space in such an input.
+    """
+    if function.words is None:
+        return
+    for found in function.parameters:
+        item = wanted.get(found.name)
+        is_unused = item and item.is_stream and found.name not in function.words
+        if not item or not is_unused or (item.is_output and item.may_be_empty):
+            continue
+        verb, call = ("written", "write(...)") if item.is_output else ("read", "read()")
+        message = f"stream '{found.name}' is never {verb}, so the hardware would stop"
+        hint = f"read all inputs and write all outputs for each message, also unneeded ones: {found.name}.{call}"
+        faults.error(message, found.place, hint)
 
 
 def _compare_pragma(pragma: InterfacePragma, modes: dict[str, str], named: set[str], faults: Diagnostics) -> None:
