@@ -72,21 +72,31 @@ def _compare_type(found: CppParameter, wanted: Parameter, faults: Diagnostics) -
 
 
 def _check_streams(wanted: dict[str, Parameter], function: CppFunction, faults: Diagnostics) -> None:
-    """Add every stream that the function does not use, except that of a string or an array that it sends empty.
+    """Add every stream at which the hardware would stop, since the function never uses it.
 
-    The wrapper waits for values of such an output, and for space in such an input.
+    An output needs its value, except that of a string or an array, which may be empty. The input after a string or an
+    array arrives only when that has been read; all that remains unread when the function returns is dropped.
     """
-    if function.words is None:
+    words = function.words
+    if words is None:
         return
     for found in function.parameters:
         item = wanted.get(found.name)
-        is_unused = item and item.is_stream and found.name not in function.words
-        if not item or not is_unused or (item.is_output and item.may_be_empty):
+        if not item or not item.is_stream or found.name in words:
             continue
-        verb, call = ("written", "write(...)") if item.is_output else ("read", "read()")
-        message = f"stream '{found.name}' is never {verb}, so the hardware would stop"
-        hint = f"read all inputs and write all outputs for each message, also unneeded ones: {found.name}.{call}"
-        faults.error(message, found.place, hint)
+        if item.is_output and not item.may_be_empty:
+            hint = f"every message needs its value: {found.name}.write(...)"
+            faults.error(f"stream '{found.name}' is never written", found.place, hint)
+        elif item.may_be_empty and (later := _next_input(item, wanted, words)):
+            hint = f"'{later}' arrives only when all elements before it have been read: {found.name}.read()"
+            faults.error(f"stream '{found.name}' is never read", found.place, hint)
+
+
+def _next_input(item: Parameter, wanted: dict[str, Parameter], words: frozenset[str]) -> str:
+    """Return the next used parameter of the same input message, or an empty string."""
+    names = [*wanted]
+    later = (name for name in names[names.index(item.name) :] if name in words and wanted[name].side == item.side)
+    return "" if item.is_output else next(later, "")
 
 
 def _compare_pragma(pragma: InterfacePragma, modes: dict[str, str], named: set[str], faults: Diagnostics) -> None:

@@ -39,15 +39,9 @@ OF_STREAMS = [
     ("<float> &range_field_in", "<double> &range_field_in", "", "needs 'hls::stream<float> &range_field_in'"),
     ("hls::stream<float> &range_field_in", "float range_field_in", "", "needs 'hls::stream<float> &range_field_in'"),
     ("mode=ap_fifo port=range_field_in", "mode=ap_none port=range_field_in", "", "and needs ap_fifo"),
-    (
-        "const float max_range_in_value = max_range_in.read();",
-        "",
-        "",
-        "stream 'max_range_in' is never read, so the hardware would stop",
-    ),
-    ("const float max_range_in_value = max_range_in.read();", "// max_range_in", "", "never read"),
-    ("const char element = header_frame_id_in.read();", "const char element = 0;", "", "'header_frame_id_in' is never"),
-    ("data_length_out.write(0);", "", "", "stream 'data_length_out' is never written, so the hardware would stop"),
+    ("= header_frame_id_in.read();", "= 0;  // header_frame_id_in", "", "stream 'header_frame_id_in' is never read"),
+    ("= header_frame_id_in.read();", "= 0;", "", "= 'radiation_type_in' arrives only when all elements before it"),
+    ("data_length_out.write(0);", "", "", "stream 'data_length_out' is never written"),
 ]
 # Other spellings of the same function, and functions whose declaration is unknown.
 LEGAL = [
@@ -64,12 +58,14 @@ LEGAL = [
     ("void acc(double pose_position_x_in", "void acc(, double pose_position_x_in"),
 ]
 
-READ = "const float max_range_in_value = max_range_in.read();"
+READ = "const char element = header_frame_id_in.read();"
 LEGAL_STREAMS = [
-    (READ, "take(max_range_in);"),
-    (READ, "READ(max_range_in)"),
-    (f"    {READ}", "#define SKIP max_range_in.read()\n    SKIP;"),
-    (f"    {READ}", '#include "further.inc"'),
+    (READ, "const char element = taken(header_frame_id_in);"),
+    (READ, "READ(element, header_frame_id_in)"),
+    (f"        {READ}", "#define NEXT header_frame_id_in.read()\n    const char element = NEXT;"),
+    (f"        {READ}", '#include "further.inc"'),
+    # What is unread when the function returns is dropped.
+    ("= max_range_in.read();", "= 0;"),
 ]
 
 

@@ -83,7 +83,8 @@ class Argument:
 class Parameter:
     """A parameter that the function must have; `count` is the number of elements of an array.
 
-    A stream of a string or an array of variable size `may_be_empty`.
+    The stream of the elements of a string or an array of variable size `may_be_empty`. `side` is the prefix of the
+    ports of a stream's message.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Parameter:
     is_output: bool
     is_stream: bool = False
     may_be_empty: bool = False
+    side: str = ""
 
     @property
     def declaration(self) -> str:
@@ -178,6 +180,7 @@ def parameters(accelerator: AcceleratorType) -> list[Parameter]:
                 is_output=is_output,
                 is_stream=True,
                 may_be_empty=item.is_stream,
+                side=item.prefix,
             )
             for is_output, items in zip((False, True), streams(accelerator), strict=True)
             for item in items
