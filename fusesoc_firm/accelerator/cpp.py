@@ -26,6 +26,8 @@ _INTERFACE = re.compile(r"#\s*pragma\s+HLS\s+INTERFACE\b", re.IGNORECASE)
 _PORT = re.compile(r"\bport\s*=\s*(\w+)", re.IGNORECASE)
 # `INTERFACE mode=ap_none`, or `INTERFACE ap_none` in older versions.
 _MODE = re.compile(r"\bmode\s*=\s*(\w+)|\bINTERFACE\s+(\w+)\b(?!\s*=)", re.IGNORECASE)
+_INCLUDE = re.compile(r"#\s*include\b")
+_WORD = re.compile(r"\w+")
 _DEFINE = re.compile(r"#\s*define\s+(\w+)")
 _OPENING, _CLOSING = ("(", "[", "{", "<"), (")", "]", "}", ">")
 _QUALIFIERS = ("const", "volatile")
@@ -71,12 +73,13 @@ class InterfacePragma:
 
 @dataclass(frozen=True)
 class CppFunction:
-    """A function with a body."""
+    """A function with a body. `words` are all words that the body may contain; None if it includes a file."""
 
     name: str
     place: SourceRef
     parameters: tuple[CppParameter, ...]
     pragmas: tuple[InterfacePragma, ...]
+    words: frozenset[str] | None
 
 
 class _Token(NamedTuple):
@@ -100,7 +103,8 @@ class _File:
         found = (_Token(match[0], match.start(), match.lastgroup or "") for match in _TOKEN.finditer(self._text))
         self._tokens = [token for token in found if token.kind != "blank"]
         directives = (token.text for token in self._tokens if token.kind == "directive")
-        self._macros = {match[1] for text in directives if (match := _DEFINE.match(text))}
+        # The name of each macro, with its text.
+        self._macros = {match[1]: text for text in directives if (match := _DEFINE.match(text))}
 
     def function(self, name: str) -> CppFunction | None:
         definitions = list(self._definitions(name))
@@ -113,7 +117,8 @@ class _File:
             return None
         body = self._tokens[end + 1 : self._closing(end + 1)]
         pragmas = tuple(pragma for token in body if (pragma := self._pragma(token)))
-        return CppFunction(name, self._place(self._tokens[start].start, len(name)), known, pragmas)
+        place = self._place(self._tokens[start].start, len(name))
+        return CppFunction(name, place, known, pragmas, self._words(body))
 
     def _definitions(self, name: str) -> Iterator[tuple[int, int]]:
         """Yield the indices of the function's name and of the parenthesis that closes its parameters."""
@@ -133,6 +138,13 @@ class _File:
             if not depth:
                 return index
         return len(self._tokens)
+
+    def _words(self, body: Sequence[_Token]) -> frozenset[str] | None:
+        """Return the words of a body and of all macros, or None if a part of the body is in another file."""
+        if any(_INCLUDE.match(token.text) for token in body if token.kind == "directive"):
+            return None
+        in_macros = (word for text in self._macros.values() for word in _WORD.findall(text))
+        return frozenset([*(token.text for token in body if token.kind == "word"), *in_macros])
 
     def _parameter(self, tokens: Sequence[_Token]) -> CppParameter | None:
         """Return a parameter, or None if it has a macro, a default value or other unknown syntax."""

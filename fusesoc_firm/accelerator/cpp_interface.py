@@ -25,6 +25,7 @@ def compare_function(type_: AcceleratorType, function: CppFunction, faults: Diag
         _compare_names(wanted, function, faults)
     for name in given.keys() & wanted.keys():
         _compare_type(given[name], wanted[name], faults)
+    _check_streams(wanted, function, faults)
     modes = {item.name: item.mode for item in wanted.values()} | {"return": "ap_ctrl_hs"}
     named = {pragma.port for pragma in function.pragmas}
     for pragma in function.pragmas:
@@ -68,6 +69,34 @@ def _compare_type(found: CppParameter, wanted: Parameter, faults: Diagnostics) -
     if is_wrong:
         message = f"the parameter is '{found.declaration}', and the interface needs '{wanted.declaration}'"
         faults.error(message, found.place)
+
+
+def _check_streams(wanted: dict[str, Parameter], function: CppFunction, faults: Diagnostics) -> None:
+    """Add every stream at which the hardware would stop, since the function never uses it.
+
+    An output needs its value, except that of a string or an array, which may be empty. The input after a string or an
+    array arrives only when that has been read; all that remains unread when the function returns is dropped.
+    """
+    words = function.words
+    if words is None:
+        return
+    for found in function.parameters:
+        item = wanted.get(found.name)
+        if not item or not item.is_stream or found.name in words:
+            continue
+        if item.is_output and not item.may_be_empty:
+            hint = f"every message needs its value: {found.name}.write(...)"
+            faults.error(f"stream '{found.name}' is never written", found.place, hint)
+        elif item.may_be_empty and (later := _next_input(item, wanted, words)):
+            hint = f"'{later}' arrives only when all elements before it have been read: {found.name}.read()"
+            faults.error(f"stream '{found.name}' is never read", found.place, hint)
+
+
+def _next_input(item: Parameter, wanted: dict[str, Parameter], words: frozenset[str]) -> str:
+    """Return the next used parameter of the same input message, or an empty string."""
+    names = [*wanted]
+    later = (name for name in names[names.index(item.name) :] if name in words and wanted[name].side == item.side)
+    return "" if item.is_output else next(later, "")
 
 
 def _compare_pragma(pragma: InterfacePragma, modes: dict[str, str], named: set[str], faults: Diagnostics) -> None:

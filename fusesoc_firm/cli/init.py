@@ -53,8 +53,8 @@ def add_init(commands: Any) -> None:
         "--include",
         action="append",
         metavar="FIELD",
-        help="a field that the accelerator changes, such as pose.position.z, while the others of the message pass; "
-        "may be repeated, and --out is then the message of --in",
+        help="a field that the accelerator receives, such as pose.position.z; may be repeated. Without --out, the "
+        "accelerator sends it, too, and all other fields of the message pass",
     )
     init.add_argument("--ros", choices=("1", "2"), help="the ROS version (default: 2)")
     init.add_argument(

@@ -6,11 +6,10 @@ A row has the fields of the frames in the host's files. Without these files, it 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 from fusesoc_firm.building.simulation import Message
 from fusesoc_firm.simulation.answers import Answer, Payload
-from fusesoc_firm.simulation.host_files import value_text
+from fusesoc_firm.simulation.host_files import is_zero, value_text
 
 
 def with_answers(messages: Iterable[Message], answers: Sequence[Answer]) -> Iterator[tuple[Message, Sequence[Answer]]]:
@@ -48,10 +47,10 @@ def _texts(sent: Payload, answers: Sequence[Answer], width: int) -> list[str]:
     changed = {name for answer in answers for name in told & answer.expected.fields.keys()}
     names = sorted(told or sent.fields, key=[*sent.fields].index)
     wrong = {name for answer in answers for name in changed if answer.wrong_fields(name)}
-    names.sort(key=lambda name: (name not in wrong, name not in changed, _is_zero(sent.fields[name])))
+    names.sort(key=lambda name: (name not in wrong, name not in changed, is_zero(sent.fields[name])))
     text = _line(sent, names)
     if len(text) > width:
-        text = _line(sent, [name for name in names if name in changed or not _is_zero(sent.fields[name])] or names)
+        text = _line(sent, [name for name in names if name in changed or not is_zero(sent.fields[name])] or names)
     return [text, *(_response(answer, _chosen(answer)) for answer in answers)]
 
 
@@ -62,10 +61,10 @@ def _chosen(answer: Answer) -> list[str]:
     """
     fields, sent = answer.expected.fields, answer.sent.fields if answer.sent else {}
     if not (names := [name for name in fields if not _is_copied(answer, name)]):
-        return sorted(fields, key=lambda name: _is_zero(fields[name]))
+        return sorted(fields, key=lambda name: is_zero(fields[name]))
     is_new = {name: name not in sent for name in names}
     return sorted(
-        names, key=lambda name: (not answer.wrong_fields(name), is_new[name], is_new[name] and _is_zero(fields[name]))
+        names, key=lambda name: (not answer.wrong_fields(name), is_new[name], is_new[name] and is_zero(fields[name]))
     )
 
 
@@ -74,13 +73,6 @@ def _is_copied(answer: Answer, name: str) -> bool:
     one, other = answer.sent.fields if answer.sent else {}, answer.expected.fields
     is_equal = name in one and name in other and repr(one[name]) == repr(other[name])
     return is_equal and not answer.wrong_fields(name)
-
-
-def _is_zero(value: Any) -> bool:
-    """Return whether a value is zero, empty, or contains only such values."""
-    if isinstance(value, dict):
-        return all(map(_is_zero, value.values()))
-    return all(map(_is_zero, value)) if isinstance(value, list | bytes) else not value
 
 
 def _response(answer: Answer, names: Iterable[str]) -> str:

@@ -219,12 +219,14 @@ def _with_fields(
     from fusesoc_firm.simulation.answers import with_values
     from fusesoc_firm.simulation.host_files import with_field
 
-    path = chosen.build.work_root / "expected.txt"
-    if loaded is None or not path.is_file():
+    paths = [chosen.build.work_root / name for name in ("stimulus.txt", "expected.txt")]
+    if loaded is None or not all(path.is_file() for path in paths):
         return [*faults]
-    expected, system = path.read_text(encoding="ascii"), loaded.system
+    sent, expected = (path.read_text(encoding="ascii") for path in paths)
+    system = loaded.system
+    topics = system.subscribers, system.publishers
     lines = with_values(faults, answers, system.id_bytes)
-    return [with_field(line, expected, system.publishers, system.id_bytes) for line in lines]
+    return [with_field(line, (sent, expected), topics, system.id_bytes) for line in lines]
 
 
 def _print_messages(report: Report, answers: Sequence[Answer]) -> None:

@@ -16,8 +16,7 @@ from fusesoc_firm.system.derived.model import Converter, Topic
 
 _BYTES_A_LINE = 32
 _LABEL_WIDTH = 160
-_ZEROS = ("0", "0.0", "False", '""', "[]")
-_WRONG_BYTE = re.compile(r"fault in cycle \d+: '(?P<label>.*)': byte (?P<byte>\d+)")
+_AT_BYTE = re.compile(r"fault in cycle \d+: '(?P<label>.*)': (?P<what>byte|only|stops after) (?P<byte>\d+)")
 
 
 def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter], id_bytes: int = ID_BYTES) -> str:
@@ -43,25 +42,40 @@ def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]
     return "\n".join(lines) + "\n"
 
 
-def with_field(fault: str, expected: str, publishers: Iterable[Converter], id_bytes: int = ID_BYTES) -> str:
-    """Return a fault of the host with the name of the wrong byte's field, if it is known: `byte 32 (vector.y): ...`.
+def with_field(
+    fault: str,
+    texts: tuple[str, str],
+    topics: tuple[Iterable[Converter], Iterable[Converter]],
+    id_bytes: int = ID_BYTES,
+) -> str:
+    """Return a fault of the host with the name of its byte's field, if it is known: `byte 32 (vector.y): ...`.
 
-    `expected` is the text of the file of expected frames.
+    `texts` are those of the stimulus file and of the file of expected frames, and `topics` the subscribers and the
+    publishers.
     """
-    match = _WRONG_BYTE.match(fault)
-    frame = _frame_of(match["label"], expected) if match else b""
-    offset = int(match["byte"]) - id_bytes - LENGTH_BYTES if match else -1
-    if match is None or not frame or offset < 0:
+    if (match := _AT_BYTE.match(fault)) is None:
         return fault
-    (topic,) = (item for item in publishers if item.block == match["label"].partition(" ")[0])
-    name = field_at(topic.frame, frame[id_bytes + LENGTH_BYTES :], offset)
-    return f"{fault[: match.end()]} ({name}){fault[match.end() :]}" if name else fault
+    is_sent = match["what"] == "only"
+    text, known = (texts[0], topics[0]) if is_sent else (texts[1], topics[1])
+    frame = _frame_of(match["label"], text)[id_bytes + LENGTH_BYTES :]
+    # Of a frame that is not taken, the last byte that was.
+    offset = int(match["byte"]) - id_bytes - LENGTH_BYTES - is_sent
+    if not frame or offset < 0:
+        return fault
+    (topic,) = (item for item in known if item.block == match["label"].partition(" ")[0])
+    if not (name := field_at(topic.frame, frame, offset)):
+        return fault
+    if match["what"] == "byte":
+        return f"{fault[: match.end()]} ({name}){fault[match.end() :]}"
+    return (
+        f"{fault}, up to {name}: no block takes this field or one before it" if is_sent else f"{fault}, before {name}"
+    )
 
 
-def _frame_of(label: str, expected: str) -> bytes:
-    """Return the first expected frame with a label, with zeros for padding; no bytes if there is none."""
-    lines = iter(expected.splitlines())
-    if not any(re.fullmatch(rf"< (@\d+ )?{re.escape(label)}", line) for line in lines):
+def _frame_of(label: str, text: str) -> bytes:
+    """Return the first frame with a label in a file, with zeros for padding; no bytes if there is none."""
+    lines = iter(text.splitlines())
+    if not any(re.fullmatch(rf"[<>] (@\d+ )?{re.escape(label)}", line) for line in lines):
         return b""
     return bytes.fromhex("".join(takewhile(lambda line: line.startswith("  "), lines)).replace("..", "00"))
 
@@ -78,16 +92,33 @@ def _label(topic: Topic, message: dict[str, Any]) -> str:
 
     A long line has no zeros and nothing empty; if it is still long, it is truncated.
     """
-    values = [(name, value_text(value)) for name, value in leaves(message)]
-    label = _line(topic, values)
+    label = _line(topic, _elements(message))
     if len(label) > _LABEL_WIDTH:
-        label = _line(topic, [item for item in values if item[1] not in _ZEROS])
+        label = _line(topic, (item for item in _elements(message) if not is_zero(item[1])))
     return label if len(label) <= _LABEL_WIDTH else label[: _LABEL_WIDTH - 3] + "..."
 
 
-def _line(topic: Topic, values: Iterable[tuple[str, str]]) -> str:
-    words = (f"{name}={value}" for name, value in values)
-    return " ".join((topic.block, str(topic.frame.message), *words)).encode("ascii", "replace").decode()
+def _line(topic: Topic, values: Iterable[tuple[str, Any]]) -> str:
+    """Return the values on one line; values beyond the length of a label are omitted."""
+    line = f"{topic.block} {topic.frame.message}"
+    for name, value in values:
+        if len(line) > _LABEL_WIDTH:
+            break
+        line += f" {name}={value_text(value)}"
+    return line.encode("ascii", "replace").decode()
+
+
+def _elements(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values in a message with their dotted names, in arrays of messages with the index of the element."""
+    match value:
+        case [dict(), *_]:
+            for number, element in enumerate(value):
+                yield from _elements(element, f"{name}[{number}]")
+        case dict():
+            for key, inner in value.items():
+                yield from _elements(inner, f"{name}.{key}" if name else key)
+        case _:
+            yield name, value
 
 
 def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
@@ -99,13 +130,20 @@ def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
+def is_zero(value: Any) -> bool:
+    """Return whether a value is zero, empty, or contains only such values."""
+    if isinstance(value, dict):
+        return all(map(is_zero, value.values()))
+    return all(map(is_zero, value)) if isinstance(value, list | bytes) else not value
+
+
 def value_text(value: Any) -> str:
     """Return a value without blanks, except in quoted texts; arrays are truncated to the length of a label."""
     match value:
         case str():
             return json.dumps(value, ensure_ascii=False)
         case Mapping():
-            return f"{{{','.join(f'{name}={value_text(inner)}' for name, inner in value.items())}}}"
+            return f"{{{','.join(f'{name}={value_text(inner)}' for name, inner in leaves(value))}}}"
         case list() | bytes():
             return f"[{','.join(map(value_text, islice(value, _LABEL_WIDTH)))}]"
         case _:

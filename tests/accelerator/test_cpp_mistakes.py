@@ -39,6 +39,9 @@ OF_STREAMS = [
     ("<float> &range_field_in", "<double> &range_field_in", "", "needs 'hls::stream<float> &range_field_in'"),
     ("hls::stream<float> &range_field_in", "float range_field_in", "", "needs 'hls::stream<float> &range_field_in'"),
     ("mode=ap_fifo port=range_field_in", "mode=ap_none port=range_field_in", "", "and needs ap_fifo"),
+    ("= header_frame_id_in.read();", "= 0;  // header_frame_id_in", "", "stream 'header_frame_id_in' is never read"),
+    ("= header_frame_id_in.read();", "= 0;", "", "= 'radiation_type_in' arrives only when all elements before it"),
+    ("data_length_out.write(0);", "", "", "stream 'data_length_out' is never written"),
 ]
 # Other spellings of the same function, and functions whose declaration is unknown.
 LEGAL = [
@@ -53,6 +56,16 @@ LEGAL = [
     ("void acc(", "void other("),
     ("void acc(double pose_position_x_in", "void acc(const pose_position_x_in"),
     ("void acc(double pose_position_x_in", "void acc(, double pose_position_x_in"),
+]
+
+READ = "const char element = header_frame_id_in.read();"
+LEGAL_STREAMS = [
+    (READ, "const char element = taken(header_frame_id_in);"),
+    (READ, "READ(element, header_frame_id_in)"),
+    (f"        {READ}", "#define NEXT header_frame_id_in.read()\n    const char element = NEXT;"),
+    (f"        {READ}", '#include "further.inc"'),
+    # What is unread when the function returns is dropped.
+    ("= max_range_in.read();", "= 0;"),
 ]
 
 
@@ -97,10 +110,15 @@ def test_a_mistake_in_a_function(
     assert part in str(fault)
 
 
-@pytest.mark.parametrize(("old", "new"), LEGAL)
-def test_nothing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
+@pytest.mark.parametrize(
+    ("messages", "old", "new"),
+    [(messages, *case) for messages, cases in ((VALUES, LEGAL), (STREAMS, LEGAL_STREAMS)) for case in cases],
+)
+def test_nothing_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, messages: tuple[str, str], old: str, new: str
+) -> None:
     monkeypatch.chdir(tmp_path)
-    assert edited(VALUES, old, new) == []
+    assert edited(messages, old, new) == []
 
 
 @pytest.mark.parametrize("language", ["hls", "vhdl"])

@@ -145,10 +145,6 @@ def problem(checker: Checker, answer: Answer) -> str:
     return ""
 
 
-# Without one of these keys, an interface has other fields, and the faults name those.
-_SELECTING = ("include", "others")
-
-
 @pytest.mark.one_in(5)
 @every_specification
 def test_a_key_that_is_left_out(checker: Checker) -> None:
@@ -167,8 +163,6 @@ def test_a_key_that_is_left_out(checker: Checker) -> None:
 
 def _names_what_lacks(fault: Fault, site: KeySite) -> bool:
     """Whether a fault names the key, and is in its section or names it."""
-    if site.name in _SELECTING:
-        return "field" in fault.words or "include" in fault.words
     is_near = fault.line in site.lines or fault.line in site.parents.values()
     is_meant = any(f"'{word}'" in fault.words for word in site.parents)
     if site.is_needed:

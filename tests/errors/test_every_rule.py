@@ -39,7 +39,6 @@ OTHER_FAULTS = {
     ("system/scaffold/core_file.py", "new_core"): "an option of the command line",
     ("system/scaffold/core_file.py", "updated_core"): "the file of a core",
     ("system/scaffold/project.py", "create"): "options of the command line",
-    ("system/scaffold/project.py", "_check_include"): "options of the command line",
     ("system/scaffold/project.py", "new_folder"): "options of the command line",
     ("system/scaffold/project.py", "_check_topics"): "options of the command line",
     ("system/scaffold/example.py", "example_named"): "options of the command line",

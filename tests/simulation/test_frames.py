@@ -39,7 +39,9 @@ def test_data_is_shown_the_same_way_in_and_out(tmp_path: Path, data: str) -> Non
     layout = "{dim: [{label: left  wheel, size: 1, stride: 2}], data_offset: 3}"
     model = f'return [("pub", {{"layout": message["layout"], "data": {data}}})]'
     said = labels(tmp_path, "std_msgs/UInt8MultiArray", f"{{layout: {layout}, data: [7, 8]}}", model)
-    values = 'layout.dim=[{label="left  wheel",size=1,stride=2}] layout.data_offset=3 data=[7,8]'
+    values = (
+        'layout.dim[0].label="left  wheel" layout.dim[0].size=1 layout.dim[0].stride=2 layout.data_offset=3 data=[7,8]'
+    )
     assert said == [
         f"> sub std_msgs/UInt8MultiArray {values}",
         f"< @0 pub std_msgs/UInt8MultiArray {values}",

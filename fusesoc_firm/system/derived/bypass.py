@@ -17,7 +17,7 @@ from fusesoc_firm.frame.select import select
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.system.derived.model import AcceleratorType, LengthSource, MessageSide, PayloadLength
 from fusesoc_firm.system.written.specification import OutputType
-from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 
 def with_bypass(type_: AcceleratorType, faults: Diagnostics) -> AcceleratorType:
@@ -44,6 +44,7 @@ def with_bypass(type_: AcceleratorType, faults: Diagnostics) -> AcceleratorType:
 def _may_pass(type_: AcceleratorType, item: OutputType, faults: Diagnostics) -> bool:
     """Whether the other fields can pass; note the reason if they cannot."""
     assert item.others
+    source = item.others.source
     if type_.accelerator.is_software:
         message, hint = "no fields can pass by an accelerator in software", "remove the key"
     elif len(type_.inputs) != 1 or len(type_.outputs) != 1 or type_.inputs[0].kind != type_.outputs[0].kind:
@@ -51,15 +52,16 @@ def _may_pass(type_: AcceleratorType, item: OutputType, faults: Diagnostics) -> 
         hint = "legal here: one input and one output of the same message"
     elif item.length is not None:
         message, hint = f"'length' is set for {item.message}, which has the input's length", "remove the key"
-    elif part := next(_variable_parts(type_), None):
+    elif found := next(_variable_parts(type_), None):
+        part, source = found
         message = f"'{dotted(part.names)}' of type '{part.ros_type}' has no fixed size"
-        hint = "with 'others: pass', include only numbers, times, and fixed arrays and messages of them"
+        hint = "with 'others: pass', 'include' must select numbers, times, or fixed arrays and messages of them"
     elif max(_own_segments(type_.inputs)) > min(_own_segments(type_.outputs)):
         message = f"'{type_.accelerator.name}' sends a field before it receives all of its fields"
         hint = "a string or an array between them passes without storage"
     else:
         return True
-    faults.error(message, item.others.source, hint)
+    faults.error(message, source, hint)
     return False
 
 
@@ -68,12 +70,23 @@ def _own_segments(sides: Sequence[MessageSide]) -> list[int]:
     return part_segments(side.frame, side.frame)
 
 
-def _variable_parts(type_: AcceleratorType) -> Iterator[Data | Loop]:
-    """Yield the strings and arrays of variable size for which the user's accelerator would have ports."""
-    for side in (*type_.inputs, *type_.outputs):
+def _variable_parts(type_: AcceleratorType) -> Iterator[tuple[Data | Loop, SourceRef | None]]:
+    """Yield the strings and arrays of variable size for which the user's accelerator would have ports.
+
+    Each has the place that selects it: an item of `include` or, without one, the message.
+    """
+    interface = type_.accelerator.interface
+    for side, written in zip((*type_.inputs, *type_.outputs), (*interface.input, *interface.output), strict=True):
         for node in all_nodes(side.frame.nodes):
             if isinstance(node, Data | Loop) and node.is_used:
-                yield node
+                name = dotted(node.names)
+                chosen = (path for path in written.include if f"{name}.".startswith(f"{path}."))
+                yield node, next(chosen, written.message).source
+
+
+def passing_hint(type_: str) -> str:
+    """Return the way in which an accelerator keeps the fields of a message that it does not have."""
+    return f"the fields that '{type_}' should pass need the key 'others' in its output"
 
 
 def part_segments(whole: Frame, part: Frame) -> list[int]:

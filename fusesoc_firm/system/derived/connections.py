@@ -15,6 +15,7 @@ from fusesoc_firm.frame.select import Names, Paths, names_in_use, select, with_n
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.system.derived.bypass import passing_hint
 from fusesoc_firm.system.derived.model import Connection, End, MessageSide
 from fusesoc_firm.system.written.specification import Block, Outgoing
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, nearest
@@ -169,7 +170,8 @@ class Wiring:
 
     def _check_sink(self, block: Block, side: MessageSide) -> None:
         """Check that a sink is driven; publishers send defaults for missing fields, accelerators need all fields."""
-        driven = self.driven.get(End(str(block.name), side.prefix), {})
+        sink = End(str(block.name), side.prefix)
+        driven = self.driven.get(sink, {})
         missing = sorted(dotted(name) for name in _names(side.frame) - driven.keys())
         if not driven:
             self.faults.error(
@@ -178,11 +180,13 @@ class Wiring:
                 f"add '{block.name}' to 'outgoing' of a block that outputs {side.frame.message}",
             )
         elif missing and block.type is not None:
+            types = [self.blocks[source.block].type for source, ends in self.sinks.items() if sink in ends]
+            hint = f"'include' each field in a connection, or 'exclude' it in the input of '{block.type}'"
             self.faults.error(
                 f"{_words('input', side)} of '{block.name}' ({side.frame.message}) has no source for"
                 f" {', '.join(missing)}",
                 block.name.source,
-                "include each field in a connection, or exclude the field in the accelerator's interface",
+                "; ".join([hint, *(passing_hint(type_) for type_ in types if type_)]),
             )
 
     def _check_sources(self) -> None:

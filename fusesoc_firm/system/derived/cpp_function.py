@@ -81,13 +81,19 @@ class Argument:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """A parameter that the function must have; `count` is the number of elements of an array."""
+    """A parameter that the function must have; `count` is the number of elements of an array.
+
+    The stream of the elements of a string or an array of variable size `may_be_empty`. `side` is the prefix of the
+    ports of a stream's message.
+    """
 
     name: str
     cpp_type: str
     count: int | None = None
     is_output: bool
     is_stream: bool = False
+    may_be_empty: bool = False
+    side: str = ""
 
     @property
     def declaration(self) -> str:
@@ -168,7 +174,14 @@ def parameters(accelerator: AcceleratorType) -> list[Parameter]:
     """Return the required parameters of the function; the accelerator must have passed `check_kernel`."""
     if is_streamed(accelerator):
         return [
-            Parameter(name=item.port, cpp_type=item.cpp_type, is_output=is_output, is_stream=True)
+            Parameter(
+                name=item.port,
+                cpp_type=item.cpp_type,
+                is_output=is_output,
+                is_stream=True,
+                may_be_empty=item.is_stream,
+                side=item.prefix,
+            )
             for is_output, items in zip((False, True), streams(accelerator), strict=True)
             for item in items
         ]

@@ -14,6 +14,7 @@ from fusesoc_firm.frame.length import Length, Repeat, sent_length_of
 from fusesoc_firm.frame.model import Data, Frame, Loop, all_nodes
 from fusesoc_firm.frame.select import names_in_use, select
 from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.system.derived.bypass import passing_hint
 from fusesoc_firm.system.derived.model import Connection, End, LengthSource, MessageSide, PayloadLength
 from fusesoc_firm.system.written.specification import Block, OutputType
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -68,7 +69,9 @@ def _check_whole(
             text = (
                 f"'{end.block}' takes different fields of {message} than '{connection.source.block}' outputs: {apart}"
             )
-            faults.error(text, place, "all blocks that take a message of variable size must take the same fields")
+            hint = "all blocks that take a message of variable size must take the same fields"
+            type_ = blocks[end.block].type
+            faults.error(text, place, f"{hint}; {passing_hint(type_)}" if type_ else hint)
         if sum(end in other.sinks for other in connections) > 1:
             text = f"'{end.block}' receives {message} from several blocks"
             faults.error(text, place, "a message of variable size must come from one block")

@@ -14,17 +14,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.frame.codec import decode
-from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import longest_payload, sent_length_of
-from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop
+from fusesoc_firm.frame.model import Data, Frame, Loop
 from fusesoc_firm.frame.model import Path as FieldPath
-from fusesoc_firm.frame.select import with_names_in_use
+from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.library import Libraries
 from fusesoc_firm.message.middleware import Middleware, middleware_of
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
+from fusesoc_firm.system.scaffold.first_stimuli import first_stimuli
 from fusesoc_firm.system.scaffold.pass_through import equal_paths, wires_of
 from fusesoc_firm.system.scaffold.python_skeleton import copied_fields
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
@@ -35,12 +34,10 @@ from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.outputs import check_parent, write
 from fusesoc_firm.text.prompts import Asker, Question
 from fusesoc_firm.text.render import Context, render
-from fusesoc_firm.text.yaml_text import yaml_dump
 
 _SUBSCRIBER, _PUBLISHER, _FORWARDER = "sub", "pub", "pass_through"
 _ARITHMETIC = "robot:acc:firm_float"
 _STIMULI = "stimuli.yaml"
-_MESSAGES = 3
 # Bytes; block RAM of a small FPGA. The author of a specification chooses the size that the messages need.
 _BUFFER = 4096
 _IGNORED = "build/*\n!build/FUSESOC_IGNORE\n__pycache__/\n"
@@ -79,7 +76,8 @@ class Project:
     """The answers that determine a new project; `width` is in bits.
 
     The topics are the names of the blocks if they are empty. Without `stimuli`, the project has examples of its own.
-    With `include`, the accelerator has only these fields of its message, and the others pass.
+    With `include`, the accelerator receives only these fields. If both messages are the same, it sends only these
+    fields, too, and the others pass.
     """
 
     name: str
@@ -160,22 +158,13 @@ def create(project: Project, folder: Path, known: Libraries, library: Path, path
     """
     if fault := name_fault(project.name):
         fail(fault)
-    if project.include:
-        _check_include(project)
+    if project.include and LANGUAGES[project.language].type == SOFTWARE:
+        hint = "omit --include, or choose vhdl, verilog or hls"
+        fail("an accelerator in Python receives whole messages, so it cannot have --include", hint=hint)
     with new_folder(folder) as inner:
         _write_all(project, inner, known, [os.path.relpath(path, folder) for path in paths])
         write_surroundings(inner, project.name, library)
     return files_of(folder)
-
-
-def _check_include(project: Project) -> None:
-    """Raise `InputError` if the other fields cannot pass beside the accelerator."""
-    if project.input != project.output:
-        message = "with --include, all other fields of the message pass, so input and output must be the same message"
-        fail(f"{message}, not {project.input} and {project.output}", hint="omit --out, or omit --include")
-    if LANGUAGES[project.language].type == SOFTWARE:
-        hint = "omit --include, or choose vhdl, verilog or hls"
-        fail("an accelerator in Python receives whole messages, so it cannot have --include", hint=hint)
 
 
 @contextmanager
@@ -229,7 +218,7 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
         stimuli.write(folder / stimuli.name)
         paths = [stimuli.name, *paths]
     else:
-        write(folder / _STIMULI, yaml_dump([{_SUBSCRIBER: message} for message in _examples(taken)]))
+        write(folder / _STIMULI, first_stimuli(_SUBSCRIBER, taken, project.width))
     write(folder / "model.py", render("project/model.py", _model(project, loaded, given)))
     core = spec.with_suffix(".core")
     description = f"{project.input} to {project.output}"
@@ -250,6 +239,7 @@ def _frame(name: str, ros: Middleware, known: Libraries) -> Frame:
 def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame) -> Context:
     longest = project.stimuli.longest if project.stimuli else 0
     language = LANGUAGES[project.language]
+    passes = bool(project.include) and project.input == project.output
     own = {"name": project.name, "type": language.type, "source": language.source.format(project.name)}
     accelerators: list[Context] = []
     buffer: list[int] = []
@@ -259,7 +249,8 @@ def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame
         accelerators = [first | {"output": project.input, "length": [] if taken.is_fixed_size else ["given"]}]
         length: list[str] = []
     else:
-        length, buffer = ([], []) if project.include else _length(taken, given, longest)
+        received = select(taken, dict.fromkeys(project.include)) if project.include else taken
+        length, buffer = ([], []) if passes else _length(received, given, longest)
     accelerators.append(own | {"output": project.output, "length": length, "next": _PUBLISHER, "buffer": []})
     return {
         "name": project.name,
@@ -267,6 +258,7 @@ def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame
         "output": project.output,
         "middleware": ros.words[0],
         "include": list(project.include),
+        "passes": passes,
         "width": [project.width] if project.width != Project.width else [],
         "accelerators": accelerators,
         "subscriber": _SUBSCRIBER,
@@ -319,44 +311,3 @@ def _model(project: Project, loaded: LoadedSystem, given: Frame) -> Context:
         "forwarded": forwarded,
         "values": copied_fields(given, dict.fromkeys(paths, "message")),
     }
-
-
-def _examples(frame: Frame) -> Iterator[dict[str, Any]]:
-    """Yield messages with different values in all fields; arrays of messages are empty."""
-    for number in range(_MESSAGES):
-        message = decode(frame, encode_used(with_names_in_use(frame, ()), {}))
-        count = number
-        for node in frame.nodes:
-            for part in node.fields if isinstance(node, Fixed) else [node] if isinstance(node, Data) else []:
-                count += 1
-                _set(message, part.names, _value(part, count))
-        yield message
-
-
-def _set(message: Any, names: Sequence[str], value: Any) -> None:
-    """Set a field; on a path through an array of messages, in all of its elements."""
-    if isinstance(message, list):
-        for item in message:
-            _set(item, names, value)
-    elif len(names) > 1:
-        _set(message[names[0]], names[1:], value)
-    elif isinstance(message[names[0]], list) and not isinstance(value, list | str):
-        message[names[0]] = [value] * len(message[names[0]])
-    else:
-        message[names[0]] = value
-
-
-def _value(part: FrameField | Data, number: int) -> Any:
-    """Return a legal value that depends on `number`."""
-    if isinstance(part, FrameField):
-        return _scalar(part.type.name, number)
-    most = 3 if part.bound is None else min(3, part.bound)
-    if part.kind is DataKind.ARRAY:
-        return [_scalar(part.element.name, number + place) for place in range(most)]
-    return f"n{number}"[:most]
-
-
-def _scalar(type_: str, number: int) -> bool | int | float:
-    if type_ == "bool":
-        return number % 2 == 1
-    return number / 2 if type_.startswith("float") else number % 100
