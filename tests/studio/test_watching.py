@@ -145,8 +145,7 @@ def test_a_picture_is_shown_and_no_content_runs(tmp_path: Path) -> None:
         assert pixels == [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 3, 2, 1, 255, 6, 5, 4, 255, 9, 8, 7, 255]
         assert await page.evaluate("window.broken") is None
         # The reason of a failure comes from a tool, which may print anything.
-        await page.evaluate("document.querySelector('.run select').value = 'verilator'")
-        await page.evaluate("document.querySelector('.run select').dispatchEvent(new Event('change', {bubbles: true}))")
+        await page.choose(".run select", "verilator")
         await page.evaluate("[...document.querySelectorAll('.run button')][0].click()")
         await page.until(f"document.querySelector('.messages pre')?.textContent.includes({json.dumps(HOSTILE)})")
         assert await page.evaluate("window.broken") is None

@@ -83,6 +83,16 @@ export function repeat(milliseconds: number, action: () => Promise<void>): () =>
   return () => void (isOver = true);
 }
 
+/** Take the answer to a question, unless the returned function is called first, since a newer question counts. */
+export function answered<T>(question: Promise<T>, take: (answer: T) => void, failed: (reason: string) => void): () => void {
+  let isOver = false;
+  question.then(
+    (answer) => isOver || take(answer),
+    (error) => isOver || failed(words(error)),
+  );
+  return () => void (isOver = true);
+}
+
 export const words = (error: unknown) => (error instanceof Error ? error.message : String(error));
 
 /** Let the keyboard reach what scrolls. */
