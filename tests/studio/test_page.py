@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import re
+import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Awaitable, Callable
 from itertools import count
@@ -15,6 +16,8 @@ import yaml
 from matplotlib import image as pictures
 
 import fusesoc_firm.studio
+from fusesoc_firm.studio import evaluation
+from fusesoc_firm.studio.resources import Tell
 from tests.studio.browser import PROGRAM, Page, opened
 from tests.studio.served import served
 
@@ -326,6 +329,64 @@ def test_bounds_and_schedulers_are_compared(robot: Path, tmp_path: Path) -> None
         await page.until("document.querySelector('.view tr.chosen td').textContent.startsWith('fixed_priority')")
 
     run(robot, tmp_path, steps)
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_resources_are_shown_as_they_come(
+    robot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    """The synthesis goes on while another view is shown; it ends when the user cancels it, and with the page."""
+    robot.write_text(TEXT.replace("width: 32", "width: 32, clock: 100 MHz"), encoding="utf-8")
+    goes_on, ended = threading.Event(), threading.Semaphore(0)
+
+    def answer(mhz: float | None) -> dict[str, object]:
+        common = {"ram": 2, "dsp": 0, "mhz": mhz}
+        blocks = [{"name": "a", "lut": 60, "ff": 70, **common}, {"name": "f", "lut": 80, "ff": 90, **common}]
+        return {"device": "a device", "blocks": blocks, "clocks": {"clk": mhz} if mhz else {}, "missing": ""}
+
+    async def resources_of(_: Path, tell: Tell) -> dict[str, object]:
+        try:
+            await tell({"step": "places", **answer(None)})
+            while not goes_on.is_set():
+                await asyncio.sleep(0.05)
+            goes_on.clear()
+            return answer(90.0)
+        finally:
+            ended.release()
+
+    monkeypatch.setattr(evaluation, "resources_of", resources_of)
+
+    async def steps(page: Page) -> None:
+        await page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        await page.evaluate(AXE.read_text(encoding="utf-8") + ";0")
+        rows = "[...document.querySelectorAll('.resources tbody tr')].map(row => row.innerText.trim())"
+        step = "document.querySelector('.view [role=status]').textContent"
+        use = "[...document.querySelectorAll('.view button')].find(item => item.textContent === '{}').click()"
+        await page.evaluate(f"{view('evaluate')}.click()")
+        await page.until(f"({use.format('synthesise')}, true)")
+        await page.until(f"{rows}.length === 3 && {rows}[0].startsWith('f\\t80\\t90\\t2') && {step}.includes('3 of 3')")
+        await page.evaluate(f"{view('file')}.click()")
+        await page.until("document.querySelector('.cm-content') !== null")
+        await page.evaluate(f"{view('evaluate')}.click()")
+        await page.until(f"{step}.includes('3 of 3')")
+        goes_on.set()
+        await page.until(f"{rows}[0].includes('90.0, less than 100') && {rows}[2].includes('clk 90.0')")
+        await page.until(f"!{step}.trim()")
+        violations = "violations.map(rule => [rule.id, rule.nodes.map(node => [node.html, node.failureSummary])])"
+        assert await page.evaluate(f"axe.run().then(({{violations}}) => {violations})") == []
+        robot.write_text(TEXT, encoding="utf-8")
+        await page.until("document.querySelector('.view').innerText.includes('of an earlier text')")
+        await page.until(f"({use.format('synthesise')}, true)")
+        await page.until(f"{step}.includes('3 of 3')")
+        await page.evaluate(use.format("cancel"))
+        await page.until(f"{step}.includes('cancelled')")
+        await page.evaluate(use.format("synthesise"))
+        await page.until(f"{step}.includes('3 of 3')")
+
+    run(robot, tmp_path, steps)
+    # One ended by itself, one with 'cancel', and one with the browser.
+    assert all(ended.acquire(timeout=60) for _ in range(3))
 
 
 def test_the_picture_is_saved_as_svg_and_png(robot: Path, tmp_path: Path) -> None:
