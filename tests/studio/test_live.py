@@ -124,6 +124,38 @@ def test_it_pauses_steps_and_ends(studio: Studio) -> None:
     assert ask(studio, "GET", f"api/message?number={ended['run']['last']}")[0] == 200
 
 
+def test_messages_of_services_and_actions_are_played(tmp_path: Path) -> None:
+    """As by `firm sim`, each converter gets its messages; the model answers with the bytes that it takes."""
+    text = """\
+project: {name: robot, width: 64, clock: 100 MHz}
+paths: [messages]
+accelerators:
+  - name: switch
+    type: VHDL
+    sources: [switch.vhd]
+    interface:
+      input: [{middleware: ROS2, message: demo_msgs/Enable_Request}]
+      output: [{middleware: ROS2, message: demo_msgs/Enable_Response}]
+blocks:
+  - {name: enable, middleware: ROS2, mode: server, service: demo_msgs/Enable, outgoing: [{name: switch}]}
+  - {name: switch, type: switch, outgoing: [{name: enable}]}
+"""
+    spec = write_system(tmp_path, [{"enable_request": {"data": True}}] * 3)
+    spec.write_text(text, encoding="utf-8")
+    (tmp_path / "switch.vhd").touch()
+    package = tmp_path / "messages" / "demo_msgs" / "srv"
+    package.mkdir(parents=True)
+    (package / "Enable.srv").write_text("bool data\n---\nbool success\n", encoding="utf-8")
+    with served(spec, modelled()) as studio:
+        begin(studio)
+        news = until(studio, lambda now: now["run"] and now["run"]["state"] in ("ended", "failed"))
+        assert news["run"]["state"] == "ended", news
+        counts = {name: count["messages"] for name, count in news["counts"].items()}
+        assert counts == {"enable_request": 3, "enable_response": 3}
+        found = ask(studio, "GET", f"api/message?number={news['run']['last']}")[2]
+        assert (found["type"], found["fields"]) == ("demo_msgs/Enable_Response", [["success", "True"]])
+
+
 def test_a_page_that_does_not_ask_holds_nothing_up(studio: Studio) -> None:
     begin(studio, isEndless=True)
 
