@@ -56,8 +56,8 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing, fuzz, loops, builds and actions: only rows whose names match, such as 'Image.* 64 bits'; for live"
-        " and studio: only tables",
+        help="for timing, fuzz, loops, builds and actions: only rows whose names match, such as 'Image.* 64 bits'; for"
+        " live and studio: only tables",
     )
     parser.add_argument(
         "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"

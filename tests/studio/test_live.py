@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import json
+import math
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 from matplotlib import image as pictures
 
 from fusesoc_firm.frame.codec import encode
-from fusesoc_firm.studio.message import fields_of, picture_of
+from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
 from fusesoc_firm.studio.server import Studio
 from tests.studio.played import HOSTILE, modelled, write_system
 from tests.studio.served import load, served
@@ -324,6 +325,25 @@ def test_pictures_are_what_their_encoding_says(spec: Path, message: dict[str, ob
     read = pictures.imread(io.BytesIO(found[0]))
     scale = 65535 if "16" in str(message["encoding"]) else 255
     assert (read * scale).round().astype(int).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        ({"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"w": -2}}, [1, 2, 3, 0, 0, 0, -1]),
+        ({"position": {"x": 1, "y": 2, "z": 3}}, None),
+        ({"position": {"x": math.nan}, "orientation": {"w": 1}}, None),
+        ({"position": {"x": 1}, "orientation": {"w": math.inf}}, None),
+    ],
+)
+def test_a_pose_has_finite_numbers_and_a_rotation(
+    tmp_path: Path, message: dict[str, dict[str, float]], expected: object
+) -> None:
+    layout = frame(write_system(tmp_path, types={"pose": "geometry_msgs/Pose"}), "pose")
+    zeros = {"position": dict.fromkeys("xyz", 0.0), "orientation": dict.fromkeys("xyzw", 0.0)}
+    whole = {part: {**numbers, **message.get(part, {})} for part, numbers in zeros.items()}
+    assert pose_of(layout, encode(layout, whole)) == expected
+    assert pose_of(layout, b"") is None
 
 
 @pytest.mark.parametrize(

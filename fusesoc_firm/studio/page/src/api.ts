@@ -81,6 +81,7 @@ export interface Message {
   row: Row;
   type: string;
   hasPicture: boolean;
+  hasPose: boolean;
   fields: [string, string][];
   isShortened: boolean;
   fault: string;

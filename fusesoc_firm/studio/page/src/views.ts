@@ -70,6 +70,10 @@ export const grants = () => get<{ grants: Grant[] }>("grants");
 export const status = () => get<{ access: string | null; counts: Record<string, number> }>("status");
 export const series = (block: string, field: string) => get<Series>("series", { block, field });
 
+/** A place and a unit quaternion: x, y, z, then x, y, z, w. */
+export type Pose = number[];
+
+export const poses = (number: number) => get<{ poses: Pose[] }>("poses", { number: String(number) });
 export const wave = (number: number) => get<Wave>("wave", { number: String(number) });
 
 /** Do something at once and then at intervals, one after the other, until the returned function is called. */
