@@ -37,7 +37,7 @@ ALLOWED: dict[str, str] = {
     "plugin": "building converter message node request simulation store system text tools",
     "emulation": "frame message node request simulation system text",
     "replay": "bags frame message node simulation system text",
-    "studio": "converter frame message node plugin request scheduling simulation system text tools",
+    "studio": "converter frame message node plugin request scheduling simulation store system text tools",
     "cli": (
         "accelerator action building converter emulation message node plugin replay scheduling simulation store studio"
         " system text tools verify"

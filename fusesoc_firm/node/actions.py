@@ -532,7 +532,7 @@ class NodeActions:
 
     def taken(self, event: Taken) -> bool:
         """Take a message from ROS, if it belongs to an action; return whether it does."""
-        if event.topic < self._first_topic:
+        if not 0 <= event.topic - self._first_topic < len(self._topics):
             return False
         server, topic = self._topics[event.topic - self._first_topic]
         server.taken(topic, event.payload)

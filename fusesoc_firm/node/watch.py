@@ -197,10 +197,15 @@ class Watch:
             first, end = self.first, min(number, self._next)
             return [self._messages[index - first] for index in range(max(first, end - most), end)]
 
-    def of(self, block: str, most: int) -> list[Seen]:
-        """Return the latest messages of a block in the record, at most `most`, the oldest first."""
+    def of(self, block: str, most: int, last: int | None = None) -> list[Seen]:
+        """Return the latest messages of a block in the record, at most `most`, the oldest first.
+
+        Those after the message with the number `last` do not count.
+        """
         with self._lock:
-            found = [*islice((seen for seen in reversed(self._messages) if seen.block == block), most)]
+            latest = reversed(self._messages)
+            own = (seen for seen in latest if seen.block == block and (last is None or seen.number <= last))
+            found = [*islice(own, most)]
         return found[::-1]
 
     @property

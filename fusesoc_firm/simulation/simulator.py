@@ -153,14 +153,19 @@ def _build(spec: Path, core: CoreFile, target_and_tool: tuple[str, str], work: P
     made_with = targets[target].get("flow_options", {}).get("tool", tool)
     if made_with != tool:
         fail(f"target '{target}' of {core.path} is for {made_with}", hint=f"use --tool {made_with}")
-    command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
-    command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, core.data.get("name", "")]
-    _run(spec, list(map(str, command)), _project_folder(spec))
+    _run(spec, fusesoc_run(core, target, work, "--setup", "--build"), project_folder(spec))
     if step := _live(tool).made_by:
         _run(spec, ["make", step], work)
 
 
-def _project_folder(spec: Path) -> Path:
+def fusesoc_run(core: CoreFile, target: str, work: Path, *stages: str) -> list[str]:
+    """Return the command by which FuseSoC does stages of a core's target in the folder `work`."""
+    command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
+    command += ["run", *stages, f"--target={target}", "--work-root", work, core.data.get("name", "")]
+    return list(map(str, command))
+
+
+def project_folder(spec: Path) -> Path:
     """Return the specification's nearest parent folder that contains a `fusesoc.conf`, or the current folder."""
     return next((folder for folder in spec.parents if (folder / "fusesoc.conf").is_file()), Path.cwd())
 

@@ -20,7 +20,7 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.node.watch import Seen
 from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
-from fusesoc_firm.studio.message import fields_of, has_picture, numbers_of, picture_of
+from fusesoc_firm.studio.message import fields_of, has_picture, has_pose, numbers_of, picture_of, pose_of
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
 from fusesoc_firm.studio.run import RUNNING, Run, SimulatedRun, Wishes
 from fusesoc_firm.studio.workspace import Workspace
@@ -70,6 +70,7 @@ class Live:
             "GET record": self._record,
             "GET message": self._message,
             "GET picture": self._picture,
+            "GET poses": self._poses,
             "GET wave": self._wave,
             "GET grants": self._grants,
             "GET status": self._status,
@@ -178,7 +179,8 @@ class Live:
         run, seen = self._seen(request)
         frame = run.topics[seen.block].frame
         found = await asyncio.to_thread(fields_of, frame, seen.payload)
-        return in_json({"row": _row(seen), "type": str(frame.message), "hasPicture": has_picture(frame), **found})
+        kinds = {"hasPicture": has_picture(frame), "hasPose": has_pose(frame)}
+        return in_json({"row": _row(seen), "type": str(frame.message), **kinds, **found})
 
     async def _picture(self, request: web.Request) -> web.Response:
         """Return the picture in a message."""
@@ -187,6 +189,13 @@ class Live:
         if not found:
             raise web.HTTPNotFound(reason="this message has no picture that a browser shows")
         return web.Response(body=found[0], content_type=found[1])
+
+    async def _poses(self, request: web.Request) -> web.Response:
+        """Return the pose in a message, and before it those of the block's messages before this one."""
+        run, seen = self._seen(request)
+        frame, messages = run.topics[seen.block].frame, run.watch.of(seen.block, _MOST_POINTS, seen.number)
+        found = await asyncio.to_thread(lambda: [pose_of(frame, message.payload) for message in messages])
+        return in_json({"poses": [pose for pose in found if pose]})
 
     async def _wave(self, request: web.Request) -> web.Response:
         """Return the beats of a message's frame on the stream of the system."""

@@ -6,7 +6,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
-from math import isfinite
+from math import hypot, isfinite
 from typing import Any
 
 from fusesoc_firm.frame.codec import CodecError, decode
@@ -17,6 +17,16 @@ _MOST_FIELDS, _MOST_ITEMS, _MOST_CHARACTERS, _MOST_BYTES = 500, 16, 500, 32
 _MOST_PIXELS = 2**24
 # The longest payload in bytes of which single numbers are plotted.
 _MOST_PLOTTED = 2**16
+# Where messages have a pose: the field that contains it, and the names of its place and of its rotation.
+_POSES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "geometry_msgs/Pose": ((), "position", "orientation"),
+    "geometry_msgs/PoseStamped": (("pose",), "position", "orientation"),
+    "geometry_msgs/PoseWithCovariance": (("pose",), "position", "orientation"),
+    "geometry_msgs/PoseWithCovarianceStamped": (("pose", "pose"), "position", "orientation"),
+    "geometry_msgs/Transform": ((), "translation", "rotation"),
+    "geometry_msgs/TransformStamped": (("transform",), "translation", "rotation"),
+    "nav_msgs/Odometry": (("pose", "pose"), "position", "orientation"),
+}
 _IMAGE, _COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
 # For each encoding of sensor_msgs/Image: bits of a value, and the places of red, green and blue or of gray in a pixel.
 _ENCODINGS: dict[str, tuple[int, tuple[int, ...], int]] = {
@@ -58,6 +68,34 @@ def numbers_of(frame: Frame, payload: bytes) -> dict[str, float | None]:
         return dict(islice(_numbers("", decode(frame, payload)), _MOST_FIELDS))
     except CodecError:
         return {}
+
+
+def has_pose(frame: Frame) -> bool:
+    """Return whether messages of a frame have a pose."""
+    return str(frame.message) in _POSES
+
+
+def pose_of(frame: Frame, payload: bytes) -> list[float] | None:
+    """Return the pose in a message: x, y and z of its place, then x, y, z and w of its rotation, a unit quaternion.
+
+    It is None if the message has no such fields, or if its numbers are no pose.
+    """
+    if not has_pose(frame):
+        return None
+    way, *names = _POSES[str(frame.message)]
+    try:
+        message: Any = decode(frame, payload)
+        for name in way:
+            message = message[name]
+        place, rotation = (
+            [float(message[part][axis]) for axis in axes] for part, axes in zip(names, ("xyz", "xyzw"), strict=True)
+        )
+    except (CodecError, KeyError):
+        return None
+    size = hypot(*rotation)
+    if not all(map(isfinite, [*place, size])) or not size:
+        return None
+    return [*place, *(number / size for number in rotation)]
 
 
 def has_picture(frame: Frame) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fusesoc_firm.node.carrier import CarrierError
@@ -130,7 +130,9 @@ class SimulatedRun(Run):
         )
         with ExitStack() as stack:
             software = stack.enter_context(node_software(self._loaded, lambda error: self._tell(str(error))))
-            node = Node(description, checked(opener, description), settings, software)
+            # The messages of services and actions are played as they are, like those of topics.
+            raw = replace(description, services=(), actions=())
+            node = Node(raw, checked(opener, description), settings, software)
             stack.callback(node.close)
             self._node = node
             if self._is_over.is_set():
@@ -163,6 +165,6 @@ def _stimuli(core: CoreFile) -> str | None:
 
 
 def _numbered(stimuli: list[Stimulus], description: NodeDescription) -> list[tuple[int, bytes]]:
-    """Return the payloads of stimuli with the numbers of their topics."""
-    numbers = {topic.block: number for number, topic in enumerate(description.subscribers)}
+    """Return the payloads of stimuli with the numbers of their inputs."""
+    numbers = {item.block: number for number, item in enumerate(description.inputs)}
     return [(numbers[item.subscriber.block], item.payload) for item in stimuli]

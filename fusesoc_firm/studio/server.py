@@ -14,6 +14,7 @@ from aiohttp import web
 
 from fusesoc_firm.studio.begin import Begin
 from fusesoc_firm.studio.editing import Editing
+from fusesoc_firm.studio.evaluation import Evaluation
 from fusesoc_firm.studio.foxglove import FOXGLOVE
 from fusesoc_firm.studio.live import Live
 from fusesoc_firm.studio.requests import Handler, in_json
@@ -45,8 +46,8 @@ class Studio:
     def __init__(self, place: Path, tools: Tools) -> None:
         """Serve a file or folder with what the command line uses."""
         workspace = Workspace(place, tools)
-        self._editing, self.live = Editing(workspace), Live(workspace)
-        self._parts = (self._editing, self.live, Views(workspace), Begin(workspace))
+        self._editing, self._evaluation, self.live = Editing(workspace), Evaluation(workspace), Live(workspace)
+        self._parts = (self._editing, self.live, Views(workspace), self._evaluation, Begin(workspace))
         self._own_hosts: set[str] = set()
         self.secret = secrets.token_urlsafe(24)
 
@@ -61,7 +62,7 @@ class Studio:
         if (_PAGE / "assets").is_dir():
             app.router.add_static(f"{under}/assets", _PAGE / "assets")
         app.cleanup_ctx.append(self._editing.following)
-        app.on_shutdown.append(lambda _: self.live.close())
+        app.on_shutdown.extend([lambda _: self.live.close(), lambda _: self._evaluation.close()])
         runner = web.AppRunner(app, access_log=None)
         await runner.setup()
         site = web.TCPSite(runner, HOST, port)

@@ -56,7 +56,8 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing, fuzz, loops, builds and actions: only rows whose names match, such as 'Image.* 64 bits'",
+        help="for timing, fuzz, loops, builds and actions: only rows whose names match, such as 'Image.* 64 bits'; for"
+        " live and studio: only tables",
     )
     parser.add_argument(
         "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"
@@ -100,7 +101,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "live": lambda: live.measure(_tell, figures.written(), arguments.row),
         "resize": lambda: resize.measure(seed, _tell),
         "store": lambda: store.measure(_tell),
-        "studio": lambda: [*studio.measure(seed, _tell), *watching.measure(_tell)],
+        "studio": lambda: _studio(arguments),
     }
     return measures[part]()
 
@@ -112,6 +113,12 @@ def _fuzz(arguments: argparse.Namespace) -> list[Table]:
         *fuzz.measure(seed, _tell, broken, written, row),
         *fuzz_systems.measure(seed, _tell, 10 * broken, written, row),
     ]
+
+
+def _studio(arguments: argparse.Namespace) -> list[Table]:
+    """The tables of the page, of which the one that a pattern does not find is that of the written page."""
+    written, row = figures.written(), arguments.row
+    return [*studio.measure(arguments.seed, _tell, written, row), *watching.measure(_tell, written, row)]
 
 
 def _tell(line: str) -> None:

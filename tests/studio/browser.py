@@ -100,6 +100,13 @@ class Page:
             x, y = to_x, to_y
         await self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, **mouse)
 
+    async def choose(self, selector: str, value: str) -> None:
+        """Choose a value of a list, once it is there."""
+        find = f"document.querySelector({json.dumps(selector)})"
+        option = f"[...{find}.options].some(option => option.value === {json.dumps(value)})"
+        chosen = f"({find}.value = {json.dumps(value)}, {find}.dispatchEvent(new Event('change', {{bubbles: true}})))"
+        await self.until(f"{option} && ({chosen}, true)")
+
     async def press(self, *keys: str, control: bool = False, shift: bool = False) -> None:
         """Press and release keys, one after the other."""
         for key in keys:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import yaml
@@ -30,10 +30,10 @@ STIMULI = [
 TYPES = {"point": "geometry_msgs/Point", "text": "std_msgs/String", "image": "sensor_msgs/Image"}
 
 
-def write_system(folder: Path, stimuli: Sequence[object] = STIMULI) -> Path:
+def write_system(folder: Path, stimuli: Sequence[object] = STIMULI, types: Mapping[str, str] = TYPES) -> Path:
     """Write a specification, the core beside it and the stimuli that it names."""
     blocks: list[dict[str, object]] = []
-    for name, message in TYPES.items():
+    for name, message in types.items():
         common = {"middleware": "ROS2", "message": message}
         blocks.append({"name": name, "mode": "subscriber", **common, "outgoing": [{"name": f"{name}_out"}]})
         blocks.append({"name": f"{name}_out", "mode": "publisher", **common})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import json
+import math
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 from matplotlib import image as pictures
 
 from fusesoc_firm.frame.codec import encode
-from fusesoc_firm.studio.message import fields_of, picture_of
+from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
 from fusesoc_firm.studio.server import Studio
 from tests.studio.played import HOSTILE, modelled, write_system
 from tests.studio.served import load, served
@@ -122,6 +123,38 @@ def test_it_pauses_steps_and_ends(studio: Studio) -> None:
     assert counts["point"] == counts["point_out"]
     # The record stays.
     assert ask(studio, "GET", f"api/message?number={ended['run']['last']}")[0] == 200
+
+
+def test_messages_of_services_and_actions_are_played(tmp_path: Path) -> None:
+    """As by `firm sim`, each converter gets its messages; the model answers with the bytes that it takes."""
+    text = """\
+project: {name: robot, width: 64, clock: 100 MHz}
+paths: [messages]
+accelerators:
+  - name: switch
+    type: VHDL
+    sources: [switch.vhd]
+    interface:
+      input: [{middleware: ROS2, message: demo_msgs/Enable_Request}]
+      output: [{middleware: ROS2, message: demo_msgs/Enable_Response}]
+blocks:
+  - {name: enable, middleware: ROS2, mode: server, service: demo_msgs/Enable, outgoing: [{name: switch}]}
+  - {name: switch, type: switch, outgoing: [{name: enable}]}
+"""
+    spec = write_system(tmp_path, [{"enable_request": {"data": True}}] * 3)
+    spec.write_text(text, encoding="utf-8")
+    (tmp_path / "switch.vhd").touch()
+    package = tmp_path / "messages" / "demo_msgs" / "srv"
+    package.mkdir(parents=True)
+    (package / "Enable.srv").write_text("bool data\n---\nbool success\n", encoding="utf-8")
+    with served(spec, modelled()) as studio:
+        begin(studio)
+        news = until(studio, lambda now: now["run"] and now["run"]["state"] in ("ended", "failed"))
+        assert news["run"]["state"] == "ended", news
+        counts = {name: count["messages"] for name, count in news["counts"].items()}
+        assert counts == {"enable_request": 3, "enable_response": 3}
+        found = ask(studio, "GET", f"api/message?number={news['run']['last']}")[2]
+        assert (found["type"], found["fields"]) == ("demo_msgs/Enable_Response", [["success", "True"]])
 
 
 def test_a_page_that_does_not_ask_holds_nothing_up(studio: Studio) -> None:
@@ -292,6 +325,25 @@ def test_pictures_are_what_their_encoding_says(spec: Path, message: dict[str, ob
     read = pictures.imread(io.BytesIO(found[0]))
     scale = 65535 if "16" in str(message["encoding"]) else 255
     assert (read * scale).round().astype(int).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        ({"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"w": -2}}, [1, 2, 3, 0, 0, 0, -1]),
+        ({"position": {"x": 1, "y": 2, "z": 3}}, None),
+        ({"position": {"x": math.nan}, "orientation": {"w": 1}}, None),
+        ({"position": {"x": 1}, "orientation": {"w": math.inf}}, None),
+    ],
+)
+def test_a_pose_has_finite_numbers_and_a_rotation(
+    tmp_path: Path, message: dict[str, dict[str, float]], expected: object
+) -> None:
+    layout = frame(write_system(tmp_path, types={"pose": "geometry_msgs/Pose"}), "pose")
+    zeros = {"position": dict.fromkeys("xyz", 0.0), "orientation": dict.fromkeys("xyzw", 0.0)}
+    whole = {part: {**numbers, **message.get(part, {})} for part, numbers in zeros.items()}
+    assert pose_of(layout, encode(layout, whole)) == expected
+    assert pose_of(layout, b"") is None
 
 
 @pytest.mark.parametrize(

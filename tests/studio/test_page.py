@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import re
+import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Awaitable, Callable
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,8 @@ import yaml
 from matplotlib import image as pictures
 
 import fusesoc_firm.studio
+from fusesoc_firm.studio import evaluation
+from fusesoc_firm.studio.resources import Tell
 from tests.studio.browser import PROGRAM, Page, opened
 from tests.studio.served import served
 
@@ -256,9 +260,14 @@ def test_nothing_of_a_specification_runs(robot: Path, tmp_path: Path, name: str)
     run(robot, tmp_path, steps)
 
 
+async def down(page: Page, number: int) -> None:
+    """Go one line down in the generated file, and wait for the reasons of the line with this number."""
+    await page.press("ArrowDown")
+    await page.until(f"document.querySelector('section[aria-label^=why] h2').textContent.includes('line {number} ')")
+
+
 def test_a_generated_line_leads_to_its_line_in_the_file(robot: Path, tmp_path: Path) -> None:
     wanted = TEXT.splitlines().index("  - name: b")
-    chosen = "document.querySelector('.code select')"
 
     async def steps(page: Page) -> None:
         await page.click(block("b"))
@@ -266,23 +275,46 @@ def test_a_generated_line_leads_to_its_line_in_the_file(robot: Path, tmp_path: P
         line = "[...document.querySelectorAll('.code .cm-line')].find(line => line.textContent.startsWith('entity '))"
         await page.until(f"{line}.textContent === 'entity geometry_msgs_point_to_axis is'")
         await page.evaluate("document.querySelector('.code .cm-content').focus()")
-        await page.press("ArrowDown", "ArrowDown")
         why = "document.querySelector('section[aria-label^=why]')"
-        await page.until(
-            f"{why}.innerText.includes('Why line 3') && {why}.innerText.includes('publisher.vhd.mustache')"
-        )
+        await down(page, 2)
+        await down(page, 3)
+        assert await page.evaluate(f"{why}.innerText.includes('publisher.vhd.mustache')")
         # The instance of the block in the top level.
-        await page.evaluate(f"{chosen}.value = 'robot_system.vhd'")
-        await page.evaluate(f"{chosen}.dispatchEvent(new Event('change', {{bubbles: true}}))")
+        await page.choose(".code select", "robot_system.vhd")
         await page.until("document.querySelector('.code .cm-content').textContent.includes('entity robot_system is')")
         leads = f"[...{why}.querySelectorAll('button')].find(button => button.textContent === 'line {wanted + 1}')"
-        for _ in range(300):
-            if await page.evaluate(f"Boolean({leads})"):
+        for number in count(2):
+            await down(page, number)
+            if await page.evaluate(f"Boolean({leads}) && ({leads}.click(), true)"):
                 break
-            await page.press("ArrowDown")
-        await page.evaluate(f"{leads}.click()")
         active = "document.querySelector('.text .cm-activeLine')?.textContent"
         await page.until(f"{active} === {json.dumps(TEXT.splitlines()[wanted])}")
+
+    run(robot, tmp_path, steps)
+
+
+def test_a_late_answer_replaces_no_newer_one(robot: Path, tmp_path: Path) -> None:
+    """The top level, which is asked for first, arrives after another file."""
+
+    async def steps(page: Page) -> None:
+        await page.evaluate("""(fetched => {
+            window.fetch = async (address, options) => {
+                const answer = await fetched(address, options);
+                if (!String(address).endsWith('name=robot_system.vhd')) return answer;
+                await new Promise(release => (window.release = release));
+                const content = await answer.json();
+                answer.json = async () => (setTimeout(() => (window.isTaken = true)), content);
+                return answer;
+            };
+        })(window.fetch)""")
+        await page.evaluate(f"{view('VHDL')}.click()")
+        await page.until("window.release")
+        await page.choose(".code select", "geometry_msgs_point_to_axis.vhd")
+        text = "document.querySelector('.code .cm-content').textContent"
+        await page.until(f"{text}.includes('entity geometry_msgs_point_to_axis is')")
+        await page.evaluate("window.release()")
+        await page.until("window.isTaken")
+        assert await page.evaluate(f"{text}.includes('entity geometry_msgs_point_to_axis is')")
 
     run(robot, tmp_path, steps)
 
@@ -297,6 +329,64 @@ def test_bounds_and_schedulers_are_compared(robot: Path, tmp_path: Path) -> None
         await page.until("document.querySelector('.view tr.chosen td').textContent.startsWith('fixed_priority')")
 
     run(robot, tmp_path, steps)
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_resources_are_shown_as_they_come(
+    robot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    """The synthesis goes on while another view is shown; it ends when the user cancels it, and with the page."""
+    robot.write_text(TEXT.replace("width: 32", "width: 32, clock: 100 MHz"), encoding="utf-8")
+    goes_on, ended = threading.Event(), threading.Semaphore(0)
+
+    def answer(mhz: float | None) -> dict[str, object]:
+        common = {"ram": 2, "dsp": 0, "mhz": mhz}
+        blocks = [{"name": "a", "lut": 60, "ff": 70, **common}, {"name": "f", "lut": 80, "ff": 90, **common}]
+        return {"device": "a device", "blocks": blocks, "clocks": {"clk": mhz} if mhz else {}, "missing": ""}
+
+    async def resources_of(_: Path, tell: Tell) -> dict[str, object]:
+        try:
+            await tell({"step": "places", **answer(None)})
+            while not goes_on.is_set():
+                await asyncio.sleep(0.05)
+            goes_on.clear()
+            return answer(90.0)
+        finally:
+            ended.release()
+
+    monkeypatch.setattr(evaluation, "resources_of", resources_of)
+
+    async def steps(page: Page) -> None:
+        await page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        await page.evaluate(AXE.read_text(encoding="utf-8") + ";0")
+        rows = "[...document.querySelectorAll('.resources tbody tr')].map(row => row.innerText.trim())"
+        step = "document.querySelector('.view [role=status]').textContent"
+        use = "[...document.querySelectorAll('.view button')].find(item => item.textContent === '{}').click()"
+        await page.evaluate(f"{view('evaluate')}.click()")
+        await page.until(f"({use.format('synthesise')}, true)")
+        await page.until(f"{rows}.length === 3 && {rows}[0].startsWith('f\\t80\\t90\\t2') && {step}.includes('3 of 3')")
+        await page.evaluate(f"{view('file')}.click()")
+        await page.until("document.querySelector('.cm-content') !== null")
+        await page.evaluate(f"{view('evaluate')}.click()")
+        await page.until(f"{step}.includes('3 of 3')")
+        goes_on.set()
+        await page.until(f"{rows}[0].includes('90.0, less than 100') && {rows}[2].includes('clk 90.0')")
+        await page.until(f"!{step}.trim()")
+        violations = "violations.map(rule => [rule.id, rule.nodes.map(node => [node.html, node.failureSummary])])"
+        assert await page.evaluate(f"axe.run().then(({{violations}}) => {violations})") == []
+        robot.write_text(TEXT, encoding="utf-8")
+        await page.until("document.querySelector('.view').innerText.includes('of an earlier text')")
+        await page.until(f"({use.format('synthesise')}, true)")
+        await page.until(f"{step}.includes('3 of 3')")
+        await page.evaluate(use.format("cancel"))
+        await page.until(f"{step}.includes('cancelled')")
+        await page.evaluate(use.format("synthesise"))
+        await page.until(f"{step}.includes('3 of 3')")
+
+    run(robot, tmp_path, steps)
+    # One ended by itself, one with 'cancel', and one with the browser.
+    assert all(ended.acquire(timeout=60) for _ in range(3))
 
 
 def test_the_picture_is_saved_as_svg_and_png(robot: Path, tmp_path: Path) -> None:

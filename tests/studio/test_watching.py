@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -45,7 +46,7 @@ async def press(page: Page, text: str, inside: str = ".run") -> None:
     await page.press("Enter")
 
 
-def watching(folder: Path, steps: Callable[[Page], Awaitable[None]], *options: str) -> None:
+def watching(folder: Path, steps: Callable[[Page], Awaitable[None]], *options: str, spec: Path | None = None) -> None:
     """Open the page of a system whose hardware is a model."""
 
     async def all_steps(address: str) -> None:
@@ -58,7 +59,7 @@ def watching(folder: Path, steps: Callable[[Page], Awaitable[None]], *options: s
                 print(f"the page at the end: {folder / 'page.png'}")
             assert page.trouble == []
 
-    with served(write_system(folder), modelled(*options)) as studio:
+    with served(spec or write_system(folder), modelled(*options)) as studio:
         asyncio.run(all_steps(studio.address))
 
 
@@ -145,13 +146,51 @@ def test_a_picture_is_shown_and_no_content_runs(tmp_path: Path) -> None:
         assert pixels == [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 3, 2, 1, 255, 6, 5, 4, 255, 9, 8, 7, 255]
         assert await page.evaluate("window.broken") is None
         # The reason of a failure comes from a tool, which may print anything.
-        await page.evaluate("document.querySelector('.run select').value = 'verilator'")
-        await page.evaluate("document.querySelector('.run select').dispatchEvent(new Event('change', {bubbles: true}))")
+        await page.choose(".run select", "verilator")
         await page.evaluate("[...document.querySelectorAll('.run button')][0].click()")
         await page.until(f"document.querySelector('.messages pre')?.textContent.includes({json.dumps(HOSTILE)})")
         assert await page.evaluate("window.broken") is None
 
     watching(tmp_path, steps)
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_poses_are_drawn(tmp_path: Path, scheme: str) -> None:
+    """A robot drives a quarter of a circle; at its end, its x axis points to where the world's y axis does."""
+    steps_of = 8
+    stimuli = []
+    for number in range(steps_of + 1):
+        angle = math.pi / 2 * number / steps_of
+        place = {"x": math.sin(angle), "y": 1 - math.cos(angle), "z": 0.1 * number}
+        pose = {"position": place, "orientation": {"z": 2 * math.sin(angle / 2), "w": 2 * math.cos(angle / 2)}}
+        stimuli.append({"pose": {"pose": {"pose": pose}}})
+    spec = write_system(tmp_path, stimuli, {"pose": "nav_msgs/Odometry"})
+
+    async def steps(page: Page) -> None:
+        await page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        await page.evaluate(AXE.read_text(encoding="utf-8") + ";0")
+        await page.evaluate("document.querySelectorAll('.run [type=checkbox]')[0].click()")
+        await press(page, "run")
+        await page.until(f"{STATE}.endsWith('ended') && {ROWS}.length === {2 * (steps_of + 1)}")
+        await page.until(f"([...{ROWS}].at(-1).querySelector('button').click(), true)")
+        points = "document.querySelector('.pose polyline').points.length"
+        await page.until(f"{points} === {steps_of + 1}")
+        way = "(line => [line.x2.baseVal.value - line.x1.baseVal.value, line.y2.baseVal.value - line.y1.baseVal.value])"
+        axis = f"{way}(document.querySelector('.pose line.{{}}.axis{{}}'))"
+        for body, world, sign in (0, 1, 1), (1, 0, -1), (2, 2, 1):
+            found = await page.evaluate(axis.format("body", body))
+            assert found == pytest.approx([sign * part for part in await page.evaluate(axis.format("world", world))])
+        assert await violations(page) == []
+        # The view turns by the keyboard; at the first message, there is no way yet.
+        before = await page.evaluate(axis.format("body", 0))
+        await page.evaluate("document.querySelector('.pose input').focus()")
+        await page.press("ArrowDown")
+        await page.until(f"{axis.format('body', 0)}[0] !== {before[0]}")
+        await open_message(page, "pose_out")
+        await page.until(f"{points} === 1")
+
+    watching(tmp_path, steps, spec=spec)
 
 
 def test_a_full_queue_is_seen_at_its_wire(tmp_path: Path) -> None:

@@ -52,6 +52,11 @@ export async function get<T>(name: string, query: Record<string, string> = {}): 
   return answer(await fetch(`api/${name}?${new URLSearchParams(query)}`));
 }
 
+/** The address of a connection that stays open. */
+export function address(name: string, query: Record<string, string> = {}): URL {
+  return new URL(`api/${name}?${new URLSearchParams(query)}`, location.href.replace(/^http/, "ws"));
+}
+
 async function post<T>(name: string, body: object): Promise<T> {
   const headers = { "Content-Type": "application/json" };
   return answer(await fetch(`api/${name}`, { method: "POST", headers, body: JSON.stringify(body) }));
@@ -76,6 +81,7 @@ export interface Message {
   row: Row;
   type: string;
   hasPicture: boolean;
+  hasPose: boolean;
   fields: [string, string][];
   isShortened: boolean;
   fault: string;
@@ -110,7 +116,7 @@ export function follow(changed: (file: string) => void): () => void {
   let socket: WebSocket | undefined;
   let isOver = false;
   const open = () => {
-    socket = new WebSocket(new URL("api/changes", location.href.replace(/^http/, "ws")));
+    socket = new WebSocket(address("changes"));
     socket.onmessage = (event) => changed(JSON.parse(event.data).changed);
     socket.onclose = () => isOver || setTimeout(open, 2000);
   };

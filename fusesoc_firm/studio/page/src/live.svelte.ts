@@ -1,5 +1,7 @@
 // What the page knows of the current run: counts and rates of each block, and the latest messages.
 
+import { address } from "./api";
+
 /** A message without its content: number, block, seconds, bytes, and of a response: cause, cycles, ns of the wall clock. */
 export type Row = [number, string, number, number, number | null, number | null, number | null];
 
@@ -83,7 +85,7 @@ export class Live {
     let socket: WebSocket | undefined;
     let isOver = false;
     const open = () => {
-      const made = (socket = new WebSocket(new URL("api/watch", location.href.replace(/^http/, "ws"))));
+      const made = (socket = new WebSocket(address("watch")));
       let last = -1;
       made.onopen = () => made.send(String(last));
       made.onmessage = (event) => {

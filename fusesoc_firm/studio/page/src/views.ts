@@ -70,6 +70,10 @@ export const grants = () => get<{ grants: Grant[] }>("grants");
 export const status = () => get<{ access: string | null; counts: Record<string, number> }>("status");
 export const series = (block: string, field: string) => get<Series>("series", { block, field });
 
+/** A place and a unit quaternion: x, y, z, then x, y, z, w. */
+export type Pose = number[];
+
+export const poses = (number: number) => get<{ poses: Pose[] }>("poses", { number: String(number) });
 export const wave = (number: number) => get<Wave>("wave", { number: String(number) });
 
 /** Do something at once and then at intervals, one after the other, until the returned function is called. */
@@ -80,6 +84,16 @@ export function repeat(milliseconds: number, action: () => Promise<void>): () =>
     if (!isOver) setTimeout(turn, milliseconds);
   };
   turn();
+  return () => void (isOver = true);
+}
+
+/** Take the answer to a question, unless the returned function is called first, since a newer question counts. */
+export function answered<T>(question: Promise<T>, take: (answer: T) => void, failed: (reason: string) => void): () => void {
+  let isOver = false;
+  question.then(
+    (answer) => isOver || take(answer),
+    (error) => isOver || failed(words(error)),
+  );
   return () => void (isOver = true);
 }
 

