@@ -76,6 +76,7 @@ class Operation(IntEnum):
     JUMP_FRAME = 0x85  # if the Manager offers a byte
     AT = 0x86  # t := address
     LOOKUP = 0x87  # a := ROM at address + a, z
+    JUMP_ABORTED = 0x88  # if the Manager has aborted its frame, whose missing bytes were zeros until now
     CALL = 0xC0  # ff := the next instruction's address, go on at address
     READ = 0xC1  # bytes of the chip to f: kind, register, f
     WRITE = 0xC2  # bytes to the chip: kind, register, f
@@ -206,6 +207,7 @@ _ADDRESSED = {
     Operation.JUMP_CARRY,
     Operation.JUMP_NOT_CARRY,
     Operation.JUMP_FRAME,
+    Operation.JUMP_ABORTED,
     Operation.AT,
     Operation.LOOKUP,
 }

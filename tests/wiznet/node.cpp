@@ -3,7 +3,8 @@
 //   node ROM MODE HALF_BIT MISO_DELAY STALL_PERCENT SEED
 //
 // Standard output and input are those of slave.h. Each 's' is answered with a number of milliseconds (a byte), and the
-// number (2 bytes, big-endian) and the bytes of what the Manager offers from then on. 'g' and 'l' are bytes for the
+// number (2 bytes, big-endian) and the bytes of what the Manager offers from then on, each as a word with 256 added to
+// the last byte of an aborted frame. 'g' and 'l' are bytes for the
 // Manager, 'l' the last of a frame.
 #include "Vfirm_wiznet_node.h"
 #include "slave.h"
@@ -13,11 +14,11 @@ class Board : public Slave {
   using Slave::Slave;
   void selected() override {
     milliseconds += take();
-    for (unsigned left = take_word(); left > 0; --left) offered.push_back(take());
+    for (unsigned left = take_word(); left > 0; --left) offered.push_back(take_word());
   }
 
   unsigned milliseconds = 0;
-  std::deque<uint8_t> offered;
+  std::deque<unsigned> offered;
 };
 
 class Bench {
@@ -35,7 +36,8 @@ class Bench {
     top_.ms = board_.milliseconds > 0;
     board_.milliseconds -= top_.ms;
     top_.s_axis_tvalid = !offered.empty() && (top_.s_axis_tvalid || !chance_.stalls());
-    top_.s_axis_tdata = offered.empty() ? 0 : offered.front();
+    top_.s_axis_tdata = offered.empty() ? 0 : offered.front() & 0xFF;
+    top_.s_axis_tlast = top_.s_axis_tuser = !offered.empty() && offered.front() > 0xFF;
     top_.m_axis_tready = !chance_.stalls();
     top_.spi_miso = board_.miso();
     top_.clk = 0;

@@ -20,9 +20,9 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from fusesoc_firm.fabric.ros1 import Node, image
+from fusesoc_firm.fabric.wiznet.chips import CHIPS
 from tests.ros.cpp_nodes import Ros, missing_ros1, ros1
 from tests.ros.live_nodes import paced
-from tests.wiznet.chips import CHIPS
 from tests.wiznet.ros1 import Board, Frame, Manager, clocked, endpoint, framed, hardware, interpreted, node
 from tests.wiznet.ros1_peers import LONGEST_SECONDS, header, header_of, read
 from tests.wiznet.sequencer import ACCESSES, Sequencer

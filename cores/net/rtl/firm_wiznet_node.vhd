@@ -24,7 +24,9 @@ entity firm_wiznet_node is
 
     -- Frames from the Manager, and to it.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
@@ -65,7 +67,9 @@ begin
       rom_address     => rom_address,
       rom_data        => rom_data,
       s_axis_tdata    => s_axis_tdata,
+      s_axis_tuser    => s_axis_tuser,
       s_axis_tvalid   => s_axis_tvalid,
+      s_axis_tlast    => s_axis_tlast,
       s_axis_tready   => s_axis_tready,
       m_axis_tdata    => m_axis_tdata,
       m_axis_tvalid   => m_axis_tvalid,

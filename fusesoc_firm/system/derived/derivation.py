@@ -117,7 +117,7 @@ def derive(
     publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
-    network = network_of(specification, scheduling, parts.software, faults)
+    network = network_of(specification, scheduling, parts.software, (subscribers, publishers), faults)
     tree = tree_of(project, scheduling, link, publishers, faults)
     faults.raise_if_any()
     system = DerivedSystem(
