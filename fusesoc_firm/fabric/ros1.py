@@ -148,24 +148,31 @@ def node_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary
     return Node(f"{space}/{network.name}", network, network.master, subscribers, publishers)
 
 
-def rom_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> dict[str, str]:
-    """Return the VHDL of the ROM of a system in the sockets of a chip, by its file's name; nothing for other systems.
+def memory_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> bytes:
+    """Return the bytes of the ROM of a system in the sockets of a chip; no bytes for other systems.
 
     Raise `InputError` if the node's texts are longer than the memory.
     """
     if system.network is None or system.network.kind not in CHIPS:
-        return {}
-    node, entity = node_of(system, libraries), rom_entity(system)
-    made = image(node, CHIPS[system.network.kind])
+        return b""
+    made = image(node_of(system, libraries), CHIPS[system.network.kind])
     if len(made) > MOST_BYTES:
         fail(
             f"the node of '{system.name}' needs {len(made)} bytes of memory for its texts",
             hint=f"{MOST_BYTES} are possible; use fewer topics, or messages with shorter definitions",
         )
-    data = [f'x"{byte:02x}"' for byte in made]
+    return made
+
+
+def rom_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> dict[str, str]:
+    """Return the VHDL of a ROM with `memory_of`, by its file's name; nothing without memory. May raise `InputError`."""
+    made = memory_of(system, libraries)
+    if not made:
+        return {}
+    entity, data = rom_entity(system), [f'x"{byte:02x}"' for byte in made]
     configuration = {
         "entity": entity,
-        "node": node.name,
+        "node": node_of(system, libraries).name,
         "byte_count": len(data),
         "address_bits": (len(data) - 1).bit_length(),
         "rows": [", ".join(data[at : at + _BYTES_IN_ROW]) for at in range(0, len(data), _BYTES_IN_ROW)],
