@@ -29,7 +29,7 @@ from tests.hdl.verilog import netlist
 from tests.wiznet.sequencer import ABORTED, ACCESSES, Sequencer
 
 HERE = Path(__file__).parent
-_HARDWARE = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
+*_HARDWARE, _LINK = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
 _IDLE_BYTES = 5  # of a turn without news
 _LONGEST_SECONDS = 60
@@ -204,13 +204,28 @@ def hardware(chip_number: int, folder: Path, half_bit: int = 1) -> Path:
     return compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_node", bench, folder, (HERE,))
 
 
+@dataclass(frozen=True)
+class Stalls:
+    """How the Manager stalls: in a percentage of the cycles, and if it is strict, while it offers something itself."""
+
+    seed: int
+    percent: int = 20
+    is_strict: bool = False
+
+
 def clocked(
-    board: Node, chip_number: int, manager: Manager, program: Path, stall_percent: int, seed: int, log: list[Frame]
+    board: Node,
+    chip_number: int,
+    manager: Manager,
+    program: Path,
+    stalls: Stalls,
+    log: list[Frame],
 ) -> Board:
     """A board whose program the hardware runs; each of its SPI frames is logged."""
     rom = program.parent / "rom"
     rom.write_bytes(image(board, chip_number))
-    command = [str(program), str(rom), "0", "1", "0", str(stall_percent), str(seed)]
+    command = [str(program), str(rom), "0", "1", "0", str(stalls.percent), str(stalls.seed)]
+    command += ["strict"] * stalls.is_strict
 
     chip = CHIPS[chip_number]()
 

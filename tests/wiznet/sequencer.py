@@ -241,7 +241,8 @@ class Sequencer:
             Operation.JUMP_NOT_ZERO: not self._zero,
             Operation.JUMP_CARRY: self._carry,
             Operation.JUMP_NOT_CARRY: not self._carry,
-            Operation.JUMP_FRAME: bool(self.offered),
+            Operation.JUMP_FRAME: bool(self.offered) or self._is_aborted,
+            Operation.JUMP_BUSY: False,  # all that is given is taken at once
             Operation.JUMP_ABORTED: self._is_aborted,
         }
         if operation is Operation.JUMP_ABORTED:

@@ -22,10 +22,12 @@ entity firm_wiznet_sequencer is
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
+    has_part      : in  std_logic;  -- the next 64 bytes of a frame are there, or its end
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
+    is_taken      : in  std_logic;  -- the Manager has all bytes, so that 64 have room
 
     -- To firm_wiznet_access: requests, bytes to write, bytes that were read.
     request_valid   : out std_logic;
@@ -71,6 +73,7 @@ architecture rtl of firm_wiznet_sequencer is
   constant DO_AT        : byte_t := x"86";
   constant DO_LOOKUP    : byte_t := x"87";
   constant DO_ABORTED   : byte_t := x"88";
+  constant DO_BUSY      : byte_t := x"89";
   constant DO_CALL      : byte_t := x"c0";
   constant DO_WRITE     : byte_t := x"c2";
 
@@ -185,12 +188,13 @@ begin
             std_logic_vector(sum(7 downto 0));
 
   is_jump <= aborted_r when operation_r = DO_ABORTED else
+             not is_taken when operation_r = DO_BUSY else
              '1' when operation_r(2 downto 0) = "000" else
              zero_r when operation_r(2 downto 0) = "001" else
              not zero_r when operation_r(2 downto 0) = "010" else
              carry_r when operation_r(2 downto 0) = "011" else
              not carry_r when operation_r(2 downto 0) = "100" else
-             s_axis_tvalid;
+             has_part or aborted_r;
 
   power_of_page : process (page_r)
   begin

@@ -67,7 +67,7 @@ def _check_size(item: Converter, block: Block, faults: Diagnostics) -> None:
         _note_long(item, block, item.frame.payload_bytes, "use a smaller message", faults)
     elif not item.frame.is_fixed_size and (least := length_of(item.frame).minimum) > LONGEST:
         _note_long(item, block, least, "use a smaller message", faults)
-    elif block.mode == "subscriber" and (item.max_length or 0) > LONGEST:
+    elif (item.max_length or 0) > LONGEST:
         _note_long(item, block, item.max_length or 0, f"add 'maxLength: {LONGEST}' to the block", faults)
 
 

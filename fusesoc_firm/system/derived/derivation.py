@@ -114,7 +114,7 @@ def derive(
     subscribers = tuple(
         replace(item, queue=queue_of(parts.blocks[item.block], item, project, faults)) for item in subscribers
     )
-    publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
+    publishers = with_longest_sent(publishers, subscribers, project, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
     network = network_of(specification, scheduling, parts.software, (subscribers, publishers), faults)
