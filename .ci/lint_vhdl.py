@@ -166,6 +166,29 @@ def write_packets() -> None:
     (SAMPLES / "packets.vhd").write_text(render(memory.template, memory.context), encoding="ascii")
 
 
+# A node of ROS 1 in the sockets of a chip.
+CHIP = """\
+project:
+  name: chip
+  clock: 12 MHz
+  interconnect: w5500
+  network: {mac: "02:00:00:00:00:01", address: 10.0.0.2, master: 10.0.0.1}
+blocks:
+  - {name: pose, middleware: ROS, mode: subscriber, message: geometry_msgs/Pose, outgoing: [{name: copy}]}
+  - {name: copy, middleware: ROS, mode: publisher, message: geometry_msgs/Pose}
+"""
+
+
+def write_chip() -> None:
+    """Write a system in the sockets of a chip, on its board and in simulation."""
+    folder = SAMPLES / "chips" / "chip"
+    folder.mkdir(parents=True)
+    (folder / "chip.yaml").write_text(CHIP, encoding="utf-8")
+    run(sys.executable, "-m", "fusesoc_firm.cli", "system", "core", "chip.yaml", cwd=folder)
+    for name, changes in (("system", {"board": "icebreaker_w5500"}), ("simulation", {"product": "network"})):
+        call_generator(folder / "chip.core", name, changes)
+
+
 def run(*command: str | Path, cwd: Path) -> None:
     """Run a program. Ends this one, with its output, if it fails."""
     done = subprocess.run(command, cwd=cwd, text=True, capture_output=True, check=False)
@@ -184,6 +207,7 @@ def samples() -> list[Path]:
     write_loop()
     write_registers()
     write_packets()
+    write_chip()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]
     return sorted([*made, *GOLDEN.glob("*.vhd")])
 

@@ -34,13 +34,13 @@ ALLOWED: dict[str, str] = {
     "bags": "frame message system text",
     "simulation": "bags converter frame message request store system text tools",
     "node": "frame message request simulation system text tools",
-    "plugin": "building converter message node request simulation store system text tools",
+    "plugin": "building converter fabric message node request simulation store system text tools",
     "emulation": "frame message node request simulation system text",
     "replay": "bags frame message node simulation system text",
     "studio": "converter frame message node plugin request scheduling simulation store system text tools",
     "cli": (
-        "accelerator action building converter emulation message node plugin replay scheduling simulation store studio"
-        " system text tools verify"
+        "accelerator action building converter emulation fabric message node plugin replay scheduling simulation store"
+        " studio system text tools verify"
     ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.

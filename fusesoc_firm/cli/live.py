@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import add_sources, command, load
-from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
+from fusesoc_firm.cli.simulator import add_simulator_options, built_board, built_simulator
 from fusesoc_firm.cli.studio import add_watch, watched
 from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.system.system_core import LoadedSystem
 
 
 def add_live(commands: Any) -> None:
@@ -57,12 +60,46 @@ def add_live(commands: Any) -> None:
 
 
 def _live(arguments: argparse.Namespace) -> None:
+    loaded = load(arguments)
+    if loaded.system.network and not arguments.transport:
+        _run_board(arguments, loaded)
+    else:
+        _run_node(arguments, loaded)
+
+
+def _run_board(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
+    """Run the simulated board of a system that is a node in the sockets of a chip."""
+    from fusesoc_firm.fabric.ros1 import PORT, node_of
+    from fusesoc_firm.fabric.wiznet.board import Board, check_address
+    from fusesoc_firm.fabric.wiznet.chips import CHIPS
+    from fusesoc_firm.system.hardware.interconnect import CHIPS as NUMBERS
+    from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
+    from fusesoc_firm.system.system_core import refuse_network
+
+    refuse_network(loaded)
+    network = loaded.system.network
+    assert network is not None
+    node = node_of(loaded.system, loaded.libraries)
+    check_address(network.address, PORT)
+    built = built_board(arguments)
+    chip = CHIPS[NUMBERS[network.kind]]()
+    board = Board(built.words, built.folder, chip, NETWORK_HERTZ)
+    master = "{}:{}".format(*node.master)
+    print(f"{node.name} is at {network.address}; its master is {master}; Ctrl-C ends it", flush=True)
+    try:
+        board.run()
+    except KeyboardInterrupt:
+        print()
+    finally:
+        board.close()
+
+
+def _run_node(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
     from fusesoc_firm.node.description import describe
     from fusesoc_firm.node.reopening import at_address, of_simulator
     from fusesoc_firm.node.run import run_node, run_options
     from fusesoc_firm.text.outputs import check_output
 
-    loaded = load(arguments)
     description = describe(loaded)
     options = run_options(arguments, arguments.remappings, description, arguments.ros)
     if arguments.trace:

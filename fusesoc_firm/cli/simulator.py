@@ -62,10 +62,24 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
 
 def built_simulator(arguments: argparse.Namespace) -> Any:
     """Build the simulator that the arguments describe, and return it as a `BuiltSimulator`."""
+    return _built(arguments, "")
+
+
+def built_board(arguments: argparse.Namespace) -> Any:
+    """Build the simulated board that the arguments describe, and return it as a `BuiltSimulator`."""
+    from fusesoc_firm.system.scaffold.core_file import NETWORK
+
+    is_first = arguments.tool == default_simulator(is_live=True)
+    return _built(arguments, NETWORK if is_first else f"{NETWORK}_{arguments.tool}")
+
+
+def _built(arguments: argparse.Namespace, target: str) -> Any:
     from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
 
     sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)
-    return build_simulator(arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources)
+    return build_simulator(
+        arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources, target=target
+    )
 
 
 def _build_simulator(arguments: argparse.Namespace) -> None:

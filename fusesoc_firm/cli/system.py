@@ -166,6 +166,8 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _check_as_json(arguments: argparse.Namespace) -> None:
     """Print whether a specification is valid, and all faults and warnings; exit with 1 if it is not valid."""
+    from fusesoc_firm.fabric.ros1 import memory_of
+
     faults: Sequence[Diagnostic] = ()
     warnings: Sequence[Diagnostic] = ()
     try:
@@ -173,6 +175,7 @@ def _check_as_json(arguments: argparse.Namespace) -> None:
         warnings = loaded.warnings
         warnings += check_sources(loaded, arguments.spec)
         _check_stimuli(loaded.system, arguments.stimuli)
+        memory_of(loaded.system, loaded.libraries)
     except InputError as error:
         faults = error.diagnostics
     _print_json({"valid": not faults, "diagnostics": [item.data() for item in (*faults, *warnings)]})
@@ -185,15 +188,19 @@ def _print_json(data: object) -> None:
 
 
 def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
+    from fusesoc_firm.fabric.ros1 import memory_of
     from fusesoc_firm.system.views.show import counts, default_lengths
 
     loaded = load(arguments)
     print_warnings(check_sources(loaded, arguments.spec))
     system = loaded.system
     _check_stimuli(system, stimuli)
+    memory = memory_of(system, loaded.libraries)
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
     for line in default_lengths(system):
         print(line)
+    if memory:
+        print(f"the node needs {len(memory)} bytes of memory for its program and texts")
 
 
 def _check_stimuli(system: DerivedSystem, paths: Iterable[Path]) -> None:

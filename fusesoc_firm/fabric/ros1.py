@@ -21,7 +21,11 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
+from fusesoc_firm.system.derived.chip import MOST_TOPICS, MOST_TYPES
 from fusesoc_firm.system.derived.model import DerivedSystem, Network, Topic
+from fusesoc_firm.system.hardware.interconnect import CHIPS, rom_entity
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.render import render
 
 _PROGRAM = Path(__file__).with_name("ros1_node.seq")
 # The port at which the node listens, for XML-RPC and TCPROS.
@@ -56,7 +60,12 @@ _STATES = {"LISTEN": 0x14, "SYN_RECEIVED": 0x16, "ESTABLISHED": 0x17, "CLOSE_WAI
 _INTERRUPTS = {5500: 0x17, 5200: 0x34}
 # Numbers of the strings in headers; those of topics are the highest.
 _FIRST_MD5, _ANY_MD5, _FIRST_TYPE, _ANY_TYPE, _FIRST_TOPIC = 0x01, 0x3F, 0x40, 0x7F, 0x80
-MOST_TYPES, MOST_TOPICS = _ANY_MD5 - _FIRST_MD5, 0x7F
+assert _ANY_MD5 - _FIRST_MD5 == MOST_TYPES
+assert 0x100 - _FIRST_TOPIC > MOST_TOPICS
+# Words in texts are addresses with bit 15 set.
+MOST_BYTES = 0x8000
+_ROM_TEMPLATE = "vhdl/node_rom.vhd"
+_BYTES_IN_ROW = 16
 _METHODS = (
     "publisherUpdate",
     "requestTopic",
@@ -122,12 +131,11 @@ class Node:
         return _uri(self.network.address, self.port)
 
 
-def node_of(
-    system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary], master: tuple[IPv4Address, int]
-) -> Node:
-    """Return the node of a system with a network."""
+def node_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> Node:
+    """Return the node of a system in the sockets of a chip."""
     library, network = libraries[ROS1], system.network
     assert network is not None
+    assert network.master is not None
     space = network.namespace.rstrip("/")
 
     def endpoint(topic: Topic) -> Endpoint:
@@ -137,7 +145,39 @@ def node_of(
         return Endpoint(name, str(message), signature(message, definitions), closure_text(message, definitions))
 
     subscribers, publishers = (tuple(map(endpoint, side)) for side in (system.subscribers, system.publishers))
-    return Node(f"{space}/{network.name}", network, master, subscribers, publishers)
+    return Node(f"{space}/{network.name}", network, network.master, subscribers, publishers)
+
+
+def memory_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> bytes:
+    """Return the bytes of the ROM of a system in the sockets of a chip; no bytes for other systems.
+
+    Raise `InputError` if the node's texts are longer than the memory.
+    """
+    if system.network is None or system.network.kind not in CHIPS:
+        return b""
+    made = image(node_of(system, libraries), CHIPS[system.network.kind])
+    if len(made) > MOST_BYTES:
+        fail(
+            f"the node of '{system.name}' needs {len(made)} bytes of memory for its texts",
+            hint=f"{MOST_BYTES} are possible; use fewer topics, or messages with shorter definitions",
+        )
+    return made
+
+
+def rom_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> dict[str, str]:
+    """Return the VHDL of a ROM with `memory_of`, by its file's name; nothing without memory. May raise `InputError`."""
+    made = memory_of(system, libraries)
+    if not made:
+        return {}
+    entity, data = rom_entity(system), [f'x"{byte:02x}"' for byte in made]
+    configuration = {
+        "entity": entity,
+        "node": node_of(system, libraries).name,
+        "byte_count": len(data),
+        "address_bits": (len(data) - 1).bit_length(),
+        "rows": [", ".join(data[at : at + _BYTES_IN_ROW]) for at in range(0, len(data), _BYTES_IN_ROW)],
+    }
+    return {f"{entity}.vhd": render(_ROM_TEMPLATE, configuration)}
 
 
 def image(node: Node, chip: int) -> bytes:

@@ -73,9 +73,11 @@ class Operation(IntEnum):
     JUMP_NOT_ZERO = 0x82
     JUMP_CARRY = 0x83
     JUMP_NOT_CARRY = 0x84
-    JUMP_FRAME = 0x85  # if the Manager offers a byte
+    JUMP_FRAME = 0x85  # if the Manager offers the next 64 bytes of a frame, or its end
     AT = 0x86  # t := address
     LOOKUP = 0x87  # a := ROM at address + a, z
+    JUMP_ABORTED = 0x88  # if the Manager has aborted its frame, whose missing bytes were zeros until now
+    JUMP_BUSY = 0x89  # if the Manager has not yet taken all bytes; otherwise, 64 have room
     CALL = 0xC0  # ff := the next instruction's address, go on at address
     READ = 0xC1  # bytes of the chip to f: kind, register, f
     WRITE = 0xC2  # bytes to the chip: kind, register, f
@@ -206,6 +208,8 @@ _ADDRESSED = {
     Operation.JUMP_CARRY,
     Operation.JUMP_NOT_CARRY,
     Operation.JUMP_FRAME,
+    Operation.JUMP_ABORTED,
+    Operation.JUMP_BUSY,
     Operation.AT,
     Operation.LOOKUP,
 }

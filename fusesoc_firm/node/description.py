@@ -96,6 +96,11 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
     Raise `InputError` for a middleware other than ROS, for ids of two bytes, and for a system that is a node itself.
     """
     refuse_network(loaded)
+    if loaded.system.network:
+        fail(
+            f"'{loaded.system.name}' is a node itself, and needs none on a host",
+            loaded.specification.project.interconnect.source,
+        )
     if loaded.system.id_bytes > 1:
         fail(
             f"nodes do not support 'idBytes: {loaded.system.id_bytes}'", hint="such a system is simulated with firm sim"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.request import message_core
 from fusesoc_firm.request.parameters import Parameter
-from fusesoc_firm.request.request import GeneratedCore, LoadedRequest, Request
+from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
 from fusesoc_firm.text.naming import PREFIX_RULE, is_prefix
 from fusesoc_firm.tools.programs import simulation_programs
 from fusesoc_firm.tools.simulators import SIMULATORS, default_simulator
@@ -45,6 +45,8 @@ def _load_converters(request: Request) -> LoadedRequest:
 
 
 def _load_system(request: Request) -> LoadedRequest:
+    from fusesoc_firm.converter.converter_core import VHDL
+    from fusesoc_firm.fabric.ros1 import rom_files
     from fusesoc_firm.node import cpp_package
     from fusesoc_firm.simulation import simulation_core
     from fusesoc_firm.system import system_core
@@ -53,12 +55,15 @@ def _load_system(request: Request) -> LoadedRequest:
         for warning in loaded.warnings:
             print(warning, file=sys.stderr)
         core = system_core.system_core(loaded)
-        return replace(core, files={**core.files, **cpp_package.generated_files(loaded)})
+        roms = {name: GeneratedFile(text, VHDL) for name, text in rom_files(loaded.system, loaded.libraries).items()}
+        node = {} if loaded.system.network else cpp_package.generated_files(loaded)
+        return replace(core, files={**roms, **core.files, **node})
 
     loaded = system_core.load_requested(request)
     make: Callable[[Request, system_core.LoadedSystem], GeneratedCore]
-    if request.parameters["product"] == "live":
-        inputs, make = simulation_core.live_inputs(request, loaded), simulation_core.live_core
+    if request.parameters["product"] in {"live", "network"}:
+        live = {"live": simulation_core.live_core, "network": simulation_core.network_core}
+        inputs, make = simulation_core.live_inputs(request, loaded), live[str(request.parameters["product"])]
     elif _is_simulation(request):
         inputs, make = simulation_core.inputs(request, loaded), simulation_core.simulation_core
     else:
@@ -139,7 +144,13 @@ GENERATORS: Mapping[str, Generator] = {
     "far": Generator(
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
-            Parameter("product", "str", "the product to generate", "system", choices=("system", "simulation", "live")),
+            Parameter(
+                "product",
+                "str",
+                "the product to generate",
+                "system",
+                choices=("system", "simulation", "live", "network"),
+            ),
             Parameter("board", "str", "the name of a supported board, or a YAML file relative to the core"),
             Parameter(
                 "interconnect",

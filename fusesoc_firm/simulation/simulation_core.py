@@ -21,14 +21,20 @@ from fusesoc_firm.simulation.stimuli import read_stimuli
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system import system_core
 from fusesoc_firm.system.derived.model import DerivedSystem
-from fusesoc_firm.system.hardware.configuration import TEST_BENCH_TEMPLATE, test_bench_configuration
+from fusesoc_firm.system.hardware.configuration import (
+    NODE_BENCH_TEMPLATE,
+    TEST_BENCH_TEMPLATE,
+    test_bench_configuration,
+)
 from fusesoc_firm.system.hardware.verilog_bench import (
     ENVIRONMENT_TEMPLATE,
     VERILOG_BENCH_TEMPLATE,
+    VERILOG_NODE_BENCH_TEMPLATE,
     translated_unit,
     verilog_bench_configuration,
 )
 from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.system.written.specification import CHIPS
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
@@ -50,6 +56,7 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     """
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "sim")
+    _refuse_node(loaded)
     stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
     answers = responses(_path(request, "model"), stimuli, answered(system))
     found = traffic(system, loaded.folder, stimuli, answers)
@@ -84,6 +91,7 @@ def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a live simulation, whose start sets the seed and the stall rate. May raise `InputError`."""
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "live")
+    _refuse_node(loaded)
     environment = environment_files(_environment(request), system)
     configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
     files = _surroundings(loaded, environment)
@@ -92,6 +100,32 @@ def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     else:
         files |= _verilog_bench(configuration, system)
     return GeneratedCore(f"Live simulation of system {system.name}", files)
+
+
+def network_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
+    """Return the core of a simulated board whose chip is at the other end of a pipe. May raise `InputError`."""
+    system = loaded.system
+    _check_simulator(system, str(request.parameters["simulator"]), "network")
+    if system.network is None:
+        fail(f"the product 'network' needs one of the interconnects {', '.join(CHIPS)}")
+    environment = environment_files(_environment(request), system)
+    configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
+    files = _surroundings(loaded, environment)
+    if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
+        files |= _vhdl_bench(configuration, NODE_BENCH_TEMPLATE)
+    else:
+        files |= _verilog_bench(configuration, system, template=VERILOG_NODE_BENCH_TEMPLATE)
+    return GeneratedCore(f"Simulated board of system {system.name}", files)
+
+
+def _refuse_node(loaded: LoadedSystem) -> None:
+    """Raise `InputError` for a system that is a node itself: its frames have no host."""
+    if loaded.system.network:
+        fail(
+            f"a system with interconnect '{loaded.specification.project.interconnect}' has no host to simulate",
+            loaded.specification.project.interconnect.source,
+            "add the parameter 'interconnect: axi_stream' to both generators of the target, as 'firm system core' does",
+        )
 
 
 def _surroundings(loaded: LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile]) -> dict[str, GeneratedFile]:
@@ -139,21 +173,23 @@ def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None
             )
 
 
-def _vhdl_bench(configuration: Context) -> dict[str, GeneratedFile]:
-    text = render(TEST_BENCH_TEMPLATE, configuration)
+def _vhdl_bench(configuration: Context, template: str = TEST_BENCH_TEMPLATE) -> dict[str, GeneratedFile]:
+    text = render(template, configuration)
     return {f"{configuration['bench']}.vhd": GeneratedFile(text, VHDL, tags=_BENCH_TAGS)}
 
 
 def _verilog_bench(
-    configuration: Context, system: DerivedSystem, frames: int = 0, beats: int = 0
+    configuration: Context,
+    system: DerivedSystem,
+    frames: int = 0,
+    beats: int = 0,
+    template: str = VERILOG_BENCH_TEMPLATE,
 ) -> dict[str, GeneratedFile]:
     """Return the test bench and, if there is an environment, the entity that connects the environment to the system."""
     has_environment = configuration["environment"] is not None
     bench = verilog_bench_configuration(configuration, system, frames, beats, has_environment=has_environment)
     files = {
-        f"{configuration['bench']}.v": GeneratedFile(
-            render(VERILOG_BENCH_TEMPLATE, bench), "verilogSource-2005", tags=_BENCH_TAGS
-        )
+        f"{configuration['bench']}.v": GeneratedFile(render(template, bench), "verilogSource-2005", tags=_BENCH_TAGS)
     }
     if has_environment:
         unit = translated_unit(system, has_environment=True)

@@ -47,7 +47,7 @@ from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
 from fusesoc_firm.system.derived.actions import with_actions
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
-from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, NetworkKind
 from fusesoc_firm.system.derived.services import with_services
 from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
@@ -202,8 +202,8 @@ def load_requested(request: Request) -> LoadedSystem:
 
 
 def refuse_network(loaded: LoadedSystem) -> None:
-    """Raise `InputError` for a system with Ethernet: its hardware is not complete, and it needs no node on a host."""
-    if loaded.system.network:
+    """Raise `InputError` for a system with Ethernet, whose hardware is not complete."""
+    if loaded.system.network and loaded.system.network.kind is NetworkKind.ETHERNET:
         fail(
             f"interconnect '{ETHERNET}' can be checked, but is not built yet",
             loaded.specification.project.interconnect.source,

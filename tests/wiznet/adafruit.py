@@ -6,7 +6,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from tests.wiznet.spi import Slave, exchange
+from fusesoc_firm.fabric.wiznet.spi import Slave, exchange
 
 
 class Bus:

@@ -1,10 +1,11 @@
 // The pins of firm_wiznet_node with an SPI slave outside, and the ROM of a file.
 //
-//   node ROM MODE HALF_BIT MISO_DELAY STALL_PERCENT SEED
+//   node ROM MODE HALF_BIT MISO_DELAY STALL_PERCENT SEED [strict]
 //
 // Standard output and input are those of slave.h. Each 's' is answered with a number of milliseconds (a byte), and the
-// number (2 bytes, big-endian) and the bytes of what the Manager offers from then on. 'g' and 'l' are bytes for the
-// Manager, 'l' the last of a frame.
+// number (2 bytes, big-endian) and the bytes of what the Manager offers from then on, each as a word with 256 added to
+// the last byte of an aborted frame. 'g' and 'l' are bytes for the
+// Manager, 'l' the last of a frame. A strict Manager takes nothing while it offers something.
 #include "Vfirm_wiznet_node.h"
 #include "slave.h"
 
@@ -13,17 +14,17 @@ class Board : public Slave {
   using Slave::Slave;
   void selected() override {
     milliseconds += take();
-    for (unsigned left = take_word(); left > 0; --left) offered.push_back(take());
+    for (unsigned left = take_word(); left > 0; --left) offered.push_back(take_word());
   }
 
   unsigned milliseconds = 0;
-  std::deque<uint8_t> offered;
+  std::deque<unsigned> offered;
 };
 
 class Bench {
  public:
-  Bench(std::vector<uint8_t> rom, const Board& board, const Chance& chance)
-      : rom_(std::move(rom)), board_(board), chance_(chance) {
+  Bench(std::vector<uint8_t> rom, const Board& board, const Chance& chance, bool is_strict)
+      : rom_(std::move(rom)), board_(board), chance_(chance), is_strict_(is_strict) {
     top_.rst_n = 0;
     for (int count = 0; count < 4; ++count) step();
     top_.rst_n = 1;
@@ -35,8 +36,9 @@ class Bench {
     top_.ms = board_.milliseconds > 0;
     board_.milliseconds -= top_.ms;
     top_.s_axis_tvalid = !offered.empty() && (top_.s_axis_tvalid || !chance_.stalls());
-    top_.s_axis_tdata = offered.empty() ? 0 : offered.front();
-    top_.m_axis_tready = !chance_.stalls();
+    top_.s_axis_tdata = offered.empty() ? 0 : offered.front() & 0xFF;
+    top_.s_axis_tlast = top_.s_axis_tuser = !offered.empty() && offered.front() > 0xFF;
+    top_.m_axis_tready = !chance_.stalls() && !(is_strict_ && !offered.empty());
     top_.spi_miso = board_.miso();
     top_.clk = 0;
     top_.eval();
@@ -61,14 +63,15 @@ class Bench {
   Vfirm_wiznet_node top_;
   Board board_;
   Chance chance_;
+  bool is_strict_;
 };
 
-int main(int, char** words) {
+int main(int count, char** words) {
   const auto number = [words](int index) { return static_cast<unsigned>(std::atoi(words[index])); };
   std::FILE* file = std::fopen(words[1], "rb");
   if (!file) fail("the ROM cannot be read");
   std::vector<uint8_t> rom(65536);
   rom.resize(std::fread(rom.data(), 1, rom.size(), file));
-  Bench bench(rom, Board(number(2), number(3), number(4)), Chance(number(6), number(5)));
+  Bench bench(rom, Board(number(2), number(3), number(4)), Chance(number(6), number(5)), count > 7);
   for (;;) bench.step();
 }

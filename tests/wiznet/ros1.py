@@ -13,6 +13,10 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from fusesoc_firm.fabric.ros1 import Endpoint, Node, image
+from fusesoc_firm.fabric.wiznet.chip import Status
+from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.w5200 import W5200
+from fusesoc_firm.fabric.wiznet.w5500 import W5500
 from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.model import MessageName
@@ -22,14 +26,10 @@ from fusesoc_firm.system.derived.model import Network
 from tests.bench.model import compiled
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
-from tests.wiznet.chip import Status
-from tests.wiznet.chips import CHIPS
-from tests.wiznet.sequencer import ACCESSES, Sequencer
-from tests.wiznet.w5200 import W5200
-from tests.wiznet.w5500 import W5500
+from tests.wiznet.sequencer import ABORTED, ACCESSES, Sequencer
 
 HERE = Path(__file__).parent
-_HARDWARE = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
+*_HARDWARE, _LINK = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
 _IDLE_BYTES = 5  # of a turn without news
 _LONGEST_SECONDS = 60
@@ -63,16 +63,16 @@ class Manager:
     taken: list[tuple[int, bytes]] = field(default_factory=list)
     _frame: bytearray = field(default_factory=bytearray)
 
-    def take(self, byte: int, is_last: bool) -> bytes:
+    def take(self, byte: int, is_last: bool) -> list[int]:
         """Take a byte; return the frames that answer."""
         self._frame.append(byte)
         if not is_last:
-            return b""
+            return []
         frame, self._frame = bytes(self._frame), bytearray()
         payload = frame[5:]
         assert len(payload) == int.from_bytes(frame[1:5], "little")
         self.taken.append((frame[0], payload))
-        return b"".join(framed(*answer) for answer in self.accelerator(frame[0], payload))
+        return [*b"".join(framed(*answer) for answer in self.accelerator(frame[0], payload))]
 
 
 def framed(number: int, payload: bytes) -> bytes:
@@ -88,14 +88,19 @@ class Board:
         self.manager = manager
         self.turns: list[int] = []
         self.is_running = True
-        self.to_offer: SimpleQueue[bytes] = SimpleQueue()
+        self.to_offer: SimpleQueue[list[int]] = SimpleQueue()
         self._error: list[Exception] = []
         self._thread = threading.Thread(target=self._run, args=(run,), daemon=True)
         self._thread.start()
 
     def send(self, number: int, payload: bytes) -> None:
         """Offer a frame."""
-        self.to_offer.put(framed(number, payload))
+        self.to_offer.put([*framed(number, payload)])
+
+    def send_cut(self, number: int, payload: bytes, size: int) -> None:
+        """Offer the first bytes of a frame, of which the last one aborts it."""
+        *begin, last = framed(number, payload)[:size]
+        self.to_offer.put([*begin, last + ABORTED])
 
     def listening(self) -> int:
         """The number of sockets that listen."""
@@ -113,9 +118,9 @@ class Board:
         """Wait until all sockets but the first listen."""
         self.wait_until(lambda: self.listening() == 7)
 
-    def offered(self) -> bytes:
+    def offered(self) -> list[int]:
         """What has been offered since the last call."""
-        data = b""
+        data: list[int] = []
         while True:
             try:
                 data += self.to_offer.get_nowait()
@@ -185,7 +190,7 @@ class Frame:
     """A frame of SPI with what the board got before it: milliseconds and bytes of the Manager."""
 
     milliseconds: int
-    offered: bytes
+    offered: list[int]
     sent: bytearray = field(default_factory=bytearray)
     answered: bytearray = field(default_factory=bytearray)
 
@@ -199,28 +204,45 @@ def hardware(chip_number: int, folder: Path, half_bit: int = 1) -> Path:
     return compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_node", bench, folder, (HERE,))
 
 
+@dataclass(frozen=True)
+class Stalls:
+    """How the Manager stalls: in a percentage of the cycles, and if it is strict, while it offers something itself."""
+
+    seed: int
+    percent: int = 20
+    is_strict: bool = False
+
+
 def clocked(
-    board: Node, chip_number: int, manager: Manager, program: Path, stall_percent: int, seed: int, log: list[Frame]
+    board: Node,
+    chip_number: int,
+    manager: Manager,
+    program: Path,
+    stalls: Stalls,
+    log: list[Frame],
 ) -> Board:
     """A board whose program the hardware runs; each of its SPI frames is logged."""
     rom = program.parent / "rom"
     rom.write_bytes(image(board, chip_number))
-    words = [str(program), str(rom), "0", "1", "0", str(stall_percent), str(seed)]
+    command = [str(program), str(rom), "0", "1", "0", str(stalls.percent), str(stalls.seed)]
+    command += ["strict"] * stalls.is_strict
 
     chip = CHIPS[chip_number]()
 
     def run(running: Board) -> None:
-        clock, answers = Clock(), b""
-        with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        clock, answers = Clock(), list[int]()
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
             assert process.stdin
             assert process.stdout
             while running.is_running:
                 match process.stdout.read(1):
                     case b"s":
                         chip.select()
-                        offered, answers = answers + running.offered(), b""
+                        offered, answers = answers + running.offered(), []
                         log.append(Frame(clock.pass_time(), offered))
-                        process.stdin.write(bytes([log[-1].milliseconds]) + len(offered).to_bytes(2, "big") + offered)
+                        words = [byte.to_bytes(2, "big") for byte in offered]
+                        size = len(offered).to_bytes(2, "big")
+                        process.stdin.write(bytes([log[-1].milliseconds]) + size + b"".join(words))
                         process.stdin.flush()
                     case b"a":
                         log[-1].answered.append(chip.answer())

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from typing import Protocol
 
 from fusesoc_firm.fabric.sequencer import GLOBALS, MEMORY_BYTES, PAGE_BYTES, SOCKETS, Operation, Side, Space
-from tests.wiznet.spi import Slave, exchange
+from fusesoc_firm.fabric.wiznet.spi import Slave, exchange
 
 _BUFFER = 2048
 _WRITE = 0x80
 _OPERAND_BITS = 6
 _IMMEDIATE = 0x20
+# Added to the last byte of a frame that the Manager aborts.
+ABORTED = 0x100
 
 
 class Access(Protocol):
@@ -93,7 +95,7 @@ class Sequencer:
         self._rom, self._access, self._time = rom, access, time
         self._own = self._page = SOCKETS
         self._a = self._pointer = self._text = self._count = self._next = 0
-        self._zero = self._carry = False
+        self._zero = self._carry = self._is_aborted = False
 
     def turn(self) -> None:
         """Run until the ninth coroutine has its turn again."""
@@ -157,9 +159,17 @@ class Sequencer:
             case Operation.COUNT:
                 self._count = self._a
             case Operation.TAKE:
-                self._a = self.offered.popleft()
+                self._a = self._taken()
             case Operation.GIVE | Operation.GIVE_LAST:
                 self.given.append((self._a, operation is Operation.GIVE_LAST))
+
+    def _taken(self) -> int:
+        """The next byte of the Manager, or 0 after an abort."""
+        if self._is_aborted:
+            return 0
+        taken = self.offered.popleft()
+        self._is_aborted = taken >= ABORTED
+        return taken & 0xFF
 
     def _with_byte(self, operation: Operation, operand: int) -> None:
         if operation & _IMMEDIATE:
@@ -170,7 +180,7 @@ class Sequencer:
             self.memory[self._place(operand)] = self._a
         elif operation is Operation.FILL:
             for index in range(self._count):
-                self.memory[self._place(operand) + index] = self.offered.popleft()
+                self.memory[self._place(operand) + index] = self._taken()
         else:
             self._with_word(operation, operand)
 
@@ -231,8 +241,12 @@ class Sequencer:
             Operation.JUMP_NOT_ZERO: not self._zero,
             Operation.JUMP_CARRY: self._carry,
             Operation.JUMP_NOT_CARRY: not self._carry,
-            Operation.JUMP_FRAME: bool(self.offered),
+            Operation.JUMP_FRAME: bool(self.offered) or self._is_aborted,
+            Operation.JUMP_BUSY: False,  # all that is given is taken at once
+            Operation.JUMP_ABORTED: self._is_aborted,
         }
+        if operation is Operation.JUMP_ABORTED:
+            self._is_aborted = False
         if operation is Operation.AT:
             self._text = address
         elif operation is Operation.LOOKUP:

@@ -12,13 +12,13 @@ from typing import IO, NamedTuple
 
 import pytest
 
+from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.spi import Slave
+from fusesoc_firm.fabric.wiznet.w5200 import W5200
+from fusesoc_firm.fabric.wiznet.w5500 import W5500
 from tests.bench.model import compiled
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops, netlist
-from tests.wiznet.chips import CHIPS
-from tests.wiznet.spi import Slave
-from tests.wiznet.w5200 import W5200
-from tests.wiznet.w5500 import W5500
 
 SEED = 20261126
 HERE = Path(__file__).parent

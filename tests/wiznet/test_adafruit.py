@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
+from fusesoc_firm.fabric.wiznet.w5500 import W5500
 from tests.wiznet.adafruit import driver
 from tests.wiznet.peers import echo, free_port
-from tests.wiznet.w5500 import W5500
 
 SEED = 20261126
 LOOPBACK = (bytes([127, 0, 0, 1]), bytes([255, 0, 0, 0]), bytes(4), bytes(4))

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tests.wiznet.chip import Chip, Status
-from tests.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.chip import Chip, Status
+from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.spi import exchange
 from tests.wiznet.peers import echo, free_port
-from tests.wiznet.spi import exchange
 
 SEED = 20261126
 FOLDER = os.environ.get("IOLIBRARY", "")

@@ -116,6 +116,20 @@ def test_a_longer_message_of_the_manager_is_dropped(running: Running, size: int)
         assert read(peer, 4 + POINT_BYTES) == framed(0, bytes(POINT_BYTES))[1:]
 
 
+def test_an_aborted_frame_of_the_manager_is_not_sent(running: Running) -> None:
+    print(f"seed {SEED}")
+    rng = random.Random(SEED)
+    whole = 5 + POINT_BYTES
+    with ExitStack() as stack:
+        peers = [_subscribe(running, stack) for _ in range(2)]
+        for cut in [*range(1, whole + 1), *rng.choices(range(1, whole + 1), k=20)]:
+            payload = rng.randbytes(POINT_BYTES)
+            running.board.send_cut(0, rng.randbytes(POINT_BYTES), cut)
+            running.board.send(0, payload)
+            for peer in peers:
+                assert read(peer, 4 + POINT_BYTES) == framed(0, payload)[1:]
+
+
 class Publisher:
     """A publisher of a topic: its XML-RPC server and its TCPROS server. It accepts one connection at a time."""
 

@@ -20,12 +20,14 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from fusesoc_firm.fabric.ros1 import Node, image
+from fusesoc_firm.fabric.wiznet.chips import CHIPS
 from tests.ros.cpp_nodes import Ros, missing_ros1, ros1
 from tests.ros.live_nodes import paced
-from tests.wiznet.chips import CHIPS
-from tests.wiznet.ros1 import Board, Frame, Manager, clocked, endpoint, framed, hardware, interpreted, node
-from tests.wiznet.ros1_peers import LONGEST_SECONDS, header, header_of, read
+from tests.wiznet.peers import free_port
+from tests.wiznet.ros1 import Board, Frame, Manager, Stalls, clocked, endpoint, framed, hardware, interpreted, node
+from tests.wiznet.ros1_peers import LONGEST_SECONDS, Running, header, header_of, read
 from tests.wiznet.sequencer import ACCESSES, Sequencer
+from tests.wiznet.test_ros1_frames import Publisher
 
 SEED = 20261126
 HERE = Path(__file__).parent
@@ -39,6 +41,12 @@ pytestmark = [pytest.mark.check, pytest.mark.skipif(bool(missing_ros1()), reason
 def _first_three(_: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
     """The accelerator: x, y and z of each quaternion as a point."""
     yield 0, payload[:24]
+
+
+def _thrice(number: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
+    """An accelerator with three answers to each quaternion."""
+    for _ in range(3):
+        yield from _first_three(number, payload)
 
 
 def _node(ros: Ros) -> Node:
@@ -82,7 +90,7 @@ def running(program: tuple[int, Path], tmp_path: Path) -> Iterator[Clocked]:
     print(f"seed {SEED}")
     with ros1(tmp_path) as ros:
         made, manager, log = _node(ros), Manager(_first_three), list[Frame]()
-        board = clocked(made, program[0], manager, program[1], 20, SEED, log)
+        board = clocked(made, program[0], manager, program[1], Stalls(SEED), log)
         board.wait_until_listening()
         yield Clocked(ros, made, board, manager, log, program[0])
         board.close()
@@ -226,9 +234,35 @@ def test_a_new_master_is_found(program: tuple[int, Path], tmp_path: Path) -> Non
     (tmp_path / "first").mkdir()
     (tmp_path / "second").mkdir()
     with ros1(tmp_path / "first") as ros:
-        board = clocked(_node(ros), program[0], Manager(_first_three), program[1], 20, SEED, [])
+        board = clocked(_node(ros), program[0], Manager(_first_three), program[1], Stalls(SEED), [])
         _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
         port = int(_node(ros).master[1])
     with ros1(tmp_path / "second", port) as ros:
         _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
+    board.close()
+
+
+def test_answers_leave_while_messages_of_many_publishers_wait(program: tuple[int, Path]) -> None:
+    """The Manager takes nothing while its answers wait, and has more answers than messages."""
+    print(f"seed {SEED}")
+    rng = random.Random(SEED)
+    made = node(("127.0.0.1", free_port()), (TURN,), (PLACE,))
+    board = clocked(made, program[0], Manager(_thrice), program[1], Stalls(SEED, is_strict=True), [])
+    board.wait_until_listening()
+    running = Running(made, board, program[0])
+    publishers = [Publisher(TURN) for _ in range(3)]
+    with running.connect() as peer:
+        peer.sendall(header("callerid=/me", "md5sum=*", "topic=/place"))
+        assert "error" not in header_of(peer)
+        assert running.call("publisherUpdate", "/master", "/turn", [item.uri for item in publishers])[0] == 1
+        for item in publishers:
+            item.accept()
+        for _ in range(20):
+            sent = [rng.randbytes(32) for _ in publishers]
+            for item, payload in zip(publishers, sent, strict=True):
+                item.send(payload)
+            points = sorted(framed(0, payload[:24])[1:] for payload in 3 * sent)
+            assert sorted(read(peer, 28) for _ in points) == points
+    for item in publishers:
+        item.close()
     board.close()

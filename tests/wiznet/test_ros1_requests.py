@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tests.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.chips import CHIPS
 from tests.wiznet.ros1 import framed
 from tests.wiznet.ros1_peers import Running, header, header_of, pause, read, running_node
 

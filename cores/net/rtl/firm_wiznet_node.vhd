@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node in the sockets of a W5500 or W5200: the sequencer, and its way to the chip. The ROM outside makes it a node.
+-- A node in the sockets of a W5500 or W5200: the sequencer, its way to the chip, and FIFOs, so that it never waits for
+-- the Manager while the Manager waits for it. The ROM outside makes it a node.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -24,7 +25,9 @@ entity firm_wiznet_node is
 
     -- Frames from the Manager, and to it.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
@@ -39,6 +42,19 @@ entity firm_wiznet_node is
 end entity firm_wiznet_node;
 
 architecture rtl of firm_wiznet_node is
+
+  signal in_data  : std_logic_vector(7 downto 0);
+  signal in_user  : std_logic_vector(0 downto 0);
+  signal in_valid : std_logic;
+  signal in_last  : std_logic;
+  signal in_ready : std_logic;
+  signal has_part : std_logic;
+
+  signal out_data  : std_logic_vector(7 downto 0);
+  signal out_valid : std_logic;
+  signal out_last  : std_logic;
+  signal out_ready : std_logic;
+  signal is_taken  : std_logic;
 
   signal request_valid   : std_logic;
   signal request_ready   : std_logic;
@@ -57,6 +73,42 @@ architecture rtl of firm_wiznet_node is
 
 begin
 
+  u_from_manager : entity firm.firm_wiznet_fifo
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tuser  => s_axis_tuser,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      m_axis_tdata  => in_data,
+      m_axis_tuser  => in_user,
+      m_axis_tvalid => in_valid,
+      m_axis_tlast  => in_last,
+      m_axis_tready => in_ready,
+      is_empty      => open,
+      has_part      => has_part
+    );
+
+  u_to_manager : entity firm.firm_wiznet_fifo
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => out_data,
+      s_axis_tuser  => "0",
+      s_axis_tvalid => out_valid,
+      s_axis_tlast  => out_last,
+      s_axis_tready => out_ready,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tuser  => open,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready,
+      is_empty      => is_taken,
+      has_part      => open
+    );
+
   u_sequencer : entity firm.firm_wiznet_sequencer
     port map (
       clk             => clk,
@@ -64,13 +116,17 @@ begin
       ms              => ms,
       rom_address     => rom_address,
       rom_data        => rom_data,
-      s_axis_tdata    => s_axis_tdata,
-      s_axis_tvalid   => s_axis_tvalid,
-      s_axis_tready   => s_axis_tready,
-      m_axis_tdata    => m_axis_tdata,
-      m_axis_tvalid   => m_axis_tvalid,
-      m_axis_tlast    => m_axis_tlast,
-      m_axis_tready   => m_axis_tready,
+      s_axis_tdata    => in_data,
+      s_axis_tuser    => in_user,
+      s_axis_tvalid   => in_valid,
+      s_axis_tlast    => in_last,
+      s_axis_tready   => in_ready,
+      has_part        => has_part,
+      m_axis_tdata    => out_data,
+      m_axis_tvalid   => out_valid,
+      m_axis_tlast    => out_last,
+      m_axis_tready   => out_ready,
+      is_taken        => is_taken,
       request_valid   => request_valid,
       request_ready   => request_ready,
       request_write   => request_write,

@@ -15,14 +15,19 @@ entity firm_wiznet_sequencer is
     rom_address : out std_logic_vector(15 downto 0);
     rom_data    : in  std_logic_vector(7 downto 0);
 
-    -- Frames from the Manager, and to it.
+    -- Frames from the Manager, and to it. After the last byte of an aborted frame, the program reads zeros until it
+    -- asks for the abort.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0);
     s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
+    has_part      : in  std_logic;  -- the next 64 bytes of a frame are there, or its end
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
+    is_taken      : in  std_logic;  -- the Manager has all bytes, so that 64 have room
 
     -- To firm_wiznet_access: requests, bytes to write, bytes that were read.
     request_valid   : out std_logic;
@@ -67,6 +72,8 @@ architecture rtl of firm_wiznet_sequencer is
   constant DO_FILL      : byte_t := x"57";
   constant DO_AT        : byte_t := x"86";
   constant DO_LOOKUP    : byte_t := x"87";
+  constant DO_ABORTED   : byte_t := x"88";
+  constant DO_BUSY      : byte_t := x"89";
   constant DO_CALL      : byte_t := x"c0";
   constant DO_WRITE     : byte_t := x"c2";
 
@@ -113,6 +120,7 @@ architecture rtl of firm_wiznet_sequencer is
   signal own_r     : unsigned(3 downto 0);              -- page of the coroutine
   signal page_r    : unsigned(3 downto 0);              -- page of fields and socket
   signal time_r    : unsigned(13 downto 0);             -- in ms
+  signal aborted_r : std_logic;                         -- the Manager's frame
 
   signal name       : unsigned(7 downto 0);
   signal value      : byte_t;
@@ -124,6 +132,9 @@ architecture rtl of firm_wiznet_sequencer is
   signal is_jump    : std_logic;
   signal to_manager : std_logic;
   signal is_read    : std_logic;
+  signal wants_byte : std_logic;
+  signal has_byte   : std_logic;
+  signal new_byte   : byte_t;
   signal is_filled  : std_logic;
   signal a_of_page  : byte_t;
 
@@ -143,7 +154,7 @@ begin
   memory_input <= std_logic_vector(word_r(15 downto 8)) when state_r = STORE_HIGH else
                   std_logic_vector(word_r(7 downto 0)) when state_r = STORE_LOW else
                   a_r when state_r = EXECUTE else
-                  s_axis_tdata when state_r = FILLING else
+                  new_byte when state_r = FILLING else
                   read_data;
 
   field <= unsigned(high_r) & unsigned(memory_data);
@@ -160,7 +171,8 @@ begin
 
   rom_address <= std_logic_vector(text_r) when state_r = PRESENT or state_r = OFFER or
                                                (state_r = EXECUTE and operation_r = DO_FETCH) else
-                 std_logic_vector(unsigned(operands_r(15 downto 0)) + unsigned(a_r)) when state_r = EXECUTE else
+                 std_logic_vector(unsigned(operands_r(15 downto 0)) + unsigned(a_r)) when state_r = EXECUTE and
+                                                                                          operation_r = DO_LOOKUP else
                  std_logic_vector(word_r) when state_r = MARK or state_r = MARKED or state_r = TARGET_HIGH else
                  std_logic_vector(next_r);
 
@@ -175,12 +187,14 @@ begin
             a_r or value when operation_r(2 downto 0) = OF_OR else
             std_logic_vector(sum(7 downto 0));
 
-  is_jump <= '1' when operation_r(2 downto 0) = "000" else
+  is_jump <= aborted_r when operation_r = DO_ABORTED else
+             not is_taken when operation_r = DO_BUSY else
+             '1' when operation_r(2 downto 0) = "000" else
              zero_r when operation_r(2 downto 0) = "001" else
              not zero_r when operation_r(2 downto 0) = "010" else
              carry_r when operation_r(2 downto 0) = "011" else
              not carry_r when operation_r(2 downto 0) = "100" else
-             s_axis_tvalid;
+             has_part or aborted_r;
 
   power_of_page : process (page_r)
   begin
@@ -217,10 +231,13 @@ begin
                    '1' when state_r = RECEIVE and side(0) = '1' and left_r = 1 else
                    '0';
 
-  s_axis_tready <= '1' when state_r = FILLING else
+  wants_byte    <= '1' when state_r = FILLING else
                    '1' when state_r = EXECUTE and operation_r = DO_TAKE else
                    '0';
-  is_filled     <= '1' when state_r = FILLING and s_axis_tvalid = '1' else '0';
+  has_byte      <= s_axis_tvalid or aborted_r;
+  new_byte      <= (others => '0') when aborted_r = '1' else s_axis_tdata;
+  s_axis_tready <= wants_byte and not aborted_r;
+  is_filled     <= '1' when state_r = FILLING and has_byte = '1' else '0';
 
   run : process (clk)
 
@@ -245,6 +262,11 @@ begin
     if rising_edge(clk) then
       if ms = '1' then
         time_r <= time_r + 1;
+      end if;
+      if state_r = EXECUTE and operation_r = DO_ABORTED then
+        aborted_r <= '0';
+      elsif wants_byte = '1' and s_axis_tvalid = '1' and s_axis_tlast = '1' and s_axis_tuser = "1" then
+        aborted_r <= '1';
       end if;
       case state_r is
         when OPCODE =>
@@ -304,8 +326,8 @@ begin
                   count_r <= unsigned(a_r);
                 when DO_TAKE =>
 
-                  a_r <= s_axis_tdata;
-                  if s_axis_tvalid = '0' then
+                  a_r <= new_byte;
+                  if has_byte = '0' then
                     state_r <= EXECUTE;
                   end if;
                 when others =>
@@ -491,11 +513,12 @@ begin
           end if;
       end case;
       if rst_n = '0' then
-        state_r <= OPCODE;
-        next_r  <= (others => '0');
-        own_r   <= LAST_PAGE;
-        page_r  <= LAST_PAGE;
-        time_r  <= (others => '0');
+        state_r   <= OPCODE;
+        next_r    <= (others => '0');
+        own_r     <= LAST_PAGE;
+        page_r    <= LAST_PAGE;
+        time_r    <= (others => '0');
+        aborted_r <= '0';
       end if;
     end if;
   end process run;

@@ -1,8 +1,8 @@
 """A board: the connections of its FPGA, and the top level that fits a system to it.
 
 A YAML file describes a board. The package's boards are in `fusesoc_firm/boards`; a core refers to any other board by a
-path. A board without a processor has pins, and a link to the host. On a board with a processor, the system is part of a
-block design (`block_design`).
+path. A board without a processor has pins, and a link to the host or a chip with TCP/IP. On a board with a processor,
+the system is part of a block design (`block_design`).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.boards.processor import MOST_CLOCKS, PROCESSORS
 from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
 from fusesoc_firm.system.hardware.configuration import top_level_pins
-from fusesoc_firm.system.hardware.interconnect import LINK_PINS
-from fusesoc_firm.system.written.specification import AXI_STREAM, LINKS, Specification
+from fusesoc_firm.system.hardware.interconnect import CHIP_PINS, LINK_PINS
+from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.text.naming import identifier, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
@@ -36,14 +36,16 @@ _NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
 _CLOCK = "clk"
 _PORTS = (
     _CLOCK,
-    *(name for pins in LINK_PINS.values() for name, _, _ in pins),
+    *dict.fromkeys(name for pins in (*LINK_PINS.values(), CHIP_PINS) for name, _, _ in pins),
     *("led", "led_n", "reset", "reset_n"),
 )
 # Contacts bounce for up to some 10 ms; the cycles are at least those that firm_debounce takes.
 _DEBOUNCE_SECONDS = 0.01
 _SHORTEST_DEBOUNCE = 4
 # The optional keys of a board.
-_OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq"}
+_OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq", "spi_rst_n"}
+# The pins of each interconnect.
+_PINS = {**{kind.value: pins for kind, pins in LINK_PINS.items()}, **dict.fromkeys(CHIPS, CHIP_PINS)}
 
 
 # Legal names of FPGAs, families and pins: scripts and constraints contain them without quotes.
@@ -76,7 +78,7 @@ class Board(Section):
     description: Text = key("maker, board and FPGA", is_required=True)
     flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=(*FLOWS, *_NEEDED))
     clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
-    interconnect: Text = key("the connection to the host", is_required=True, choices=(AXI_STREAM, *LINKS))
+    interconnect: Text = key("the connection to the host", is_required=True, choices=(AXI_STREAM, *_PINS))
     part: Text | None = key("the FPGA's name in Vivado", rule=word_fault)
     board_part: Text | None = key(
         "the board's name in Vivado, if Vivado sets up the processor", name="boardPart", rule=word_fault
@@ -94,7 +96,7 @@ class Board(Section):
 
     @property
     def is_linked(self) -> bool:
-        """Whether a byte link connects the host to the system."""
+        """Whether pins connect the host or the network to the system."""
         return self.flow in FLOWS
 
 
@@ -143,11 +145,11 @@ def read_board(name: str, folder: Path = Path()) -> Board:
 
 
 def _check_pins(board: Board, faults: Diagnostics) -> None:
-    if board.interconnect not in LINKS:
+    if board.interconnect not in _PINS:
         faults.error(
             f"boards with flow '{board.flow}' have no processor for streams",
             board.interconnect.source,
-            nearest("", LINKS),
+            nearest("", _PINS),
         )
         return
     seen: dict[str, Text] = {}
@@ -156,7 +158,7 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
         if twin is not pin.port:
             faults.error(f"port '{pin.port}' already has a pin, at {twin.source}", pin.port.source)
     source = board.pins[-1].source if board.pins else board.source
-    needed = {_CLOCK, *(name for name, _, _ in LINK_PINS[LinkKind(board.interconnect)])} - _OPTIONAL
+    needed = {_CLOCK, *(name for name, _, _ in _PINS[board.interconnect])} - _OPTIONAL
     for port in sorted(needed - seen.keys()):
         faults.error(
             f"the board has no pin for '{port}'", source, f"interconnect '{board.interconnect}' needs this pin"
@@ -231,11 +233,12 @@ def board_entity(system: DerivedSystem, board: Board) -> str:
 
 def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
     """Return the configuration of the top level and of its constraints."""
-    assert system.link is not None
-    clock_hz = system.link.clock_hz
+    assert system.clock is not None
+    clock_hz = int(system.clock)
     ports = {pin.port.lower() for pin in board.pins}
     pins = _accelerator_pins(system)
-    link = [(name, direction) for name, direction, _ in LINK_PINS[system.link.kind] if name in ports]
+    link = [(name, direction) for name, direction, _ in _PINS[board.interconnect] if name in ports]
+    is_spi = board.interconnect == LinkKind.SPI.value
     own = [(name, "out" if name.startswith("led") else "in") for name in ("led", "led_n", "reset", "reset_n")]
     declared = [(_CLOCK, "in"), *link, *((name, direction) for name, direction in own if name in ports)]
     typed = [(name, direction, vhdl_type(None)) for name, direction in declared]
@@ -248,12 +251,13 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
         "error_count": len(system.error_blocks),
         "ports": [{"name": name, "direction": direction, "type": type_} for name, direction, type_ in typed],
         # The pad of spi_miso is at the top level.
-        "handed_on": [*(name for name, _ in link if name != "spi_miso"), *(pin.name for pin in pins)],
+        "handed_on": [*(name for name, _ in link if not (is_spi and name == "spi_miso")), *(pin.name for pin in pins)],
         "has_button": bool(ports & {"reset", "reset_n"}),
         "debounce": max(_SHORTEST_DEBOUNCE, round(clock_hz * _DEBOUNCE_SECONDS)),
         **{name: name in ports for name, _ in own},
-        "is_uart": system.link.kind is LinkKind.UART,
-        "is_spi": system.link.kind is LinkKind.SPI,
+        "is_uart": board.interconnect == LinkKind.UART.value,
+        "is_spi": is_spi,
+        "has_link": system.link is not None,
         "clock_mhz": f"{clock_hz / 10**6:g}",
         "pins": [
             {

@@ -114,10 +114,10 @@ def derive(
     subscribers = tuple(
         replace(item, queue=queue_of(parts.blocks[item.block], item, project, faults)) for item in subscribers
     )
-    publishers = with_longest_sent(publishers, subscribers, parts.blocks, faults)
+    publishers = with_longest_sent(publishers, subscribers, project, parts.blocks, faults)
     scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
     link = link_of(project, clock, scheduling, subscribers, faults)
-    network = network_of(specification, scheduling, parts.software, faults)
+    network = network_of(specification, scheduling, parts.software, (subscribers, publishers), faults)
     tree = tree_of(project, scheduling, link, faults)
     faults.raise_if_any()
     system = DerivedSystem(

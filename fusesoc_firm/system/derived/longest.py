@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fusesoc_firm.frame.length import DEFAULT_LONGEST, MOST_BYTES, bounded_payload, length_of
 from fusesoc_firm.system.derived.model import Converter
-from fusesoc_firm.system.written.specification import AXI_STREAM, Block, Project
+from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 # The default with a link, which stores whole frames. With the header and the bytes that an adapter sends late, such a
@@ -32,16 +32,18 @@ def with_longest_payloads(
 def with_longest_sent(
     publishers: tuple[Converter, ...],
     subscribers: Iterable[Converter],
+    project: Project,
     blocks: Mapping[str, Block],
     faults: Diagnostics,
 ) -> tuple[Converter, ...]:
     """Return the publishers, those whose frames may pause with their longest payloads; note faults in `maxLength`.
 
     By default, a publisher sends at most as much as the system's subscribers accept from the host, since a response
-    often has the size of its cause.
+    often has the size of its cause. A node in the sockets of a chip sends no more than a link does.
     """
     _check_keys(blocks, publishers, faults)
-    default = max([DEFAULT_LONGEST, *(item.max_length or 0 for item in subscribers if item.software is None)])
+    least = _LINK_DEFAULT if project.interconnect in CHIPS else DEFAULT_LONGEST
+    default = max([least, *(item.max_length or 0 for item in subscribers if item.software is None)])
     return tuple(
         _limited(item, blocks[item.block], default if item.software is None else MOST_BYTES, faults)
         if item.may_pause

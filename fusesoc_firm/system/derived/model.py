@@ -319,11 +319,19 @@ class Link:
     longest: int
 
 
+class NetworkKind(Enum):
+    """The way of a system that is a node itself to its network."""
+
+    ETHERNET = "ethernet"
+    W5500 = "w5500"
+    W5200 = "w5200"
+
+
 @dataclass(frozen=True)
 class Network:
-    """The place of a system that is a node of ROS 2: its MAC address (six bytes), IPv4 addresses and names.
+    """The place of a system that is a node itself: its MAC address (six bytes), IPv4 addresses and names.
 
-    `namespace` is absolute, such as `/` or `/arm`.
+    `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port.
     """
 
     mac: bytes
@@ -333,6 +341,8 @@ class Network:
     name: str
     namespace: str
     domain: int
+    kind: NetworkKind = NetworkKind.ETHERNET
+    master: tuple[IPv4Address, int] | None = None
 
 
 class StatusAccess(Enum):

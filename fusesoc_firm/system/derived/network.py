@@ -1,16 +1,20 @@
-"""The network of a system that is a node of ROS 2 itself: the specification's `network`."""
+"""The network of a system that is a node itself: the specification's `network`."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from ipaddress import AddressValueError, IPv4Address, IPv4Network
 
 from fusesoc_firm.message.middleware import MIDDLEWARES
+from fusesoc_firm.system.derived.chip import check_chip
 from fusesoc_firm.system.derived.ids import ONE_BYTE
-from fusesoc_firm.system.derived.model import Network, Scheduling, Software
+from fusesoc_firm.system.derived.model import Converter, Network, NetworkKind, Scheduling, Software
 from fusesoc_firm.system.written.specification import (
     AXI_STREAM,
+    CHIPS,
     ETHERNET,
+    NETWORKS,
     STATUS_AXI_LITE,
     STATUS_FRAMES,
     NodeNetwork,
@@ -23,7 +27,11 @@ from fusesoc_firm.text.yaml_text import Text
 
 # The ports of higher domains overlap with those that Linux gives to clients by default.
 _LAST_DOMAIN = 101
-_VERSION = 2
+# The port of a master of ROS 1 that does not have another one.
+_MASTER_PORT = 11311
+_HIGHEST_PORT = 0xFFFF
+# The middleware of a node by its interconnect: the legal word, and the version.
+_VERSIONS = {ETHERNET: ("ROS2", 2), **dict.fromkeys(CHIPS, ("ROS", 1))}
 _MAC = re.compile(r"[0-9A-Fa-f]{2}(:[0-9A-Fa-f]{2}){5}")
 _GROUP_BIT = 1
 # The limit of rmw (RMW_NODE_NAME_MAX_NAME_LENGTH).
@@ -37,51 +45,70 @@ _UNUSED_ADDRESS = IPv4Address(0)
 
 
 def network_of(
-    specification: Specification, scheduling: Scheduling, software: Software, faults: Diagnostics
+    specification: Specification,
+    scheduling: Scheduling,
+    software: Software,
+    converters: tuple[Sequence[Converter], Sequence[Converter]],
+    faults: Diagnostics,
 ) -> Network | None:
-    """Return the network of a system with Ethernet, or None; note faults, also those of a `network` that is not used.
+    """Return the network of a system that is a node itself, or None; note faults, also those of an unused `network`.
 
     The key is legal with each interconnect, since a board or a generator call may replace the interconnect.
+    `converters` are the subscribers and the publishers.
     """
     project = specification.project
     section = project.network
     network = _network(section, project, faults) if section else None
-    if project.interconnect != ETHERNET:
+    if project.interconnect not in NETWORKS:
         return None
+    is_chip = project.interconnect in CHIPS
     if section is None:
+        keys = "'mac', 'address' and 'master'" if is_chip else "'mac' and 'address'"
         faults.error(
-            f"interconnect '{ETHERNET}' needs the key 'network'",
+            f"interconnect '{project.interconnect}' needs the key 'network'",
             project.interconnect.source,
-            "add 'network' with 'mac' and 'address' to 'project'",
+            f"add 'network' with {keys} to 'project'",
+        )
+    elif is_chip and section.master is None and section.is_sound:
+        faults.error(
+            f"interconnect '{project.interconnect}' needs the key 'master' in 'network'",
+            section.source,
+            "add the address of the master of ROS 1, such as 'master: 192.168.1.10:11311'",
         )
     _check_system(specification, scheduling, software, faults)
+    if is_chip:
+        check_chip(specification, *converters, faults)
     return network
 
 
 def _check_system(written: Specification, scheduling: Scheduling, software: Software, faults: Diagnostics) -> None:
     """Note what a node in fabric cannot do."""
     project = written.project
-    message, source = f"interconnect '{ETHERNET}' ", project.interconnect.source
+    message, source = f"interconnect '{project.interconnect}' ", project.interconnect.source
+    legal, version = _VERSIONS[project.interconnect]
     if scheduling.is_preemptive:
         hint = "a message is sent whole; use a non-preemptive scheduler"
         faults.error(f"{message}cannot carry the bursts of scheduler '{scheduling.policy}'", source, hint)
     if project.id_bytes != ONE_BYTE:
         faults.error(f"{message}is not possible with 'idBytes: {project.id_bytes}'", source, f"use '{AXI_STREAM}'")
-    if project.status == STATUS_AXI_LITE:
+    if project.status == STATUS_AXI_LITE and project.interconnect == ETHERNET:
         faults.error(f"{message}has no port for AXI4-Lite", project.status.source, f"use 'status: {STATUS_FRAMES}'")
     for item in software.blocks:
         if item.type.accelerator.sources:
             hint = "without 'sources', the software is another node, on a host"
             faults.error(f"{message}has no host for '{item.block}'", source, hint)
     for block in written.blocks:
-        if block.middleware is not None and MIDDLEWARES[block.middleware].number != _VERSION:
-            faults.error(f"{message}is not possible with ROS 1", block.middleware.source, "legal here: ROS2")
+        if block.middleware is not None and MIDDLEWARES[block.middleware].number != version:
+            faults.error(
+                f"{message}is not possible with ROS {3 - version}", block.middleware.source, f"legal here: {legal}"
+            )
 
 
 def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Network | None:
     """Return the network of a section, or None if it has a fault."""
     mac = _mac(section.mac, faults)
     network = _addresses(section, faults)
+    master = None if section.master is None else _master(section.master, faults)
     name = _name(section, project, faults)
     if not _NAMESPACE.fullmatch(section.namespace) or len(section.namespace) > _LONGEST_NAME:
         hint = "legal here: / or an absolute name, such as /arm/left, of up to 255 letters, digits and single '_'"
@@ -92,7 +119,32 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     if not section.is_sound or mac is None or network is None:
         return None
     address, netmask, gateway = network
-    return Network(mac, address, netmask, gateway, name, str(section.namespace), section.domain)
+    if master:
+        _check_way(section, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
+    kind = NetworkKind(project.interconnect) if project.interconnect in NETWORKS else NetworkKind.ETHERNET
+    return Network(mac, address, netmask, gateway, name, str(section.namespace), section.domain, kind, master)
+
+
+def _master(text: Text, faults: Diagnostics) -> tuple[IPv4Address, int] | None:
+    """Return address and port of a master; the form of ROS_MASTER_URI is legal, too."""
+    address, colon, port = text.removeprefix("http://").removesuffix("/").partition(":")
+    try:
+        found = IPv4Address(address), int(port) if colon else _MASTER_PORT
+    except (AddressValueError, ValueError):
+        found = IPv4Address(0), 0
+    if not 0 < found[1] <= _HIGHEST_PORT or found[0] == _UNUSED_ADDRESS or found[0].is_multicast:
+        hint = "legal here: four numbers and a port, such as 192.168.1.10:11311; the chip does not look up names"
+        faults.error(f"'{text}' is not the address of a master", text.source, hint)
+        return None
+    return found
+
+
+def _check_way(section: NodeNetwork, network: IPv4Network, master: IPv4Address, faults: Diagnostics) -> None:
+    """Note a master that the board cannot reach."""
+    assert section.master is not None
+    if master not in network and section.gateway is None:
+        hint = "add 'gateway', the router to other networks"
+        faults.error(f"the master {master} is not in the board's network {network}", section.master.source, hint)
 
 
 def _mac(text: Text, faults: Diagnostics) -> bytes | None:

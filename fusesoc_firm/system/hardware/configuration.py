@@ -39,6 +39,7 @@ _HOST_PERIOD = 10_000
 
 SYSTEM_TEMPLATE = "vhdl/system.vhd"
 TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
+NODE_BENCH_TEMPLATE = "vhdl/node_bench.vhd"
 
 
 def system_configuration(system: DerivedSystem) -> Context:
@@ -70,7 +71,12 @@ def system_configuration(system: DerivedSystem) -> Context:
 
 
 def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
-    """Return the name of the test bench that compares frames with files, or of the live test bench with a pipe."""
+    """Return the name of the test bench that compares frames with files, or of the live test bench with a pipe.
+
+    The live test bench of a node in fabric is a board: the pipe carries the bytes of its chip.
+    """
+    if system.network:
+        return f"{system.entity}_network"
     return f"{system.entity}_live" if is_live else f"{system.entity}_tb"
 
 

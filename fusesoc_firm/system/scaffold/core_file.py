@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.request.core_reader import read_core
@@ -18,6 +18,7 @@ from fusesoc_firm.system.derived.link import may_be_linked
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.verilog_bench import translated_unit
 from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
@@ -42,6 +43,8 @@ _SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
 # line takes ten cycles of this clock, and the emulated processor does not know how fast the line is.
 EMULATING = "verilator"
 EMULATED = {"interconnect": "uart", "clock": "10 MHz"}
+# The target of a simulated board with a chip, and its clock: the time of the node is about that of its peers.
+NETWORK, NETWORK_HERTZ = "network", 1_000_000
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
 # A target with the comment above it; blank lines separate targets.
 _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
@@ -136,8 +139,8 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             "entity": system.entity,
             "simulations": [
                 target
-                for is_live in ((False, True) if is_simulated else ())
-                for target in _simulations(system, unit, is_live=is_live)
+                for kind in (_kinds(system) if is_simulated else ())
+                for target in _simulations(system, unit, kind)
             ],
             "emulation": _emulation(system, unit) if is_simulated else None,
             # Only an HLS tool generates kernels, so there is no netlist of the whole system.
@@ -148,33 +151,66 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
     )
 
 
-def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator[dict[str, object]]:
-    """Yield the targets of simulations or live simulations; the first simulator's target has the name without a suffix.
+@dataclass(frozen=True)
+class _Kind:
+    """A kind of simulation: its name, its flag for simulators of Verilog, and the ending of its test bench.
+
+    `product` and `replaced` are further parameters of the generator, the latter for the system, too.
+    """
+
+    name: str
+    flag: str
+    suffix: str
+    product: str = ""
+    replaced: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_live(self) -> bool:
+        """Whether another program starts the simulator."""
+        return bool(self.product)
+
+
+def _kinds(system: DerivedSystem) -> list[_Kind]:
+    """Return the kinds of simulations. With a node in fabric, the frames of the first two are at the node's place."""
+    streams = {"interconnect": AXI_STREAM} if system.network else {}
+    kinds = [
+        _Kind("sim", "verilog_host", "tb", replaced=streams),
+        _Kind("live", "verilog_pipe", "live", "live", streams),
+    ]
+    if system.network:
+        kinds.append(_Kind(NETWORK, "verilog_chip", "network", "network", {"clock": f"{NETWORK_HERTZ // 10**6} MHz"}))
+    return kinds
+
+
+def _simulations(system: DerivedSystem, unit: str, kind: _Kind) -> Iterator[dict[str, object]]:
+    """Yield the targets of a kind of simulations; the first simulator's target has the name without a suffix.
 
     For simulators that do not read VHDL, the targets translate the design unit `unit` with all subunits.
     """
     has_verilog = any(item.own.is_component for item in system.accelerator_types)
     sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
     is_system_verilog = any(source.endswith((".sv", ".svh")) for source in sources)
-    kind, bench, suffix = ("live", "verilog_pipe", "live") if is_live else ("sim", "verilog_host", "tb")
-    known = fitting(has_verilog=has_verilog, is_live=is_live)
+    known = fitting(has_verilog=has_verilog, is_live=kind.is_live)
+    replaced = ", ".join(f"{name}: {value}" for name, value in kind.replaced.items())
     for name, item in known.items():
         is_first, is_default = item is next(iter(known.values())), name == default_simulator()
-        parameters = ["product: live"] * is_live + [f"simulator: {name}"] * (not is_default)
+        parameters = [f"product: {kind.product}"] * kind.is_live + [f"simulator: {name}"] * (not is_default)
+        parameters += [replaced] * bool(replaced)
         # If the default simulator does not support the system, the first target is listed under both names.
-        anchor = (kind if is_live else name) if is_first and not is_default else ""
+        anchor = (kind.name if kind.is_live else name) if is_first and not is_default else ""
         yield {
-            "target": kind if is_first else f"{kind}_{name}",
-            "alias": {"name": f"{kind}_{name}", "anchor": anchor} if anchor else None,
+            "target": kind.name if is_first else f"{kind.name}_{name}",
+            "alias": {"name": f"{kind.name}_{name}", "anchor": anchor} if anchor else None,
             "anchored": f" &{anchor}" if anchor else "",
-            "description": _description(item, is_first=is_first, is_live=is_live),
+            "description": _description(item, kind, is_first=is_first),
+            "replaced": f": {{{replaced}}}" if replaced else "",
             "parameters": f": {{{', '.join(parameters)}}}" if parameters else "",
-            "further_flag": "" if item.reads_vhdl else f", {bench}: true",
+            "further_flag": "" if item.reads_vhdl else f", {kind.flag}: true",
             "simulator": name,
             "before": _options(item.system_verilog if is_system_verilog else {}),
             "translated": None if item.reads_vhdl else {"unit": unit},
             "options": _options(item.options),
-            "toplevel": f"{system.entity}_{suffix}",
+            "toplevel": f"{system.entity}_{kind.suffix}",
         }
 
 
@@ -193,10 +229,12 @@ def _emulation(system: DerivedSystem, unit: str) -> dict[str, object] | None:
     }
 
 
-def _description(simulator: Simulator, *, is_first: bool, is_live: bool) -> str:
-    if is_live and is_first:
+def _description(simulator: Simulator, kind: _Kind, *, is_first: bool) -> str:
+    if kind.name == NETWORK and is_first:
+        return f"Build the simulated board of firm live in {simulator.title}, behind the pins of its chip"
+    if kind.is_live and is_first:
         return f"Build a simulator in {simulator.title} that another program starts and sends frames to"
-    if is_live:
+    if kind.is_live:
         return f"The same in {simulator.title}"
     if is_first:
         netlist = "" if simulator.reads_vhdl else "; GHDL makes a netlist of the VHDL"
@@ -209,9 +247,10 @@ def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
 
 
 def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
-    """Return a board's target, or None if the system has HLS kernels and the board does not support them."""
+    """Return a board's target, or None if it lacks support for the HLS kernels of the system, or needs a node."""
     board = read_board(name)
-    if has_kernels and board.flow != VIVADO:
+    is_node = system.network is not None and system.network.kind.value in CHIPS
+    if (has_kernels and board.flow != VIVADO) or (board.interconnect in CHIPS and not is_node):
         return None
     options: dict[str, str | Sequence[str] | None] = {
         "frontends": ["ghdlsynth"] if board.is_linked else None,

@@ -27,7 +27,7 @@ from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.derived.timing import bounds_of
 from fusesoc_firm.system.hardware.configuration import top_level_pins
 from fusesoc_firm.system.hardware.crossings import all_crossings
-from fusesoc_firm.system.written.specification import AXI_STREAM, ETHERNET
+from fusesoc_firm.system.written.specification import AXI_STREAM
 
 if TYPE_CHECKING:
     from fusesoc_firm.scheduling.analysis import Bound
@@ -42,7 +42,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "top": system.entity,
             "fpgaPart": system.fpga_part,
             "width": system.width,
-            "interconnect": system.link.kind.value if system.link else ETHERNET if system.network else AXI_STREAM,
+            "interconnect": way.kind.value if (way := system.link or system.network) else AXI_STREAM,
             **_network(system.network),
             **_scheduling(system.scheduling),
             **_clocks(system),
@@ -86,7 +86,7 @@ def _network(network: Network | None) -> dict[str, Any]:
             **{name: str(value) for name, value in addresses.items() if value},
             "name": network.name,
             "namespace": network.namespace,
-            "domain": network.domain,
+            **({"master": "{}:{}".format(*network.master)} if network.master else {"domain": network.domain}),
         }
     }
 

@@ -46,8 +46,10 @@ AUTO_SCHEDULER = "auto"
 # The routes of frames between the host and the system: streams of the top level, or a byte link (cores/board).
 AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
-# The system is a node of ROS 2 itself.
+# The system is a node itself: of ROS 2, or of ROS 1 in the sockets of a chip with TCP/IP.
 ETHERNET = "ethernet"
+CHIPS = W5500, W5200 = ("w5500", "w5200")
+NETWORKS = (ETHERNET, *CHIPS)
 # The accesses to the registers of a system's status, if it has one.
 NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
@@ -110,7 +112,7 @@ class PublisherGroup(Section):
 
 @dataclass(frozen=True)
 class NodeNetwork(Section):
-    """The place of a system with Ethernet in its network, and its name in ROS 2."""
+    """The place of a system that is a node itself in its network, and its name in ROS."""
 
     mac: Text = key("the board's MAC address, such as 02:00:00:00:00:01", is_required=True)
     address: Text = key("the board's IPv4 address, such as 192.168.1.20", is_required=True)
@@ -118,7 +120,10 @@ class NodeNetwork(Section):
     gateway: Text | None = key("the router to other networks (default: none)")
     name: Text | None = key("the node's name (default: the system's name)")
     namespace: Text = key("the node's namespace, such as /arm", default=Text("/"))
-    domain: int = key("the domain of ROS 2 (ROS_DOMAIN_ID)", form="integer", default=0)
+    domain: int = key("the domain of ROS 2 (ROS_DOMAIN_ID); only used with ethernet", form="integer", default=0)
+    master: Text | None = key(
+        "address and port of the master of ROS 1, such as 192.168.1.10:11311; required with w5500 and w5200"
+    )
 
 
 @dataclass(frozen=True)
@@ -177,12 +182,13 @@ class Project(Section):
         is_asked=False,
     )
     interconnect: Text = key(
-        "connection between host and system: streams for a DMA engine, a serial link, or a network without a host",
-        choices=(AXI_STREAM, *LINKS, ETHERNET),
+        "connection between host and system: streams for a DMA engine, a serial link, or a network without a host"
+        " (w5500 and w5200: by that chip)",
+        choices=(AXI_STREAM, *LINKS, *NETWORKS),
         default=Text(AXI_STREAM),
     )
     network: NodeNetwork | None = key(
-        "addresses and names of a system with interconnect ethernet",
+        "addresses and names of a system with interconnect ethernet, w5500 or w5200",
         form="section",
         section=NodeNetwork,
         is_asked=False,

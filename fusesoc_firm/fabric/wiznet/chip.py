@@ -140,8 +140,10 @@ class Chip:
     """
 
     def __init__(self, common: int, address: int, retry: int) -> None:
-        """A chip after reset. `common`: its number of common registers; `address`: that of SIPR; `retry`: that of RTR,
-        which is followed by RCR."""
+        """A chip after reset.
+
+        `common` is its number of common registers, `address` that of SIPR, `retry` that of RTR, which RCR follows.
+        """
         self.misuses: list[str] = []
         self._common_bytes = common
         self._address = address

@@ -6,7 +6,7 @@ address does not wrap at the end of one: the host splits what crosses it.
 
 from __future__ import annotations
 
-from tests.wiznet.chip import Chip, ChipSocket
+from fusesoc_firm.fabric.wiznet.chip import Chip, ChipSocket
 
 _ADDRESS, _RETRY = 0x0F, 0x17
 _VERSION, _INTERRUPTS, _PHY = 0x1F, 0x34, 0x35

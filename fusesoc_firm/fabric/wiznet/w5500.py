@@ -5,7 +5,7 @@ A frame: address (2 bytes), block (5 bits), write (1 bit), mode (2 bits: any len
 
 from __future__ import annotations
 
-from tests.wiznet.chip import Chip
+from fusesoc_firm.fabric.wiznet.chip import Chip
 
 _ADDRESS, _RETRY = 0x0F, 0x19
 _INTERRUPTS, _PHY, _VERSION = 0x17, 0x2E, 0x39

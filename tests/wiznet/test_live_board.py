@@ -1,0 +1,137 @@
+"""`firm live` of a system in the sockets of a chip: a simulated board at a switch, beside a host with ROS 1."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.fabric.hosts import Host, missing, switched
+from tests.ros.cpp_nodes import DEBIAN_PYTHON, missing_ros1
+from tests.ros.live_nodes import PACED_PEER
+
+MASTER, BOARD = "192.0.2.1", "192.0.2.2"
+SPECIFICATION = """\
+project:
+  name: turn
+  clock: 12 MHz
+  width: {width}
+  interconnect: {chip}
+  network: {{mac: "02:00:00:00:00:01", address: {board}, master: {master}, namespace: /lab}}
+accelerators:
+  - name: first_three
+    type: VHDL
+    sources: first_three.vhd
+    interface:
+      input: [{{middleware: ROS, message: geometry_msgs/Quaternion, exclude: [w]}}]
+      output: [{{middleware: ROS, message: geometry_msgs/Point}}]
+blocks:
+  - {{name: turn, middleware: ROS, mode: subscriber, message: geometry_msgs/Quaternion, outgoing: [{{name: three}}]}}
+  - {{name: three, type: first_three, outgoing: [{{name: place}}]}}
+  - {{name: place, middleware: ROS, mode: publisher, message: geometry_msgs/Point}}
+  - {{name: roll, middleware: ROS, mode: subscriber, message: geometry_msgs/Quaternion, topic: /roll,
+     outgoing: [{{name: other}}]}}
+  - {{name: other, type: first_three, outgoing: [{{name: site}}]}}
+  - {{name: site, middleware: ROS, mode: publisher, message: geometry_msgs/Point, topic: /site}}
+"""
+WAYS = [("/lab/turn", "/lab/place"), ("/roll", "/site")]
+
+_reason = missing_ros1() or missing()
+pytestmark = [pytest.mark.check, pytest.mark.skipif(bool(_reason), reason=_reason)]
+
+
+@dataclass(frozen=True)
+class Peers:
+    """The host with ROS 1, and its variables."""
+
+    host: Host
+    folder: Path
+
+    def start(self, *words: str) -> subprocess.Popen[str]:
+        """Start a program there."""
+        variables = {
+            "ROS_MASTER_URI": f"http://{MASTER}:11311",
+            "ROS_IP": MASTER,
+            "ROS_HOME": str(self.folder),
+            "ROS_LOG_DIR": str(self.folder / "log"),
+        }
+        given = [f"{name}={value}" for name, value in variables.items()]
+        return subprocess.Popen(
+            self.host.command("env", *given, *words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def run(self, *words: str) -> str:
+        """Run a program there, which has to succeed; return what it prints."""
+        with self.start(*words) as process:
+            printed, faults = process.communicate()
+            assert process.returncode == 0, faults[-2000:]
+            return printed
+
+
+def _specification(folder: Path, chip: str, width: int) -> Path:
+    path = folder / "turn.yaml"
+    path.write_text(SPECIFICATION.format(chip=chip, width=width, board=BOARD, master=MASTER), encoding="utf-8")
+    subprocess.run([*_firm(), "system", "skeleton", path.name], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    return path
+
+
+def _firm() -> list[str]:
+    return [sys.executable, "-m", "fusesoc_firm.cli"]
+
+
+@contextmanager
+def _until_the_end(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
+    """A process that ends with the test."""
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(
+    ("tool", "chip", "width"),
+    [
+        ("verilator", "w5500", 64),
+        pytest.param("verilator", "w5200", 8, marks=pytest.mark.thorough),
+        pytest.param("ghdl", "w5500", 8, marks=pytest.mark.thorough),
+    ],
+)
+def test_a_simulated_board_serves_rospy(tmp_path: Path, tool: str, chip: str, width: int) -> None:
+    specification = _specification(tmp_path, chip, width)
+    with switched(2) as (_, host, board_host):
+        assert (host.address, board_host.address) == (MASTER, BOARD)
+        peers = Peers(host, tmp_path)
+        live = [*_firm(), "live", str(specification), "--tool", tool, "--build-root", str(tmp_path / "build")]
+        with (
+            _until_the_end(peers.start("rosmaster", "--core", "-p", "11311")),
+            _until_the_end(subprocess.Popen(board_host.command(*live), stdout=subprocess.PIPE, text=True)) as board,
+        ):
+            assert board.stdout
+            assert board.stdout.readline() == f"/lab/turn is at {BOARD}; its master is {MASTER}:11311; Ctrl-C ends it\n"
+            words = [DEBIAN_PYTHON, PACED_PEER, "1", "10", "2", json.dumps(WAYS)]
+            for result in json.loads(peers.run(*words)):
+                assert result["sent"] == 20
+                assert result["z"] == [math.sin((number / 1000 - 3) / 2) for number in range(20)]
+            assert "Pid: 1" in peers.run("rosnode", "info", "/lab/turn")
+            peers.run("rosnode", "kill", "/lab/turn")
+            while "/lab/turn" in peers.run("rosnode", "list"):
+                time.sleep(0.1)
+            board.send_signal(signal.SIGINT)
+            assert board.wait() == 0
+
+
+def test_an_address_of_another_machine_is_explained(tmp_path: Path) -> None:
+    specification = _specification(tmp_path, "w5500", 8)
+    done = subprocess.run([*_firm(), "live", str(specification)], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert f"this machine does not have the board's address {BOARD}" in done.stderr
