@@ -274,7 +274,7 @@ begin
     );
 
   watched_frames : if WATCHDOG > 0 generate
-    signal counted_r  : natural range 0 to PERIOD-1;
+    signal counted_r  : natural range 0 to max(1, PERIOD-1);
     signal clearing_r : std_logic;
     signal cleared_r  : unsigned(CLEAR_BITS-1 downto 0);
   begin

@@ -156,7 +156,7 @@ CODES = {
 _CDR = bytes.fromhex("00010000")
 
 
-def _texts(folder: Path, width: int, fault: str, queue: int, **keys: int) -> GeneratedSystem:
+def _texts(folder: Path, width: int, fault: str, queue: int, id_bytes: int = 1, **keys: int) -> GeneratedSystem:
     """A channel that returns Points, and one that responds to a number with a text of this length, and a fault."""
     folder.mkdir()
     text = (DATA / "falter.vhd").read_text()
@@ -173,7 +173,7 @@ def _texts(folder: Path, width: int, fault: str, queue: int, **keys: int) -> Gen
         _ros2("good_back", "publisher", POINT),
         _ros2("bad_back", "publisher", "std_msgs/String", **keys),
     ]
-    project = {"name": "faulty", "width": width, "status": "frames", "watchdog": LIMIT}
+    project = {"name": "faulty", "width": width, "status": "frames", "watchdog": LIMIT, "idBytes": id_bytes}
     content = {"project": project, "accelerators": [source], "blocks": blocks}
     (folder / "faulty.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
     (folder / "stimuli.yaml").write_text("- good: {x: 1.0, y: 2.0, z: 3.0}\n")
@@ -189,25 +189,35 @@ def _number(number: int) -> bytes:
     return pack_frame(BAD, _CDR + number.to_bytes(2, "little"))
 
 
-def _answer(frame: bytes, fault: str) -> str:
-    """The lines of the expected frame for a frame to the system."""
+def _with_id(frame: bytes, id_bytes: int) -> bytes:
+    """A frame whose id has one byte, with an id of so many bytes."""
+    return frame[:1] + bytes(id_bytes - 1) + frame[1:]
+
+
+def _answer(frame: bytes, fault: str, id_bytes: int = 1) -> str:
+    """The lines of the expected frame for a frame to the system, both with an id of one byte or of so many."""
     number = int.from_bytes(frame[-2:], "little")
     if frame[0] == BAD and number in SICK and fault != HEALTHY:
-        return "" if fault == "is silent" else f"  {BAD:02x}\n! aborted {BAD} 10\n"
+        return "" if fault == "is silent" else f"  {BAD.to_bytes(id_bytes, 'little').hex()}\n! aborted {BAD} 10\n"
     letters = bytes(ord("a") + place % 26 for place in range(number))
     text = pack_frame(BAD, _CDR + (number + 1).to_bytes(4, "little") + letters + b"\0")
-    return f"  {(frame if frame[0] == GOOD else text).hex()}\n"
+    return f"  {_with_id(frame if frame[0] == GOOD else text, id_bytes).hex()}\n"
 
 
 def _run(
-    system: GeneratedSystem, frames: list[bytes], fault: str, faults: int, answered: set[int] | None = None
+    system: GeneratedSystem,
+    frames: list[bytes],
+    fault: str,
+    faults: int,
+    answered: set[int] | None = None,
+    id_bytes: int = 1,
 ) -> int:
     """Send the frames, and expect the responses to `answered`, by default to all; return the number of cycles."""
-    write_stimulus(system.folder / "stimulus.txt", frames)
+    write_stimulus(system.folder / "stimulus.txt", [_with_id(frame, id_bytes) for frame in frames], id_bytes=id_bytes)
     answers = "".join(
         f"< @{place} answer\n{lines}"
         for place, frame in enumerate(frames)
-        if (answered is None or place in answered) and (lines := _answer(frame, fault))
+        if (answered is None or place in answered) and (lines := _answer(frame, fault, id_bytes))
     )
     (system.folder / "expected.txt").write_text(f"! frame_error {faults}\n{answers}")
     result = system.run(SEED=SEED, STALL_PERCENT=0)
@@ -216,8 +226,11 @@ def _run(
 
 
 @pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
+@pytest.mark.parametrize("id_bytes", [1, 2])
 @pytest.mark.parametrize("fault", ["pauses", "ends early", "goes on"])
-def test_an_accelerator_whose_response_is_faulty_now_and_then(tmp_path: Path, width: int, fault: str) -> None:
+def test_an_accelerator_whose_response_is_faulty_now_and_then(
+    tmp_path: Path, width: int, fault: str, id_bytes: int
+) -> None:
     """The other channel keeps 99 % of the rate that it has beside a healthy accelerator."""
     print(f"frames from seed {SEED}")
     source = random.Random(SEED)
@@ -229,15 +242,16 @@ def test_an_accelerator_whose_response_is_faulty_now_and_then(tmp_path: Path, wi
         frames[place] = frame
     sick = sum(number in SICK for number in numbers)
     assert sick
-    healthy = _run(_texts(tmp_path / "healthy", width, HEALTHY, 128), frames, HEALTHY, 0)
-    cycles = _run(_texts(tmp_path / "faulty", width, fault, 128), frames, fault, sick)
+    healthy = _run(_texts(tmp_path / "healthy", width, HEALTHY, 128, id_bytes), frames, HEALTHY, 0, id_bytes=id_bytes)
+    cycles = _run(_texts(tmp_path / "faulty", width, fault, 128, id_bytes), frames, fault, sick, id_bytes=id_bytes)
     print(f"{fault}: {cycles} cycles, {healthy} beside a healthy accelerator")
     assert 99 * cycles <= 100 * healthy
 
 
 @pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
+@pytest.mark.parametrize("id_bytes", [1, 2])
 @pytest.mark.parametrize("fault", ["stops", "is silent"])
-def test_an_accelerator_that_answers_no_more(tmp_path: Path, width: int, fault: str) -> None:
+def test_an_accelerator_that_answers_no_more(tmp_path: Path, width: int, fault: str, id_bytes: int) -> None:
     """The other channel keeps 99 % of the rate that it has alone; the host's stream also carries the dropped frames."""
     print(f"frames from seed {SEED}")
     source = random.Random(SEED)
@@ -246,29 +260,31 @@ def test_an_accelerator_that_answers_no_more(tmp_path: Path, width: int, fault: 
     frames[-1] = _point(source)
     good = [place for place, frame in enumerate(frames) if frame[0] == GOOD]
     bad = [place for place, frame in enumerate(frames) if frame[0] == BAD]
-    system = _texts(tmp_path / "faulty", width, fault, FRAMES)
+    system = _texts(tmp_path / "faulty", width, fault, FRAMES, id_bytes)
     faults = len(bad) - FRAMES - 1 + (fault == "stops")
-    cycles = _run(system, frames, fault, faults, {*good, bad[0]})
-    alone = _run(system, [frames[place] for place in good], fault, 0)
-    beats = sum(-(-len(frames[place]) // (width // 8)) for place in bad)
+    cycles = _run(system, frames, fault, faults, {*good, bad[0]}, id_bytes)
+    alone = _run(system, [frames[place] for place in good], fault, 0, id_bytes=id_bytes)
+    beats = sum(-(-len(_with_id(frames[place], id_bytes)) // (width // 8)) for place in bad)
     print(f"{fault}: {cycles} cycles; {alone} alone, and {beats} beats")
     assert 99 * cycles <= 100 * (alone + beats)
 
 
+@pytest.mark.parametrize("id_bytes", [1, 2])
 @pytest.mark.parametrize("fault", CODES)
-def test_the_status_has_the_code_at_the_channel(tmp_path: Path, fault: str) -> None:
+def test_the_status_has_the_code_at_the_channel(tmp_path: Path, fault: str, id_bytes: int) -> None:
     registers = status_map("faulty", 2, 2)
     code = CODES[fault].value
-    system = _texts(tmp_path / "faulty", 8, fault, FRAMES)
+    system = _texts(tmp_path / "faulty", 8, fault, FRAMES, id_bytes)
     values = {f"publisher[{BAD}].faults[{code - 1}]": 1, f"publisher[{GOOD}].faults[{code - 1}]": 0}
     # A register that never changes; the responses leave meanwhile.
     reads = [("magic", 0x4D524946)] * 60 + [*values.items()]
     sent = [_number(SICK[0]), _point(random.Random(SEED))]
-    frames = sent + [read_request(registers.by_name[name].address) for name, _ in reads]
-    write_stimulus(system.folder / "stimulus.txt", frames)
-    answers = [f"< @{place} answer\n{_answer(frame, fault)}" for place, frame in enumerate(sent)]
+    frames = [_with_id(frame, id_bytes) for frame in sent]
+    frames += [read_request(registers.by_name[name].address, id_bytes) for name, _ in reads]
+    write_stimulus(system.folder / "stimulus.txt", frames, id_bytes=id_bytes)
+    answers = [f"< @{place} answer\n{_answer(frame, fault, id_bytes)}" for place, frame in enumerate(sent)]
     answers += [
-        f"< @{place} read\n  {status_answer(registers.by_name[name].address, word).hex()}\n"
+        f"< @{place} read\n  {status_answer(registers.by_name[name].address, word, id_bytes).hex()}\n"
         for place, (name, word) in enumerate(reads, start=len(sent))
     ]
     (system.folder / "expected.txt").write_text(f"! frame_error 1\n{''.join(answers)}")

@@ -7,15 +7,22 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.system.derived.model import PublisherTimes
 from fusesoc_firm.system.derived.tree import groups_by_period
-from tests.hdl.frames import traffic
+from fusesoc_firm.system.hardware.status import status_map
+from fusesoc_firm.system.status_frames import read_request, status_answer
+from tests.hdl.frames import traffic, write_expected, write_stimulus
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
 SEED = 20261123
+# Ids that no subscriber has, with a byte of the status id.
+UNKNOWN = (0x00FF, 0xFF00, 0x01FF, 0xFFFE)
 
 
-def generated(folder: Path, publishers: int, width: int, *, messages: int, scheduler: str = "auto") -> GeneratedSystem:
+def generated(
+    folder: Path, publishers: int, width: int, *, messages: int, scheduler: str = "auto", status: str = "none"
+) -> GeneratedSystem:
     """A subscriber whose messages all publishers send; periods from a seed."""
     source = random.Random(SEED)
     names = ", ".join(f"{{name: pub{number}}}" for number in range(publishers))
@@ -27,7 +34,7 @@ def generated(folder: Path, publishers: int, width: int, *, messages: int, sched
         )
     folder.mkdir(parents=True, exist_ok=True)
     spec, stimuli, model = (folder / name for name in ("spec.yaml", "stimuli.yaml", "model.py"))
-    settings = f"{{name: tree, width: {width}, idBytes: 2, scheduler: {scheduler}}}"
+    settings = f"{{name: tree, width: {width}, idBytes: 2, scheduler: {scheduler}, status: {status}}}"
     spec.write_text(f"project: {settings}\nblocks:\n" + "\n".join(blocks) + "\n", encoding="utf-8")
     lines = (f"- sub: {{data: {source.randrange(2**16)}}}\n" for _ in range(messages))
     stimuli.write_text("".join(lines), encoding="utf-8")
@@ -45,6 +52,56 @@ def test_messages_come_from_the_right_ids(tmp_path: Path, width: int, scheduler:
     system = generated(tmp_path, 11, width, messages=5, scheduler=scheduler)
     for stall in (0, 40):
         assert system.passes(SEED=SEED, STALL_PERCENT=stall)
+
+
+@pytest.mark.parametrize("width", [8, 16, pytest.param(128, marks=pytest.mark.check)])
+def test_requests_of_the_status_are_found_among_other_frames(tmp_path: Path, width: int) -> None:
+    """Among frames of ids with one byte of the status id; requests that are aborted, too short or too long."""
+    publishers, messages = 5, 6
+    system = generated(tmp_path, publishers, width, messages=1, status="frames")
+    registers = status_map("tree", 1, publishers).by_name
+    print(f"seed {SEED}")
+    source = random.Random(SEED)
+    good = [(pack_frame(0, source.randbytes(2), 2), "good") for _ in range(messages)]
+    unknown = [(pack_frame(id_, source.randbytes(size), 2), "unknown") for id_ in UNKNOWN for size in (0, 3, 8, 9)]
+    unknown += [(bytes([byte]), "unknown") for byte in (0xFF, 0xFF, 3)]
+    request = read_request(registers["magic"].address, 2)
+    wrong = [
+        (frame, "wrong") for frame in (request[:-1], request[:6], b"\xff\xff", request + b"\0", request + bytes(90))
+    ]
+    asked = [(request, "status")] * 5
+    frames = [*good, *unknown, *wrong, *asked, (request, "aborted")]
+    source.shuffle(frames)
+    expected = {
+        "subscriber[0].frames": messages,
+        **{f"publisher[{number}].frames": messages for number in range(publishers)},
+        "id_errors": len(unknown),
+        "lost": 0,
+        "shape": 0x01000001 | publishers << 12,
+    }
+    words = [("magic", 0x4D524946)] * 60 + [*expected.items()]
+    frames += [(read_request(registers[name].address, 2), "status") for name, _ in words]
+    answers = [*[("magic", 0x4D524946)] * len(asked), *words]
+    found: list[tuple[int, bytes]] = []
+    for place, (frame, kind) in enumerate(frames):
+        if kind == "good":
+            found += [(place, pack_frame(number, frame[6:], 2)) for number in range(publishers)]
+        elif kind == "status":
+            name, word = answers.pop(0)
+            found.append((place, status_answer(registers[name].address, word, 2)))
+    aborted = [place for place, (_, kind) in enumerate(frames) if kind == "aborted"]
+    write_stimulus(tmp_path / "system" / "stimulus.txt", [frame for frame, _ in frames], aborted, id_bytes=2)
+    write_expected(tmp_path / "system" / "expected.txt", found, len(unknown))
+    for stall in (0, 40):
+        assert system.passes(SEED=SEED, STALL_PERCENT=stall)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("status", ["axi_lite", "frames"])
+def test_a_status_changes_no_frame(tmp_path: Path, status: str) -> None:
+    system = generated(tmp_path, 11, 16, messages=5, status=status)
+    assert system.passes(SEED=SEED, STALL_PERCENT=30)
+    assert system.work.latches("tree_system") == []
 
 
 @pytest.mark.check
