@@ -10,11 +10,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.accelerator.rtlil import read_modules, source_faults
 from fusesoc_firm.accelerator.unit import Unit, UnitPort, place
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 _ERROR = re.compile(r"(?P<file>.+?):(?P<line>\d+): ERROR: (?P<text>.+)")
 _IMPLICIT = re.compile(r"(?P<file>.+?):(?P<line>\d+): Warning: Identifier `\\(?P<name>.+)' is implicitly declared")
+_RANGE = re.compile(
+    r"(?P<file>.+?):(?P<line>\d+): Warning: Range (?:(?P<range>\[.+?\]) )?select out of bounds"
+    r" on signal `\\(?P<name>.+?)'"
+)
+_ASSIGNED = re.compile(
+    r"Warning: (?P<kind>wire|reg) '\\(?P<name>.+)' is assigned in a (?P<place>block|continuous assignment)"
+    r" at (?P<file>.+):(?P<line>\d+)\.(?P<column>\d+)-"
+)
 _SOURCE = re.compile(r"(?P<file>.+):(?P<line>\d+)\.(?P<column>\d+)-")
 _SYSTEM_VERILOG = (".sv", ".svh")
 _INCLUDED = (".vh", ".svh")
@@ -35,10 +44,9 @@ class VerilogReader:
         if done.returncode:
             self._report(done.stderr, paths, faults)
             return []
-        for line in done.stderr.splitlines():
-            if match := _IMPLICIT.match(line):
-                hint = "an undeclared name is a wire of 1 bit; declare it, or correct its name"
-                faults.warn(f"'{match['name']}' is not declared", _line(match), hint)
+        self._warn(done.stderr, faults)
+        if not _is_system_verilog(paths):
+            self._report_sources(read, paths, top, faults)
         interfaces = f"{read} -lib {_quoted(_compiled(paths))}"
         modules = self._modules(interfaces)
         parameters = modules.get(top, {}).get("parameter_default_values", {})
@@ -49,8 +57,35 @@ class VerilogReader:
 
     def _reading(self, paths: Sequence[Path]) -> str:
         folders = dict.fromkeys(f'-I"{path.parent}"' for path in paths if path.suffix.lower() in _INCLUDED)
-        is_system_verilog = any(path.suffix.lower() in _SYSTEM_VERILOG for path in paths)
-        return " ".join(["read_verilog", *(["-sv"] if is_system_verilog else []), *folders])
+        return " ".join(["read_verilog", *(["-sv"] if _is_system_verilog(paths) else []), *folders])
+
+    def _warn(self, output: str, faults: Diagnostics) -> None:
+        for line in output.splitlines():
+            if match := _IMPLICIT.match(line):
+                hint = "an undeclared name is a wire of 1 bit; declare it, or correct its name"
+                faults.warn(f"'{match['name']}' is not declared", _line(match), hint)
+            elif match := _RANGE.match(line):
+                bits = match["range"] or "selected here"
+                faults.warn(f"'{match['name']}' does not have the bits {bits}", _line(match))
+
+    def _report_sources(self, read: str, paths: Sequence[Path], top: str, faults: Diagnostics) -> None:
+        """Add the assignments of a wrong kind, and signals with several sources, or with none."""
+        result = self.folder / "module.il"
+        done = self._run(f'{read} {_quoted(_compiled(paths))}; hierarchy -top {top}; proc; write_rtlil "{result}"')
+        found = list(filter(None, map(_ASSIGNED.match, done.stderr.splitlines())))
+        for match in found:
+            source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
+            faults.error(f"'{match['name']}' is a {match['kind']}, and is assigned in a {match['place']}", source)
+        # Signals with the value z may have several sources.
+        if done.returncode or found or "tri-state" in done.stderr:
+            return
+        modules = read_modules(result.read_text(encoding="utf-8"))
+        for wire, message, hint in source_faults(modules, f"\\{top}"):
+            source = _declared({"src": wire.place}, paths[0], len(wire.name) - 1)
+            if hint:
+                faults.error(message, source, hint)
+            else:
+                faults.warn(message, source, "assign it a value")
 
     def _report(self, output: str, paths: Sequence[Path], faults: Diagnostics) -> None:
         """Report Yosys' error, except in SystemVerilog, of which simulators know more than Yosys."""
@@ -73,6 +108,10 @@ class VerilogReader:
             stdin=subprocess.DEVNULL,
             check=False,
         )
+
+
+def _is_system_verilog(paths: Sequence[Path]) -> bool:
+    return any(path.suffix.lower() in _SYSTEM_VERILOG for path in paths)
 
 
 def _compiled(paths: Sequence[Path]) -> list[Path]:

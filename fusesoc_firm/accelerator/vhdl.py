@@ -22,9 +22,14 @@ from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, p
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.tools.library_path import library_root
 
-_MESSAGE = re.compile(r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?!warning|note)(?P<text>.+)")
+# A process that never waits is only a warning, but its simulation would never end.
+_MESSAGE = re.compile(
+    r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?:warning: (?=infinite loop))?(?!warning|note)(?P<text>.+)"
+)
+_OPTION = re.compile(r" \[-W[\w-]+\]$")
 # Of GHDL's synthesis; the place is the signal's declaration.
 _TWO_SOURCES = re.compile(r'(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*multiple assignments for "(?P<name>.+?)"')
+_NO_SOURCE = re.compile(r'(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*no assignment for port "(?P<name>.+?)"')
 _MISSING_UNIT = re.compile(r'unit "(\w+)" not found in library|cannot find resource library')
 # The name of a core of this package, without its version.
 _CORE = re.compile(r"^name: (\w+:\w+:\w+)", re.MULTILINE)
@@ -104,19 +109,24 @@ class VhdlReader:
     def _report_sources(
         self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics
     ) -> None:
-        """Add the signals with more than one source; other messages of GHDL's synthesis are ignored.
+        """Add the signals with more than one source, and warn of outputs with none.
 
-        A file with the value 'Z' may have such signals.
+        Other messages of GHDL's synthesis are ignored. A file with the value 'Z' may have such signals.
         """
         if any("'Z'" in path.read_text(encoding="utf-8", errors="replace").upper() for path in paths):
             return
         # All names of a generic differ only in case.
         options = ["--out=none", *(f"-g{name}={value}" for name, value in list(generics.items())[:1])]
-        for match in map(_TWO_SOURCES.match, self._run("--synth", [*options, top]).stderr.splitlines()):
-            if match and Path(match["file"]) in paths:
-                source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
-                hint = "keep one source: an assignment, a process or an output of an instance; remove the others"
-                faults.error(f"'{match['name']}' has more than one source", source, hint)
+        lines = dict.fromkeys(self._run("--synth", [*options, top]).stderr.splitlines())
+        several = "keep one source: an assignment, a process or an output of an instance; remove the others"
+        for pattern, report, message, hint in (
+            (_TWO_SOURCES, faults.error, "'{}' has more than one source", several),
+            (_NO_SOURCE, faults.warn, "output '{}' has no source", "assign it a value"),
+        ):
+            for match in filter(None, map(pattern.match, lines)):
+                if Path(match["file"]) in paths:
+                    source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
+                    report(message.format(match["name"]), source, hint)
 
     def _packages(self) -> list[Path]:
         return [self._written(f"package_{number}.vhd", text) for number, text in enumerate(self._known.packages)]
@@ -162,7 +172,7 @@ def _messages(output: str) -> Iterator[tuple[str, int, int]]:
         if match["text"].startswith("(") and found:
             found[-1] = (f"{found[-1][0]} {match['text']}", *found[-1][1:])
         else:
-            found.append((match["text"], int(match["line"]), int(match["column"])))
+            found.append((_OPTION.sub("", match["text"]), int(match["line"]), int(match["column"])))
     yield from found
 
 
@@ -269,7 +279,9 @@ class _Tree:
 
 
 def _hint(text: str) -> str:
-    """Return how the file gets the library `firm` or a unit of it that GHDL misses, or an empty text."""
+    """Return a way to mend a fault, such as the library or the unit that GHDL misses, or an empty text."""
+    if text.startswith("infinite loop"):
+        return "list the signals that start the process: 'process (clk)'"
     if text.startswith('no declaration for "firm"'):
         return "write 'library firm;' at the top of the file"
     found = _MISSING_UNIT.match(text)

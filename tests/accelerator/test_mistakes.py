@@ -109,11 +109,20 @@ VHDL = [
     ("  in_msg_ready <= is_there", "  in_msg_valid <= is_there", "in_msg_valid <= is_there", "can't be assigned"),
     ("begin\n\n", "begin\n  u : entity work.adder;\n", "work.adder", 'unit "adder" not found'),
     ("use ieee.std_logic_1164.all;", "use ieee.std_logic_1146.all;", "1146", 'unit "std_logic_1146" not found'),
+    (
+        "begin\n\n",
+        "begin\n  p : process\n  begin\n    is_there <= in_msg_valid;\n  end process;\n",
+        "process",
+        "infinite loop",
+    ),
     ("architecture rtl of img", "architecture rtl of image", "of image", "entity 'image' was not analysed"),
     # two sources of a signal
+    ("  out_data <= (others => '0');\n", "", "out_data   ", "output 'out_data' has no source"),
     ("begin\n\n", "begin\n  out_data <= in_step;\n", "out_data   ", "'out_data' has more than one source"),
     ("begin\n\n", "begin\n  is_there <= clk when rst_n = '0' else 'Z';\n", "", ""),
 ]
+_INSTANCE = "copy u (.i(in_step), .o(out_data));"
+_ZERO = "assign out_data = 32'b0;"
 VERILOG = [
     ("module img ", "module image ", "module image", "the module is 'image'"),
     ("[31:0] in_height", "[31:0] in_heigth", "in_heigth", "port 'in_heigth' is not in the interface"),
@@ -130,6 +139,25 @@ VERILOG = [
     ("is_there && out_msg_ready;", "is_there && out_msg_ready", "assign out_segment_valid", "syntax error"),
     ("in_msg_ready = is_there", "in_msg_ready = is_their", "is_their", "'is_their' is not declared"),
     ("endmodule", "", "", "syntax error"),
+    # sources of signals
+    (f"  {_ZERO}", "", "out_data", "output 'out_data' has no source"),
+    ("out_data = 32'b0;", "out_data[7:0] = 8'b0;", "out_data", "a part of output 'out_data' has no source"),
+    (_ZERO, f"{_ZERO} assign out_data[7] = 1'b1;", "out_data,", "'out_data' has more than one source"),
+    (_ZERO, f"{_INSTANCE} copy v (.i(in_width), .o(out_data[31:0]));", "out_data,", "has more than one source"),
+    (_ZERO, f"{_ZERO} assign in_step = 32'b1;", "in_step", "'in_step' is an input, and is assigned"),
+    (_ZERO, "always @* out_data = 32'b0;", "always", "'out_data' is a wire, and is assigned in a block"),
+    (_ZERO, "reg [31:0] r; assign r = 0; assign out_data = r;", "reg", "'r' is a reg, and is assigned in a continuous"),
+    ("out_data = 32'b0;", "out_data = in_step[32:1];", "in_step[32", "'in_step' does not have the bits [32:1]"),
+]
+_COPY = "module copy (input [31:0] i, output [31:0] o); assign o = i; endmodule\n"
+LEGAL_VERILOG = [
+    "assign out_data = in_msg_valid ? 32'bz : 0; assign out_data[0] = 1'bz;",
+    "unknown u (.i(in_step), .o(out_data));",
+    _INSTANCE,
+    "copy u (.i(in_step), .o({out_data[3:0], out_data[31:4]}));",
+    "integer i; reg [31:0] a, b; assign out_data = a ^ b;"
+    + "".join(f" always @(posedge clk) for (i = 0; i < 32; i = i + 1) {name}[i] <= in_step[31 - i];" for name in "ab"),
+    "reg [31:0] m[0:3]; always @(posedge clk) m[in_step[1:0]] <= in_step; assign out_data = m[in_width[1:0]];",
 ]
 
 
@@ -147,7 +175,8 @@ def diagnostics(language: str, old: str, new: str, libraries: Libraries | None =
     # The analysis has no files of this library.
     text = re.sub("library firm;.*\n", "", source.read_text(encoding="utf-8"))
     assert old in text
-    source.write_text(text.replace(old, new, 1), encoding="utf-8")
+    copy = _COPY if language == "verilog" else ""
+    source.write_text(text.replace(old, new, 1) + copy, encoding="utf-8")
     loaded = load_beside(Path("img/img.yaml"))
     try:
         return list(check_accelerators(loaded, lambda: libraries or Libraries(is_complete=True)))
@@ -175,6 +204,11 @@ def test_a_mistake_in_vhdl(old: str, new: str, where: str, message: str) -> None
 @pytest.mark.parametrize(("old", "new", "where", "message"), VERILOG)
 def test_a_mistake_in_verilog(old: str, new: str, where: str, message: str) -> None:
     check(diagnostics("verilog", old, new), "img/rtl/img.v", where, message)
+
+
+@pytest.mark.parametrize("new", LEGAL_VERILOG)
+def test_signals_in_verilog_with_right_sources(new: str) -> None:
+    assert diagnostics("verilog", _ZERO, new) == []
 
 
 def test_what_a_missing_unit_declares_is_unknown() -> None:

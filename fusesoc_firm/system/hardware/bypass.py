@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fusesoc_firm.converter.message_ports import segment_count
 from fusesoc_firm.converter.ports import field_ports
+from fusesoc_firm.converter.segments import segments_of
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived.bypass import part_segments, whole_ports
 from fusesoc_firm.system.derived.model import AcceleratorType, MessageSide
@@ -34,8 +35,7 @@ def bypass_configuration(type_: AcceleratorType) -> Context:
         "ports": [*_declarations(type_), *_pins(type_)],
         "pins": [str(pin.name) for pin in type_.accelerator.pins],
         "is_fixed": source.frame.is_fixed_size,
-        # With the last segment, the message is complete and correct.
-        "waits_for_end": last == segments - 1,
+        "waits_for_end": last == segments - 1 and not _is_followed(source, last),
         "last": last,
         "segments": [{"number": k, "is_own": k >= first} for k in range(segments)],
         "fields": [
@@ -47,6 +47,14 @@ def bypass_configuration(type_: AcceleratorType) -> Context:
         ],
         "passed": _passed(type_, sink, part_out),
     }
+
+
+def _is_followed(source: MessageSide, segment: int) -> bool:
+    """Whether a string or an array follows a segment.
+
+    It passes only after the answer, so the accelerator cannot wait until the message is complete and correct.
+    """
+    return not source.frame.is_fixed_size and segment in segments_of(source.frame).parts.values()
 
 
 def _declarations(type_: AcceleratorType) -> list[Context]:

@@ -30,7 +30,7 @@ from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.system.written.specification import SOFTWARE
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError, fail, nearest
-from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.naming import KEYWORDS, identifier
 from fusesoc_firm.text.outputs import check_parent, write
 from fusesoc_firm.text.prompts import Asker, Question
 from fusesoc_firm.text.render import Context, render
@@ -94,8 +94,10 @@ class Project:
 
 def name_fault(name: str) -> str | None:
     """Return the reason why a project cannot have this name, or None."""
+    if name.lower() in KEYWORDS:
+        return f"'{name}' is not legal: it is a keyword of VHDL or Verilog"
     if identifier(name) != name:
-        return f"'{name}' is not legal; legal here: letters, digits and single '_' between them, except keywords"
+        return f"'{name}' is not legal; legal here: letters, digits and single '_' between them"
     if name.lower() in (_SUBSCRIBER, _PUBLISHER, _FORWARDER):
         return f"'{name}' is the name of another block of the new system"
     return None

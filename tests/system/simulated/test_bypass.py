@@ -123,6 +123,9 @@ def test_a_slow_accelerator_and_broken_frames(tmp_path: Path, width: int, cycles
         ("sensor_msgs/JointState", "header.stamp", "hls"),
         ("nav_msgs/Path", "header.stamp.sec", "vhdl"),
         ("sensor_msgs/CameraInfo", "roi.do_rectify", "vhdl"),
+        # Its last segment precedes the data.
+        ("sensor_msgs/Image", "step", "vhdl"),
+        ("sensor_msgs/Image", "is_bigendian", "hls"),
     ],
 )
 def test_a_new_project_for_a_part(
