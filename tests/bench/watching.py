@@ -31,8 +31,8 @@ _NOTE = f"""
     Verilator simulates quat2euler at 8 bits, which gets {RATE:,} messages a second. Processor time is that of the
     server and the simulator, for each simulated cycle of clk. It is compared in {PAIRS} pairs of {PHASE_SECONDS} s with
     and without a page that has loaded; the first value is the median of their quotients. Frames are updates of the
-    page, which the server limits to 20 a second. Memory is the heap of the page after a collection, after {MINUTES} minutes and after
-    one, with the list of messages and the picture shown.
+    page, which the server limits to 20 a second. Memory is the heap of the page after a collection, after {MINUTES}
+    minutes and after one, with the list of messages and the picture shown.
     """
 _FIRM = [sys.executable, "-m", "fusesoc_firm.cli"]
 _TICKS = os.sysconf("SC_CLK_TCK")
