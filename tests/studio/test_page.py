@@ -443,14 +443,15 @@ def test_the_picture_is_saved_as_svg_and_png(robot: Path, tmp_path: Path) -> Non
     robot.write_text(TEXT.replace("name: b\n", f"name: {json.dumps(hostile)}\n"), encoding="utf-8")
 
     async def steps(page: Page) -> None:
-        place = str(tmp_path / "saved")
-        await page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=place)
+        place = tmp_path / "saved"
+        await page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(place))
         for form in "SVG", "PNG":
             found = f"[...document.querySelectorAll('header button')].find(button => button.textContent === '{form}')"
             await page.evaluate(f"{found}.click()")
-        svg, png = (tmp_path / "saved" / f"robot.{form}" for form in ("svg", "png"))
+        svg, png = (place / f"robot.{form}" for form in ("svg", "png"))
         for _ in range(300):
-            if svg.exists() and png.exists():
+            # A file that the browser still writes has another ending.
+            if svg.exists() and png.exists() and {*place.iterdir()} == {svg, png}:
                 break
             await asyncio.sleep(0.1)
         root = ET.fromstring(svg.read_text(encoding="utf-8"))
