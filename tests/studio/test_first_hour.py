@@ -80,6 +80,7 @@ def test_a_system_is_begun_extended_run_and_measured(tmp_path: Path) -> None:
     async def steps(page: Page) -> None:
         # The form of an empty folder: name, two messages, language, width.
         await page.until("document.activeElement?.id === 'begin-name'")
+        await page.until("document.querySelectorAll('dialog .choices option').length > 10")
         await page.write("tilt")
         for _ in range(2):
             await page.press("Tab")

@@ -171,7 +171,7 @@ FILES = [
 def test_no_other_file_is_read_or_written(studio: Studio, folder: Path, name: str) -> None:
     hidden = folder.parent / "secret.yaml"
     before = hidden.read_bytes()
-    for path in "scene", "messages", "sources":
+    for path in "scene", "messages", "sources", "bytes", "generated", "schedulers", "resources":
         status, _, text = ask(studio, "GET", f"api/{path}?file={quote(name, safe='')}")
         assert status == 404
         assert "hidden" not in str(text)
@@ -197,7 +197,18 @@ HEADERS = [
 
 
 @pytest.mark.parametrize("headers", HEADERS, ids=str)
-@pytest.mark.parametrize("path", ["", "api/files", "api/scene?file=arm/arm.yaml", "api/changes", "assets/index.js"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "",
+        "api/files",
+        "api/scene?file=arm/arm.yaml",
+        "api/changes",
+        "api/watch",
+        "api/resources?file=arm/arm.yaml",
+        "assets/index.js",
+    ],
+)
 def test_other_pages_are_refused(studio: Studio, headers: dict[str, str], path: str) -> None:
     status, _, text = ask(studio, "GET", path, None, **headers)
     assert (status, text) == (403, "open the address that firm studio printed\n")

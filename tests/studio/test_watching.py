@@ -131,6 +131,8 @@ def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
 def test_a_picture_is_shown_and_no_content_runs(tmp_path: Path) -> None:
     async def steps(page: Page) -> None:
         await press(page, "run")
+        # An opened message holds the list.
+        await page.until(f"{row_of('text_out')} && {row_of('image_out')}")
         await open_message(page, "text_out")
         await page.until(f"document.querySelector('.message dd')?.textContent === {json.dumps(HOSTILE)}")
         await open_message(page, "image_out")
