@@ -23,8 +23,9 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity
-from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros
 from tests.ros.live_nodes import LiveNode, model_address, paced, specification
+from tests.ros.places import running, versions
 
 RATE, SECONDS = 1000, 30
 # Processes on a computer share the names of systems whose status they serve.
@@ -128,16 +129,9 @@ class Place:
         return int.from_bytes(image[19:23] if self.ros.version == 1 else image[20:24], "little")
 
 
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"qos_{version}")) for version in (1, 2)],
-    ids=["ros1", "ros2"],
-)
+@pytest.fixture(scope="module", params=versions("qos"))
 def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder = tmp_path_factory.mktemp(f"qos{request.param}")
-    if reason := missing_ros(request.param):
-        pytest.skip(reason)
-    with running_ros(request.param, folder) as ros:
+    with running(request, tmp_path_factory) as (ros, folder):
         yield Place(ros, folder)
 
 
