@@ -160,6 +160,8 @@ class ActionServer(ABC):
             for goal in begun:
                 self._accept(goal)
                 goal.state = State.CANCELING
+                # The hardware has not been silent about a cancellation that it does not have yet.
+                self._line.extend()
             self._tell_states()
             named = self._goals.get(wanted.id)
         for goal in begun:
@@ -211,6 +213,7 @@ class ActionServer(ABC):
                 return
             self._line.extend()
             self._accept(goal)
+            self._before_feedback()
             with self._reporting():
                 self._publish(FEEDBACK, self.messages.feedback(goal.status, payload))
 
@@ -351,6 +354,10 @@ class ActionServer(ABC):
         """Tell the client."""
 
     @abstractmethod
+    def _before_feedback(self) -> None:
+        """Tell clients the state of the goal first."""
+
+    @abstractmethod
     def _ended(self, goal: _Goal) -> None:
         """Give the result to the clients."""
 
@@ -432,6 +439,10 @@ class Ros1Server(ActionServer):
         # The states tell it.
         pass
 
+    def _before_feedback(self) -> None:
+        # A client of actionlib gives up a goal that it cancels before it knows its state.
+        self._tell_news()
+
     def _ended(self, goal: _Goal) -> None:
         self._publish(RESULT, goal.result)
 
@@ -491,6 +502,10 @@ class Ros2Server(ActionServer):
         goal.reference = goal.reference._replace(stamp=now())
         if goal.asker is not None:
             self._reply(SEND_GOAL, goal.asker, self.messages.accepted(goal.reference.stamp))
+
+    def _before_feedback(self) -> None:
+        # The states are published at each change.
+        pass
 
     def _ended(self, goal: _Goal) -> None:
         if goal.state is State.REJECTED:

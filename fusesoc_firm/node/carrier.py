@@ -136,7 +136,7 @@ class RosOptions:
 
     `arguments` are arguments to ROS, such as remappings. `depth`, in messages, and `is_reliable` are for all topics; if
     they are None, each topic has its own. `python` is the interpreter for which ROS is installed; if it is None, the
-    carrier searches for an interpreter.
+    carrier searches for an interpreter. With `is_managed`, a node of ROS 2 has lifecycle states.
     """
 
     name: str
@@ -145,6 +145,7 @@ class RosOptions:
     is_reliable: bool | None = None
     is_timed: bool = False
     python: str | None = None
+    is_managed: bool = False
 
 
 class RosCarrier:
@@ -182,6 +183,7 @@ class RosCarrier:
             "ros": ros,
             "name": options.name,
             "is_timed": options.is_timed,
+            "is_managed": options.is_managed,
             "subscribers": _numbered(ros, description.taken_topics, len(description.subscribers), options),
             "publishers": _numbered(ros, description.given_topics, len(description.publishers), options),
             "services": _services(ros, description.all_services),

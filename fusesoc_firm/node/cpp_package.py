@@ -191,6 +191,7 @@ def _service(description: NodeDescription, item: NodeService) -> dict[str, Any]:
     """Return the row of a service; a failure is a list of bytes."""
     ids = _ids(description)
     return {
+        "block": item.block,
         "is_server": _word(item.is_server),
         "request": ids[item.request],
         "response": ids[item.response],
@@ -208,6 +209,7 @@ def _action(description: NodeDescription, item: NodeAction) -> dict[str, Any]:
     """Return the row of an action."""
     ids = _ids(description)
     return {
+        "block": item.block,
         **{end: ids[getattr(item, end)] for end in ("goal", "cancel", "feedback", "result")},
         "name": item.name,
         "subscribers": [*map(_row, item.subscribers)],

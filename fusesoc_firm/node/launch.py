@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.text.render import render
 
@@ -14,16 +16,33 @@ _FORMS = {1: ("node/ros1_launch.xml", "launch"), 2: ("node/ros2_launch.py", "lau
 def launch_file(description: NodeDescription, ros: int, executable: str) -> dict[str, str]:
     """Return the launch file by its path in the package; the package has the node's topics of one version of ROS."""
     template, ending = _FORMS[ros]
-    used = [topic for topic in (*description.subscribers, *description.publishers) if topic.ros == ros]
     # Several blocks may use a topic; the first one names it.
-    topics = {topic.name: f"{topic.block}_topic" for topic in reversed(used)}
+    names = {name: (argument, endings) for argument, name, endings in reversed([*_names(description, ros)])}
     context = {
         "name": description.name,
         "package": package_name(description),
         "executable": executable,
-        "topics": [{"argument": argument, "topic": name} for name, argument in reversed(topics.items())],
+        "names": [
+            {"argument": argument, "default": name, "endings": [{"ending": ending} for ending in endings]}
+            for name, (argument, endings) in reversed(names.items())
+        ],
     }
     return {f"launch/{description.name}.{ending}": render(template, context)}
+
+
+def _names(description: NodeDescription, ros: int) -> Iterator[tuple[str, str, list[str]]]:
+    """Yield arguments that change a name, that name, and the endings of the names in ROS that begin with it."""
+    for topic in (*description.subscribers, *description.publishers):
+        if topic.ros == ros:
+            yield f"{topic.block}_topic", topic.name, [""]
+    for service in description.services:
+        if service.ros == ros:
+            yield f"{service.block}_service", service.name, [""]
+    for action in description.actions:
+        if action.ros == ros:
+            topics = (*action.subscribers, *action.publishers)
+            ends = [*(topic.name for topic in topics), *(service.name for service in action.services)]
+            yield f"{action.block}_action", action.name, [end.removeprefix(action.name) for end in ends]
 
 
 def package_name(description: NodeDescription) -> str:

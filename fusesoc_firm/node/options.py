@@ -58,6 +58,11 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
         "--trace", type=Path, metavar="F.csv", help="write the trace of each message to this table; see `firm trace`"
     )
     parser.add_argument(
+        "--lifecycle",
+        action="store_true",
+        help="start a node of ROS 2 with lifecycle states, which carries messages only while it is active",
+    )
+    parser.add_argument(
         "--ros-python", metavar="PATH", help="a Python that can import ROS (default: the first one found)"
     )
     parser.add_argument(

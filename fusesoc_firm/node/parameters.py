@@ -24,8 +24,8 @@ from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.text.diagnostics import fail
 
 # The parameters, by their names; `-` in an option is `_`.
-PARAMETERS = ("transport", "status", "qos", "queue", "overflow", "drain", "restart", "trace", "ros_python")
-_SWITCHES = ("restart",)
+PARAMETERS = ("transport", "status", "qos", "queue", "overflow", "drain", "restart", "trace", "lifecycle", "ros_python")
+_SWITCHES = ("restart", "lifecycle")
 _MASTER = "http://localhost:11311"
 _MASTER_SECONDS = 5.0
 _AGAIN_SECONDS = 0.1

@@ -58,6 +58,8 @@ def run_options(
             f"'{ROS_ARGUMENTS}' is for ROS 2, but the topics use ROS 1",
             hint="for ROS 1, write NAME:=VALUE without '{ROS_ARGUMENTS}'",
         )
+    if arguments.lifecycle and 2 not in versions:
+        fail("'--lifecycle' is for ROS 2, but the topics use ROS 1")
     passed = [*rest, *([ROS_ARGUMENTS, *arguments.ros_args] if arguments.ros_args else ())]
     return RunOptions(
         versions,
@@ -68,6 +70,7 @@ def run_options(
             None if arguments.qos is None else arguments.qos == RELIABLE,
             arguments.trace is not None,
             arguments.ros_python,
+            arguments.lifecycle,
         ),
         NodeSettings(arguments.queue, Overflow(arguments.overflow), drain=arguments.drain, restarts=arguments.restart),
         arguments.trace,

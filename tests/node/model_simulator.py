@@ -16,6 +16,7 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from fusesoc_firm.node.bursts import split_frame
 from fusesoc_firm.system.status_frames import answered, status_answer
@@ -112,6 +113,30 @@ class Simulator:
         leaves = any(last - self.beats(burst) <= self.cycle for last, _, burst in self.events)
         quiet = 0 if self.waiting or leaves else min(self.cycle - self.moved, 2**32 - 1)
         return b"S" + self.cycle.to_bytes(8, "little") + quiet.to_bytes(4, "little")
+
+
+@dataclass(frozen=True)
+class Gate:
+    """A file for which a model waits, and one that tells that it does."""
+
+    path: Path
+
+    @property
+    def reached(self) -> Path:
+        return self.path.with_suffix(".reached")
+
+    def wait(self) -> None:
+        """Wait in the model until the gate is opened."""
+        self.reached.touch()
+        while not self.path.exists():
+            time.sleep(0.01)
+
+    def open(self) -> None:
+        self.path.touch()
+
+    def close(self) -> None:
+        for path in (self.path, self.reached):
+            path.unlink(missing_ok=True)
 
 
 def main() -> None:

@@ -22,6 +22,7 @@ from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.node.action_types import CANCEL, CANCEL_GOAL, FEEDBACK, GET_RESULT, GOAL, RESULT, SEND_GOAL, STATES
 from fusesoc_firm.node.actions import MOST_KEPT
+from fusesoc_firm.node.calls import CallLine
 from fusesoc_firm.node.carrier import Call
 from fusesoc_firm.node.description import NodeDescription, describe
 from fusesoc_firm.node.node import HardwareListener, NodeSettings
@@ -244,6 +245,44 @@ def test_a_cancellation_of_actionlib_may_come_before_its_goal(tmp_path: Path) ->
     assert client.result(5) == (3, 5)
     client.run.stop()
     assert client.handed() == [5]
+
+
+def test_actionlib_learns_of_a_goal_before_its_feedback(tmp_path: Path) -> None:
+    """A client gives up a goal that it cancels at its first feedback, if it does not know it yet."""
+    client = Peer(tmp_path, 1)
+    for goal in range(20):
+        client.send(goal)
+    client.result(19)
+    client.run.stop()
+    known: set[bytes] = set()
+    for topic, payload in client.run.carrier.published:
+        if topic == STATES:
+            known |= {name for name, state in states(1, payload) if state}
+        elif topic == FEEDBACK:
+            message = decode(frame(1, "actionlib/TestActionFeedback"), payload)
+            assert message["status"]["goal_id"]["id"].encode() in known
+    assert len(client.published(FEEDBACK)) == 20
+
+
+def test_a_cancellation_extends_the_time_limit(peer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Feedback extends it, too; the cancellation of a goal that waits concerns nothing in the hardware."""
+    extended = []
+
+    def extend(line: CallLine) -> None:
+        extended.append(line)
+
+    monkeypatch.setattr(CallLine, "extend", extend)
+    client = peer(accept_limit=0.05)
+    client.send(HELD)
+    client.send(1)
+    until(lambda: client.published(FEEDBACK) and len(states(client.version, client.published(STATES)[-1])) == 2)
+    client.cancel(1)
+    client.result(1)
+    assert len(extended) == 1
+    client.cancel(HELD)
+    assert client.result(HELD) == (client.number(CANCELED), HELD)
+    assert len(extended) == 2
+    client.run.stop()
 
 
 def test_cancellations_of_ros2_have_return_codes(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ import pytest
 
 from fusesoc_firm.cli import main
 from tests.node.fake_node import loaded
+from tests.ros.action_simulator import HERE as ROS_TESTS
+from tests.ros.action_simulator import in_ros2
 from tests.system.systems import accelerator, converter, instance, specification
 
 PACKAGE = "robot_node"
@@ -95,9 +97,44 @@ def test_roslaunch_reads_the_file(tmp_path: Path, language: str) -> None:
     assert line.endswith(f"{program} --transport uart:/dev/ttyUSB1:1000000 /imu/data:=raw out:=/turned __name:=robot")
 
 
-def launched(folder: Path, node: str, *arguments: str) -> str:
+@pytest.mark.skipif(not shutil.which("roslaunch"), reason="roslaunch is not installed (python3-roslaunch)")
+def test_roslaunch_renames_services_and_actions(tmp_path: Path) -> None:
+    line = launched(tmp_path, "/arm", "transport:=x", "count_action:=/left/count", package=served(tmp_path, "arm", 1))
+    ends = ("goal", "cancel", "status", "feedback", "result")
+    assert " ".join(f"count/{end}:=/left/count/{end}" for end in ends) in line
+    package = served(tmp_path, "camera", 1)
+    line = launched(tmp_path, "/camera", "transport:=x", "set_camera_info_service:=store", package=package)
+    assert " set_camera_info:=store" in line
+
+
+def test_ros_2_renames_services_and_actions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = ("feedback", "status", "send_goal", "cancel_goal", "get_result")
+    renamed = [(f"count/_action/{end}", f"/left/count/_action/{end}") for end in ends]
+    package = served(tmp_path, "arm", 2)
+    (node,) = described(tmp_path, package, {"transport": "x", "count_action": "/left/count"}, monkeypatch)
+    assert sorted(node["remappings"]) == sorted(renamed)
+    package = served(tmp_path, "camera", 2)
+    (node,) = described(tmp_path, package, {"transport": "x", "set_camera_info_service": "store"}, monkeypatch)
+    assert node["remappings"] == [("set_camera_info", "store")]
+
+
+def served(folder: Path, system: str, version: int) -> str:
+    """The package of the node of tests/ros/arm or tests/ros/camera."""
+    shutil.copytree(ROS_TESTS / system, folder / system, dirs_exist_ok=True)
+    spec = folder / system / f"{system}.yaml"
+    if version == 2:
+        text = in_ros2(spec.read_text(encoding="utf-8"))
+        spec.write_text(text.replace("SetCameraInfoRe", "SetCameraInfo_Re"), encoding="utf-8")
+    output = folder / "packages" / f"{system}_node"
+    assert main(["system", "node", str(spec), "--language", "cpp", "--ros", str(version), "-o", str(output)]) == 0
+    (output / f"{system}_node").touch(0o755)
+    return f"{system}_node"
+
+
+def launched(folder: Path, node: str, *arguments: str, package: str = PACKAGE) -> str:
+    file = f"{package.removesuffix('_node')}.launch"
     environment = {**os.environ, "ROS_PACKAGE_PATH": str(folder / "packages"), "ROS_HOME": str(folder / "home")}
-    command = ["roslaunch", "--args", node, PACKAGE, "robot.launch", *arguments]
+    command = ["roslaunch", "--args", node, package, file, *arguments]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
@@ -140,16 +177,26 @@ def stand_ins(values: Mapping[str, str]) -> dict[str, types.ModuleType]:
     return made
 
 
-@pytest.mark.parametrize("language", ["cpp", "python"])
-def test_ros_2_starts_the_node(tmp_path: Path, language: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = (package(tmp_path, "ROS2", language) / "launch/robot.launch.py").read_text(encoding="utf-8")
+def described(
+    folder: Path, package: str, values: Mapping[str, str], monkeypatch: pytest.MonkeyPatch
+) -> list[dict[str, Any]]:
+    """The nodes that a launch file of ROS 2 starts."""
+    (file,) = (folder / "packages" / package / "launch").iterdir()
+    text = file.read_text(encoding="utf-8")
     ast.parse(text, feature_version=(3, 8))
-    values = {"transport": "pipe:cat 'a  b'", "namespace": "arm", "options": "--trace 'a b.csv'", "in_topic": "raw"}
     for name, module in stand_ins(values).items():
         monkeypatch.setitem(sys.modules, name, module)
     names: dict[str, Any] = {}
-    exec(compile(text, "robot.launch.py", "exec"), names)
-    assert names["generate_launch_description"]() == [
+    exec(compile(text, file.name, "exec"), names)
+    found: list[dict[str, Any]] = names["generate_launch_description"]()
+    return found
+
+
+@pytest.mark.parametrize("language", ["cpp", "python"])
+def test_ros_2_starts_the_node(tmp_path: Path, language: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    package(tmp_path, "ROS2", language)
+    values = {"transport": "pipe:cat 'a  b'", "namespace": "arm", "options": "--trace 'a b.csv'", "in_topic": "raw"}
+    assert described(tmp_path, PACKAGE, values, monkeypatch) == [
         {
             "package": PACKAGE,
             "executable": PACKAGE if language == "cpp" else f"{PACKAGE}.py",

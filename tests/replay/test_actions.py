@@ -40,7 +40,7 @@ def test_goals_of_a_bag_are_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyP
     spec = spec.replace("[counting.vhd, counter.vhd]", "[counter.vhd]")
     (tmp_path / "arm.yaml").write_text(spec, encoding="utf-8")
     (tmp_path / "counter.vhd").touch()
-    command = [sys.executable, str(HERE / "action_simulator.py"), "1", "--width", "32"]
+    command = [sys.executable, str(HERE / "action_simulator.py"), "1", str(tmp_path / "gate"), "--width", "32"]
     replay(
         load(tmp_path / "arm.yaml"),
         Source(write(tmp_path / "in.bag", "ros1", items)),

@@ -23,6 +23,12 @@ LONGEST = 120.0
 
 
 class Ros1Client:
+    """A client of actionlib.
+
+    SimpleActionClient is not sufficient for a fast server: it drops feedback that comes before its `send_goal` returns.
+    Both clients give up a goal as lost that was canceled before its first state came.
+    """
+
     def __init__(self, action: str) -> None:
         import actionlib
         import rospy
@@ -30,24 +36,40 @@ class Ros1Client:
         from actionlib_msgs.msg import GoalStatus
 
         rospy.init_node("client", anonymous=True, disable_signals=True)
-        self.rospy, self.goal = rospy, TestGoal
-        self.client = actionlib.SimpleActionClient(action, TestAction)
+        self.goal, self.phases = TestGoal, actionlib.CommState
+        self.client = actionlib.ActionClient(action, TestAction)
         self.client.wait_for_server()
         self.states = {value: name for name, value in vars(GoalStatus).items() if isinstance(value, int)}
 
     def run(self, number: int, is_canceled: Callable[[int], bool]) -> Any:
         feedback: list[int] = []
+        changed = threading.Condition()
 
-        def take(message: Any) -> None:
+        def note(_: Any) -> None:
+            with changed:
+                changed.notify_all()
+
+        def take(handle: Any, message: Any) -> None:
             feedback.append(message.feedback)
-            if is_canceled(number):
-                self.client.cancel_goal()
+            note(handle)
 
-        self.client.send_goal(self.goal(number), feedback_cb=take)
-        if not self.client.wait_for_result(self.rospy.Duration(LONGEST)):
-            return number, "NONE", feedback, None
-        result = self.client.get_result()
-        return number, self.states[self.client.get_state()], feedback, result and result.result
+        handle = self.client.send_goal(self.goal(number), note, take)
+
+        def has_begun() -> bool:
+            return bool(feedback) and handle.get_comm_state() != self.phases.WAITING_FOR_GOAL_ACK
+
+        def has_ended() -> bool:
+            return bool(handle.get_comm_state() == self.phases.DONE)
+
+        with changed:
+            begun = is_canceled(number) and changed.wait_for(lambda: has_begun() or has_ended(), LONGEST)
+        if begun:
+            handle.cancel()
+        with changed:
+            if not changed.wait_for(has_ended, LONGEST):
+                return number, "NONE", feedback, None
+        result = handle.get_result()
+        return number, self.states[handle.get_terminal_state()], feedback, result and result.result
 
 
 class Ros2Client:

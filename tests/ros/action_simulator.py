@@ -1,10 +1,10 @@
 """A simulator's end of the pipe before a model of the action in arm/arm.yaml.
 
-    python action_simulator.py 1|2 [--width BITS ...]
+    python action_simulator.py 1|2 GATE [--width BITS ...]
 
 A goal g leads to g % 4 messages of feedback, g + 1, g + 2 and so on, and to the result g. If bits 4 to 6 of g are set,
-there is one message of feedback, and the result follows a cancellation. Negative goals: see `Goal`. The rest is that of
-tests/node/model_simulator.py.
+there is one message of feedback, and the result follows a cancellation. Negative goals: see `Goal`; GATE is a file. The
+rest is that of tests/node/model_simulator.py.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ HELD = 0x70
 
 
 class Goal(IntEnum):
-    """Goals that do not end well: a rejected frame, a result that rejects it, one that aborts it, silence."""
+    """A rejected frame, a result that rejects the goal, one that aborts it, silence, and a wait until a file exists."""
 
     REFUSED = -1
     REJECTED = -2
     ABORTED = -3
     SILENT = -4
+    GATED = -5
 
 
 # The states of the results, for each version of ROS: succeeded, canceled, aborted, rejected.
@@ -113,6 +114,7 @@ class ActionSimulator(model_simulator.Simulator):
     """The model; `version` is that of ROS."""
 
     version = 1
+    gate = model_simulator.Gate(Path())
     held: int | None = None
     sent = 0
 
@@ -131,12 +133,14 @@ class ActionSimulator(model_simulator.Simulator):
             return report + b"E\0\0" + now.to_bytes(8, "little")
         if number == Goal.SILENT:
             return report
+        if number == Goal.GATED:
+            self.gate.wait()
         if number == Goal.REJECTED:
             self.send(now, RESULT, result_of(self.version, 3, 0))
         elif number == Goal.ABORTED:
             self.send(now, FEEDBACK, feedback_of(self.version, 0))
             self.send(now, RESULT, result_of(self.version, 2, 7))
-        elif number & HELD == HELD:
+        elif number > 0 and number & HELD == HELD:
             self.held = number
             self.send(now, FEEDBACK, feedback_of(self.version, number + 1))
         else:
@@ -153,7 +157,7 @@ class ActionSimulator(model_simulator.Simulator):
 
 
 if __name__ == "__main__":
-    ActionSimulator.version = int(sys.argv.pop(1))
+    ActionSimulator.version, ActionSimulator.gate = int(sys.argv.pop(1)), model_simulator.Gate(Path(sys.argv.pop(1)))
     # The first goal is to take no longer than others.
     frames(ActionSimulator.version)
     model_simulator.Simulator = ActionSimulator  # type: ignore[misc]

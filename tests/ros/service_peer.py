@@ -3,7 +3,8 @@
     python service_peer.py 1|2 SERVICE CALLS SEED
 
 It calls the service so many times and prints as JSON what came that was not the answer to its call. Each request has a
-text that no other one has. A text that begins with a word of `--texts` leads to a failure, which is printed as well.
+text that no other one has. Some texts begin with a word of `--texts`, or all with `--always`; a failure to which they
+lead is printed as well.
 It needs nothing but ROS.
 """
 
@@ -76,6 +77,7 @@ def main() -> None:
     parser.add_argument("calls", type=int)
     parser.add_argument("seed", type=int)
     parser.add_argument("--texts", nargs="*", default=[])
+    parser.add_argument("--always", action="store_true")
     arguments = parser.parse_args()
     source = random.Random(arguments.seed)
     client: Ros1Client | Ros2Client = (Ros1Client if arguments.version == 1 else Ros2Client)(arguments.service)
@@ -84,7 +86,8 @@ def main() -> None:
     wrong, failed = [], []
     for number in range(arguments.calls):
         request = client.make()
-        word = source.choice(arguments.texts) if arguments.texts and source.random() < 0.3 else "call"
+        has_word = arguments.always or (arguments.texts and source.random() < 0.3)
+        word = source.choice(arguments.texts) if has_word else "call"
         text = f"{word} {number} of {arguments.seed} {'x' * source.randrange(40)}"
         request.camera_info.distortion_model = text
         request.camera_info.width = source.randrange(1 << 32)

@@ -1,10 +1,10 @@
 """A simulator's end of the pipe before a model of the service in camera.yaml, or of the client in asking.yaml.
 
-    python service_simulator.py camera|asking 1|2 [--width BITS ...]
+    python service_simulator.py camera|asking 1|2 GATE [--width BITS ...]
 
 The response to a request is that of camera/model.py, unless the request's text begins with `refused` (frame error and
-abort), `aborted` or `silent`. The client sends each name in a request, and the text of each response to a topic. The
-rest is that of tests/node/model_simulator.py.
+abort), `aborted`, `silent`, or `gated`: the response comes when the file GATE exists. The client sends each name in a
+request, and the text of each response to a topic. The rest is that of tests/node/model_simulator.py.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ class ServiceSimulator(model_simulator.Simulator):
     """The model; `version` is that of ROS."""
 
     version = 1
+    gate = model_simulator.Gate(Path())
 
     def take(self, now: int) -> bytes:
         frame = self.waiting[0]
@@ -51,6 +52,8 @@ class ServiceSimulator(model_simulator.Simulator):
         word = message["camera_info"]["distortion_model"].partition(" ")[0]
         (_, answer), *_ = respond("", message)
         reply = pack_frame(0, encode(response, answer))
+        if word == "gated":
+            self.gate.wait()
         if word not in ("refused", "aborted", "silent"):
             self.waiting[0] = reply
             return super().take(now)
@@ -69,6 +72,7 @@ class AskingSimulator(model_simulator.Simulator):
     """The model of the client."""
 
     version = 1
+    gate = model_simulator.Gate(Path())
 
     def take(self, now: int) -> bytes:
         frame = self.waiting[0]
@@ -86,7 +90,7 @@ class AskingSimulator(model_simulator.Simulator):
 if __name__ == "__main__":
     kinds: dict[str, type[ServiceSimulator | AskingSimulator]] = {"camera": ServiceSimulator, "asking": AskingSimulator}
     kind = kinds[sys.argv.pop(1)]
-    kind.version = int(sys.argv.pop(1))
+    kind.version, kind.gate = int(sys.argv.pop(1)), model_simulator.Gate(Path(sys.argv.pop(1)))
     # The first call is to take no longer than others.
     frames(kind.version)
     model_simulator.Simulator = kind  # type: ignore[misc]

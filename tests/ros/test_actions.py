@@ -19,11 +19,10 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.cli import main
-from fusesoc_firm.simulation.simulator import build_simulator
 from tests.ros.action_simulator import HELD, Goal, in_ros2
-from tests.ros.cpp_nodes import Client, Node, NodeProcess, Ros, missing_ros, running_ros
-from tests.ros.live_nodes import REPOSITORY, LiveNode
+from tests.ros.cpp_nodes import Client, NodeProcess
+from tests.ros.live_nodes import REPOSITORY
+from tests.ros.places import Place, diagnoses, running, versions, wait_until_reached
 
 HERE = Path(__file__).resolve().parent
 CLIENTS = 4
@@ -33,51 +32,34 @@ MODULES = {1: "actionlib.msg", 2: "test_msgs.action"}
 
 
 @dataclass
-class Place:
-    """A version of ROS that runs, and a folder with the system of tests/ros/arm."""
+class Arm(Place):
+    """The system of tests/ros/arm."""
 
-    ros: Ros
-    folder: Path
-
-    @property
-    def version(self) -> int:
-        return self.ros.version
-
-    def specification(self) -> Path:
-        spec = self.folder / "arm/arm.yaml"
-        if not spec.exists():
-            shutil.copytree(HERE / "arm", spec.parent)
-            if self.version == 2:
-                spec.write_text(in_ros2(spec.read_text(encoding="utf-8")), encoding="utf-8")
+    def specification(self, time_limit: str = "") -> Path:
+        """The specification, with another time limit of the hardware if one is given."""
+        folder = self.folder / "arm"
+        if not folder.exists():
+            shutil.copytree(HERE / "arm", folder)
+        text = (HERE / "arm/arm.yaml").read_text(encoding="utf-8")
+        text = in_ros2(text) if self.version == 2 else text
+        spec = folder / ("hasty.yaml" if time_limit else "arm.yaml")
+        spec.write_text(text.replace("timeLimit: 100 s", f"timeLimit: {time_limit or '100 s'}"), encoding="utf-8")
         return spec
 
-    def node(self, language: str, transport: str) -> NodeProcess:
+    def node(self, language: str, transport: str, time_limit: str = "") -> NodeProcess:
         """A node in Python or C++."""
-        if language == "python":
-            build = ["--build-root", str(self.folder / "simulators")]
-            return LiveNode(
-                self.ros,
-                self.folder / "node.log",
-                ["live", str(self.specification()), "--transport", transport, *build],
-            )
-        package, program = self.folder / "package", self.folder / "arm_node"
-        if not program.exists():
-            command = ["system", "node", str(self.specification()), "--language", "cpp", "--ros", str(self.version)]
-            assert main([*command, "-o", str(package)]) == 0
-            self.ros.compile(package, program)
-        return Node(self.ros, program, transport, "--drain", "100")
+        return self.node_of(self.specification(time_limit), language, transport)
 
     @property
     def model(self) -> str:
         """The address of the model of the hardware."""
         script = HERE / "action_simulator.py"
-        return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {script} {self.version} --width 32"
+        return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {script} {self.version} {self.gate.path} --width 32"
 
     @property
     def hardware(self) -> str:
         """The address of the VHDL in GHDL."""
-        build_root = self.folder / "simulators"
-        return f"pipe:{build_simulator(self.specification(), 'ghdl', build_root=build_root).script()}"
+        return self.simulator(self.specification())
 
     def cpp_client(self, goals: int, seed: int) -> Client:
         """A client of actionlib for roscpp."""
@@ -96,28 +78,21 @@ class Place:
         return Client(self.ros, [*script, *words])
 
 
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"actions_{version}")) for version in (1, 2)],
-    ids=["ros1", "ros2"],
-)
-def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder = tmp_path_factory.mktemp(f"actions{request.param}")
-    if reason := missing_ros(request.param):
-        pytest.skip(reason)
-    with running_ros(request.param, folder) as ros:
-        module = MODULES[request.param]
+@pytest.fixture(scope="module", params=versions("actions"))
+def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Arm]:
+    with running(request, tmp_path_factory) as (ros, folder):
+        module = MODULES[ros.version]
         done = subprocess.run(
             [ros.python, "-c", f"import {module}"], env=dict(ros.environment), capture_output=True, check=False
         )
         if done.returncode:
             pytest.skip(f"{ros.python} lacks {module}")
-        if request.param == 1 and subprocess.run(["pkg-config", "--exists", "actionlib"], check=False).returncode:
+        if ros.version == 1 and subprocess.run(["pkg-config", "--exists", "actionlib"], check=False).returncode:
             pytest.skip("actionlib is not installed (libactionlib-dev)")
-        yield Place(ros, folder)
+        yield Arm(ros, folder)
 
 
-def run_at_once(place: Place, node: NodeProcess, clients: Sequence[Client]) -> list[list[Any]]:
+def run_at_once(node: NodeProcess, clients: Sequence[Client]) -> list[list[Any]]:
     """What all clients found, one list for each."""
     try:
         assert [client.line() for client in clients] == ["ready\n"] * len(clients), node.said()
@@ -147,7 +122,7 @@ def check_counts(node: NodeProcess, **counts: int) -> None:
     names = ("goals", "succeeded", "canceled", "aborted", "rejected")
     values = [sum(counts.values()), *(counts.get(name, 0) for name in names[1:])]
     python = r"^count +{} +{} +{} +{} +{}$".format(*values)
-    cpp = "^its actions: {} goals, {} succeeded, {} canceled, {} aborted, {} rejected".format(*values)
+    cpp = "^count: {} goals, {} succeeded, {} canceled, {} aborted, {} rejected".format(*values)
     assert re.search(f"{python}|{cpp}", node.said(), re.MULTILINE), node.said()
 
 
@@ -162,7 +137,7 @@ RUNS = product(("python", "cpp"), ("model", "hardware"), (FEW, MANY))
 
 
 @pytest.mark.parametrize(("language", "where", "goals"), [goals_of_each(*run) for run in RUNS])
-def test_four_clients_at_once_get_their_own_results(place: Place, language: str, where: str, goals: int) -> None:
+def test_four_clients_at_once_get_their_own_results(place: Arm, language: str, where: str, goals: int) -> None:
     """Each goal has its own number, feedback and result; some are canceled while the hardware holds them.
 
     In ROS 1, two of the clients are of roscpp.
@@ -172,7 +147,7 @@ def test_four_clients_at_once_get_their_own_results(place: Place, language: str,
         print(f"seeds {seeds}")
         clients = [place.client("--random", str(goals), str(seed)) for seed in seeds[: 2 if place.version == 1 else 4]]
         clients += [place.cpp_client(goals, seed) for seed in seeds[len(clients) :]]
-        found = [item for goals_of_client in run_at_once(place, node, clients) for item in goals_of_client]
+        found = [item for goals_of_client in run_at_once(node, clients) for item in goals_of_client]
         assert faults(place.version, found) == []
         assert len({item[0] for item in found}) == CLIENTS * goals
         canceled = sum(item[1] == CANCELED[place.version] for item in found)
@@ -181,38 +156,52 @@ def test_four_clients_at_once_get_their_own_results(place: Place, language: str,
 
 @pytest.mark.check
 @pytest.mark.parametrize("language", ["python", "cpp"])
-def test_goals_that_fail_are_rejected_or_aborted(place: Place, language: str) -> None:
-    """Hardware rejects the frame of a goal, rejects the goal, gives up after feedback, or says nothing."""
-    with place.node(language, place.model) as node:
-        client = place.client("--goals", *map(str, [*Goal, 3, HELD]))
-        (found,) = run_at_once(place, node, [client])
+def test_goals_that_fail_are_rejected_or_aborted(place: Arm, language: str) -> None:
+    """Hardware rejects the frame of a goal, rejects the goal, or gives up after feedback."""
+    with place.node(language, place.model) as node, diagnoses(place.ros, "arm: node") as reports:
+        goals = [Goal.REFUSED, Goal.REJECTED, Goal.ABORTED, 3, HELD]
+        (found,) = run_at_once(node, [place.client("--goals", *map(str, goals))])
         nothing = 0 if place.version == 1 else None
         assert [(goal, state, result) for goal, state, _, result in found] == [
             (Goal.REFUSED, "REJECTED", nothing),
             (Goal.REJECTED, "REJECTED", nothing),
             (Goal.ABORTED, "ABORTED", 7),
-            # The time limit is that of acceptance, too.
-            (Goal.SILENT, *(("REJECTED", 0) if place.version == 1 else ("REJECTED", None))),
             (3, SUCCEEDED, 3),
             (HELD, CANCELED[place.version], HELD),
         ]
-        check_counts(node, rejected=3, aborted=1, succeeded=1, canceled=1)
+        counts = {"rejected": 2, "aborted": 1, "succeeded": 1, "canceled": 1}
+        published = {f"count {name}": count for name, count in {**counts, "goals": 5, "unasked": 0}.items()}
+        assert next(report for report in reports if published.items() <= report.items())
+        check_counts(node, **counts)
 
 
 @pytest.mark.check
 @pytest.mark.parametrize("language", ["python", "cpp"])
-def test_a_client_that_dies_harms_nobody(place: Place, language: str) -> None:
-    """A client is killed whose goal the hardware does not finish; the goal of the other one waits, and is reached."""
+def test_a_goal_without_an_answer_is_rejected_in_time(place: Arm, language: str) -> None:
+    """The time limit comes before that of acceptance."""
+    with place.node(language, place.model, "2 s") as node:
+        (found,) = run_at_once(node, [place.client("--goals", str(Goal.SILENT))])
+        assert found == [[Goal.SILENT, "REJECTED", [], 0 if place.version == 1 else None]]
+        assert "rejected: no answer within 2" in node.said()
+        check_counts(node, rejected=1)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_a_client_that_dies_harms_nobody(place: Arm, language: str) -> None:
+    """A client is killed while the hardware has its goal; the goals of the other one wait, and are reached."""
+    place.gate.close()
     with place.node(language, place.model) as node:
-        dying, other = place.client("--goals", str(Goal.SILENT)), place.client("--goals", "5", str(HELD + 1))
+        dying, other = place.client("--goals", str(Goal.GATED)), place.client("--goals", "5", str(HELD + 1))
         try:
             assert dying.line() == other.line() == "ready\n"
             dying.begin()
-            node.wait_until_said("no answer within 5")
+            wait_until_reached(place.gate, node)
             dying.end()
             other.begin()
+            place.gate.open()
             assert faults(place.version, json.loads(other.line())) == []
         finally:
             dying.end()
             other.end()
-        assert node.stop() == 0
+        check_counts(node, succeeded=2, canceled=1)

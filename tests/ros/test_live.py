@@ -20,8 +20,9 @@ from urllib.request import Request, urlopen
 import pytest
 
 from fusesoc_firm.cli import main
-from tests.ros.cpp_nodes import Peer, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Peer, Ros
 from tests.ros.live_nodes import LiveNode, model_address, paced, specification
+from tests.ros.places import running, versions
 
 # Topics of no bytes and of any number, with no accelerator between.
 pytestmark = pytest.mark.check
@@ -91,16 +92,9 @@ class Place:
         )
 
 
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"live_{version}")) for version in (1, 2)],
-    ids=["ros1", "ros2"],
-)
+@pytest.fixture(scope="module", params=versions("live"))
 def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder = tmp_path_factory.mktemp(f"live{request.param}")
-    if reason := missing_ros(request.param):
-        pytest.skip(reason)
-    with running_ros(request.param, folder) as ros:
+    with running(request, tmp_path_factory) as (ros, folder):
         yield Place(ros, folder)
 
 

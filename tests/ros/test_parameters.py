@@ -15,8 +15,9 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from tests.ros.cpp_nodes import NodeProcess, Peer, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import NodeProcess, Peer, Ros
 from tests.ros.live_nodes import REPOSITORY, model_address
+from tests.ros.places import running, versions
 
 pytestmark = pytest.mark.check
 
@@ -79,18 +80,9 @@ class Place:
         return Peer(self.ros, {"/arm/out": point}, {"/arm/in": point})
 
 
-@pytest.fixture(
-    scope="module",
-    params=[
-        pytest.param(version, marks=pytest.mark.xdist_group(f"parameters_{version}"), id=f"ros{version}")
-        for version in (1, 2)
-    ],
-)
+@pytest.fixture(scope="module", params=versions("parameters"))
 def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder = tmp_path_factory.mktemp(f"ros{request.param}")
-    if reason := missing_ros(request.param):
-        pytest.skip(reason)
-    with running_ros(request.param, folder) as ros:
+    with running(request, tmp_path_factory) as (ros, folder):
         yield Place(ros, folder)
 
 

@@ -12,6 +12,7 @@ import re
 import signal
 import struct
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -23,8 +24,9 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity
-from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros
 from tests.ros.live_nodes import LiveNode, model_address, paced, specification
+from tests.ros.places import running, versions
 
 RATE, SECONDS = 1000, 30
 # Processes on a computer share the names of systems whose status they serve.
@@ -128,21 +130,19 @@ class Place:
         return int.from_bytes(image[19:23] if self.ros.version == 1 else image[20:24], "little")
 
 
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"qos_{version}")) for version in (1, 2)],
-    ids=["ros1", "ros2"],
-)
+@pytest.fixture(scope="module", params=versions("qos"))
 def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder = tmp_path_factory.mktemp(f"qos{request.param}")
-    if reason := missing_ros(request.param):
-        pytest.skip(reason)
-    with running_ros(request.param, folder) as ros:
+    with running(request, tmp_path_factory) as (ros, folder):
         yield Place(ros, folder)
 
 
 check = pytest.mark.check
 both_kinds = pytest.mark.parametrize("kind", ["live", "cpp"])
+
+
+def state(task: Path) -> str:
+    """The letter of a thread's state in Linux."""
+    return (task / "stat").read_text().rpartition(")")[2].split()[0]
 
 
 @contextmanager
@@ -152,6 +152,9 @@ def stopped(node: NodeProcess) -> Iterator[None]:
     if isinstance(node, LiveNode):
         (number,) = [found for line, found in node.children().items() if "node/bridge" in line]
     os.kill(number, signal.SIGSTOP)
+    # Each of its threads stops when it runs next.
+    while any(state(task) != "T" for task in Path(f"/proc/{number}/task").iterdir()):
+        time.sleep(0.01)
     try:
         yield
     finally:
@@ -260,9 +263,17 @@ def test_counts_are_published_as_diagnostics(place: Place, kind: str, capsys: py
                 for number in range(2, MESSAGES):
                     peer.publish("/image_in", place.image(number))
                 peer.wait_until_published()
+            # After it, all others have come, or were lost.
+            peer.publish("/image_in", place.image(MESSAGES))
+            while place.number(peer.take()[1]) != MESSAGES:
+                continue
             own = (status for status in statuses if status["name"] == f"{NAME}: node")
             warning = next(status for status in own if status["level"])
-            calm = next(status for status in own if not status["level"])
+            prefix = "image_in " if kind == "live" else ""
+            names = [f"{prefix}{name}" for name in ("received", "dropped", "sent", "lost")]
+            calm = (status for status in own if not status["level"])
+            told = (tuple(int(status["values"][name]) for name in names) for status in calm)
+            last = next(found for found in told if found[0] + found[3] == MESSAGES + 1 == sum(found[1:]))
         finally:
             watcher.kill()
         assert node.stop() == 0
@@ -270,12 +281,9 @@ def test_counts_are_published_as_diagnostics(place: Place, kind: str, capsys: py
     hardware["values"].pop("accesses without an answer")
     assert hardware["values"] == {name: str(count) for name, count in HARDWARE.items()}
     assert re.search(r"text_in +\w{8} +17 +0 cycles  2 of code 7\n", capsys.readouterr().out)
-    prefix = "image_in " if kind == "live" else ""
     assert warning["level"] == 1
-    assert int(first["values"][prefix + "received"]) == 0
-    received, dropped, sent, lost = counts(node, "image_in")
-    expected = {"received": received, "dropped": dropped, "sent": sent, "lost": lost}
-    assert {name: int(calm["values"][prefix + name]) for name in expected} == expected
+    assert int(first["values"][names[0]]) == 0
+    assert last == counts(node, "image_in")
 
 
 @pytest.mark.thorough

@@ -18,79 +18,52 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.cli import main
-from fusesoc_firm.simulation.simulator import build_simulator
-from tests.ros.cpp_nodes import Client, Node, NodeProcess, Peer, Ros, missing_ros, running_ros
-from tests.ros.live_nodes import REPOSITORY, LiveNode
+from tests.ros.cpp_nodes import Client, NodeProcess, Peer
+from tests.ros.live_nodes import REPOSITORY
+from tests.ros.places import Place, diagnoses, running, versions, wait_until_reached
 
 HERE = Path(__file__).resolve().parent
 CLIENTS = 4
-REASONS = {
-    "refused": "the hardware rejected the request",
-    "aborted": "the hardware aborted the response",
-    "silent": "no answer within 5",
-}
-# Each silence takes the time limit.
-TEXTS = [*["refused", "aborted"] * 4, "silent"]
+REASONS = {"refused": "the hardware rejected the request", "aborted": "the hardware aborted the response"}
 
 
 @dataclass
-class Place:
-    """A version of ROS that runs, and a folder with the systems of tests/ros/camera, of which one is meant."""
+class Camera(Place):
+    """The systems of tests/ros/camera, of which one is meant."""
 
-    ros: Ros
-    folder: Path
     system: str = "camera"
 
-    @property
-    def version(self) -> int:
-        return self.ros.version
-
-    def specification(self) -> Path:
-        spec = self.folder / f"camera/{self.system}.yaml"
-        if not spec.parent.exists():
-            shutil.copytree(HERE / "camera", spec.parent)
+    def specification(self, time_limit: str = "") -> Path:
+        """The specification, with another time limit of the hardware if one is given."""
+        folder = self.folder / "camera"
+        if not folder.exists():
+            shutil.copytree(HERE / "camera", folder)
             # The source of hardware that only a model stands for.
-            (spec.parent / "ask.vhd").touch()
+            (folder / "ask.vhd").touch()
         text = (HERE / f"camera/{self.system}.yaml").read_text(encoding="utf-8")
         if self.version == 2:
             text = text.replace("middleware: ROS", "middleware: ROS2").replace("SetCameraInfoRe", "SetCameraInfo_Re")
-        spec.write_text(text, encoding="utf-8")
+        spec = folder / ("hasty.yaml" if time_limit else f"{self.system}.yaml")
+        spec.write_text(text.replace("timeLimit: 100 s", f"timeLimit: {time_limit or '100 s'}"), encoding="utf-8")
         return spec
 
-    def node(self, language: str, transport: str = "") -> NodeProcess:
-        """A node in Python or C++, by default before the VHDL in GHDL."""
-        if language == "python":
-            return self._live(*(["--transport", transport] if transport else []))
-        return self._cpp(transport or f"pipe:{self._simulator()}")
+    def node(self, language: str, transport: str, time_limit: str = "") -> NodeProcess:
+        """A node in Python or C++."""
+        return self.node_of(self.specification(time_limit), language, transport)
 
-    def _simulator(self) -> Path:
-        return build_simulator(self.specification(), "ghdl", build_root=self.folder / "simulators").script()
+    @property
+    def hardware(self) -> str:
+        """The address of the VHDL in GHDL."""
+        return self.simulator(self.specification())
 
-    def _cpp(self, transport: str) -> Node:
-        package, program = self.folder / f"{self.system}_package", self.folder / f"{self.system}_node"
-        if not program.exists():
-            command = ["system", "node", str(self.specification()), "--language", "cpp", "--ros", str(self.version)]
-            assert main([*command, "-o", str(package)]) == 0
-            self.ros.compile(package, program, self._header(package))
-        return Node(self.ros, program, transport, "--drain", "100")
-
-    def _header(self, package: Path) -> Path:
-        """What both nodes include, compiled once."""
-        header = self.folder / f"ros{self.version}_nodes.hpp"
-        return header if header.exists() else self.ros.precompile(package, self.folder)
-
-    def _live(self, *arguments: str) -> LiveNode:
-        build = ["--build-root", str(self.folder / "simulators")]
-        spec = str(self.specification())
-        return LiveNode(self.ros, self.folder / "node.log", ["live", spec, *arguments, *build])
-
-    def client(self, kind: str, calls: int, seed: int, texts: Sequence[str] = ()) -> Client:
-        """A client of rospy or rclpy, or of roscpp."""
+    def client(self, kind: str, calls: int, seed: int, texts: Sequence[str] = (), *, always: bool = False) -> Client:
+        """A client of rospy or rclpy, or of roscpp; some requests begin with one of the texts, or all."""
         words = ["/set_camera_info", str(calls), str(seed)]
         if kind == "python":
             script = [self.ros.python, str(HERE / "service_peer.py"), str(self.version)]
-            return Client(self.ros, [*script, *words, *(["--texts", *texts] if texts else [])])
+            return Client(
+                self.ros, [*script, *words, *(["--texts", *texts] if texts else []), *(["--always"] if always else [])]
+            )
         program = self.folder / "client"
         if not program.exists():
             options = ["-std=c++17", "-O1", "-pthread", str(HERE / "service_client.cpp"), "-o", str(program)]
@@ -103,24 +76,18 @@ class Place:
     def model(self) -> str:
         """The address of the model of the hardware."""
         script = HERE / "service_simulator.py"
-        return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {script} {self.system} {self.version} --width 32"
+        command = f"{sys.executable} {script} {self.system} {self.version} {self.gate.path}"
+        return f"pipe:env PYTHONPATH={REPOSITORY} {command} --width 32"
 
 
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"services_{version}")) for version in (1, 2)],
-    ids=["ros1", "ros2"],
-)
-def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder = tmp_path_factory.mktemp(f"services{request.param}")
-    if reason := missing_ros(request.param):
-        pytest.skip(reason)
-    with running_ros(request.param, folder) as ros:
-        yield Place(ros, folder)
+@pytest.fixture(scope="module", params=versions("services"))
+def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Camera]:
+    with running(request, tmp_path_factory) as (ros, folder):
+        yield Camera(ros, folder)
 
 
 def call_at_once(
-    place: Place, node: NodeProcess, kinds: Sequence[str], calls: int, texts: Sequence[str] = ()
+    place: Camera, node: NodeProcess, kinds: Sequence[str], calls: int, texts: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
     """What came to all clients that was wrong or failed; each call has a text of its own."""
     seeds = [random.randrange(2**32) for _ in kinds]
@@ -141,7 +108,7 @@ def check_counts(node: NodeProcess, answered: int, failed: int) -> None:
     assert node.stop() == 0, node.said()
     counts = (answered + failed, answered, failed, 0)
     python = r"^set_camera_info +{} +{} +{} +{}$".format(*counts)
-    cpp = "^its services: {} called, {} answered, {} failed, {} unasked$".format(*counts)
+    cpp = "^set_camera_info: {} called, {} answered, {} failed, {} unasked$".format(*counts)
     assert re.search(f"{python}|{cpp}", node.said(), re.MULTILINE), node.said()
 
 
@@ -149,50 +116,70 @@ def check_counts(node: NodeProcess, answered: int, failed: int) -> None:
 @pytest.mark.parametrize(
     "calls", [pytest.param(20, marks=pytest.mark.check), pytest.param(250, marks=pytest.mark.thorough)]
 )
-def test_four_clients_at_once_get_their_own_answers(place: Place, calls: int, language: str) -> None:
+def test_four_clients_at_once_get_their_own_answers(place: Camera, calls: int, language: str) -> None:
     """The whole way: clients of ROS, two of them of roscpp in ROS 1, the node, the VHDL in GHDL."""
     kinds = ["python", "python", *["cpp" if place.version == 1 else "python"] * 2]
-    with place.node(language) as node:
+    with place.node(language, place.hardware) as node:
         assert call_at_once(place, node, kinds, calls) == [{"wrong": [], "failed": []}] * CLIENTS
         check_counts(node, CLIENTS * calls, 0)
 
 
 @pytest.mark.check
 @pytest.mark.parametrize("language", ["python", "cpp"])
-def test_what_hardware_refuses_fails_at_its_client_only(place: Place, language: str) -> None:
+def test_what_hardware_refuses_fails_at_its_client_only(place: Camera, language: str) -> None:
     """ROS 1 tells the reason; in ROS 2, `success` is false."""
-    with place.node(language, place.model) as node:
-        results = call_at_once(place, node, ["python"] * CLIENTS, 15, TEXTS)
+    with place.node(language, place.model) as node, diagnoses(place.ros, "camera: node") as reports:
+        results = call_at_once(place, node, ["python"] * CLIENTS, 15, [*REASONS])
         failed = [item for result in results for item in result["failed"]]
         assert [item for result in results for item in result["wrong"]] == []
         for text, reason in failed:
             told = REASONS[text.partition(" ")[0]]
             assert (told if place.version == 1 else "the hardware did not answer") in reason, (text, reason)
-        check_counts(node, CLIENTS * 15 - len(failed), len(failed))
+        counts = {"called": CLIENTS * 15, "answered": CLIENTS * 15 - len(failed), "failed": len(failed), "unasked": 0}
+        published = {f"set_camera_info {name}": count for name, count in counts.items()}
+        assert next(report for report in reports if published.items() <= report.items())
+        check_counts(node, counts["answered"], counts["failed"])
 
 
 @pytest.mark.check
 @pytest.mark.parametrize("language", ["python", "cpp"])
-def test_a_client_that_dies_harms_nobody(place: Place, language: str) -> None:
-    """One of two clients is killed during calls that the hardware does not answer; the other one gets all answers."""
+def test_a_call_without_an_answer_fails_in_time(place: Camera, language: str) -> None:
+    with place.node(language, place.model, "2 s") as node:
+        client = place.client("python", 1, 1, ["silent"], always=True)
+        try:
+            assert client.line() == "ready\n"
+            client.begin()
+            ((_, reason),) = json.loads(client.line())["failed"]
+        finally:
+            client.end()
+        assert ("no answer within 2" if place.version == 1 else "the hardware did not answer") in reason
+        check_counts(node, 0, 1)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_a_client_that_dies_harms_nobody(place: Camera, language: str) -> None:
+    """One of two clients is killed while the hardware has its call; the other one gets all answers."""
+    place.gate.close()
     with place.node(language, place.model) as node:
-        dying, other = place.client("python", 1_000_000, 1, ["silent"]), place.client("python", 30, 2)
+        dying, other = place.client("python", 1, 1, ["gated"], always=True), place.client("python", 30, 2)
         try:
             assert dying.line() == other.line() == "ready\n"
             dying.begin()
-            node.wait_until_said("no answer within 5")
+            wait_until_reached(place.gate, node)
+            dying.end()
             other.begin()
-            dying.process.kill()
+            place.gate.open()
             assert json.loads(other.line()) == {"wrong": [], "failed": []}
         finally:
             for client in (dying, other):
                 client.end()
-        assert node.stop() == 0
+        check_counts(node, 31, 0)
 
 
 @pytest.mark.check
 @pytest.mark.parametrize("language", ["python", "cpp"])
-def test_hardware_calls_a_service(place: Place, language: str) -> None:
+def test_hardware_calls_a_service(place: Camera, language: str) -> None:
     """Each call gets its answer, in order; a call that fails is not successful."""
     asking = replace(place, system="asking")
     names = [f"{'no' if number % 5 == 3 else 'yes'} {number}" for number in range(15)]
@@ -206,7 +193,7 @@ def test_hardware_calls_a_service(place: Place, language: str) -> None:
 
 @pytest.mark.check
 @pytest.mark.parametrize("language", ["python", "cpp"])
-def test_a_call_without_a_server_fails_at_once(place: Place, language: str) -> None:
+def test_a_call_without_a_server_fails_at_once(place: Camera, language: str) -> None:
     asking = replace(place, system="asking")
     topics = {"/name_out": "std_msgs/String"}, {"/name_in": "std_msgs/String"}
     if place.version == 2:

@@ -53,7 +53,7 @@ def test_an_action_is_four_converters(tmp_path: Path, version: int) -> None:
     assert [item.block for item in system.publishers] == ["count_feedback", "count_result"]
     ros, type_ = {1: (ROS1, "actionlib/Test"), 2: (ROS2, "test_msgs/Fibonacci")}[version]
     ends = ("count_goal", "count_cancel", "count_feedback", "count_result")
-    assert system.actions == (Action("count", MessageName(*type_.split("/")), ros, "count", *ends, 5.0, 20.0),)
+    assert system.actions == (Action("count", MessageName(*type_.split("/")), ros, "count", *ends, 100.0, 100.0),)
     names = [item.name for item in (*system.subscribers, *system.publishers)]
     if version == 1:
         # Those in bags.

@@ -6,7 +6,8 @@ import functools
 import time
 from typing import Any
 
-from .channel import DIAGNOSTICS, DONE, Channel
+from .channel import DIAGNOSTICS, DONE, STOP, Channel
+from .managed import managed_node
 from .ros import FLUSH_SECONDS, KINDS, LOOK_SECONDS, BridgeError, Ends, Gaps, Ros, type_report
 from .ros2_types import SERVICE_DEPTH, message_class, service_class
 
@@ -23,7 +24,9 @@ class Ros2(Ros):
         self._rclpy = rclpy
         types = {topic["type"]: message_class(topic["type"]) for kind in KINDS for topic in config[kind]}
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node(config["name"])
+        # A node with lifecycle states carries messages, calls and goals only while it is active.
+        self._is_active = not config["is_managed"]
+        self._node = rclpy.create_node(config["name"]) if self._is_active else self._managed(config["name"])
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         # The number of callbacks so far.
@@ -40,12 +43,35 @@ class Ros2(Ros):
             for topic in config["publishers"]
         }
         self._add_diagnostics(config["diagnostics"])
-        self._services = {number: self._service(number, item) for number, item in self._servers.items()}
+        self._services: dict[int, Any] = {}
+        if self._is_active:
+            self._serve()
         self._callers = {number: self._caller(item) for number, item in self._clients.items()}
         self._subscribers = {
             topic["number"]: self._subscription(topic, types[topic["type"]]) for topic in config["subscribers"]
         }
         self._check_hashes()
+
+    def _managed(self, name: str) -> Any:
+        def end() -> None:
+            self._channel.send(STOP)
+
+        return managed_node(name, self._change, end)
+
+    def _change(self, is_active: bool) -> None:
+        """Begin or cease to carry messages. Clients see that an inactive node has no services and no actions."""
+        if is_active == self._is_active:
+            return
+        self._is_active = is_active
+        if is_active:
+            self._serve()
+            return
+        for service in self._services.values():
+            self._node.destroy_service(service)
+        self._services.clear()
+
+    def _serve(self) -> None:
+        self._services = {number: self._service(number, item) for number, item in self._servers.items()}
 
     def _add_diagnostics(self, topic: dict[str, Any]) -> None:
         try:
@@ -80,7 +106,8 @@ class Ros2(Ros):
         """Send the response; a call that failed has none in ROS 2."""
         from rclpy.serialization import deserialize_message
 
-        if payload is None:
+        # A node that is no longer active has no clients.
+        if payload is None or service not in self._services:
             return
         try:
             self._senders[service](deserialize_message(payload, self._services[service].srv_type.Response), asker)
@@ -98,6 +125,9 @@ class Ros2(Ros):
         from rclpy.serialization import deserialize_message
 
         client = self._callers[service]
+        if not self._is_active:
+            self.give_answer(service, number, None, "the node is not active")
+            return
         if not client.service_is_ready():
             self.give_answer(service, number, None, f"there is no server of {client.srv_name}")
             return
@@ -126,13 +156,16 @@ class Ros2(Ros):
 
         def taken(payload: bytes, info: dict[str, int]) -> None:
             self._handled += 1
-            self.take(number, payload)
+            if self._is_active:
+                self.take(number, payload)
             # The message need not wait for the look at the publishers.
-            self.lose(number, self._missing(number, info))
+            missing = self._missing(number, info)
+            if self._is_active:
+                self.lose(number, missing)
 
         def lost(event: Any) -> None:
             self._handled += 1
-            if not self._has_one_publisher(number):
+            if self._is_active and not self._has_one_publisher(number):
                 self.lose(number, event.total_count_change)
 
         create = functools.partial(
@@ -191,7 +224,7 @@ class Ros2(Ros):
         """Return the names of the topics and services after remapping."""
         return {
             "services": {
-                **{number: end.service_name for number, end in self._services.items()},
+                **{number: self._node.resolve_service_name(end["name"]) for number, end in self._servers.items()},
                 **{number: end.service_name for number, end in self._callers.items()},
             },
             "subscribers": {number: topic.topic_name for number, topic in self._subscribers.items()},
@@ -201,8 +234,8 @@ class Ros2(Ros):
         }
 
     def publish(self, topic: int, payload: bytes) -> None:
-        """Publish a message; `/diagnostics` may have no publisher."""
-        if topic in self._publishers:
+        """Publish a message; `/diagnostics` may have no publisher, and is published in every state."""
+        if topic in self._publishers and (self._is_active or topic == DIAGNOSTICS):
             self._publishers[topic].publish(payload)
 
     def stop(self) -> None:

@@ -28,11 +28,12 @@
 
 namespace firm {
 
-// An action that the hardware serves: the ids of the converters of its messages, its topics and services. The topics to
+// An action that the hardware serves: the name of its block, the ids of the converters of its messages, its topics and services. The topics to
 // the node are goals and cancellations (ROS 1), those from it are states, feedback and, in ROS 1, results. The services
 // of ROS 2 are those of goals, cancellations and results. If the hardware sends nothing about its goal for `limit`, the
 // goal fails; after `accept_limit`, it is accepted. `no_result` is the payload of a result without contents.
 struct Action {
+  std::string block;
   unsigned goal;
   unsigned cancel;
   unsigned feedback;
@@ -168,6 +169,8 @@ class ActionServer {
     if (!current_) return take_unasked("feedback");
     line_.extend();
     accept(current_);
+    // A client of actionlib gives up a goal that it cancels before it knows its state.
+    if (has_news_) publish_states();
     try {
       publish(kFeedback, messages().feedback(current_->status(), payload));
     } catch (const MessageError& error) {
@@ -305,6 +308,8 @@ class ActionServer {
         } else if (goal->state != GoalState::kCanceling) {
           accept(goal);
           goal->state = GoalState::kCanceling;
+          // The hardware has not been silent about a cancellation that it does not have yet.
+          line_.extend();
           begun.push_back(goal->reference);
         }
       }
@@ -566,18 +571,11 @@ class NodeActions {
     for (const auto& server : servers_) server->close();
   }
 
-  GoalStatistics statistics() const {
-    GoalStatistics sum;
-    for (const auto& server : servers_) {
-      const GoalStatistics counted = server->statistics();
-      sum.goals += counted.goals;
-      sum.succeeded += counted.succeeded;
-      sum.canceled += counted.canceled;
-      sum.aborted += counted.aborted;
-      sum.rejected += counted.rejected;
-      sum.unasked += counted.unasked;
-    }
-    return sum;
+  // Return the counts of each action, in their order.
+  std::vector<GoalStatistics> statistics() const {
+    std::vector<GoalStatistics> found;
+    for (const auto& server : servers_) found.push_back(server->statistics());
+    return found;
   }
 
  private:

@@ -13,7 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include <firm/actions.hpp>
 #include <firm/node.hpp>
+#include <firm/services.hpp>
 #include <firm/topic.hpp>
 
 namespace firm {
@@ -88,6 +90,26 @@ inline Report report_of(const std::string& name, const Node& node, std::uint64_t
            {"restarts", counted.restarts},
            {"lost", lost}},
           counted.dropped + counted.errors + counted.restarts + lost};
+}
+
+// Add the counts of a service to a report, by the name of its block.
+inline void add_counts(Report& report, const std::string& block, const CallStatistics& counted) {
+  report.counts.insert(report.counts.end(), {{block + " called", counted.called},
+                                             {block + " answered", counted.answered},
+                                             {block + " failed", counted.failed},
+                                             {block + " unasked", counted.unasked}});
+  report.troubles += counted.failed + counted.unasked;
+}
+
+// Add the counts of an action to a report, by the name of its block.
+inline void add_counts(Report& report, const std::string& block, const GoalStatistics& counted) {
+  report.counts.insert(report.counts.end(), {{block + " goals", counted.goals},
+                                             {block + " succeeded", counted.succeeded},
+                                             {block + " canceled", counted.canceled},
+                                             {block + " aborted", counted.aborted},
+                                             {block + " rejected", counted.rejected},
+                                             {block + " unasked", counted.unasked}});
+  report.troubles += counted.aborted + counted.rejected + counted.unasked;
 }
 
 // Publishes reports each second, with a warning if a count of trouble has grown.

@@ -358,10 +358,18 @@ class Engines {
     actions_.drain(longest);
   }
 
-  NodeCalls& calls() { return calls_; }
   NodeActions& actions() { return actions_; }
   Node& hardware() { return *hardware_; }
   Node* software() { return software_.get(); }
+
+  // Call these functions with the block and the counts of each service, and of each action.
+  template <typename TakeCalls, typename TakeGoals>
+  void for_each_count(TakeCalls take_calls, TakeGoals take_goals) const {
+    const auto calls = calls_.statistics();
+    for (std::size_t index = 0; index < calls.size(); ++index) take_calls(system_.services[index].block, calls[index]);
+    const auto goals = actions_.statistics();
+    for (std::size_t index = 0; index < goals.size(); ++index) take_goals(system_.actions[index].block, goals[index]);
+  }
 
   bool has_status() const { return system_.has_status_frames() || registers_.has_value(); }
 
@@ -461,13 +469,13 @@ inline void print_statistics(const std::string& name, const Node& node, std::uin
             << " restarts, " << lost << " lost by ROS" << std::endl;
 }
 
-inline void print_calls(const CallStatistics& counted) {
-  std::cerr << "its services: " << counted.called << " called, " << counted.answered << " answered, " << counted.failed
+inline void print_calls(const std::string& block, const CallStatistics& counted) {
+  std::cerr << block << ": " << counted.called << " called, " << counted.answered << " answered, " << counted.failed
             << " failed, " << counted.unasked << " unasked" << std::endl;
 }
 
-inline void print_goals(const GoalStatistics& counted) {
-  std::cerr << "its actions: " << counted.goals << " goals, " << counted.succeeded << " succeeded, " << counted.canceled
+inline void print_goals(const std::string& block, const GoalStatistics& counted) {
+  std::cerr << block << ": " << counted.goals << " goals, " << counted.succeeded << " succeeded, " << counted.canceled
             << " canceled, " << counted.aborted << " aborted, " << counted.rejected << " rejected, " << counted.unasked
             << " unasked" << std::endl;
 }
@@ -530,6 +538,8 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
     engines.actions().tick();
     diagnosis.tell([&] {
       std::vector<Report> reports{report_of(system.name + ": node", engines.hardware(), ros.lost())};
+      const auto add = [&](const std::string& block, const auto& counted) { add_counts(reports[0], block, counted); };
+      engines.for_each_count(add, add);
       if (watch) reports.push_back(watch->report(system.name + ": hardware"));
       if (engines.software()) reports.push_back(report_of(system.name + ": software", *engines.software()));
       return reports;
@@ -545,8 +555,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   ros.flush();
   print_statistics(system.name + "_node", engines.hardware(), ros.lost());
   if (software) print_statistics("its software", *engines.software());
-  if (!system.services.empty()) print_calls(engines.calls().statistics());
-  if (!system.actions.empty()) print_goals(engines.actions().statistics());
+  engines.for_each_count(print_calls, print_goals);
   return status;
 }
 

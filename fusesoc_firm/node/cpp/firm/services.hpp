@@ -28,10 +28,11 @@
 
 namespace firm {
 
-// A service that the hardware serves, or calls: the ids of the converters of its messages, its name in ROS, its type and
-// signature, and the types of its messages. A call is answered within `limit`. `failure` is the response to a call that
+// A service that the hardware serves, or calls: the name of its block, the ids of the converters of its messages, its name
+// in ROS, its type and signature, and the types of its messages. A call is answered within `limit`. `failure` is the response to a call that
 // fails, if the response has a field `success`; otherwise, it is empty.
 struct Service {
+  std::string block;
   bool is_server;
   unsigned request;
   unsigned response;
@@ -232,7 +233,10 @@ class NodeCalls {
 
   // `tells_failures`: the middleware has an answer for a call that fails.
   NodeCalls(std::vector<Service> services, bool tells_failures, Put put)
-      : services_(std::move(services)), tells_failures_(tells_failures), put_(std::move(put)) {
+      : services_(std::move(services)),
+        tells_failures_(tells_failures),
+        put_(std::move(put)),
+        statistics_(services_.size()) {
     for (const auto& service : services_) {
       (service.is_server ? responses_ : requests_)[service.is_server ? service.response : service.request] =
           lines_.size();
@@ -264,7 +268,7 @@ class NodeCalls {
   bool take(unsigned publisher, const std::uint8_t* payload, std::size_t size) {
     if (const auto found = responses_.find(publisher); found != responses_.end()) {
       if (lines_[found->second]->settle({Bytes(payload, payload + size)})) return true;
-      count(&CallStatistics::unasked);
+      count(found->second, &CallStatistics::unasked);
       report("the hardware sent a response of " + services_[found->second].name + " to no call");
       return true;
     }
@@ -308,7 +312,8 @@ class NodeCalls {
     for (const auto& line : lines_) line->close();
   }
 
-  CallStatistics statistics() const {
+  // Return the counts of each service, in their order.
+  std::vector<CallStatistics> statistics() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return statistics_;
   }
@@ -317,7 +322,7 @@ class NodeCalls {
   static constexpr unsigned kMostReports = 20;
 
   void put(std::size_t index, Bytes payload, AnswerHandler answer) {
-    count(&CallStatistics::called);
+    count(index, &CallStatistics::called);
     lines_[index]->put(std::move(payload), std::move(answer));
   }
 
@@ -365,7 +370,7 @@ class NodeCalls {
 
   // Count an answer, and report a failure; return whether the call failed.
   bool counted(std::size_t index, const Answer& answer) {
-    count(answer.payload ? &CallStatistics::answered : &CallStatistics::failed);
+    count(index, answer.payload ? &CallStatistics::answered : &CallStatistics::failed);
     if (answer.payload) return false;
     const auto& service = services_[index];
     const bool is_told = !service.failure.empty() || (service.is_server && tells_failures_);
@@ -373,9 +378,9 @@ class NodeCalls {
     return true;
   }
 
-  void count(std::uint64_t CallStatistics::*what) {
+  void count(std::size_t index, std::uint64_t CallStatistics::*what) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    ++(statistics_.*what);
+    ++(statistics_[index].*what);
   }
 
   void report(const std::string& text) {
@@ -389,7 +394,7 @@ class NodeCalls {
   std::map<unsigned, std::size_t> responses_;  // the service of each publisher with responses
   std::map<unsigned, std::size_t> requests_;   // the service of each publisher with requests
   mutable std::mutex mutex_;                   // protects the members below
-  CallStatistics statistics_;
+  std::vector<CallStatistics> statistics_;
   unsigned reported_ = 0;
   std::vector<CallHandler> callers_;
   std::vector<std::unique_ptr<CallLine>> lines_;  // the last member, as their threads use the others
