@@ -77,6 +77,13 @@ def _run_board(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
     from fusesoc_firm.system.system_core import refuse_network
 
     refuse_network(loaded)
+    for option in ("trace", "watch", "status"):
+        if getattr(arguments, option):
+            hint = "the simulated board is the node, and firm live only connects its chip"
+            fail(
+                f"'--{option}' is not possible with interconnect '{loaded.specification.project.interconnect}'",
+                hint=hint,
+            )
     network = loaded.system.network
     assert network is not None
     node = node_of(loaded.system, loaded.libraries)

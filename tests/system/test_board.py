@@ -20,7 +20,7 @@ from fusesoc_firm.system.boards.board import (
 )
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
-from fusesoc_firm.system.written.specification import read_specification
+from fusesoc_firm.system.written.specification import LINKS, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.render import render
 
@@ -74,7 +74,7 @@ def written(tmp_path: Path, text: str) -> Board:
 BOARDS = {name: read_board(name, Path()) for name in boards()}
 
 
-@pytest.mark.parametrize("name", [name for name, board in BOARDS.items() if board.is_linked])
+@pytest.mark.parametrize("name", [name for name, board in BOARDS.items() if board.interconnect in LINKS])
 def test_every_board_takes_a_system(tmp_path: Path, name: str) -> None:
     board = read_board(name, tmp_path)
     system = on(tmp_path, board, "fixed_priority")

@@ -4,7 +4,7 @@
 //
 // Standard output and input are those of slave.h. Each 's' is answered with a number of milliseconds (a byte), and the
 // number (2 bytes, big-endian) and the bytes of what the Manager offers from then on, each as a word with 256 added to
-// the last byte of an aborted frame. 'g' and 'l' are bytes for the
+// the last byte of a frame, and 512 to that of an aborted one. 'g' and 'l' are bytes for the
 // Manager, 'l' the last of a frame. A strict Manager takes nothing while it offers something.
 #include "Vfirm_wiznet_node.h"
 #include "slave.h"
@@ -37,7 +37,8 @@ class Bench {
     board_.milliseconds -= top_.ms;
     top_.s_axis_tvalid = !offered.empty() && (top_.s_axis_tvalid || !chance_.stalls());
     top_.s_axis_tdata = offered.empty() ? 0 : offered.front() & 0xFF;
-    top_.s_axis_tlast = top_.s_axis_tuser = !offered.empty() && offered.front() > 0xFF;
+    top_.s_axis_tlast = !offered.empty() && offered.front() & 0x100;
+    top_.s_axis_tuser = !offered.empty() && offered.front() & 0x200;
     top_.m_axis_tready = !chance_.stalls() && !(is_strict_ && !offered.empty());
     top_.spi_miso = board_.miso();
     top_.clk = 0;

@@ -26,7 +26,7 @@ from fusesoc_firm.system.derived.model import Network
 from tests.bench.model import compiled
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
-from tests.wiznet.sequencer import ABORTED, ACCESSES, Sequencer
+from tests.wiznet.sequencer import ABORTED, ACCESSES, LAST, Sequencer
 
 HERE = Path(__file__).parent
 *_HARDWARE, _LINK = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
@@ -72,12 +72,17 @@ class Manager:
         payload = frame[5:]
         assert len(payload) == int.from_bytes(frame[1:5], "little")
         self.taken.append((frame[0], payload))
-        return [*b"".join(framed(*answer) for answer in self.accelerator(frame[0], payload))]
+        return [word for answer in self.accelerator(frame[0], payload) for word in offer(framed(*answer))]
 
 
 def framed(number: int, payload: bytes) -> bytes:
     """A frame of the Manager."""
     return bytes([number]) + len(payload).to_bytes(4, "little") + payload
+
+
+def offer(frame: bytes) -> list[int]:
+    """The bytes of a frame, with a mark on the last one."""
+    return [*frame[:-1], frame[-1] + LAST]
 
 
 class Board:
@@ -95,11 +100,11 @@ class Board:
 
     def send(self, number: int, payload: bytes) -> None:
         """Offer a frame."""
-        self.to_offer.put([*framed(number, payload)])
+        self.to_offer.put(offer(framed(number, payload)))
 
     def send_cut(self, number: int, payload: bytes, size: int) -> None:
         """Offer the first bytes of a frame, of which the last one aborts it."""
-        *begin, last = framed(number, payload)[:size]
+        *begin, last = offer(framed(number, payload)[:size])
         self.to_offer.put([*begin, last + ABORTED])
 
     def listening(self) -> int:

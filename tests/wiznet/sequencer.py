@@ -13,8 +13,8 @@ _BUFFER = 2048
 _WRITE = 0x80
 _OPERAND_BITS = 6
 _IMMEDIATE = 0x20
-# Added to the last byte of a frame that the Manager aborts.
-ABORTED = 0x100
+# Added to the last byte of a frame of the Manager, and to that of a frame that it aborts.
+LAST, ABORTED = 0x100, 0x200
 
 
 class Access(Protocol):

@@ -513,12 +513,13 @@ begin
           end if;
       end case;
       if rst_n = '0' then
-        state_r   <= OPCODE;
-        next_r    <= (others => '0');
-        own_r     <= LAST_PAGE;
-        page_r    <= LAST_PAGE;
-        time_r    <= (others => '0');
-        aborted_r <= '0';
+        state_r    <= OPCODE;
+        operands_r <= (others => '0');
+        next_r     <= (others => '0');
+        own_r      <= LAST_PAGE;
+        page_r     <= LAST_PAGE;
+        time_r     <= (others => '0');
+        aborted_r  <= '0';
       end if;
     end if;
   end process run;

@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import os
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -39,12 +40,13 @@ class Board:
         from_us, to_simulator = os.pipe()
         from_simulator, to_us = os.pipe()
         self._answers, self._reports = to_simulator, from_simulator
+        self._printed = tempfile.TemporaryFile()  # noqa: SIM115
         try:
             self._process = subprocess.Popen(
                 ["/bin/sh", "-c", _SHELL, "sh", f"/dev/fd/{from_us}", f"/dev/fd/{to_us}", *command],
                 cwd=folder,
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
+                stdout=self._printed,
                 stderr=subprocess.STDOUT,
                 pass_fds=(from_us, to_us),
                 # Ctrl-C reaches only this process.
@@ -73,8 +75,7 @@ class Board:
         """End the simulator and all connections."""
         self._process.kill()
         self._process.wait()
-        assert self._process.stdout
-        self._process.stdout.close()
+        self._printed.close()
         for end in (self._answers, self._reports):
             with suppress(OSError):
                 os.close(end)
@@ -116,8 +117,9 @@ class Board:
 
     def _fail(self) -> None:
         self._process.kill()
-        assert self._process.stdout
-        printed = self._process.stdout.read()[-_SHOWN_BYTES:].decode(errors="replace")
+        self._process.wait()
+        size = os.fstat(self._printed.fileno()).st_size
+        printed = os.pread(self._printed.fileno(), _SHOWN_BYTES, max(0, size - _SHOWN_BYTES)).decode(errors="replace")
         fail(f"the simulator of the board ended:\n{printed}")
 
 

@@ -100,7 +100,7 @@ def _check_counts(
         hint = "other nodes wait until a connection ends"
         faults.warn(f"{message}has {CONNECTIONS} connections for {len(items)} topics", place, hint)
     types = dict.fromkeys(item.frame.message for item in items)
-    for count, most, what in ((len(items), MOST_TOPICS, "topics"), (len(types), MOST_TYPES, "types")):
-        if count > most:
-            place = blocks[items[most].block].name.source
-            faults.error(f"{message}allows {most} {what}, not {count}", place, f"legal here: up to {most} {what}")
+    if len(items) > MOST_TOPICS or len(types) > MOST_TYPES:
+        place = blocks[items[min(len(items) - 1, MOST_TOPICS)].block].name.source
+        hint = f"legal here: up to {MOST_TOPICS} topics of up to {MOST_TYPES} types"
+        faults.error(f"{message}cannot have {len(items)} topics of {len(types)} types", place, hint)
