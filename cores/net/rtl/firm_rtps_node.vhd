@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node of ROS 2 above UDP: packets of RTPS in, frames `id | length | payload` and jobs for firm_packet_builder out. It
--- announces itself, notes its peers, and has readers of several topics and a writer of one, best effort.
+-- A node of ROS 2 above UDP: packets of RTPS in, frames `id | length | payload` and jobs for firm_packet_builder out.
+-- It announces itself, notes its peers, and has readers of several topics and a writer of one, best effort.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
