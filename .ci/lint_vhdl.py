@@ -26,6 +26,7 @@ import yaml
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.converter.pipeline import PIPELINES
+from fusesoc_firm.fabric.names import memory_of_names
 from fusesoc_firm.fabric.node import node_of
 from fusesoc_firm.fabric.packets import memory_of
 from fusesoc_firm.frame.layout import frame_of
@@ -155,15 +156,18 @@ blocks:
 """
 
 
-def write_packets() -> None:
-    """Write the programs of the packets of a node in fabric."""
+def write_node() -> None:
+    """Write the memories of a node in fabric: the programs of its packets, and the names of its topics."""
     path = SAMPLES / "node.yaml"
     path.write_text(NODE, encoding="utf-8")
     faults, known = Diagnostics(), libraries((), None, None)
     system = derive(read_specification(path, path.name, faults), SAMPLES, known, faults)
     faults.raise_if_any()
-    memory = memory_of(node_of(system, known), "node_packets")
-    (SAMPLES / "packets.vhd").write_text(render(memory.template, memory.context), encoding="ascii")
+    node = node_of(system, known)
+    for memory in (memory_of(node, "node_packets"), memory_of_names(node.readers, "node_names")):
+        (SAMPLES / f"{memory.context['entity']}.vhd").write_text(
+            render(memory.template, memory.context), encoding="ascii"
+        )
 
 
 # A node of ROS 1 in the sockets of a chip.
@@ -206,8 +210,8 @@ def samples() -> list[Path]:
     write_converters()
     write_loop()
     write_registers()
-    write_packets()
     write_chip()
+    write_node()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]
     return sorted([*made, *GOLDEN.glob("*.vhd")])
 

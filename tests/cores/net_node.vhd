@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node in fabric at a GMII that publishes numbers: found by ARP, pings and ROS 2, in the domain 0, at 192.0.2.9 and
--- 02:00:00:00:00:02. Every hundredth `tick` a sample of std_msgs/UInt32 is sent, which counts from 0.
+-- A node in fabric at a GMII: found by ARP, pings and ROS 2, in the domain 0, at 192.0.2.9 and 02:00:00:00:00:02. Every
+-- hundredth `tick` a sample of std_msgs/UInt32 is sent, which counts from 0; samples of peers leave as frames.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,7 +17,14 @@ entity net_node is
     tx_en : out std_logic;
     txd   : out std_logic_vector(7 downto 0);
 
-    peers_known : out std_logic_vector(7 downto 0)
+    -- Frames to the host.
+    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic;
+
+    peers_known   : out std_logic_vector(7 downto 0);
+    sources_known : out std_logic_vector(7 downto 0)
   );
 end entity net_node;
 
@@ -27,6 +34,11 @@ architecture rtl of net_node is
   constant ADDRESS      : std_logic_vector(31 downto 0) := x"c0000209";
   constant SAMPLE_BYTES : positive := 8;
   constant PERIOD       : positive := 100;
+  constant WRITERS      : positive := 3;
+  constant READERS      : positive := 2;
+  constant SOURCES      : positive := 8;
+  constant WANTED       : std_logic_vector(READERS-1 downto 0) := (others => '0');
+  constant NODE_PREFIX  : std_logic_vector(95 downto 0) := x"0000" & MAC & x"00000000";
 
   signal received_tdata  : std_logic_vector(7 downto 0);
   signal received_tuser  : std_logic_vector(0 downto 0);
@@ -39,16 +51,8 @@ architecture rtl of net_node is
   signal udp_tlast  : std_logic;
   signal source_mac : std_logic_vector(47 downto 0);
 
-  signal field_valid   : std_logic;
-  signal field_address : std_logic_vector(7 downto 0);
-  signal field_data    : std_logic_vector(7 downto 0);
-  signal payload_valid : std_logic;
-  signal payload_data  : std_logic_vector(7 downto 0);
-  signal is_submessage : std_logic;
-  signal is_whole      : std_logic;
-  signal is_faulty     : std_logic;
-  signal is_foreign    : std_logic;
-  signal is_aborted    : std_logic;
+  signal names_address : std_logic_vector(9 downto 0);
+  signal names_data    : std_logic_vector(8*READERS-1 downto 0);
 
   signal start           : std_logic;
   signal packet          : std_logic_vector(7 downto 0);
@@ -149,58 +153,43 @@ begin
       is_broken      => open
     );
 
-  u_walker : entity firm.firm_rtps_walker
+  u_names : entity work.net_node_names
     port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      s_axis_tdata  => udp_tdata,
-      s_axis_tuser  => udp_tuser,
-      s_axis_tvalid => udp_tvalid,
-      s_axis_tlast  => udp_tlast,
-      source_mac    => source_mac,
-      field_valid   => field_valid,
-      field_address => field_address,
-      field_data    => field_data,
-      payload_valid => payload_valid,
-      payload_data  => payload_data,
-      kind          => open,
-      flags         => open,
-      has_key       => open,
-      has_status    => open,
-      is_submessage => is_submessage,
-      is_whole      => is_whole,
-      is_faulty     => is_faulty,
-      is_foreign    => is_foreign,
-      is_aborted    => is_aborted
+      clk     => clk,
+      address => names_address,
+      data    => names_data
     );
 
-  u_control : entity firm.firm_rtps_control
+  u_node : entity firm.firm_rtps_node
     generic map (
-      PEERS   => 8,
-      WRITERS => 2,
-      READERS => 0,
+      WRITERS => WRITERS,
+      READERS => READERS,
+      SOURCES => SOURCES,
       DEPTH   => 4096
     )
     port map (
       clk                 => clk,
       rst_n               => rst_n,
       tick                => tick,
-      prefix              => x"0000" & MAC & x"00000000",
-      sample_writer       => x"00000303",
-      field_valid         => field_valid,
-      field_address       => field_address,
-      field_data          => field_data,
-      payload_valid       => payload_valid,
-      payload_data        => payload_data,
-      is_submessage       => is_submessage,
-      is_whole            => is_whole,
-      is_faulty           => is_faulty,
-      is_foreign          => is_foreign,
-      is_aborted          => is_aborted,
-      s_axis_tdata        => sample_tdata,
-      s_axis_tvalid       => sample_tvalid,
-      s_axis_tlast        => sample_tlast,
-      s_axis_tready       => sample_tready,
+      prefix              => NODE_PREFIX,
+      sample_writer       => x"00000403",
+      wants_reliable      => WANTED,
+      wants_transient     => WANTED,
+      packet_tdata        => udp_tdata,
+      packet_tuser        => udp_tuser,
+      packet_tvalid       => udp_tvalid,
+      packet_tlast        => udp_tlast,
+      source_mac          => source_mac,
+      names_address       => names_address,
+      names_data          => names_data,
+      frame_tdata         => m_axis_tdata,
+      frame_tvalid        => m_axis_tvalid,
+      frame_tlast         => m_axis_tlast,
+      frame_tready        => m_axis_tready,
+      sample_tdata        => sample_tdata,
+      sample_tvalid       => sample_tvalid,
+      sample_tlast        => sample_tlast,
+      sample_tready       => sample_tready,
       start               => start,
       packet              => packet,
       payload_bytes       => payload_bytes,
@@ -208,12 +197,15 @@ begin
       build_field_valid   => build_valid,
       build_field_address => build_address,
       build_field_data    => build_data,
-      m_axis_tdata        => payload_tdata,
-      m_axis_tvalid       => payload_tvalid,
-      m_axis_tready       => payload_tready,
+      payload_tdata       => payload_tdata,
+      payload_tvalid      => payload_tvalid,
+      payload_tready      => payload_tready,
       peers_known         => peers_known,
+      sources_known       => sources_known,
+      is_lost             => open,
       is_full             => open,
-      is_lost             => open
+      is_unmatched        => open,
+      is_dropped          => open
     );
 
   u_packets : entity work.net_node_packets

@@ -40,18 +40,21 @@ CLASSES: dict[str, type[IdlStruct]] = {"Quaternion": Quaternion, "String": Strin
 class CyclonePeer:
     """A participant with types of its own, which have no hash."""
 
-    def __init__(self, types: dict[str, str], is_reliable: bool, only_listens: bool) -> None:
-        self.types = types
+    def __init__(self, reads: dict[str, str], writes: dict[str, str], is_reliable: bool) -> None:
+        self.types = {**reads, **writes}
         participant = DomainParticipant(0)
         kind = Policy.Reliability.Reliable(duration(seconds=10)) if is_reliable else Policy.Reliability.BestEffort
         quality = Qos(kind, Policy.History.KeepLast(DEPTH))
         self.writers: dict[str, Any] = {}
         self.readers: dict[str, Any] = {}
-        for name, type_ in types.items():
-            topics = [Topic(participant, f"rt/{name}_{end}", CLASSES[type_], qos=quality) for end in ("in", "out")]
-            if not only_listens:
-                self.writers[name] = DataWriter(participant, topics[0], qos=quality)
-            self.readers[name] = DataReader(participant, topics[1], qos=quality)
+
+        def topic(name: str) -> Topic[Any]:
+            return Topic(participant, f"rt/{name}", CLASSES[self.types[name.rpartition("_")[0]]], qos=quality)
+
+        for name in writes:
+            self.writers[name] = DataWriter(participant, topic(f"{name}_in"), qos=quality)
+        for name in reads:
+            self.readers[name] = DataReader(participant, topic(f"{name}_out"), qos=quality)
 
     def is_matched(self) -> bool:
         writers = all(writer.get_matched_subscriptions() for writer in self.writers.values())

@@ -422,6 +422,13 @@ class ParameterList:
         value = self.all(number)[0][4:] if length else b""
         return value[: length[0]].rstrip(b"\0") if length and length[0] <= len(value) else b""
 
+    def string(self, number: int) -> str:
+        """A string; empty if it is missing, its length is wrong, or it does not end with its only NUL."""
+        length = self.integers(number, "I")
+        value = self.all(number)[0][4 : 4 + length[0]] if length else b""
+        is_string = value[-1:] == b"\0" and value.count(0) == 1 and length == (len(value),)
+        return value[:-1].decode(errors="replace") if is_string else ""
+
     def address(self, number: int) -> Address | None:
         """The first locator for UDP over IPv4."""
         for value in self.all(number):

@@ -46,7 +46,7 @@ DISCOVERY_REQUEST, DISCOVERY_HEARTBEAT = 200, 500
 # A writer that has written nothing may not answer.
 USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
 REASSEMBLY = 1000
-WINDOW = 64
+WINDOW = 32
 MOST_REQUESTED = 8
 FRAGMENT_BYTES = 1344
 XCDR1 = 0
@@ -66,37 +66,27 @@ class Limits:
 
 @dataclass
 class Window:
-    """The numbers that have come from a writer of discovery: all below `expected`, and some of those after it."""
+    """The numbers that have come from a writer of discovery: all below `expected`. Later ones are not kept."""
 
     expected: int = 1
-    came: int = 0
     last: int = 0
     is_heard: bool = False
 
     def take(self, number: int) -> bool:
-        """Note a number; whether it is new."""
-        place = number - self.expected
-        if not 0 <= place < WINDOW or self.came >> place & 1:
-            return False
-        self.came |= 1 << place
+        """Note a number; whether it is the next one."""
         self.last = max(self.last, number)
-        while self.came & 1:
-            self.came, self.expected = self.came >> 1, self.expected + 1
-        return True
+        is_next = number == self.expected
+        self.expected += is_next
+        return is_next
 
     def begin(self, first: int) -> None:
         """All numbers below `first` are gone."""
-        while self.expected < first and self.came:
-            self.came, self.expected = self.came >> 1, self.expected + 1
         self.expected = max(self.expected, first)
-        while self.came & 1:
-            self.came, self.expected = self.came >> 1, self.expected + 1
 
     @property
     def missing(self) -> Numbers:
         """The numbers to ask for."""
-        reach = range(self.expected, min(self.last + 1, self.expected + WINDOW))
-        return Numbers.of((number for number in reach if not self.came >> (number - self.expected) & 1), self.expected)
+        return Numbers.of(range(self.expected, min(self.last + 1, self.expected + WINDOW)), self.expected)
 
 
 @dataclass
@@ -434,9 +424,6 @@ class Participant:
         window = peer.windows[item.writer]
         if item.start <= window.expected:
             window.begin(item.others.base)
-        for number in (*range(item.start, min(item.others.base, item.start + WINDOW)), *item.others):
-            if number >= window.expected:
-                window.take(number)
 
     def _discovery_asked(self, peer: Peer, item: AckNack) -> None:
         announced = self._announced[item.writer]
@@ -466,7 +453,7 @@ class Participant:
             self.sinks = [other for other in self.sinks if not _is(other, peer, guid[12:])]
             return
         is_writer = item.writer == PUBLICATIONS_WRITER
-        name = facts.octets(Parameter.TOPIC_NAME).decode(errors="replace")
+        name = facts.string(Parameter.TOPIC_NAME)
         for endpoint in self.node.readers if is_writer else self.node.writers:
             if endpoint.topic == name and self._is_compatible(endpoint, facts):
                 self._match(peer, endpoint, guid[12:], facts)
@@ -478,10 +465,10 @@ class Participant:
         theirs = _quality(facts, is_writer=not endpoint.is_writer)
         offered, requested = (ours, theirs) if endpoint.is_writer else (theirs, ours)
         reasons = {
-            "other types": facts.octets(Parameter.TYPE_NAME).decode(errors="replace") != endpoint.type,
+            "other types": facts.string(Parameter.TYPE_NAME) != endpoint.type,
             "other hashes": hash_ not in ("", endpoint.hash),
             "other encodings": XCDR1 not in _encodings(facts),
-            "other partitions": bool(facts.octets(Parameter.PARTITION).strip(b"\0")),
+            "other partitions": bool(sum(facts.integers(Parameter.PARTITION, "I") or ())),
             "other qualities": any(wanted and not given for wanted, given in zip(requested, offered, strict=True)),
         }
         reason = next((name for name, applies in reasons.items() if applies), None)

@@ -49,10 +49,11 @@ def obey(peer: Peer, line: str) -> bool:
     return True
 
 
-def run(make: Callable[[dict[str, str], bool, bool], Peer]) -> None:
+def run(make: Callable[[dict[str, str], dict[str, str], bool], Peer]) -> None:
     """Run a peer until its input ends or says so."""
-    reliability, types, *others = sys.argv[1:]
-    peer = make(json.loads(types), reliability == "reliable", others == ["listen"])
+    reliability, reads, *others = sys.argv[1:]
+    writes = others[0] if others else reads
+    peer = make(json.loads(reads), json.loads(writes), reliability == "reliable")
     begun = time.monotonic()
     while not peer.is_matched():
         peer.poll()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 from typing import Any
 
@@ -16,23 +17,20 @@ BOARD = "board"
 class RosPeer:
     """A node of rclpy, which also waits for the name of the node in fabric."""
 
-    def __init__(self, types: dict[str, str], is_reliable: bool, only_listens: bool) -> None:
-        self.types = types
+    def __init__(self, reads: dict[str, str], writes: dict[str, str], is_reliable: bool) -> None:
+        self.reads, self.types = reads, {**reads, **writes}
         rclpy.init()
         self.node = rclpy.create_node("peer")
         kind = ReliabilityPolicy.RELIABLE if is_reliable else ReliabilityPolicy.BEST_EFFORT
         quality = QoSProfile(depth=DEPTH, reliability=kind)
         self.came: list[tuple[str, list[Any]]] = []
         self.classes = {
-            name: getattr(importlib.import_module(f"{PACKAGES[kind]}.msg"), kind) for name, kind in types.items()
+            name: getattr(importlib.import_module(f"{PACKAGES[kind]}.msg"), kind) for name, kind in self.types.items()
         }
-        self.writers = {
-            name: self.node.create_publisher(made, f"/{name}_in", quality)
-            for name, made in self.classes.items()
-            if not only_listens
-        }
-        for name, made in self.classes.items():
-            self.node.create_subscription(made, f"/{name}_out", lambda text, name=name: self.take(name, text), quality)
+        self.writers = {name: self.node.create_publisher(self.classes[name], f"/{name}_in", quality) for name in writes}
+        for name in reads:
+            take = functools.partial(self.take, name)
+            self.node.create_subscription(self.classes[name], f"/{name}_out", take, quality)
 
     def take(self, name: str, message: Any) -> None:
         self.came.append((name, [getattr(message, field) for field in FIELDS[self.types[name]]]))
@@ -41,7 +39,7 @@ class RosPeer:
         return (
             BOARD in self.node.get_node_names()
             and all(writer.get_subscription_count() for writer in self.writers.values())
-            and all(self.node.count_publishers(f"/{name}_out") for name in self.types)
+            and all(self.node.count_publishers(f"/{name}_out") for name in self.reads)
         )
 
     def write(self, name: str, values: list[Any]) -> None:

@@ -5,28 +5,31 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import struct
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.fabric.node import Node
+from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.names import memory_of_names
 from fusesoc_firm.fabric.packets import memory_of
 from fusesoc_firm.text.render import render
 from tests.bench.model import compiled
 from tests.fabric.echo_node import node_in
 from tests.fabric.hosts import Host, switched
 from tests.fabric.test_peers import HERE, Peer, Process, _why_not
-from tests.hdl.ghdl import Library, core_files
-from tests.hdl.verilog import loops, netlist
+from tests.hdl.ghdl import core_files
+from tests.hdl.verilog import netlist
 from tests.ros.cpp_nodes import ros2
 
 CORES = HERE.parent / "cores"
 PARTS = ("axis/package", "axis/axis", "net/mac", "net/responder", "net/udp", "net/rtps", "net/builder")
 HARDWARE = core_files(*PARTS)
+SAMPLES = 200
+TYPES = {"count": "UInt32", "words": "String"}
 SPECIFICATION = """\
 project:
   name: board
@@ -34,26 +37,27 @@ project:
   interconnect: ethernet
   network: {mac: "02:00:00:00:00:02", address: 192.0.2.9}
 blocks:
-  - {name: start, middleware: ROS2, mode: subscriber, message: std_msgs/UInt32, outgoing: [{name: count}]}
+  - {name: start, middleware: ROS2, mode: subscriber, message: std_msgs/UInt32, topic: /count_in,
+     qos: {reliability: best_effort}, outgoing: [{name: count}]}
+  - {name: words, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /words_in,
+     qos: {reliability: best_effort}, outgoing: [{name: said}]}
   - {name: count, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /count_out,
+     qos: {reliability: best_effort}}
+  - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_out,
      qos: {reliability: best_effort}}
 """
 
 
-def publishing_node(folder: Path) -> Node:
-    """The node of the specification without its reader, which this hardware has not."""
+def memories(folder: Path) -> list[Path]:
+    """The programs of the node's packets, and the names of its readers' topics."""
     path = folder / "node.yaml"
     path.write_text(SPECIFICATION, encoding="utf-8")
     node = node_in(path)
-    return replace(node, endpoints=node.writers)
-
-
-def memory(folder: Path) -> Path:
-    """The programs of the node's packets."""
-    path = folder / "net_node_packets.vhd"
-    rendering = memory_of(publishing_node(folder), "net_node_packets")
-    path.write_text(render(rendering.template, rendering.context), encoding="utf-8")
-    return path
+    written = []
+    for rendering in (memory_of(node, "net_node_packets"), memory_of_names(node.readers, "net_node_names")):
+        written.append(folder / f"{rendering.context['entity']}.vhd")
+        written[-1].write_text(render(rendering.template, rendering.context), encoding="utf-8")
+    return written
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +66,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not shutil.which("verilator"):
         pytest.skip("verilator is not installed")
     folder = tmp_path_factory.mktemp("node")
-    verilog = netlist("net_node", folder, [memory(folder), CORES / "net_node.vhd"], HARDWARE)
+    verilog = netlist("net_node", folder, [*memories(folder), CORES / "net_node.vhd"], HARDWARE)
     bench = (CORES / "net_node.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "net_node", bench, folder, [CORES])
 
@@ -83,17 +87,18 @@ class Lab:
         assert started.line() == {"ready": True}
         return started
 
-    def peers(self) -> dict[str, Peer]:
-        """A peer of each kind that listens to the board's topic."""
+    def peers(self, *written: str) -> dict[str, Peer]:
+        """A peer of each kind that reads the board's topic, and writes some."""
         others = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DOMAIN_ID")
         environment = {name: value for name, value in self._ros.environment.items() if name not in others}
         return {
-            "rclpy": self._peer(self._hosts[0], self._ros.python, "ros_peer.py", environment),
-            "cyclone": self._peer(self._hosts[1], sys.executable, "cyclone_peer.py", dict(os.environ)),
+            "rclpy": self._peer(self._hosts[0], self._ros.python, "ros_peer.py", environment, written),
+            "cyclone": self._peer(self._hosts[1], sys.executable, "cyclone_peer.py", dict(os.environ), written),
         }
 
-    def _peer(self, host: Host, python: str, name: str, environment: dict[str, str]) -> Peer:
-        options = ["best_effort", json.dumps({"count": "UInt32"}), "listen"]
+    def _peer(self, host: Host, python: str, name: str, environment: dict[str, str], written: tuple[str, ...]) -> Peer:
+        types = ({"count": "UInt32"}, {topic: TYPES[topic] for topic in written})
+        options = ["best_effort", *map(json.dumps, types)]
         peer = Peer(host, [python, str(HERE / name), *options], environment)
         self._stack.callback(peer.kill)
         return peer
@@ -111,9 +116,31 @@ def numbers(peer: Peer, count: int) -> list[int]:
     return [int(values[0]) for _, values in peer.take(count)]
 
 
-def wait_for_peers(board: Process, count: int) -> None:
-    while board.line() != {"peers": count}:
+def wait_for(board: Process, peers: int, sources: int) -> None:
+    while board.line() != {"peers": peers, "sources": sources}:
         pass
+
+
+def frames(board: Process, count: int) -> list[bytes]:
+    """The next frames to the host."""
+    found: list[bytes] = []
+    while len(found) < count:
+        line = board.line()
+        found += [bytes.fromhex(line["frame"])] if "frame" in line else []
+    return found
+
+
+def sample(frame: bytes) -> str | int:
+    """The number of a frame of the first reader, or the text of one of the second. Some peers pad their payloads."""
+    number, size = struct.unpack_from("<BI", frame)
+    payload = frame[5:]
+    assert size == len(payload) and payload[:2] == rtps.XCDR1[:2]
+    (value,) = struct.unpack_from("<I", payload, 4)
+    if number == 0:
+        assert size == 8
+        return int(value)
+    assert number == 1 and 0 <= size - 8 - value < 4 and payload[7 + value] == 0
+    return payload[8 : 7 + value].decode()
 
 
 @pytest.mark.check
@@ -128,11 +155,12 @@ def test_both_peers_see_the_hardware_and_get_its_samples_in_order(lab: Lab) -> N
     graph = next(line for line in iter(peers["rclpy"].line, None) if isinstance(line, dict))
     assert ["board", "/"] in graph["nodes"]
     assert ["/count_out", ["std_msgs/msg/UInt32"]] in graph["topics"]
-    assert [end[:3] for end in graph["ends"]] == [["board", "/", "std_msgs/msg/UInt32"]]
-    assert graph["ends"][0][3].startswith("RIHS01_")
-    wait_for_peers(board, 2)
+    # The writer of /count_out and the reader of /count_in.
+    assert [end[:3] for end in graph["ends"]] == [["board", "/", "std_msgs/msg/UInt32"]] * 2
+    assert all(end[3].startswith("RIHS01_") for end in graph["ends"])
+    wait_for(board, 2, 0)
     peers["cyclone"].tell('"farewell"\n')
-    wait_for_peers(board, 1)
+    wait_for(board, 1, 0)
     # The node runs on, and the other peer is not disturbed.
     came = numbers(peers["rclpy"], 20)
     assert came == list(range(came[0], came[0] + 20))
@@ -144,15 +172,31 @@ def test_both_peers_see_the_hardware_and_get_its_samples_in_order(lab: Lab) -> N
     assert came == list(range(came[0], came[0] + 5))
 
 
-def test_the_control_has_no_latch_and_refuses_bad_generics(tmp_path: Path) -> None:
-    library = Library("firm", tmp_path)
-    library.analyse(core_files("axis/package", "axis/axis", "net/mac", "net/rtps"))
-    assert library.latches("firm_rtps_control") == []
-    for value in (0, 9):
-        result = library.run("firm_rtps_control", {"PEERS": value})
-        assert result.exit_code != 0
-        assert f"firm_rtps_control: PEERS is {value}; legal: 1 to 8" in result.output
-
-
-def test_the_control_has_no_combinational_loop(tmp_path: Path) -> None:
-    assert loops("firm_rtps_control", tmp_path, HARDWARE[-2:-1], HARDWARE[:-2]) == []
+@pytest.mark.check
+@pytest.mark.xdist_group("fabric")
+def test_samples_of_both_peers_become_frames_once_and_in_order(lab: Lab) -> None:
+    board, peers = lab.board(), lab.peers("count", "words")
+    print({name: peer.wait_until_matched() for name, peer in peers.items()})
+    wait_for(board, 2, 4)
+    sent: list[list[str | int]] = []
+    for place, peer in enumerate(peers.values()):
+        # A value tells of whom it is; texts have many lengths.
+        sent.append([1000 * place + number if number % 2 else f"{place} {'.' * number}" for number in range(SAMPLES)])
+        for value in sent[-1]:
+            peer.tell(["words" if isinstance(value, str) else "count", [value]])
+    found = list(map(sample, frames(board, 2 * SAMPLES)))
+    assert sorted(map(str, found)) == sorted(str(value) for values in sent for value in values)
+    for values in sent:
+        for kind in (str, int):
+            # The order holds for each writer.
+            wanted = [value for value in values if isinstance(value, kind)]
+            assert [value for value in found if value in wanted] == wanted
+    peers["cyclone"].tell('"farewell"\n')
+    wait_for(board, 1, 2)
+    # The other one is not disturbed.
+    peers["rclpy"].tell(["words", ["more"]])
+    while "frame" not in (line := board.line()):
+        pass
+    assert sample(bytes.fromhex(line["frame"])) == "more"
+    print(line["cycles"], "cycles from the last byte at the GMII to the first beat")
+    assert line["cycles"] <= 16

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The control of a node in fabric that publishes one topic, best effort: announces the node (SPDP), notes the peers
--- that it hears of, tells each of them the node's endpoints when it asks (SEDP), and sends each sample to all of them.
+-- The control of a node in fabric: announces the node (SPDP), notes the peers that it hears of, tells each of them the
+-- node's endpoints when it asks (SEDP), and asks for theirs. It sends the samples of one topic, best effort, to all.
 --
--- What a packet causes waits until the packet is known to be good. Leases of peers are not watched yet: a peer is
--- forgotten when it says farewell.
+-- What peers announce is taken in its order, so that a number for each of their writers is all that is noted. Leases of
+-- peers are not watched yet: a peer is forgotten when it says farewell.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -13,32 +13,46 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_control is
   generic (
-    PEERS   : integer := 8;   -- 1 to 8
-    WRITERS : integer := 2;   -- of the node: the first one is that of ros_discovery_info, the second one sends samples
-    READERS : integer := 0;   -- of the node
-    SAMPLE  : integer := 64;  -- bytes of the longest payload, a power of two
-    DEPTH   : integer := 1024 -- words of waiting packets, a power of two
+    PEERS   : integer := 8; -- 1 to 8
+    WRITERS : integer := 2; -- of the node: the first one is that of ros_discovery_info, the second one sends samples
+    READERS : integer := 0; -- of the node
+    SAMPLE  : integer := 64 -- bytes of the longest payload, a power of two
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
     tick  : in std_logic;  -- a pulse each millisecond
 
-    -- The prefix of the node, and the entity of the writer that sends samples; the first byte on the line highest.
-    prefix        : in std_logic_vector(95 downto 0);
+    -- The entity of the writer that sends samples; the first byte on the line highest.
     sample_writer : in std_logic_vector(31 downto 0);
 
-    -- From firm_rtps_walker.
-    field_valid   : in std_logic;
-    field_address : in std_logic_vector(RECORD_BITS-1 downto 0);
-    field_data    : in std_logic_vector(7 downto 0);
-    payload_valid : in std_logic;
-    payload_data  : in std_logic_vector(7 downto 0);
-    is_submessage : in std_logic;
-    is_whole      : in std_logic;
-    is_faulty     : in std_logic;
-    is_foreign    : in std_logic;
-    is_aborted    : in std_logic;
+    -- Of firm_rtps_inbox.
+    take        : out std_logic;
+    has_word    : in  std_logic;
+    has_field   : in  std_logic;
+    address     : in  std_logic_vector(RECORD_BITS-1 downto 0);
+    data        : in  std_logic_vector(7 downto 0);
+    is_end      : in  std_logic;
+    kind        : in  std_logic_vector(7 downto 0);
+    flags       : in  std_logic_vector(7 downto 0);
+    writer      : in  std_logic_vector(31 downto 0);
+    number      : in  std_logic_vector(31 downto 0);
+    second      : in  std_logic_vector(31 downto 0);
+    is_large    : in  std_logic;
+    is_gone     : in  std_logic;
+    begins      : in  std_logic;
+    is_value    : in  std_logic;
+    id          : in  std_logic_vector(15 downto 0);
+    size        : in  std_logic_vector(15 downto 0);
+    place       : in  std_logic_vector(15 downto 0);
+    is_little   : in  std_logic;
+    is_last     : in  std_logic;
+
+    -- To firm_rtps_readers: a peer announced or ended a writer; a peer is forgotten. No word is taken while it is busy.
+    is_announced : out std_logic;
+    is_left      : out std_logic;
+    peer         : out std_logic_vector(2 downto 0);
+    readers_busy : in  std_logic;
 
     -- Samples, with the header of their encoding.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
@@ -59,8 +73,7 @@ entity firm_rtps_control is
     m_axis_tready       : in  std_logic;
 
     peers_known : out std_logic_vector(7 downto 0);
-    is_full     : out std_logic;  -- a pulse for each announcement of a peer without room
-    is_lost     : out std_logic   -- a pulse for each packet without room
+    is_full     : out std_logic   -- a pulse for each announcement of a peer without room
   );
 end entity firm_rtps_control;
 
@@ -77,21 +90,18 @@ architecture rtl of firm_rtps_control is
   constant GRAPH             : natural := 6 + WRITERS + READERS;
   constant PLAIN_SAMPLE      : natural := 7 + WRITERS + READERS;
   constant HEARTBEAT         : natural := 11 + WRITERS + READERS;
+  constant ACKNOWLEDGE       : natural := 12 + WRITERS + READERS;
+  constant REQUEST           : natural := 13 + WRITERS + READERS;
 
-  constant PARTICIPANT_WRITER   : std_logic_vector(31 downto 0) := x"000100c2";
-  constant PUBLICATIONS_WRITER  : std_logic_vector(31 downto 0) := x"000003c2";
-  constant SUBSCRIPTIONS_WRITER : std_logic_vector(31 downto 0) := x"000004c2";
-  constant GRAPH_WRITER         : std_logic_vector(31 downto 0) := x"00000103";
+  -- The last byte of the entities of discovery's readers.
+  constant DISCOVERY_READER : std_logic_vector(7 downto 0) := x"c7";
+  constant GRAPH_WRITER     : std_logic_vector(31 downto 0) := x"00000103";
 
   -- Milliseconds.
   constant AFTER_FAREWELL : natural := 200;
   constant SOON           : natural := 100;
   constant LATER          : natural := 3000;
   constant FIRST_ONES     : natural := 5;
-
-  -- A word of a packet: whether it is the submessage's last one, an address of the record, and a byte.
-  constant AT_PAYLOAD : natural := 255;
-  constant AT_NOTHING : natural := 254;
 
   -- A peer's entry, and the same in the record, from RECORD_SOURCE_MAC on.
   constant ENTRY_BITS      : positive := 5;
@@ -109,18 +119,19 @@ architecture rtl of firm_rtps_control is
   constant AT_NUMBER    : natural := 44;
   constant AT_FIRST     : natural := 52;
   constant AT_LAST      : natural := 60;
-  constant FIELDS       : natural := 64;
+  constant AT_SET_SIZE  : natural := 64;
+  constant AT_SET       : natural := 68;
+  constant FIELDS       : natural := 72;
+  constant AT_FLAGS     : natural := 6;
+  -- Of a request: little-endian and final.
+  constant REQUEST_FLAGS  : std_logic_vector(7 downto 0) := x"03";
+  constant MOST_REQUESTED : positive := 32;
 
-  constant METATRAFFIC_LOCATOR : std_logic_vector(15 downto 0) := x"0032";
-  constant DEFAULT_LOCATOR     : std_logic_vector(15 downto 0) := x"0031";
-  constant ENDPOINT_LOCATOR    : std_logic_vector(15 downto 0) := x"002f";
-  constant TOPIC_NAME          : std_logic_vector(15 downto 0) := x"0005";
   -- "ros_discovery_info", with its NUL.
   constant GRAPH_TOPIC         : std_logic_vector(0 to 151) := x"726f735f646973636f766572795f696e666f00";
   constant GRAPH_TOPIC_BYTES   : positive := 19;
-  constant NAME_PLACE          : natural := 8;  -- in the parameter, whose header and length have four bytes each
+  constant NAME_PLACE          : natural := 4;  -- in the value, after the length
   constant LOCATOR_BYTES       : natural := 24;
-  constant SENTINEL            : std_logic_vector(15 downto 0) := x"0001";
 
   subtype byte_t is std_logic_vector(7 downto 0);
   type memory_t is array (natural range <>) of byte_t;
@@ -129,57 +140,32 @@ architecture rtl of firm_rtps_control is
   signal peer_memory   : memory_t(0 to 8*2**ENTRY_BITS-1);
   signal sample_memory : memory_t(0 to SAMPLE-1);
 
-  -- ------------------------------------------------------------------ words
-  signal writer_r    : std_logic_vector(31 downto 0) := (others => '0');
-  signal listens     : std_logic;  -- its payloads are read
-  signal word        : std_logic_vector(16 downto 0);
-  signal word_valid  : std_logic;
-  signal ends_packet : std_logic;
-  signal spoils      : std_logic_vector(0 downto 0);
-  signal taken       : std_logic_vector(16 downto 0);
-  signal taken_valid : std_logic;
-  signal take        : std_logic;
-  signal takes       : std_logic;
-  signal at          : unsigned(7 downto 0);
-  signal value       : byte_t;
+  signal takes : std_logic;
+  signal at    : unsigned(15 downto 0);  -- the place in a parameter
 
-  -- ------------------------------------------------------------------ the submessage
-  signal mine_r        : std_logic;
-  signal kind_r        : byte_t := (others => '0');
-  signal flags_r       : byte_t := (others => '0');
-  signal from_r        : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
-  signal base_r        : unsigned(7 downto 0) := (others => '0');
-  signal large_r       : std_logic;  -- the number is above 255
-  signal is_ours_r     : std_logic;  -- the destination so far
-  signal is_all_r      : std_logic;
-  signal own_r         : std_logic_vector(95 downto 0) := (others => '0');  -- the prefix, turned
-  signal gone_r        : std_logic;  -- the status says that the instance ended
-
-  -- ------------------------------------------------------------------ parameters of a participant
-  signal place_r       : unsigned(15 downto 0) := (others => '0');  -- in the parameter, its header included
-  signal size_r        : unsigned(15 downto 0) := (others => '0');  -- of its value
-  signal id_r          : std_logic_vector(15 downto 0) := (others => '0');
-  signal lead_r        : unsigned(2 downto 0) := (others => '0');   -- bytes of the encoding's header so far
-  signal little_r      : std_logic;
-  signal over_r        : std_logic;
-  signal udp_r         : std_logic;  -- the locator is one for UDP over IPv4, so far
-  signal has_meta_r    : std_logic;
-  signal has_user_r    : std_logic;
-  signal has_end_r     : std_logic;
-  signal is_graph_r    : std_logic;  -- the topic is that of the graph
-  signal named_r       : std_logic;  -- the same, so far
-  signal is_end        : std_logic;
-  signal is_meta       : std_logic;
-  signal is_user       : std_logic;
+  -- ------------------------------------------------------------------ where a participant listens
+  signal udp_r      : std_logic;  -- the locator is one for UDP over IPv4, so far
+  signal has_meta_r : std_logic;
+  signal has_user_r : std_logic;
+  signal has_end_r  : std_logic;
+  signal is_graph_r : std_logic;  -- the topic is that of the graph
+  signal named_r    : std_logic;  -- the same, so far
+  signal is_meta    : std_logic;
+  signal is_user    : std_logic;
+  signal is_point   : std_logic;  -- the locator is that of an endpoint
 
   -- ------------------------------------------------------------------ what is done
-  type state_t is (TAKING, DECIDE, FIND, INSERT, CHOOSE, LOAD, BEGIN_PACKET, WAIT_PACKET);
-  type job_t is (NOTHING, GREETING, GRAPH_PORT, ENDPOINTS, GRAPH_JOB, SAMPLES, TO_GROUP);
+  type state_t is (
+    TAKING, DECIDE, FIND, FORGET, EXPECT, JUDGE, TELL, REST, ASK, INSERT, CHOOSE, LOAD, BEGIN_PACKET, WAIT_PACKET
+  );
+  type job_t is (
+    NOTHING, GREETING, ANNOUNCED, TOLD, SKIPPED, GRAPH_PORT, ENDPOINTS, GRAPH_JOB, SAMPLES, TO_GROUP
+  );
   signal state_r   : state_t;
   signal job_r     : job_t;
   signal removes_r : std_logic;
   signal slot_r    : unsigned(2 downto 0) := (others => '0');
-  signal index_r   : unsigned(5 downto 0) := (others => '0');
+  signal index_r   : unsigned(6 downto 0) := (others => '0');
   signal second_r  : std_logic;  -- the memories show what index_r selects
   signal packet_r  : unsigned(7 downto 0) := (others => '0');
   signal stop_r    : unsigned(7 downto 0) := (others => '0');
@@ -189,6 +175,19 @@ architecture rtl of firm_rtps_control is
   signal is_used   : std_logic;  -- the entry of slot_r
   signal full      : std_logic;
   signal free      : unsigned(2 downto 0);
+
+  -- The next number of each peer's writers of discovery, of which all before have come. Others are not kept.
+  type numbers_t is array (natural range 0 to 15) of unsigned(31 downto 0);
+  signal numbers       : numbers_t := (others => (others => '0'));
+  signal number_place  : unsigned(3 downto 0);
+  signal number_write  : std_logic;
+  signal new_number    : unsigned(31 downto 0);
+  signal expected_r    : unsigned(31 downto 0) := (others => '0');
+  signal is_expected   : std_logic;
+  signal is_subscribed : std_logic;  -- the writer is that of subscriptions
+  signal lacks         : unsigned(32 downto 0);  -- how many numbers the peer has told of that have not come
+  signal set_size_r    : unsigned(5 downto 0) := (others => '0');
+  signal set_r         : std_logic_vector(31 downto 0) := (others => '0');
 
   signal record_address : unsigned(RECORD_BITS-1 downto 0);
   signal record_r       : byte_t := (others => '0');
@@ -210,33 +209,33 @@ architecture rtl of firm_rtps_control is
   signal read_r           : unsigned(7 downto 0) := (others => '0');
   signal number_r         : unsigned(31 downto 0) := (others => '0');
 
-  function byte_of(number : std_logic_vector(31 downto 0); place : unsigned(1 downto 0)) return byte_t is
+  function byte_of(word : std_logic_vector(31 downto 0); where : unsigned(1 downto 0)) return byte_t is
   begin
-    if place = 0 then
-      return number(31 downto 24);
-    elsif place = 1 then
-      return number(23 downto 16);
-    elsif place = 2 then
-      return number(15 downto 8);
+    if where = 0 then
+      return word(31 downto 24);
+    elsif where = 1 then
+      return word(23 downto 16);
+    elsif where = 2 then
+      return word(15 downto 8);
     end if;
-    return number(7 downto 0);
+    return word(7 downto 0);
   end function byte_of;
 
-  -- Whether a byte is that of the topic's name at this place of the parameter; after the name, any byte is.
-  function is_character(char : byte_t; place : unsigned(15 downto 0)) return boolean is
+  -- Whether a byte is that of the topic's name at this place of the value; after the name, any byte is.
+  function is_character(char : byte_t; where : unsigned(15 downto 0)) return boolean is
     variable wanted : byte_t := char;
   begin
     for index in 0 to GRAPH_TOPIC_BYTES-1 loop
-      if place = NAME_PLACE+index then
+      if where = NAME_PLACE+index then
         wanted := GRAPH_TOPIC(8*index to 8*index+7);
       end if;
     end loop;
     return char = wanted;
   end function is_character;
 
-  function reversed(number : std_logic_vector(31 downto 0)) return std_logic_vector is
+  function reversed(word : std_logic_vector(31 downto 0)) return std_logic_vector is
   begin
-    return number(7 downto 0) & number(15 downto 8) & number(23 downto 16) & number(31 downto 24);
+    return word(7 downto 0) & word(15 downto 8) & word(23 downto 16) & word(31 downto 24);
   end function reversed;
 
 begin
@@ -245,174 +244,63 @@ begin
     report "firm_rtps_control: PEERS is " & integer'image(PEERS) & "; legal: 1 to 8"
     severity failure;
 
-  -- ------------------------------------------------------------------ words of packets
-
-  note_writer : process (clk)
-  begin
-    if rising_edge(clk) then
-      if field_valid = '1' and unsigned(field_address) >= RECORD_WRITER
-         and unsigned(field_address) < RECORD_WRITER+4 then
-        writer_r <= writer_r(23 downto 0) & field_data;
-      end if;
-    end if;
-  end process note_writer;
-
-  listens <= '1' when writer_r = PARTICIPANT_WRITER or writer_r = SUBSCRIPTIONS_WRITER else '0';
-
-  word(16)          <= is_submessage;
-  word(15 downto 8) <= field_address when field_valid = '1' else
-                       std_logic_vector(to_unsigned(AT_PAYLOAD, 8))
-                       when payload_valid = '1' and listens = '1' else
-                       std_logic_vector(to_unsigned(AT_NOTHING, 8));
-  word(7 downto 0)  <= field_data when field_valid = '1' else payload_data;
-  ends_packet       <= is_whole or is_faulty or is_foreign or is_aborted;
-  spoils(0)         <= is_foreign or is_aborted;
-  word_valid        <= '1' when field_valid = '1' or is_submessage = '1' or ends_packet = '1' else
-                       payload_valid when listens = '1' else
-                       '0';
-
-  u_store : entity firm.firm_mac_store
-    generic map (
-      DEPTH     => DEPTH,
-      DATA_BITS => 17
-    )
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      s_axis_tdata  => word,
-      s_axis_tuser  => spoils,
-      s_axis_tvalid => word_valid,
-      s_axis_tlast  => ends_packet,
-      m_axis_tdata  => taken,
-      m_axis_tvalid => taken_valid,
-      m_axis_tlast  => open,
-      m_axis_tready => take,
-      is_lost       => is_lost
-    );
-
   take  <= '1' when state_r = TAKING and due_r = '0' and leave_r = '0' else '0';
-  takes <= take and taken_valid;
-  at    <= unsigned(taken(15 downto 8));
-  value <= taken(7 downto 0);
-
-  note_submessage : process (clk)
-  begin
-    if rising_edge(clk) then
-      if takes = '1' then
-        if at = RECORD_SOURCE_MAC then
-          mine_r <= '1';
-        elsif at = RECORD_KIND then
-          kind_r     <= value;
-          large_r    <= '0';
-          gone_r     <= '0';
-        elsif at = RECORD_FLAGS then
-          flags_r <= value;
-        elsif at >= RECORD_WRITER and at < RECORD_WRITER+4 then
-          from_r <= from_r(23 downto 0) & value;
-        elsif at = RECORD_NUMBER then
-          base_r <= unsigned(value);
-        elsif at > RECORD_NUMBER and at < RECORD_NUMBER+8 then
-          if value /= x"00" then
-            large_r <= '1';
-          end if;
-        elsif at = RECORD_STATUS+3 then
-          gone_r <= value(0) or value(1);
-        elsif at >= RECORD_DESTINATION and at < RECORD_DESTINATION+12 then
-          own_r <= own_r(87 downto 0) & own_r(95 downto 88);
-          if at = RECORD_DESTINATION then
-            is_ours_r <= '1';
-            is_all_r  <= '1';
-          end if;
-          if value /= own_r(95 downto 88) then
-            is_ours_r <= '0';
-          end if;
-          if value /= x"00" then
-            is_all_r <= '0';
-          end if;
-        end if;
-        if at = RECORD_KIND then
-          own_r <= prefix;
-        end if;
-      elsif state_r = DECIDE and kind_r = RTPS_INFO_DESTINATION then
-        mine_r <= is_ours_r or is_all_r;
-      end if;
-    end if;
-  end process note_submessage;
+  takes <= has_word when state_r = TAKING and due_r = '0' and leave_r = '0' else '0';
+  at    <= unsigned(place);
 
   -- ------------------------------------------------------------------ where a participant listens
 
-  is_meta <= '1' when id_r = METATRAFFIC_LOCATOR and size_r = LOCATOR_BYTES and has_meta_r = '0' else '0';
-  is_end  <= '1' when id_r = ENDPOINT_LOCATOR and size_r = LOCATOR_BYTES and has_end_r = '0' else '0';
-  is_user <= '1' when id_r = DEFAULT_LOCATOR and size_r = LOCATOR_BYTES and has_user_r = '0' else '0';
+  is_meta  <= '1' when id = RTPS_METATRAFFIC_LOCATOR and unsigned(size) = LOCATOR_BYTES and has_meta_r = '0' else '0';
+  is_user  <= '1' when id = RTPS_DEFAULT_LOCATOR and unsigned(size) = LOCATOR_BYTES and has_user_r = '0' else '0';
+  is_point <= '1' when id = RTPS_UNICAST_LOCATOR and unsigned(size) = LOCATOR_BYTES and has_end_r = '0' else '0';
 
   read_parameters : process (clk)
     variable expected : byte_t;
-    variable last     : boolean;
+    variable named    : std_logic;
   begin
     if rising_edge(clk) then
-      if takes = '1' and at = RECORD_KIND then
-        lead_r     <= (others => '0');
-        place_r    <= (others => '0');
-        over_r     <= '0';
+      if takes = '1' and is_value = '1' then
+        expected := x"00";
+        if (at = 0 and is_little = '1') or (at = 3 and is_little = '0') then
+          expected := x"01";
+        end if;
+        if at < 4 then
+          udp_r <= '0';
+          if data = expected then
+            udp_r <= udp_r;
+            if at = 0 then
+              udp_r <= '1';
+            end if;
+          end if;
+        end if;
+        named := named_r;
+        if at = 0 then
+          named := '1';
+        end if;
+        if id /= RTPS_TOPIC_NAME or (at >= NAME_PLACE and not is_character(data, at)) then
+          named := '0';
+        end if;
+        named_r <= named;
+        if is_last = '1' then
+          has_end_r  <= has_end_r or (is_point and udp_r);
+          has_meta_r <= has_meta_r or (is_meta and udp_r);
+          has_user_r <= has_user_r or (is_user and udp_r);
+          if named = '1' and unsigned(size) >= GRAPH_TOPIC_BYTES+NAME_PLACE then
+            is_graph_r <= '1';
+          end if;
+        end if;
+      end if;
+      if begins = '1' then
         has_meta_r <= '0';
         has_user_r <= '0';
         has_end_r  <= '0';
         is_graph_r <= '0';
-      elsif takes = '1' and at = AT_PAYLOAD and over_r = '0' then
-        if lead_r /= 4 then
-          lead_r <= lead_r + 1;
-          if lead_r = 1 then
-            little_r <= value(0);
-          end if;
-        else
-          place_r <= place_r + 1;
-          if place_r = 0 or place_r = 1 then
-            id_r <= id_r(7 downto 0) & value;
-            if little_r = '1' then
-              id_r <= value & id_r(15 downto 8);
-            end if;
-          elsif place_r = 2 or place_r = 3 then
-            size_r <= size_r(7 downto 0) & unsigned(value);
-            if little_r = '1' then
-              size_r <= unsigned(value) & size_r(15 downto 8);
-            end if;
-            udp_r   <= '1';
-            named_r <= '1';
-            if place_r = 3 and id_r = SENTINEL then
-              over_r <= '1';
-            end if;
-            if place_r = 3 and ((little_r = '1' and value = x"00" and size_r(15 downto 8) = 0)
-                                or (little_r = '0' and value = x"00" and size_r(7 downto 0) = 0)) then
-              place_r <= (others => '0');
-            end if;
-          else
-            expected := x"00";
-            if (place_r = 4 and little_r = '1') or (place_r = 7 and little_r = '0') then
-              expected := x"01";
-            end if;
-            if place_r < 8 and value /= expected then
-              udp_r <= '0';
-            end if;
-            if id_r /= TOPIC_NAME or (place_r >= NAME_PLACE and not is_character(value, place_r)) then
-              named_r <= '0';
-            end if;
-            if place_r = size_r + 3 then
-              if named_r = '1' and size_r >= GRAPH_TOPIC_BYTES+4 then
-                is_graph_r <= '1';
-              end if;
-              has_end_r  <= has_end_r or (is_end and udp_r);
-              place_r    <= (others => '0');
-              has_meta_r <= has_meta_r or (is_meta and udp_r);
-              has_user_r <= has_user_r or (is_user and udp_r);
-            end if;
-          end if;
-        end if;
       end if;
     end if;
   end process read_parameters;
 
   -- Fields of the record, and ports and addresses of locators.
-  place_words : process (takes, at, place_r, little_r, udp_r, is_meta, is_user, is_end, over_r, lead_r)
+  place_words : process (takes, has_field, address, is_value, at, is_little, udp_r, is_meta, is_user, is_point)
     variable port_place : natural range 0 to 31;
     variable ip_place   : natural range 0 to 31;
     variable offset     : natural range 0 to 31;
@@ -423,32 +311,29 @@ begin
     if is_user = '1' then
       port_place := AT_USER_PORT;
       ip_place   := AT_USER_ADDRESS;
-    elsif is_end = '1' then
+    elsif is_point = '1' then
       port_place := AT_GRAPH_PORT;
     end if;
     offset := 0;
     found  := '0';
-    if place_r >= 24 and place_r < 28 then
-      found  := not is_end;
-      offset := ip_place + to_integer(place_r(1 downto 0));
-    elsif place_r >= 8 and place_r < 12 then
+    if at >= 20 and at < 24 then
+      found  := not is_point;
+      offset := ip_place + to_integer(at(1 downto 0));
+    elsif at >= 4 and at < 8 then
       -- Of four bytes, the port is in the lower two.
-      found := little_r xor place_r(1);
-      if (place_r(0) = '0') = (little_r = '0') then
+      found := is_little xor at(1);
+      if (at(0) = '0') = (is_little = '0') then
         offset := port_place;
       else
         offset := port_place + 1;
       end if;
     end if;
-    if at = AT_PAYLOAD then
-      record_write  <= takes and found and udp_r and (is_meta or is_user or is_end) and not over_r;
-      write_address <= to_unsigned(RECORD_SOURCE_MAC, RECORD_BITS) + offset;
-      if lead_r /= 4 then
-        record_write <= '0';
-      end if;
-    else
+    if has_field = '1' then
       record_write  <= takes;
-      write_address <= at;
+      write_address <= unsigned(address);
+    else
+      record_write  <= takes and is_value and found and udp_r and (is_meta or is_user or is_point);
+      write_address <= to_unsigned(RECORD_SOURCE_MAC, RECORD_BITS) + offset;
     end if;
   end process place_words;
 
@@ -491,7 +376,7 @@ begin
     if rising_edge(clk) then
       record_r <= record_memory(to_integer(record_address));
       if record_write = '1' then
-        record_memory(to_integer(write_address)) <= value;
+        record_memory(to_integer(write_address)) <= data;
       end if;
     end if;
   end process access_record;
@@ -508,6 +393,67 @@ begin
       end if;
     end if;
   end process access_peers;
+
+  is_subscribed <= '1' when writer = RTPS_SUBSCRIPTIONS_WRITER else '0';
+  is_expected   <= '1' when unsigned(number) = expected_r and is_large = '0' else '0';
+  number_place  <= slot_r & index_r(0) when state_r = INSERT else slot_r & is_subscribed;
+
+  choose_number : process (state_r, job_r, second_r, is_expected, expected_r, number, second, is_large)
+  begin
+    number_write <= '0';
+    new_number   <= to_unsigned(1, 32);
+    if state_r = INSERT and job_r = GREETING then
+      number_write <= second_r;
+    elsif state_r = JUDGE then
+      if job_r = ANNOUNCED then
+        number_write <= is_expected;
+        new_number   <= expected_r + 1;
+      elsif job_r = TOLD then
+        if unsigned(number) > expected_r then
+          number_write <= not is_large;
+        end if;
+        new_number <= unsigned(number);
+      elsif job_r = SKIPPED then
+        if unsigned(number) <= expected_r and unsigned(second) > expected_r then
+          number_write <= not is_large;
+        end if;
+        new_number <= unsigned(second);
+      end if;
+    end if;
+  end process choose_number;
+
+  access_numbers : process (clk)
+  begin
+    if rising_edge(clk) then
+      expected_r <= numbers(to_integer(number_place));
+      if number_write = '1' then
+        numbers(to_integer(number_place)) <= new_number;
+        expected_r                        <= new_number;
+      end if;
+    end if;
+  end process access_numbers;
+
+  lacks <= ('0' & unsigned(second)) + 1 - ('0' & expected_r);
+
+  note_request : process (clk)
+  begin
+    if rising_edge(clk) then
+      if state_r = ASK then
+        set_size_r <= lacks(5 downto 0);
+        if lacks(32) = '1' then
+          set_size_r <= (others => '0');
+        elsif lacks > MOST_REQUESTED then
+          set_size_r <= to_unsigned(MOST_REQUESTED, 6);
+        end if;
+      end if;
+      for bit_place in set_r'range loop
+        set_r(bit_place) <= '0';
+        if 31-bit_place < set_size_r then
+          set_r(bit_place) <= '1';
+        end if;
+      end loop;
+    end if;
+  end process note_request;
 
   sample_write <= s_axis_tvalid and not has_sample_r;
 
@@ -529,9 +475,9 @@ begin
   begin
     free <= (others => '0');
     full <= '1';
-    for number in used_r'range loop
-      if used_r(number) = '0' and number < PEERS then
-        free <= to_unsigned(number, 3);
+    for entry in used_r'range loop
+      if used_r(entry) = '0' and entry < PEERS then
+        free <= to_unsigned(entry, 3);
         full <= '0';
       end if;
     end loop;
@@ -550,26 +496,27 @@ begin
 
     procedure decide_submessage is
     begin
-      removes_r <= gone_r;
-      if mine_r = '0' then
-        null;
-      elsif kind_r = RTPS_DATA and from_r = PARTICIPANT_WRITER then
-        if gone_r = '1' or has_meta_r = '1' then
+      removes_r <= '0';
+      if writer = RTPS_PARTICIPANT_WRITER then
+        removes_r <= is_gone;
+        if kind = RTPS_DATA and (is_gone = '1' or has_meta_r = '1') then
           find_peer(GREETING, ANNOUNCE, READERS_TOLD);
         end if;
-      elsif kind_r = RTPS_DATA and from_r = SUBSCRIPTIONS_WRITER then
-        removes_r <= '0';
-        if gone_r = '0' and is_graph_r = '1' and has_end_r = '1' then
-          find_peer(GRAPH_PORT, GRAPH, GRAPH);
-        end if;
-      elsif kind_r = RTPS_ACKNACK and large_r = '0' then
-        removes_r <= '0';
-        if from_r = PUBLICATIONS_WRITER and (base_r <= WRITERS or flags_r(RTPS_FINAL) = '0') then
+      elsif kind = RTPS_ACKNACK and is_large = '0' then
+        if writer = RTPS_PUBLICATIONS_WRITER and (unsigned(number) <= WRITERS or flags(RTPS_FINAL) = '0') then
           find_peer(ENDPOINTS, FIRST_WRITER, WRITERS_TOLD);
-        elsif from_r = SUBSCRIPTIONS_WRITER and (base_r <= READERS or flags_r(RTPS_FINAL) = '0') then
+        elsif writer = RTPS_SUBSCRIPTIONS_WRITER and (unsigned(number) <= READERS or flags(RTPS_FINAL) = '0') then
           find_peer(ENDPOINTS, FIRST_READER, READERS_TOLD);
-        elsif from_r = GRAPH_WRITER and base_r <= 1 then
+        elsif writer = GRAPH_WRITER and unsigned(number) <= 1 then
           find_peer(GRAPH_JOB, HEARTBEAT, GRAPH);
+        end if;
+      elsif writer = RTPS_PUBLICATIONS_WRITER or writer = RTPS_SUBSCRIPTIONS_WRITER then
+        if kind = RTPS_DATA then
+          find_peer(ANNOUNCED, GRAPH, GRAPH);
+        elsif kind = RTPS_HEARTBEAT and is_large = '0' then
+          find_peer(TOLD, ACKNOWLEDGE, ACKNOWLEDGE);
+        elsif kind = RTPS_GAP then
+          find_peer(SKIPPED, GRAPH, GRAPH);
         end if;
       end if;
     end procedure decide_submessage;
@@ -634,7 +581,7 @@ begin
             stop_r   <= to_unsigned(LEAVE_GROUP, 8);
           end if;
         elsif takes = '1' then
-          if taken(16) = '1' then
+          if is_end = '1' then
             state_r <= DECIDE;
           end if;
         elsif has_sample_r = '1' and job_r /= SAMPLES then
@@ -657,16 +604,50 @@ begin
           elsif index_r = 11 then
             index_r <= (others => '0');
             state_r <= LOAD;
-            if job_r = GRAPH_PORT then
-              state_r <= INSERT;
-              index_r <= to_unsigned(AT_GRAPH_PORT, 6);
+            if job_r = ANNOUNCED or job_r = TOLD or job_r = SKIPPED then
+              state_r <= EXPECT;
             elsif job_r = GREETING then
               state_r <= TAKING;
               if removes_r = '1' then
-                used_r <= used_r and not slot;
+                state_r <= FORGET;
               end if;
             end if;
           end if;
+        end if;
+      elsif state_r = FORGET then
+        used_r  <= used_r and not slot;
+        state_r <= TAKING;
+      elsif state_r = EXPECT then
+        state_r <= JUDGE;
+      elsif state_r = JUDGE then
+        second_r <= '0';
+        state_r  <= TAKING;
+        if job_r = TOLD then
+          state_r <= ASK;
+        elsif job_r = ANNOUNCED and is_expected = '1' then
+          if is_subscribed = '0' then
+            state_r <= TELL;
+          elsif is_gone = '0' and is_graph_r = '1' and has_end_r = '1' then
+            state_r <= INSERT;
+            job_r   <= GRAPH_PORT;
+            index_r <= to_unsigned(AT_GRAPH_PORT, 7);
+          end if;
+        end if;
+      elsif state_r = TELL then
+        state_r <= REST;
+      elsif state_r = REST then
+        if readers_busy = '0' then
+          state_r <= TAKING;
+        end if;
+      elsif state_r = ASK then
+        second_r <= '0';
+        state_r  <= TAKING;
+        if lacks(32) = '0' and lacks /= 0 then
+          state_r  <= LOAD;
+          packet_r <= to_unsigned(REQUEST, 8);
+          stop_r   <= to_unsigned(REQUEST, 8);
+        elsif flags(RTPS_FINAL) = '0' then
+          state_r <= LOAD;
         end if;
       elsif state_r = INSERT then
         if second_r = '1' then
@@ -715,39 +696,53 @@ begin
 
   start       <= '1' when state_r = BEGIN_PACKET else '0';
   packet      <= std_logic_vector(packet_r);
-  peers_known <= used_r;
+  peers_known  <= used_r;
+  is_announced <= '1' when state_r = TELL else '0';
+  is_left      <= '1' when state_r = FORGET else '0';
+  peer         <= std_logic_vector(slot_r);
 
   -- ------------------------------------------------------------------ fields of packets
 
   build_field_valid   <= second_r when state_r = LOAD else '0';
-  build_field_address <= std_logic_vector(resize(index_r, 7));
+  build_field_address <= std_logic_vector(index_r);
 
-  choose_field : process (index_r, job_r, peer_r, record_r, sample_writer, count_r, number_r)
-    variable writer : std_logic_vector(31 downto 0);
+  choose_field : process (index_r, job_r, peer_r, record_r, sample_writer, writer, count_r, number_r, expected_r,
+                          set_size_r, set_r)
+    variable sender : std_logic_vector(31 downto 0);
+    variable named  : std_logic_vector(31 downto 0);
     variable shown  : std_logic_vector(31 downto 0);
   begin
-    writer := GRAPH_WRITER;
+    sender := GRAPH_WRITER;
+    named  := std_logic_vector(number_r);
     if job_r = SAMPLES then
-      writer := sample_writer;
+      sender := sample_writer;
+    elsif job_r = TOLD then
+      sender := writer;
+      named  := std_logic_vector(expected_r);
     end if;
     shown := (others => '0');
     if index_r >= AT_WRITER and index_r < AT_WRITER+4 then
-      shown := writer;
+      shown := sender;
     elsif index_r >= AT_COUNT and index_r < AT_COUNT+4 then
       shown := reversed(x"0000" & std_logic_vector(count_r));
     elsif index_r >= AT_NUMBER and index_r < AT_NUMBER+4 then
-      shown := reversed(std_logic_vector(number_r));
+      shown := reversed(named);
+    elsif index_r >= AT_SET then
+      shown := reversed(set_r);
+    elsif index_r >= AT_SET_SIZE then
+      shown := reversed(std_logic_vector(resize(set_size_r, 32)));
     elsif (index_r >= AT_FIRST and index_r < AT_FIRST+4) or index_r >= AT_LAST then
       shown := x"01000000";
+    elsif index_r >= AT_READER and index_r < AT_READER+4 and job_r = TOLD then
+      shown := writer(31 downto 8) & DISCOVERY_READER;
     end if;
     build_field_data <= byte_of(shown, index_r(1 downto 0));
-    if index_r < ENTRY_FIELDS then
+    if job_r = TOLD and index_r = AT_FLAGS then
+      build_field_data <= REQUEST_FLAGS;
+    elsif index_r < ENTRY_FIELDS then
       build_field_data <= peer_r;
-    elsif index_r < AT_READER+4 then
-      build_field_data <= (others => '0');
-      if job_r = GRAPH_JOB then
-        build_field_data <= record_r;
-      end if;
+    elsif index_r < AT_READER+4 and job_r = GRAPH_JOB then
+      build_field_data <= record_r;
     end if;
   end process choose_field;
 

@@ -53,6 +53,24 @@ package firm_rtps_pkg is
   constant RECORD_SOURCE_MAC  : natural  := 128; -- 6 bytes, as on the line
   constant RECORD_SOURCE      : natural  := 144; -- 12 bytes: the sender's prefix
 
+  -- Writers of discovery.
+  constant RTPS_PARTICIPANT_WRITER   : std_logic_vector(31 downto 0) := x"000100c2";
+  constant RTPS_PUBLICATIONS_WRITER  : std_logic_vector(31 downto 0) := x"000003c2";
+  constant RTPS_SUBSCRIPTIONS_WRITER : std_logic_vector(31 downto 0) := x"000004c2";
+
+  -- Parameters of discovery.
+  constant RTPS_TOPIC_NAME          : std_logic_vector(15 downto 0) := x"0005";
+  constant RTPS_TYPE_NAME           : std_logic_vector(15 downto 0) := x"0007";
+  constant RTPS_RELIABILITY         : std_logic_vector(15 downto 0) := x"001a";
+  constant RTPS_DURABILITY          : std_logic_vector(15 downto 0) := x"001d";
+  constant RTPS_PARTITION           : std_logic_vector(15 downto 0) := x"0029";
+  constant RTPS_USER_DATA           : std_logic_vector(15 downto 0) := x"002c";
+  constant RTPS_UNICAST_LOCATOR     : std_logic_vector(15 downto 0) := x"002f";
+  constant RTPS_DEFAULT_LOCATOR     : std_logic_vector(15 downto 0) := x"0031";
+  constant RTPS_METATRAFFIC_LOCATOR : std_logic_vector(15 downto 0) := x"0032";
+  constant RTPS_ENDPOINT_GUID       : std_logic_vector(15 downto 0) := x"005a";
+  constant RTPS_REPRESENTATION      : std_logic_vector(15 downto 0) := x"0073";
+
   constant MOST_SET_BITS : positive := 256;
 
 end package firm_rtps_pkg;

@@ -1,0 +1,275 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Holds back what a packet tells until the packet is known to be good, and gives it byte by byte to those that act on
+-- it: the fields that firm_rtps_walker finds, and the payloads of the writers of discovery with their parameters.
+--
+-- After the last word of a submessage, its user may act on it before it takes the next word.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_rtps_pkg.all;
+
+entity firm_rtps_inbox is
+  generic (
+    DEPTH : integer := 1024 -- words of waiting packets, a power of two
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- The prefix of the node; the first byte on the line highest.
+    prefix : in std_logic_vector(95 downto 0);
+
+    -- From firm_rtps_walker.
+    field_valid   : in std_logic;
+    field_address : in std_logic_vector(RECORD_BITS-1 downto 0);
+    field_data    : in std_logic_vector(7 downto 0);
+    payload_valid : in std_logic;
+    payload_data  : in std_logic_vector(7 downto 0);
+    is_submessage : in std_logic;
+    is_whole      : in std_logic;
+    is_faulty     : in std_logic;
+    is_foreign    : in std_logic;
+    is_aborted    : in std_logic;
+
+    -- A word moves with `take`. It is a byte of a field, a byte of a payload, or none.
+    take        : in  std_logic;
+    has_word    : out std_logic;
+    has_field   : out std_logic;
+    has_payload : out std_logic;
+    address     : out std_logic_vector(RECORD_BITS-1 downto 0);
+    data        : out std_logic_vector(7 downto 0);
+    is_end      : out std_logic;  -- the word is the last one of its submessage
+
+    -- The submessage that arrives is for this node. The words of others are forgotten.
+    is_mine : out std_logic;
+
+    -- Of the submessage, from its last word on.
+    kind     : out std_logic_vector(7 downto 0);
+    flags    : out std_logic_vector(7 downto 0);
+    writer   : out std_logic_vector(31 downto 0);
+    number   : out std_logic_vector(31 downto 0);  -- RECORD_NUMBER, and RECORD_SECOND: the lower half
+    second   : out std_logic_vector(31 downto 0);
+    is_large : out std_logic;                      -- one of both is larger
+    is_gone  : out std_logic;                      -- its status says that the instance ended
+
+    -- Of the byte of a payload: see firm_rtps_parameters.
+    begins    : out std_logic;
+    is_value  : out std_logic;
+    id        : out std_logic_vector(15 downto 0);
+    size      : out std_logic_vector(15 downto 0);
+    place     : out std_logic_vector(15 downto 0);
+    is_little : out std_logic;
+    is_last   : out std_logic;
+
+    is_lost : out std_logic  -- a pulse for each packet without room
+  );
+end entity firm_rtps_inbox;
+
+architecture rtl of firm_rtps_inbox is
+
+  -- Addresses at which the record has no field.
+  constant AT_PAYLOAD : std_logic_vector(RECORD_BITS-1 downto 0) := x"ff";
+  constant AT_NOTHING : std_logic_vector(RECORD_BITS-1 downto 0) := x"fe";
+
+  signal writer_r    : std_logic_vector(31 downto 0) := (others => '0');  -- of the submessage that arrives
+  signal listens     : std_logic;                                         -- its payload is read
+  signal word        : std_logic_vector(16 downto 0);
+  signal word_valid  : std_logic;
+  signal ends_packet : std_logic;
+  signal spoils      : std_logic_vector(0 downto 0);
+  signal taken       : std_logic_vector(16 downto 0);
+  signal valid       : std_logic;
+  signal takes       : std_logic;
+  signal shown       : std_logic_vector(RECORD_BITS-1 downto 0);
+  signal at          : unsigned(RECORD_BITS-1 downto 0);
+  signal value       : std_logic_vector(7 downto 0);
+  signal new_kind    : std_logic;
+  signal list_valid  : std_logic;
+  signal in_value    : std_logic;
+
+  signal kind_r   : std_logic_vector(7 downto 0) := (others => '0');
+  signal flags_r  : std_logic_vector(7 downto 0) := (others => '0');
+  signal from_r   : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
+  signal number_r : std_logic_vector(31 downto 0) := (others => '0');
+  signal second_r : std_logic_vector(31 downto 0) := (others => '0');
+  signal large_r  : std_logic;
+  signal gone_r   : std_logic;
+
+  -- Of the packet that arrives.
+  signal mine_r   : std_logic;  -- the last destination was this node, or any
+  signal mine     : std_logic;  -- the byte that comes is for this node
+  signal own_r    : std_logic_vector(95 downto 0) := (others => '0');  -- the prefix, turned
+  signal ours_r   : std_logic;  -- the destination was this node, before this byte
+  signal all_r    : std_logic;  -- the destination was zero, before this byte
+  signal starts   : std_logic;  -- this is the first byte of a destination
+  signal ours     : std_logic;
+  signal all_zero : std_logic;
+
+  function is_zero(byte : std_logic_vector(7 downto 0)) return std_logic is
+  begin
+    if byte = x"00" then
+      return '1';
+    end if;
+    return '0';
+  end function is_zero;
+
+  -- A number with another byte at its place.
+  function placed(before : std_logic_vector(31 downto 0); byte : std_logic_vector(7 downto 0);
+    where  : unsigned(1 downto 0)) return std_logic_vector is
+    variable result : std_logic_vector(31 downto 0) := before;
+  begin
+    for index in 0 to 3 loop
+      if where = index then
+        result(8*index+7 downto 8*index) := byte;
+      end if;
+    end loop;
+    return result;
+  end function placed;
+
+begin
+
+  -- ------------------------------------------------------------------ what is for this node
+
+  starts   <= '1' when unsigned(field_address) = RECORD_DESTINATION else '0';
+  ours     <= (ours_r or starts) and is_zero(field_data xor own_r(95 downto 88));
+  all_zero <= (all_r or starts) and is_zero(field_data);
+  -- A packet is for this node until it names a destination.
+  mine     <= '1' when field_valid = '1' and unsigned(field_address) = RECORD_SOURCE_MAC else mine_r;
+  is_mine  <= mine_r;
+
+  note_destination : process (clk)
+  begin
+    if rising_edge(clk) then
+      if field_valid = '1' then
+        if unsigned(field_address) = RECORD_SOURCE_MAC then
+          mine_r <= '1';
+        elsif unsigned(field_address) = RECORD_KIND then
+          own_r <= prefix;
+        elsif unsigned(field_address) >= RECORD_DESTINATION and unsigned(field_address) < RECORD_DESTINATION+12 then
+          own_r  <= own_r(87 downto 0) & own_r(95 downto 88);
+          ours_r <= ours;
+          all_r  <= all_zero;
+          if unsigned(field_address) = RECORD_DESTINATION+11 then
+            mine_r <= ours or all_zero;
+          end if;
+        end if;
+      end if;
+    end if;
+  end process note_destination;
+
+  -- ------------------------------------------------------------------ words of packets
+
+  note_writer : process (clk)
+  begin
+    if rising_edge(clk) then
+      if field_valid = '1' and unsigned(field_address) >= RECORD_WRITER
+         and unsigned(field_address) < RECORD_WRITER+4 then
+        writer_r <= writer_r(23 downto 0) & field_data;
+      end if;
+    end if;
+  end process note_writer;
+
+  listens <= '1' when writer_r = RTPS_PARTICIPANT_WRITER or writer_r = RTPS_PUBLICATIONS_WRITER
+                      or writer_r = RTPS_SUBSCRIPTIONS_WRITER else
+             '0';
+
+  word(16)          <= is_submessage and mine;
+  word(15 downto 8) <= field_address when field_valid = '1' and mine = '1' else
+                       AT_PAYLOAD when payload_valid = '1' and listens = '1' and mine = '1' else
+                       AT_NOTHING;
+  word(7 downto 0)  <= field_data when field_valid = '1' else payload_data;
+  ends_packet       <= is_whole or is_faulty or is_foreign or is_aborted;
+  spoils(0)         <= is_foreign or is_aborted;
+  -- The destination is not needed any more.
+  word_valid        <= '1' when ends_packet = '1' else
+                       '0' when mine = '0' else
+                       field_valid or is_submessage or (payload_valid and listens);
+
+  u_store : entity firm.firm_mac_store
+    generic map (
+      DEPTH     => DEPTH,
+      DATA_BITS => 17
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => word,
+      s_axis_tuser  => spoils,
+      s_axis_tvalid => word_valid,
+      s_axis_tlast  => ends_packet,
+      m_axis_tdata  => taken,
+      m_axis_tvalid => valid,
+      m_axis_tlast  => open,
+      m_axis_tready => take,
+      is_lost       => is_lost
+    );
+
+  takes       <= take and valid;
+  shown       <= taken(15 downto 8);
+  at          <= unsigned(shown);
+  value       <= taken(7 downto 0);
+  has_word    <= valid;
+  has_field   <= '0' when shown = AT_PAYLOAD or shown = AT_NOTHING else '1';
+  has_payload <= '1' when shown = AT_PAYLOAD else '0';
+  address     <= shown;
+  data        <= value;
+  is_end      <= taken(16);
+
+  -- ------------------------------------------------------------------ the submessage
+
+  note_submessage : process (clk)
+  begin
+    if rising_edge(clk) then
+      if takes = '1' then
+        if at = RECORD_KIND then
+          kind_r  <= value;
+          gone_r  <= '0';
+          large_r <= '0';
+        elsif at = RECORD_FLAGS then
+          flags_r <= value;
+        elsif at >= RECORD_WRITER and at < RECORD_WRITER+4 then
+          from_r <= from_r(23 downto 0) & value;
+        elsif at >= RECORD_NUMBER and at < RECORD_NUMBER+4 then
+          number_r <= placed(number_r, value, at(1 downto 0));
+        elsif at >= RECORD_SECOND and at < RECORD_SECOND+4 then
+          second_r <= placed(second_r, value, at(1 downto 0));
+        elsif at >= RECORD_NUMBER+4 and at < RECORD_SECOND+8 then
+          large_r <= large_r or not is_zero(value);
+        elsif at = RECORD_STATUS+3 then
+          gone_r <= value(0) or value(1);
+        end if;
+      end if;
+    end if;
+  end process note_submessage;
+
+  kind    <= kind_r;
+  flags   <= flags_r;
+  writer  <= from_r;
+  number  <= number_r;
+  second  <= second_r;
+  is_large <= large_r;
+  is_gone <= gone_r;
+
+  -- ------------------------------------------------------------------ parameters
+
+  new_kind   <= '1' when takes = '1' and at = RECORD_KIND else '0';
+  list_valid <= '1' when takes = '1' and shown = AT_PAYLOAD else '0';
+  begins     <= new_kind;
+  is_value   <= in_value when shown = AT_PAYLOAD else '0';
+
+  u_parameters : entity firm.firm_rtps_parameters
+    port map (
+      clk       => clk,
+      begins    => new_kind,
+      s_valid   => list_valid,
+      s_data    => value,
+      is_value  => in_value,
+      id        => id,
+      size      => size,
+      place     => place,
+      is_little => is_little,
+      is_last   => is_last
+    );
+
+end architecture rtl;
