@@ -194,6 +194,7 @@ def image(node: Node, chip: int) -> bytes:
     rom.add(gateway + network.netmask.packed + network.mac + network.address.packed)
     rom.label("master")
     rom.add(node.master[0].packed + node.master[1].to_bytes(2, "big"))
+    rom.add([0])  # the sequencer reads a byte more than it sends
     return rom.image()
 
 

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -55,6 +55,7 @@ class Peers:
 
     host: Host
     folder: Path
+    board: subprocess.Popen[str] | None = None
 
     def start(self, *words: str) -> subprocess.Popen[str]:
         """Start a program there."""
@@ -71,7 +72,10 @@ class Peers:
 
     def run(self, *words: str) -> str:
         """Run a program there, which has to succeed; return what it prints."""
-        with self.start(*words) as process:
+        with _until_the_end(self.start(*words)) as process:
+            while process.poll() is None:
+                assert self.board is None or self.board.poll() is None, "the board has ended"
+                time.sleep(0.1)
             printed, faults = process.communicate()
             assert process.returncode == 0, faults[-2000:]
             return printed
@@ -103,7 +107,6 @@ def _until_the_end(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[
     [
         ("verilator", "w5500", 64),
         pytest.param("verilator", "w5200", 8, marks=pytest.mark.thorough),
-        pytest.param("ghdl", "w5500", 8, marks=pytest.mark.thorough),
     ],
 )
 def test_a_simulated_board_serves_rospy(tmp_path: Path, tool: str, chip: str, width: int) -> None:
@@ -118,6 +121,7 @@ def test_a_simulated_board_serves_rospy(tmp_path: Path, tool: str, chip: str, wi
         ):
             assert board.stdout
             assert board.stdout.readline() == f"/lab/turn is at {BOARD}; its master is {MASTER}:11311; Ctrl-C ends it\n"
+            peers = replace(peers, board=board)
             words = [DEBIAN_PYTHON, PACED_PEER, "1", "10", "2", json.dumps(WAYS)]
             for result in json.loads(peers.run(*words)):
                 assert result["sent"] == 20
