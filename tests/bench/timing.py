@@ -19,7 +19,7 @@ from tests.bench import schedulers
 from tests.bench.applications import NotBuiltError, netlist_of
 from tests.bench.area import Subject
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, generate
-from tests.bench.manager import TREE_PUBLISHERS, WATCHDOG, tree
+from tests.bench.manager import TREE_PUBLISHERS, tree
 from tests.bench.nextpnr import SEEDS, Nextpnr, Placement
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.bench.yosys import SynthesisError
@@ -288,7 +288,7 @@ def _loop(policy: str, channels: int) -> Callable[[Path], Design]:
 
 def _trees() -> Iterator[Row]:
     label = _label("Manager of Managers, round_robin", TREE_PUBLISHERS)
-    yield Row(label, None, lambda folder: _synthesised(tree(WATCHDOG)(folder)), _TREE_BAR)
+    yield Row(label, None, lambda folder: _synthesised(tree(watchdog=0)(folder)), _TREE_BAR)
 
 
 def _arithmetic() -> Iterator[Row]:

@@ -48,7 +48,7 @@ architecture simulation of status_bench is
   signal bus_valid, bus_write, bus_done : std_logic;
   signal bus_address                    : std_logic_vector(15 downto 0);
   signal bus_write_data, bus_read_data  : word_t;
-  signal channel_address                : std_logic_vector(12 downto 0);
+  signal channel_address                : std_logic_vector(13 downto 0);
   signal channel_word                   : word_t;
   signal enable, is_clear               : std_logic;
   signal fault, lost, interrupt         : std_logic;
@@ -368,7 +368,7 @@ begin
       fault_code       => fault_code,
       lost             => lost,
       cycles           => cycles,
-      read_address     => channel_address,
+      read_address     => channel_address(12 downto 0),
       read_word        => channel_word
     );
 

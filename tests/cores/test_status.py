@@ -28,8 +28,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     registers = folder / "bench_status.vhd"
     registers.write_text(render(REGISTERS_TEMPLATE, registers_configuration(MAP, SIGNATURES)))
     library = Library("firm", folder)
-    library.analyse([*core_files("axis/package", "axis/axis", "status/status"), registers])
-    library.analyse([Path(__file__).with_name("status_bench.vhd")])
+    library.analyse([*core_files("axis/package", "axis/axis", "sched/package", "status/status"), registers])
+    library.analyse([Path(__file__).with_name(name) for name in ("status_bench.vhd", "status_tree_bench.vhd")])
     return library
 
 
@@ -167,3 +167,27 @@ def test_faults_frames_and_waits_are_counted_in_their_channels(library: Library,
     script.read("subscriber[0].faults[0]", 1)
     script.read("subscriber[0].frames", 3)
     script.run(library, tmp_path)
+
+
+@pytest.mark.parametrize("is_crowded", [False, True])
+@pytest.mark.parametrize(
+    ("subscribers", "publishers"), [(3, 5), (1, 1), (2, 3), pytest.param(9, 40, marks=pytest.mark.check)]
+)
+def test_the_counters_beside_a_tree(library: Library, subscribers: int, publishers: int, is_crowded: bool) -> None:
+    for seed in (1, 2):
+        print(f"seed {seed}")
+        generics = {"SUBSCRIBERS": subscribers, "PUBLISHERS": publishers, "SEED": seed, "CROWDED": is_crowded}
+        options = ("--ieee-asserts=disable-at-0", "--assert-level=failure")
+        result = library.run("status_tree_bench", generics, options=options)
+        assert result.exit_code == 0 and "PASS" in result.output, result.output
+
+
+def test_too_many_channels_are_named(library: Library) -> None:
+    result = library.run("firm_status_tree_counters", {"SUBSCRIBERS": 4000, "PUBLISHERS": 97})
+    assert result.exit_code != 0
+    assert "SUBSCRIBERS is 4000 and PUBLISHERS is 97; legal: 1 or more each, and at most 4096 together" in result.output
+
+
+@pytest.mark.parametrize("entity", ["firm_status_tree_counters", "firm_status_waits", "firm_status_faults"])
+def test_the_parts_beside_a_tree_are_latch_free(library: Library, entity: str) -> None:
+    assert library.latches(entity, {}) == []

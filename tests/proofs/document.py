@@ -21,7 +21,6 @@ _SHORT = {
     "SOURCES": "N",
     "FRAMES": "F",
     "LIMIT": "L",
-    "WATCHDOG": "L",
     "MAX_LENGTH": "M",
     "DEPTH": "D",
 }

@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Frees a stream of whole frames from a source that stops in the middle of a frame. After LIMIT cycles in which the
 -- receiver is ready and the source offers nothing, the frame ends with an abort (`tuser`) instead of its next beat, and
--- the scheduler is told that the frame is over. Only cycles with `tick` count, so that many watchdogs share a timer. The source's late beats up to its `tlast` are taken and dropped; if
--- the source stops among them, its grant ends after LIMIT cycles as well. Then its next frame is forwarded.
+-- the scheduler is told that the frame is over. The source's late beats up to its `tlast` are taken and dropped; if
+-- the source stops among them, its grant ends after LIMIT cycles as well. Then its next frame is forwarded. Only cycles
+-- with `tick` count, so that many watchdogs can share a timer.
 --
 -- A memory with one bit per source records which sources are late. It is cleared in the 2**n cycles after reset, for an
 -- index of n bits; no beat is taken meanwhile. The paths from input to output are combinational.

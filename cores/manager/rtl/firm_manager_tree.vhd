@@ -2,8 +2,8 @@
 -- A Manager of Managers, with ids of two bytes on the host's side: up to 65,536 subscribers and publishers. The
 -- converters are those of firm_manager, with ids of one byte, the lower one; the upper byte is removed and inserted
 -- here. Publishers form groups. In each group, a scheduler grants one publisher, and a register slice ends the paths;
--- a further scheduler chooses among the groups. Frames are sent whole (docs/reference/manager.md). With a WATCHDOG, each
--- group cuts off a publisher that stops in the middle of a frame; the groups share the timer.
+-- a further scheduler chooses among the groups. Frames are sent whole (docs/reference/manager.md). With a WATCHDOG,
+-- each group cuts off a publisher that stops in the middle of a frame; the groups share the timer.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -331,25 +331,25 @@ begin
         return result;
       end function highs_of_group;
 
-      signal grant_valid   : std_logic;
-      signal grant_select  : std_logic_vector(index_bits(SIZE)-1 downto 0);
-      signal beat          : std_logic;
-      signal cut           : std_logic;  -- the watchdog ends the granted publisher's frame
-      signal ends          : std_logic;
-      signal highs_in      : std_logic_vector(SIZE*8-1 downto 0);
+      signal grant_valid    : std_logic;
+      signal grant_select   : std_logic_vector(index_bits(SIZE)-1 downto 0);
+      signal beat           : std_logic;
+      signal cut            : std_logic;  -- the watchdog ends the granted publisher's frame
+      signal ends           : std_logic;
+      signal highs_in       : std_logic_vector(SIZE*8-1 downto 0);
       signal granted_tdata  : std_logic_vector(WIDTH-1 downto 0);
       signal granted_tkeep  : std_logic_vector(LANES-1 downto 0);
       signal granted_tuser  : std_logic_vector(0 downto 0);
       signal granted_tvalid : std_logic;
       signal granted_tlast  : std_logic;
       signal granted_tready : std_logic;
-      signal chosen_tdata  : std_logic_vector(WIDTH-1 downto 0);
-      signal chosen_tkeep  : std_logic_vector(LANES-1 downto 0);
-      signal chosen_tuser  : std_logic_vector(8 downto 0);
-      signal chosen_tvalid : std_logic;
-      signal chosen_tlast  : std_logic;
-      signal chosen_tready : std_logic;
-      signal group_user    : std_logic_vector(8 downto 0);
+      signal chosen_tdata   : std_logic_vector(WIDTH-1 downto 0);
+      signal chosen_tkeep   : std_logic_vector(LANES-1 downto 0);
+      signal chosen_tuser   : std_logic_vector(8 downto 0);
+      signal chosen_tvalid  : std_logic;
+      signal chosen_tlast   : std_logic;
+      signal chosen_tready  : std_logic;
+      signal group_user     : std_logic_vector(8 downto 0);
     begin
       u_scheduler : entity firm.firm_sched_by_policy
         generic map (

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Reads and writes registers by frames, between the host and the Manager. A request is a frame from the host with the
 -- highest id, 255 or 65,535, and eight bytes: an address, with bit 31 to write, and data. The answer has the same form,
--- with the register's word before the access. It leaves between two frames of the Manager. A frame with this id that has
+-- with the register's word before the access. It leaves between two frames of the Manager. A frame of this id that has
 -- another form or is aborted is dropped. All other frames pass unchanged.
 library ieee;
 use ieee.std_logic_1164.all;

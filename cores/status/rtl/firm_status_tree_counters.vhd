@@ -4,8 +4,8 @@
 -- by id, then the publishers by id. The entity only listens.
 --
 -- Frames are counted in the cycle of their last beat, those of publishers at the host's side of the Manager. Faults
--- wait in one place for each channel until they are counted, one in three cycles; a fault that finds its channel's place
--- taken is not counted, and `lost` pulses. The waits of publishers are measured in turns (firm_status_waits).
+-- wait in one place for each channel until they are counted, one in three cycles; a fault that finds the place of its
+-- channel taken is not counted, and `lost` pulses. The waits of publishers are measured in turns (firm_status_waits).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
