@@ -163,6 +163,11 @@ architecture rtl of firm_rtps_readers is
   signal index_r   : unsigned(3 downto 0) := (others => '0');
   signal to_r      : source_t := (others => '0');
   signal writes    : sources_t;
+
+  signal number_place : source_t;
+  signal number_write : std_logic;
+  signal new_number   : number_t;
+
   signal all_ones  : sources_t;
 
   -- The lowest bit that is set.
@@ -501,14 +506,16 @@ begin
     end if;
   end process note_writers;
 
-  -- A new writer begins with 1; after a sample, the next one follows.
+  -- A new writer begins with 1; after a sample, the next one follows. A memory needs that there is one write only.
+  number_place <= to_r when notes_r = '1' else from_r;
+  number_write <= '1' when notes_r = '1' or (state_r = JUDGING and is_new_r = '1') else '0';
+  new_number   <= to_unsigned(1, NUMBER_BITS) when notes_r = '1' else next_r;
+
   note_numbers : process (clk)
   begin
     if rising_edge(clk) then
-      if notes_r = '1' then
-        numbers(to_integer(to_r)) <= to_unsigned(1, NUMBER_BITS);
-      elsif state_r = JUDGING and is_new_r = '1' then
-        numbers(to_integer(from_r)) <= next_r;
+      if number_write = '1' then
+        numbers(to_integer(number_place)) <= new_number;
       end if;
     end if;
   end process note_numbers;
