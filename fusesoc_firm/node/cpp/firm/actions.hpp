@@ -28,10 +28,11 @@
 
 namespace firm {
 
-// An action that the hardware serves: the name of its block, the ids of the converters of its messages, its topics and services. The topics to
-// the node are goals and cancellations (ROS 1), those from it are states, feedback and, in ROS 1, results. The services
-// of ROS 2 are those of goals, cancellations and results. If the hardware sends nothing about its goal for `limit`, the
-// goal fails; after `accept_limit`, it is accepted. `no_result` is the payload of a result without contents.
+// An action that the hardware serves: the name of its block, the ids of the converters of its messages, its topics and
+// services. The topics to the node are goals and cancellations (ROS 1), those from it are states, feedback and, in
+// ROS 1, results. The services of ROS 2 are those of goals, cancellations and results. If the hardware sends nothing
+// about its goal for `limit`, the goal fails; after `accept_limit`, it is accepted. `no_result` is the payload of a
+// result without contents.
 struct Action {
   std::string block;
   unsigned goal;

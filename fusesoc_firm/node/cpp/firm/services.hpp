@@ -28,9 +28,9 @@
 
 namespace firm {
 
-// A service that the hardware serves, or calls: the name of its block, the ids of the converters of its messages, its name
-// in ROS, its type and signature, and the types of its messages. A call is answered within `limit`. `failure` is the response to a call that
-// fails, if the response has a field `success`; otherwise, it is empty.
+// A service that the hardware serves, or calls: the name of its block, the ids of the converters of its messages, its
+// name in ROS, its type and signature, and the types of its messages. A call is answered within `limit`. `failure` is
+// the response to a call that fails, if the response has a field `success`; otherwise, it is empty.
 struct Service {
   std::string block;
   bool is_server;
