@@ -200,6 +200,11 @@ class RosCarrier:
         """Wait for the bridge; return the names of subscribed topics, published topics and services."""
         parcel = self._channel.receive()
         if parcel is None or parcel.kind == bridge.FAULT:
+            module = _MODULES[self._ros]
+            if not _can_import(self._python, module):
+                raise CarrierError(
+                    f"{self._python} cannot import {module}, which {self.title} installs; {_INSTALLATION[self._ros]}"
+                )
             raise self._fault(parcel)
         names = json.loads(parcel.data)
         subscribers, publishers, services = (
@@ -327,9 +332,13 @@ def _python_of(ros: int) -> str:
     candidates = [path for path in dict.fromkeys(found) if path and Path(path).exists()]
     for path in candidates:
         # An installed interpreter is not sufficient, since the sourced ROS may be for another Python.
-        if not subprocess.run([path, "-c", f"import {module}"], capture_output=True, check=False).returncode:
+        if _can_import(path, module):
             return path
     raise CarrierError(
         f"no Python found here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
         f" {_INSTALLATION[ros]}; if ROS is installed, source its setup file, or select its Python with --ros-python"
     )
+
+
+def _can_import(python: str, module: str) -> bool:
+    return not subprocess.run([python, "-c", f"import {module}"], capture_output=True, check=False).returncode

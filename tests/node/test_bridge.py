@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import sys
 import threading
 from pathlib import Path
 
@@ -69,3 +70,13 @@ def test_a_python_of_ros_that_cannot_be_started(tmp_path: Path) -> None:
     with pytest.raises(CarrierError, match=f"{nothing}, the Python for ROS 1, cannot be started: No such file"):
         RosCarrier(1, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=nothing))
     assert len([*Path("/proc/self/fd").iterdir()]) == before
+
+
+@pytest.mark.parametrize(("ros", "module"), [(1, "rospy"), (2, "rclpy")])
+def test_a_python_without_ros(ros: int, module: str, tmp_path: Path) -> None:
+    # Without its packages, this Python cannot import the modules of ROS.
+    python = tmp_path / "python"
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" -S "$@"\n', encoding="utf-8")
+    python.chmod(0o755)
+    with pytest.raises(CarrierError, match=f"python cannot import {module}, which ROS {ros} installs; .* install"):
+        RosCarrier(ros, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=str(python)))
