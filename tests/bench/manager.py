@@ -47,6 +47,8 @@ _TREE_SIDE = 32
 TREE_PUBLISHERS = _TREE_SIDE**2
 # The default of a system.
 WATCHDOG = 2**20
+TREES = {"without watchdog": 0, "with watchdog": WATCHDOG}
+"""The limits in cycles of a Manager of Managers, by its name."""
 # 10 LUT6 a channel.
 _TREE_BAR = Bar(10 * TREE_PUBLISHERS)
 # Of its status: subscribers, and as many publishers. 16 LUT6 and 12 FF for one of each, and 600 LUT6 and FF.
@@ -143,7 +145,7 @@ def _combination(name: str) -> Callable[[Path], Subject]:
 
 
 def _trees() -> Iterator[Row]:
-    for name, watchdog in (("without watchdog", 0), ("with watchdog", WATCHDOG)):
+    for name, watchdog in TREES.items():
         yield Row(label(f"round_robin, {name}", TREE_PUBLISHERS), "", None, tree(watchdog), bar=_TREE_BAR)
     channels: dict[str, Generic] = {"SUBSCRIBERS": _STATUS_CHANNELS, "PUBLISHERS": _STATUS_CHANNELS}
     counters = of_core("firm_status_tree_counters", channels, (*CORES, "sched/package", "status/status"))

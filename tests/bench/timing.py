@@ -19,7 +19,7 @@ from tests.bench import schedulers
 from tests.bench.applications import NotBuiltError, netlist_of
 from tests.bench.area import Subject
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, generate
-from tests.bench.manager import TREE_PUBLISHERS, tree
+from tests.bench.manager import TREE_PUBLISHERS, TREES, tree
 from tests.bench.nextpnr import SEEDS, Nextpnr, Placement
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.bench.yosys import SynthesisError
@@ -287,8 +287,12 @@ def _loop(policy: str, channels: int) -> Callable[[Path], Design]:
 
 
 def _trees() -> Iterator[Row]:
-    label = _label("Manager of Managers, round_robin", TREE_PUBLISHERS)
-    yield Row(label, None, lambda folder: _synthesised(tree(watchdog=0)(folder)), _TREE_BAR)
+    for name, watchdog in TREES.items():
+        yield Row(_label(f"Manager of Managers, {name}", TREE_PUBLISHERS), None, _tree(watchdog), _TREE_BAR)
+
+
+def _tree(watchdog: int) -> Callable[[Path], Design]:
+    return lambda folder: _synthesised(tree(watchdog)(folder))
 
 
 def _arithmetic() -> Iterator[Row]:
