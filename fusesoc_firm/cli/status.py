@@ -45,14 +45,14 @@ def add_status(commands: Any) -> None:
 
 
 def _print_status(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.frame.model import ID_BYTES
     from fusesoc_firm.node.status import check_digest, read_status, status_text
     from fusesoc_firm.node.status_socket import open_status
     from fusesoc_firm.node.transport.transport import TransportError
+    from fusesoc_firm.system.derived.ids import ONE_BYTE
     from fusesoc_firm.system.system_core import identity
 
     names: list[str] = []
-    expected, id_bytes = "", ID_BYTES
+    expected, id_bytes = "", ONE_BYTE
     if arguments.system:
         arguments.spec = arguments.system
         loaded = load(arguments, needs_sources=False)

@@ -55,6 +55,14 @@ def test_no_converter_has_the_id_of_the_status(converters: int, faults: int) -> 
     assert len(found.found) == faults
 
 
+@pytest.mark.parametrize(("converters", "faults"), [(2048, 0), (2049, 1)])
+def test_the_registers_of_two_byte_ids_have_a_limit(converters: int, faults: int) -> None:
+    found = Diagnostics()
+    project = replace(load_beside(SPEC, [], None).specification.project, status=Text("frames"), id_bytes=2)
+    assert status_of(project, None, 2048, converters, found) is StatusAccess.FRAMES
+    assert len(found.found) == faults
+
+
 def test_the_files_of_the_registers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("peakrdl_python")
     assert main(["registers", str(SPEC), "-o", str(tmp_path)]) == 1

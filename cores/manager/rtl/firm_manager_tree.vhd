@@ -337,12 +337,12 @@ begin
       signal cut            : std_logic;  -- the watchdog ends the granted publisher's frame
       signal ends           : std_logic;
       signal highs_in       : std_logic_vector(SIZE*8-1 downto 0);
-      signal granted_tdata  : std_logic_vector(WIDTH-1 downto 0);
-      signal granted_tkeep  : std_logic_vector(LANES-1 downto 0);
-      signal granted_tuser  : std_logic_vector(0 downto 0);
-      signal granted_tvalid : std_logic;
-      signal granted_tlast  : std_logic;
-      signal granted_tready : std_logic;
+      signal member_tdata   : std_logic_vector(WIDTH-1 downto 0);
+      signal member_tkeep   : std_logic_vector(LANES-1 downto 0);
+      signal member_tuser   : std_logic_vector(0 downto 0);
+      signal member_tvalid  : std_logic;
+      signal member_tlast   : std_logic;
+      signal member_tready  : std_logic;
       signal chosen_tdata   : std_logic_vector(WIDTH-1 downto 0);
       signal chosen_tkeep   : std_logic_vector(LANES-1 downto 0);
       signal chosen_tuser   : std_logic_vector(8 downto 0);
@@ -380,21 +380,21 @@ begin
           s_axis_tvalid => pub_axis_tvalid(FIRST+SIZE-1 downto FIRST),
           s_axis_tlast  => pub_axis_tlast(FIRST+SIZE-1 downto FIRST),
           s_axis_tready => pub_ready(FIRST+SIZE-1 downto FIRST),
-          m_axis_tdata  => granted_tdata,
-          m_axis_tkeep  => granted_tkeep,
-          m_axis_tuser  => granted_tuser,
-          m_axis_tvalid => granted_tvalid,
-          m_axis_tlast  => granted_tlast,
-          m_axis_tready => granted_tready
+          m_axis_tdata  => member_tdata,
+          m_axis_tkeep  => member_tkeep,
+          m_axis_tuser  => member_tuser,
+          m_axis_tvalid => member_tvalid,
+          m_axis_tlast  => member_tlast,
+          m_axis_tready => member_tready
         );
 
       unwatched : if WATCHDOG = 0 generate
-        chosen_tdata             <= granted_tdata;
-        chosen_tkeep             <= granted_tkeep;
-        chosen_tuser(0 downto 0) <= granted_tuser;
-        chosen_tvalid            <= granted_tvalid;
-        chosen_tlast             <= granted_tlast;
-        granted_tready           <= chosen_tready;
+        chosen_tdata             <= member_tdata;
+        chosen_tkeep             <= member_tkeep;
+        chosen_tuser(0 downto 0) <= member_tuser;
+        chosen_tvalid            <= member_tvalid;
+        chosen_tlast             <= member_tlast;
+        member_tready           <= chosen_tready;
         cut                      <= '0';
 
         expired(FIRST+SIZE-1 downto FIRST) <= (others => '0');
@@ -428,12 +428,12 @@ begin
             clearing      => clearing,
             cleared       => cleared(index_bits(SIZE)-1 downto 0),
             source        => grant_select,
-            s_axis_tdata  => granted_tdata,
-            s_axis_tkeep  => granted_tkeep,
-            s_axis_tuser  => granted_tuser,
-            s_axis_tvalid => granted_tvalid,
-            s_axis_tlast  => granted_tlast,
-            s_axis_tready => granted_tready,
+            s_axis_tdata  => member_tdata,
+            s_axis_tkeep  => member_tkeep,
+            s_axis_tuser  => member_tuser,
+            s_axis_tvalid => member_tvalid,
+            s_axis_tlast  => member_tlast,
+            s_axis_tready => member_tready,
             m_axis_tdata  => chosen_tdata,
             m_axis_tkeep  => chosen_tkeep,
             m_axis_tuser  => chosen_tuser(0 downto 0),
@@ -447,8 +447,8 @@ begin
       end generate watched;
 
       highs_in <= highs_of_group;
-      beat     <= cut or (granted_tvalid and granted_tready);
-      ends     <= cut or granted_tlast;
+      beat     <= cut or (member_tvalid and member_tready);
+      ends     <= cut or member_tlast;
 
       u_group_high : entity firm.firm_axis_select
         generic map (

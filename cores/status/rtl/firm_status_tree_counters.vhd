@@ -315,7 +315,7 @@ begin
 
   -- Reading. The indices of other tables are meaningless, but within the tables.
   channel    <= unsigned(read_address(15 downto 4));
-  fault_read <= read_address(CHANNEL_BITS+3 downto 0);
+  fault_read <= std_logic_vector(resize(unsigned(read_address), CHANNEL_BITS+4));
   sub_read   <= read_address(SUB_BITS+3 downto 4);
   pub_read   <= std_logic_vector(resize(channel - SUBSCRIBERS, PUB_BITS));
 
