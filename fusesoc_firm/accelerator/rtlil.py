@@ -18,6 +18,8 @@ _WIRE = re.compile(
     r"(?:(?P<direction>input|output|inout) \d+ )?(?P<signed>signed )?(?P<name>\S+)"
 )
 _SLICE = re.compile(r"\[(\d+)(?::(\d+))?\]")
+# The width of Verilog's integers. The loop variables of several blocks are one integer.
+_INTEGER_BITS = 32
 _OUTPUTS = ("\\Y", "\\Q")
 
 
@@ -66,7 +68,7 @@ def read_modules(text: str) -> dict[str, Module]:
         if key == "module":
             module = modules.setdefault(words[0], Module())
         elif key == "attribute" and words[0] == "\\src":
-            source = words[1].strip('"')
+            source = line.split('"')[1]
         elif key == "wire" and (match := _WIRE.fullmatch(line)):
             name, width = match["name"], int(match["width"] or 1)
             module.wires[name] = Wire(name, width, match["direction"] or "", bool(match["signed"]), source)
@@ -85,24 +87,29 @@ def read_modules(text: str) -> dict[str, Module]:
 
 
 def sources(modules: dict[str, Module], top: str) -> tuple[Counter[Bit], set[Bit]]:
-    """Return the number of sources of each bit of a module, and the bits at cells of unknown modules."""
+    """Return the number of sources of each bit of a module, and the bits that unknown modules or inouts may drive."""
     module = modules[top]
     found = Counter(bit for words in module.assigned for bit in module.bits_of(words))
     unknown: set[Bit] = set()
     for type_, ports in module.cells:
         for port, words in ports:
-            if type_[0] == "\\" and type_ not in modules:
+            direction = _direction(type_, port, modules)
+            if not direction or direction == "inout":
                 unknown |= {*module.bits_of(words)}
-            elif _is_output(type_, port, modules):
+            elif direction == "output":
                 found.update(module.bits_of(words))
     return found, unknown
 
 
-def _is_output(type_: str, port: str, modules: dict[str, Module]) -> bool:
+def _direction(type_: str, port: str, modules: dict[str, Module]) -> str:
+    """Return the direction of a cell's port, or an empty string for a module that is not known."""
     if type_ in modules:
         wire = modules[type_].wires.get(port)
-        return wire is not None and wire.direction == "output"
-    return port in _OUTPUTS or (port == "\\DATA" and type_.startswith("$memrd"))
+        return wire.direction if wire else "input"
+    if type_[0] == "\\":
+        return ""
+    is_output = port in _OUTPUTS or (port == "\\DATA" and type_.startswith("$memrd"))
+    return "output" if is_output else "input"
 
 
 def _closing(words: Sequence[str]) -> int:
@@ -138,8 +145,7 @@ def source_faults(modules: dict[str, Module], top: str) -> Iterator[tuple[Wire, 
             continue
         if wire.direction == "input" and any(found[bit] for bit in wire.bits):
             yield wire, f"'{name}' is an input, and is assigned", "the value comes from outside; remove the assignment"
-        # The loop variables of several blocks are one integer.
-        elif any(found[bit] > 1 for bit in wire.bits) and not wire.is_signed:
+        elif any(found[bit] > 1 for bit in wire.bits) and not (wire.is_signed and wire.width == _INTEGER_BITS):
             hint = "keep one source: an 'assign', an 'always' block or an output of an instance; remove the others"
             yield wire, f"'{name}' has more than one source", hint
         elif wire.direction == "output" and any(not found[bit] and bit not in unknown for bit in wire.bits):

@@ -66,7 +66,8 @@ class VerilogReader:
                 faults.warn(f"'{match['name']}' is not declared", _line(match), hint)
             elif match := _RANGE.match(line):
                 bits = match["range"] or "selected here"
-                faults.warn(f"'{match['name']}' does not have the bits {bits}", _line(match))
+                hint = "select bits of the declared range"
+                faults.warn(f"'{match['name']}' does not have the bits {bits}", _line(match), hint)
 
     def _report_sources(self, read: str, paths: Sequence[Path], top: str, faults: Diagnostics) -> None:
         """Add the assignments of a wrong kind, and signals with several sources, or with none."""
@@ -75,7 +76,9 @@ class VerilogReader:
         found = list(filter(None, map(_ASSIGNED.match, done.stderr.splitlines())))
         for match in found:
             source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
-            faults.error(f"'{match['name']}' is a {match['kind']}, and is assigned in a {match['place']}", source)
+            other, way = ("reg", "'assign'") if match["kind"] == "wire" else ("wire", "an 'always' block")
+            hint = f"declare it as '{other}', or use {way}"
+            faults.error(f"'{match['name']}' is a {match['kind']}, and is assigned in a {match['place']}", source, hint)
         # Signals with the value z may have several sources.
         if done.returncode or found or "tri-state" in done.stderr:
             return

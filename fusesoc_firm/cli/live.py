@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from fusesoc_firm.system.system_core import LoadedSystem
 
 
+# The options that a simulated board cannot serve, since it is the node.
+_OF_NODES = ("trace", "watch", "status", "name", "qos", "queue", "restart", "lifecycle", "ros_python", "ros_args")
+
+
 def add_live(commands: Any) -> None:
     """Declare the commands."""
     from fusesoc_firm.node.options import add_node_options
@@ -71,25 +75,21 @@ def _run_board(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
     """Run the simulated board of a system that is a node in the sockets of a chip."""
     from fusesoc_firm.fabric.ros1 import PORT, node_of
     from fusesoc_firm.fabric.wiznet.board import Board, check_address
-    from fusesoc_firm.fabric.wiznet.chips import CHIPS
-    from fusesoc_firm.system.hardware.interconnect import CHIPS as NUMBERS
+    from fusesoc_firm.fabric.wiznet.chips import MODELS
+    from fusesoc_firm.system.hardware.interconnect import CHIP_NUMBERS
     from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
     from fusesoc_firm.system.system_core import refuse_network
 
     refuse_network(loaded)
-    for option in ("trace", "watch", "status"):
-        if getattr(arguments, option):
-            hint = "the simulated board is the node, and firm live only connects its chip"
-            fail(
-                f"'--{option}' is not possible with interconnect '{loaded.specification.project.interconnect}'",
-                hint=hint,
-            )
+    _refuse_options(arguments, loaded)
     network = loaded.system.network
     assert network is not None
     node = node_of(loaded.system, loaded.libraries)
     check_address(network.address, PORT)
     built = built_board(arguments)
-    chip = CHIPS[NUMBERS[network.kind]]()
+    # The build may have taken minutes.
+    check_address(network.address, PORT)
+    chip = MODELS[CHIP_NUMBERS[network.kind]]()
     board = Board(built.words, built.folder, chip, NETWORK_HERTZ)
     master = "{}:{}".format(*node.master)
     print(f"{node.name} is at {network.address}; its master is {master}; Ctrl-C ends it", flush=True)
@@ -99,6 +99,17 @@ def _run_board(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
         print()
     finally:
         board.close()
+
+
+def _refuse_options(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
+    """Raise `InputError` for an option about a node on the host: the simulated board is the node."""
+    given = [f"--{name.replace('_', '-')}" for name in _OF_NODES if getattr(arguments, name)]
+    given += [*arguments.remappings, *([f"--ros {arguments.ros}"] if arguments.ros == 2 else [])]
+    if given:
+        fail(
+            f"'{given[0]}' is not possible with interconnect '{loaded.specification.project.interconnect}'",
+            hint="the simulated board is the node; its names are those of the specification",
+        )
 
 
 def _run_node(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:

@@ -23,7 +23,7 @@ from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.system.derived.chip import MOST_TOPICS, MOST_TYPES
 from fusesoc_firm.system.derived.model import DerivedSystem, Network, Topic
-from fusesoc_firm.system.hardware.interconnect import CHIPS, rom_entity
+from fusesoc_firm.system.hardware.interconnect import CHIP_NUMBERS, rom_entity
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import render
 
@@ -153,9 +153,9 @@ def memory_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibra
 
     Raise `InputError` if the node's texts are longer than the memory.
     """
-    if system.network is None or system.network.kind not in CHIPS:
+    if system.network is None or system.network.kind not in CHIP_NUMBERS:
         return b""
-    made = image(node_of(system, libraries), CHIPS[system.network.kind])
+    made = image(node_of(system, libraries), CHIP_NUMBERS[system.network.kind])
     if len(made) > MOST_BYTES:
         fail(
             f"the node of '{system.name}' needs {len(made)} bytes of memory for its texts",

@@ -100,6 +100,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         fail(
             f"'{loaded.system.name}' is a node itself, and needs none on a host",
             loaded.specification.project.interconnect.source,
+            "'firm live' runs its simulated board; omit --transport",
         )
     if loaded.system.id_bytes > 1:
         fail(

@@ -56,10 +56,11 @@ def run_options(
     if arguments.ros_args and 2 not in versions:
         fail(
             f"'{ROS_ARGUMENTS}' is for ROS 2, but the topics use ROS 1",
-            hint="for ROS 1, write NAME:=VALUE without '{ROS_ARGUMENTS}'",
+            hint=f"for ROS 1, write NAME:=VALUE without '{ROS_ARGUMENTS}'",
         )
     if arguments.lifecycle and 2 not in versions:
-        fail("'--lifecycle' is for ROS 2, but the topics use ROS 1")
+        hint = "nodes of ROS 1 have no lifecycle states; omit --lifecycle"
+        fail("'--lifecycle' is for ROS 2, but the topics use ROS 1", hint=hint)
     passed = [*rest, *([ROS_ARGUMENTS, *arguments.ros_args] if arguments.ros_args else ())]
     return RunOptions(
         versions,

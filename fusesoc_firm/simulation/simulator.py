@@ -159,7 +159,7 @@ def _build(spec: Path, core: CoreFile, target_and_tool: tuple[str, str], work: P
 
 
 def fusesoc_run(core: CoreFile, target: str, work: Path, *stages: str) -> list[str]:
-    """Return the command by which FuseSoC does stages of a core's target in the folder `work`."""
+    """Return the FuseSoC command that runs stages of a core's target in the folder `work`."""
     command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
     command += ["run", *stages, f"--target={target}", "--work-root", work, core.data.get("name", "")]
     return list(map(str, command))

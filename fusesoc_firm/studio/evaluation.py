@@ -62,10 +62,14 @@ class Evaluation:
                 await tell({"step": "done", "wanted": wanted(loaded.system)} | found)
             except InputError as error:
                 await tell({"step": "failed", "reason": str(error).removeprefix("error: ")})
+            except Exception as error:
+                # Without an answer, the page would wait forever.
+                await tell({"step": "failed", "reason": f"the synthesis failed: {type(error).__name__}: {error}"})
+                raise
 
 
 def wanted(system: DerivedSystem) -> dict[str, float]:
-    """Return the clocks of a system in MHz: that of each block with another one by its name, and clk by the name ""."""
+    """Return the clocks of a system in MHz: clk by the name "", and by its name each block's that has another."""
     clocks = {block.block: system.clock_of(block.block) for block in system.accelerators}
     found = {name: float(clock.frequency) / 1e6 for name, clock in clocks.items() if clock}
     return found if system.clock is None else {"": float(system.clock) / 1e6} | found

@@ -196,7 +196,8 @@ class Live:
         run, seen = self._seen(request)
         frame, messages = run.topics[seen.block].frame, run.watch.of(seen.block, _MOST_POINTS, seen.number)
         found = await asyncio.to_thread(lambda: [pose_of(frame, message.payload) for message in messages])
-        return in_json({"poses": [pose for pose in found if pose]})
+        # Without its own pose, an earlier one would be shown as that of this message.
+        return in_json({"poses": [pose for pose in found if pose] if found and found[-1] else []})
 
     async def _wave(self, request: web.Request) -> web.Response:
         """Return the beats of a message's frame on the stream of the system."""
@@ -290,7 +291,7 @@ def _value(frame: Frame, seen: Seen, field: str) -> float | None:
 
 
 def _counted(count: Count) -> dict[str, Any]:
-    """Return the counts of a block as plain data; the general `asdict` would take most of the time of a news."""
+    """Return the counts of a block as plain data; `asdict` copies deeply, which would take most of a report's time."""
     percentiles = {"cycles": count.cycles, "wall_ns": count.wall_ns}
     return vars(count) | {name: found and vars(found) for name, found in percentiles.items()}
 

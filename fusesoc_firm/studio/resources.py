@@ -1,4 +1,4 @@
-"""What each block of a system takes on an FPGA: its cells and its clock, by the synthesis that is installed.
+"""The cells and the clock of each block of a system on an FPGA, by the programs that are installed.
 
 FuseSoC and GHDL make a netlist of the system's core, Yosys maps it with its hierarchy to an ECP5, and nextpnr places it
 without pins. Yosys optimises no logic across the borders of blocks, so each cell belongs to one block.
@@ -27,6 +27,7 @@ import yaml
 
 from fusesoc_firm.request.core_reader import CoreFile
 from fusesoc_firm.simulation.simulator import fusesoc_run, project_folder
+from fusesoc_firm.store import own_code
 from fusesoc_firm.store.layout import default_root
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.text.diagnostics import fail
@@ -57,7 +58,7 @@ _MOST_KEPT = 200
 _SHOWN_LINES = 20
 
 Tell = Callable[[dict[str, Any]], Awaitable[None]]
-"""Hears of the step that begins, and of the cells before the places are known."""
+"""Receives the step that begins and, before the placement, the cells."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +204,7 @@ async def _run(command: Sequence[str], folder: Path) -> None:
     process = await asyncio.create_subprocess_exec(
         *command,
         cwd=folder,
+        # The launcher of firm's own builds would run the steps from its cache.
         env={name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"},
         stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
@@ -222,10 +224,10 @@ async def _run(command: Sequence[str], folder: Path) -> None:
 
 
 def _key(netlist: Path, yosys: Path, nextpnr: Path | None) -> str:
-    """Return the name of all that decides the result."""
+    """Return the SHA-256 of all that decides the result: the netlist, the programs and this package."""
     text = _COMMENT.sub("", netlist.read_text(encoding="utf-8"))
     tools = [facts_of(program, path) for program, path in (("yosys", yosys), ("nextpnr-ecp5", nextpnr)) if path]
-    return hashlib.sha256(json.dumps([text, tools, _PLACING]).encode()).hexdigest()
+    return hashlib.sha256(json.dumps([text, tools, own_code.digest()]).encode()).hexdigest()
 
 
 def _json(file: Path) -> dict[str, Any]:

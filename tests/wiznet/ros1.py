@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 
 from fusesoc_firm.fabric.ros1 import Endpoint, Node, image
 from fusesoc_firm.fabric.wiznet.chip import Status
-from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.fabric.wiznet.w5200 import W5200
 from fusesoc_firm.fabric.wiznet.w5500 import W5500
 from fusesoc_firm.message import ROS1
@@ -156,7 +156,7 @@ class Board:
 def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
     """A board whose program the interpreter runs."""
 
-    chip = CHIPS[chip_number]()
+    chip = MODELS[chip_number]()
 
     def run(running: Board) -> None:
         access, clock = ACCESSES[chip_number](chip), Clock()
@@ -232,7 +232,7 @@ def clocked(
     command = [str(program), str(rom), "0", "1", "0", str(stalls.percent), str(stalls.seed)]
     command += ["strict"] * stalls.is_strict
 
-    chip = CHIPS[chip_number]()
+    chip = MODELS[chip_number]()
 
     def run(running: Board) -> None:
         clock, answers = Clock(), list[int]()

@@ -12,7 +12,7 @@ from typing import IO, NamedTuple
 
 import pytest
 
-from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.fabric.wiznet.spi import Slave
 from fusesoc_firm.fabric.wiznet.w5200 import W5200
 from fusesoc_firm.fabric.wiznet.w5500 import W5500
@@ -97,7 +97,7 @@ def _pins(folder: Path, number: int, line: Line) -> Iterator[tuple[Pins, W5200 |
     verilog = netlist("firm_wiznet_access", folder, HARDWARE[-1:], HARDWARE[:-1], (), **generics)
     bench = (HERE / "access.cpp").read_text(encoding="ascii")
     program = compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_access", bench, folder, (HERE,))
-    chip = CHIPS[number]()
+    chip = MODELS[number]()
     words = [str(program), *map(str, (line.mode, line.half_bit, line.miso_delay, line.stall, SEED))]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         yield Pins(process, chip), chip
@@ -114,7 +114,7 @@ def _address(rng: random.Random, space: int) -> int:
 
 @pytest.mark.check
 @pytest.mark.parametrize("line", LINES, ids=lambda line: f"mode{line.mode}_half{line.half_bit}_stall{line.stall}")
-@pytest.mark.parametrize("number", CHIPS)
+@pytest.mark.parametrize("number", MODELS)
 def test_every_byte_is_written_and_read_at_its_place(tmp_path: Path, number: int, line: Line) -> None:
     print(f"seed {SEED}")
     rng = random.Random(SEED + number)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from fusesoc_firm.fabric.wiznet.chip import Chip, Status
-from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.fabric.wiznet.spi import exchange
 from tests.wiznet.peers import echo, free_port
 
@@ -55,9 +55,9 @@ class Driven(NamedTuple):
     functions: tuple[Any, ...]
 
 
-@pytest.fixture(params=CHIPS, ids="w{}".format)
+@pytest.fixture(params=MODELS, ids="w{}".format)
 def driven(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Driven]:
-    chip = CHIPS[request.param]()
+    chip = MODELS[request.param]()
     driver = ctypes.CDLL(str(_compiled(request.param, tmp_path)))
     functions = (
         _SELECT(chip.select),

@@ -20,7 +20,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from fusesoc_firm.fabric.ros1 import Node, image
-from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.chips import MODELS
 from tests.ros.cpp_nodes import Ros, missing_ros1, ros1
 from tests.ros.live_nodes import paced
 from tests.wiznet.peers import free_port
@@ -60,7 +60,7 @@ def _check_paced(results: list[dict[str, Any]], count: int) -> None:
         assert result["z"] == [math.sin((number / 1000 - 3) / 2) for number in range(count)]
 
 
-@pytest.mark.parametrize("number", CHIPS)
+@pytest.mark.parametrize("number", MODELS)
 def test_the_interpreter_answers_rospy(tmp_path: Path, number: int) -> None:
     with ros1(tmp_path) as ros:
         board = interpreted(_node(ros), number, Manager(_first_three))

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.fabric.wiznet.chips import CHIPS
+from fusesoc_firm.fabric.wiznet.chips import MODELS
 from tests.wiznet.ros1 import framed
 from tests.wiznet.ros1_peers import Running, header, header_of, pause, read, running_node
 
@@ -21,7 +21,7 @@ QUATERNION = "a779879fadf0160734f906b8c19c7004"
 POINT = "4a842b65f413084dc2b10fb484ea7f17"
 
 
-@pytest.fixture(params=CHIPS, ids="w{}".format)
+@pytest.fixture(params=MODELS, ids="w{}".format)
 def running(request: pytest.FixtureRequest) -> Iterator[Running]:
     yield from running_node(request.param)
 

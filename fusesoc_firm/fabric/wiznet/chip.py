@@ -345,7 +345,7 @@ class Chip:
     def _accept(self, item: ChipSocket) -> None:
         try:
             item.connection, (address, port) = self._listeners[item.port].accept()
-        except BlockingIOError:
+        except (BlockingIOError, ConnectionAbortedError):
             return
         self._set_up(item)
         item.registers[PEER_ADDRESS : PEER_ADDRESS + 4] = socket.inet_aton(address)

@@ -62,16 +62,24 @@ class Ros2(Ros):
         """Begin or cease to carry messages. Clients see that an inactive node has no services and no actions."""
         if is_active == self._is_active:
             return
-        self._is_active = is_active
         if is_active:
             self._serve()
-            return
+        else:
+            self._cease()
+        self._is_active = is_active
+
+    def _serve(self) -> None:
+        try:
+            for number, item in self._servers.items():
+                self._services[number] = self._service(number, item)
+        except BaseException:
+            self._cease()
+            raise
+
+    def _cease(self) -> None:
         for service in self._services.values():
             self._node.destroy_service(service)
         self._services.clear()
-
-    def _serve(self) -> None:
-        self._services = {number: self._service(number, item) for number, item in self._servers.items()}
 
     def _add_diagnostics(self, topic: dict[str, Any]) -> None:
         try:

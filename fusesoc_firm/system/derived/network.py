@@ -98,9 +98,12 @@ def _check_system(written: Specification, scheduling: Scheduling, software: Soft
             hint = "without 'sources', the software is another node, on a host"
             faults.error(f"{message}has no host for '{item.block}'", source, hint)
     for block in written.blocks:
-        if block.middleware is not None and MIDDLEWARES[block.middleware].number != version:
+        given = version if block.middleware is None else MIDDLEWARES[block.middleware].number
+        if block.middleware is not None and given != version:
             faults.error(
-                f"{message}is not possible with ROS {3 - version}", block.middleware.source, f"legal here: {legal}"
+                f"{message}is not possible with ROS {MIDDLEWARES[block.middleware].number}",
+                block.middleware.source,
+                f"legal here: {legal}",
             )
 
 
@@ -120,7 +123,7 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
         return None
     address, netmask, gateway = network
     if master:
-        _check_way(section, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
+        _check_reachable(section, address, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
     kind = NetworkKind(project.interconnect) if project.interconnect in NETWORKS else NetworkKind.ETHERNET
     return Network(mac, address, netmask, gateway, name, str(section.namespace), section.domain, kind, master)
 
@@ -128,10 +131,11 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
 def _master(text: Text, faults: Diagnostics) -> tuple[IPv4Address, int] | None:
     """Return address and port of a master; the form of ROS_MASTER_URI is legal, too."""
     address, colon, port = text.removeprefix("http://").removesuffix("/").partition(":")
+    port = port if colon else str(_MASTER_PORT)
     try:
-        found = IPv4Address(address), int(port) if colon else _MASTER_PORT
-    except (AddressValueError, ValueError):
-        found = IPv4Address(0), 0
+        found = IPv4Address(address), int(port) if port.isascii() and port.isdecimal() else 0
+    except AddressValueError:
+        found = _UNUSED_ADDRESS, 0
     if not 0 < found[1] <= _HIGHEST_PORT or found[0] == _UNUSED_ADDRESS or found[0].is_multicast:
         hint = "legal here: four numbers and a port, such as 192.168.1.10:11311; the chip does not look up names"
         faults.error(f"'{text}' is not the address of a master", text.source, hint)
@@ -139,10 +143,15 @@ def _master(text: Text, faults: Diagnostics) -> tuple[IPv4Address, int] | None:
     return found
 
 
-def _check_way(section: NodeNetwork, network: IPv4Network, master: IPv4Address, faults: Diagnostics) -> None:
+def _check_reachable(
+    section: NodeNetwork, address: IPv4Address, network: IPv4Network, master: IPv4Address, faults: Diagnostics
+) -> None:
     """Note a master that the board cannot reach."""
     assert section.master is not None
-    if master not in network and section.gateway is None:
+    if master == address:
+        hint = "legal here: the address of another host"
+        faults.error(f"the master {master} is the board itself", section.master.source, hint)
+    elif master not in network and section.gateway is None:
         hint = "add 'gateway', the router to other networks"
         faults.error(f"the master {master} is not in the board's network {network}", section.master.source, hint)
 

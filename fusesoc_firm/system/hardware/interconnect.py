@@ -32,7 +32,7 @@ CHIP_PINS = (
     ("spi_miso", "in", "std_logic"),
     ("spi_rst_n", "out", "std_logic"),
 )
-CHIPS = {NetworkKind.W5500: 5500, NetworkKind.W5200: 5200}
+CHIP_NUMBERS = {NetworkKind.W5500: 5500, NetworkKind.W5200: 5200}
 
 # The default baud rate of firm_uart_link, which a netlist keeps.
 _BAUD = 1_000_000
@@ -67,7 +67,7 @@ def _node(system: DerivedSystem) -> dict[str, Any]:
     assert system.network is not None
     assert system.clock is not None
     return {
-        "chip": CHIPS[system.network.kind],
+        "chip": CHIP_NUMBERS[system.network.kind],
         "clock_hz": round(system.clock),
         "rom": rom_entity(system),
         "pins": _pins(CHIP_PINS),

@@ -128,7 +128,8 @@ def _kind(node: FieldNode) -> Kind:
 def registers_configuration(registers: RegisterMap, signatures: Sequence[str], address_bits: int = 16) -> Context:
     """Return the configuration of the block of registers; `signatures` are the channels', in hexadecimal digits.
 
-    External registers are not part of the block. Many signatures, of addresses with more than 16 bits, are in memory.
+    External registers are not part of the block. With addresses of more than 16 bits, there are many signatures, which
+    are in a memory.
     """
     has_signature_memory = address_bits > 16
     signature_bits = index_bits(len(signatures))

@@ -21,8 +21,9 @@ DIGEST_ADDRESS, DIGEST_WORDS = 0x30, 4
 _CHANNELS_ADDRESS, _CHANNEL_BYTES = 0x8000, 0x40
 _WORD_DIGITS = 8
 
-# The bits of addresses, and the channels that these reach: beside a Manager, and beside a Manager of Managers.
+# The bits of a register's address beside a Manager, and the channels that they reach.
 ADDRESS_BITS, MOST_CHANNELS = 16, 512
+# Beside a Manager of Managers, which has at most TREE_CHANNELS.
 _TREE_ADDRESS_BITS = 20
 # Of the address of a word within a channel.
 _WORD_BITS = 4

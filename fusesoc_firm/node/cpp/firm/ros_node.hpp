@@ -457,7 +457,7 @@ class Engines {
 
 // Return the word of a register of the hardware. Throws TransportError.
 inline std::uint32_t word_at(Engines& engines, std::uint32_t address) {
-  return little_endian(engines.access_status(status_request(address, 0), std::chrono::seconds(1)), kFrameHeaderBytes + 4);
+  return status_word(engines.access_status(status_request(address, 0), std::chrono::seconds(1)));
 }
 
 // Print an engine's counts.

@@ -62,11 +62,14 @@ struct Status {
   std::vector<ChannelStatus> channels;
 };
 
+// A simulator may have to start first, on a busy machine.
+constexpr std::chrono::seconds kStatusPatience(20);
+
 // Accesses registers one after the other.
 class StatusAccess {
  public:
-  // A simulator may have to start first, on a busy machine. Ids have one byte, or two with `idBytes: 2`.
-  explicit StatusAccess(Transport& transport, std::chrono::nanoseconds patience = std::chrono::seconds(20),
+  // Ids have one byte, or two with `idBytes: 2`.
+  explicit StatusAccess(Transport& transport, std::chrono::nanoseconds patience = kStatusPatience,
                         std::size_t id_bytes = kIdBytes)
       : transport_(transport), patience_(patience), id_bytes_(id_bytes) {}
 
@@ -123,7 +126,7 @@ void check_digest(Access& access, const std::string& expected, const std::string
 inline Status read_status(Transport& transport, std::size_t id_bytes = kIdBytes) {
   constexpr std::uint32_t kMark = 0x4D524946, kVersion = 1;
   namespace at = status_register;
-  StatusAccess access(transport, std::chrono::seconds(20), id_bytes);
+  StatusAccess access(transport, kStatusPatience, id_bytes);
   const std::uint32_t mark = access.read(at::kMagic), shape = access.read(at::kShape);
   if (mark != kMark || shape >> 24 != kVersion) throw TransportError("the hardware has another kind of status");
   Status status;
