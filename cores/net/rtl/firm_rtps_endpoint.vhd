@@ -301,7 +301,8 @@ begin
           end if;
         elsif id = RTPS_REPRESENTATION then
           seen_coding_r <= '1';
-          if seen_coding_r = '0' and unsigned(size) >= WORD_BYTES and room = '1' and number_r /= 0 then
+          if seen_coding_r = '0' and unsigned(size) >= WORD_BYTES and room = '1'
+             and (beyond_r = '1' or number_r /= 0) then
             encodes_r <= found_r;
           end if;
         elsif id = RTPS_ENDPOINT_GUID then
