@@ -108,12 +108,12 @@ architecture rtl of firm_rtps_control is
 
   -- A peer's entry, and the same in the record, from RECORD_SOURCE_MAC on.
   constant ENTRY_BITS      : positive := 5;
-  constant AT_GRAPH_PORT   : natural := 6;  -- of the reader of ros_discovery_info
+  constant AT_GRAPH_PORT   : natural  := 6;   -- of the reader of ros_discovery_info
   constant AT_ADDRESS      : natural  := 8;   -- for discovery
   constant AT_PORT         : natural  := 12;
-  constant AT_USER_PORT    : natural := 14;
+  constant AT_USER_PORT    : natural  := 14;
   constant AT_PREFIX       : natural  := 16;
-  constant AT_USER_ADDRESS : natural := 28;
+  constant AT_USER_ADDRESS : natural  := 28;
   -- Bytes of the entry that become fields of the builder, at the same addresses; addresses of its other fields.
   constant ENTRY_FIELDS : natural := 28;
   constant AT_READER    : natural := 28;
@@ -131,10 +131,10 @@ architecture rtl of firm_rtps_control is
   constant MOST_REQUESTED : positive := 32;
 
   -- "ros_discovery_info", with its NUL.
-  constant GRAPH_TOPIC         : std_logic_vector(0 to 151) := x"726f735f646973636f766572795f696e666f00";
-  constant GRAPH_TOPIC_BYTES   : positive := 19;
-  constant NAME_PLACE          : natural := 4;  -- in the value, after the length
-  constant LOCATOR_BYTES       : natural := 24;
+  constant GRAPH_TOPIC       : std_logic_vector(0 to 151) := x"726f735f646973636f766572795f696e666f00";
+  constant GRAPH_TOPIC_BYTES : positive := 19;
+  constant NAME_PLACE        : natural  := 4;  -- in the value, after the length
+  constant LOCATOR_BYTES     : natural  := 24;
 
   subtype byte_t is std_logic_vector(7 downto 0);
   type memory_t is array (natural range <>) of byte_t;
@@ -707,8 +707,8 @@ begin
     end if;
   end process act;
 
-  start       <= '1' when state_r = BEGIN_PACKET else '0';
-  packet      <= std_logic_vector(packet_r);
+  start        <= '1' when state_r = BEGIN_PACKET else '0';
+  packet       <= std_logic_vector(packet_r);
   peers_known  <= used_r;
   is_announced <= '1' when state_r = TELL else '0';
   is_left      <= '1' when state_r = FORGET else '0';

@@ -2,7 +2,7 @@
 -- Reads how a peer announces a writer (SEDP, a publication), and tells which of the node's readers match it: those with
 -- the same topic, type and hash of the type, if what the writer offers is enough for them.
 --
--- Of several parameters with the same id, the first one counts, as in the specification of the product's reference.
+-- Of several parameters with the same id, the first one counts, as in the reference participant (tests/fabric/participant.py).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -245,6 +245,7 @@ begin
     if rising_edge(clk) then
       mask_r <= mask;
       if hash_r = '1' then
+        -- The part begins with "typehash=", which is the same for all readers.
         if before_r = HASH_NAME_BYTES-1 then
           named_r <= mask(0);
         end if;

@@ -456,6 +456,7 @@ begin
 
   has_free   <= any(not sources_r);
   free       <= lowest(not sources_r, SOURCE_BITS);
+  -- Of several readers of one topic, only the first gets the samples.
   reader     <= lowest(matches, ID_BITS);
   guid_place <= std_logic_vector(index_r);
   is_busy    <= notes_r;
