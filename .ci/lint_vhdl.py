@@ -142,9 +142,10 @@ def write_loop() -> None:
 
 
 def write_registers() -> None:
-    """Write the registers of a system's status."""
-    configuration = registers_configuration(status_map("robot_status", 2, 1), ["0"] * 3)
-    (SAMPLES / "registers.vhd").write_text(render(REGISTERS_TEMPLATE, configuration), encoding="ascii")
+    """Write the registers of a system's status, also of one with a Manager of Managers."""
+    for name, bits in (("registers", 16), ("many_registers", 20)):
+        configuration = registers_configuration(status_map("robot_status", 2, 1), ["0" * 8] * 3, bits)
+        (SAMPLES / f"{name}.vhd").write_text(render(REGISTERS_TEMPLATE, configuration), encoding="ascii")
 
 
 # A node on Ethernet; no system contains its hardware yet.

@@ -174,7 +174,6 @@ def rom_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibra
         "entity": entity,
         "node": node_of(system, libraries).name,
         "byte_count": len(data),
-        "address_bits": (len(data) - 1).bit_length(),
         "rows": [", ".join(data[at : at + _BYTES_IN_ROW]) for at in range(0, len(data), _BYTES_IN_ROW)],
     }
     return {f"{entity}.vhd": render(_ROM_TEMPLATE, configuration)}

@@ -54,10 +54,11 @@ class Step:
 
 @dataclass
 class Results:
-    """Frames to the host, and requests as destination, reader, writer, base and size of the set."""
+    """Frames to the host; requests as destination, reader, writer, base and size of the set; sizes of sent samples."""
 
     frames: list[bytes] = field(default_factory=list)
     requests: list[tuple[bytes, bytes, bytes, int, int]] = field(default_factory=list)
+    samples: list[int] = field(default_factory=list)
 
 
 def expected(steps: Sequence[Step], sources: int) -> Results:
@@ -111,9 +112,10 @@ class _Peer:
 
 
 class Peers:
-    """Some peers that announce, end, send and leave at random."""
+    """Some peers that announce, end, send and leave at random; if they exaggerate, so do their lists of encodings."""
 
-    def __init__(self, count: int, seed: int) -> None:
+    def __init__(self, count: int, seed: int, *, exaggerate: bool = False) -> None:
+        self._exaggerates = exaggerate
         self._chance, self._node = random.Random(seed), a_node()
         self._peers = [self._peer(number) for number in range(count)]
         self.steps: list[Step] = []
@@ -270,13 +272,15 @@ class Peers:
         texts = [*hash_texts, f"typehash={hash_};typehash={HASH};"] * 3 + ["", "typehash=;", "typehas", "x" * 300]
         order = "<" if peer.is_little else ">"
         encodings = chance.choice([[0], [0, 2], [2, 0], [], [7] * 15 + [0], [0], [0], [2], [256]])
+        if self._exaggerates:
+            encodings = [7] * 16
         some = {
             Parameter.USER_DATA: self._octets(peer, chance.choice(texts).encode()),
             Parameter.RELIABILITY: word(peer, chance.choice([Reliability.BEST_EFFORT, Reliability.RELIABLE]))
             + bytes(8),
             Parameter.DURABILITY: word(peer, chance.choice([Durability.VOLATILE] + [Durability.TRANSIENT_LOCAL] * 3)),
             Parameter.PARTITION: word(peer, chance.choice([0] * 9 + [1])) + bytes(8),
-            Parameter.DATA_REPRESENTATION: word(peer, len(encodings))
+            Parameter.DATA_REPRESENTATION: word(peer, 65536 if self._exaggerates else len(encodings))
             + struct.pack(f"{order}{len(encodings)}H", *encodings)
             + bytes(2 * (len(encodings) % 2)),
             Parameter.PROTOCOL_VERSION: bytes(chance.choice([0, 4])),

@@ -205,7 +205,8 @@ begin
       is_lost             => open,
       is_full             => open,
       is_unmatched        => open,
-      is_dropped          => open
+      is_dropped          => open,
+      is_long             => open
     );
 
   u_packets : entity work.net_node_packets

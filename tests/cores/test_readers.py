@@ -17,6 +17,7 @@ SOURCES = 8
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/rtps")
 NODE: dict[str, Generic] = {"WRITERS": 2, "READERS": 2, "SOURCES": SOURCES, "DEPTH": 4096, "SAMPLES": 16}
 REQUEST = 17
+LONG = 0  # a sample that is too long
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +40,9 @@ def _results(library: Library, folder: Path, steps: list[Step], **generics: Gene
     found = Results()
     for row in (folder / "results.txt").read_text(encoding="ascii").splitlines():
         kind, *numbers = row.split()
+        if kind in ("sample", "long"):
+            found.samples.append(int(numbers[0]) if numbers else LONG)
+            continue
         content = bytes(map(int, numbers[kind == "request" :]))
         if kind == "frame":
             found.frames.append(content)
@@ -84,6 +88,22 @@ def test_a_host_that_takes_nothing_loses_samples_but_no_discovery(library: Libra
     assert found.requests == wanted.requests
 
 
+def test_a_list_of_very_many_encodings_counts(library: Library, tmp_path: Path) -> None:
+    """Its number is a multiple of 65536, of which the lower half is that of a list that is not told."""
+    seed = SEED + 3
+    print(f"seed {seed}")
+    steps = Peers(4, seed, exaggerate=True).run(60)
+    found = _results(library, tmp_path, steps)
+    assert found.frames == expected(steps, SOURCES).frames
+
+
+def test_a_sample_that_is_too_long_is_dropped_and_reported(library: Library, tmp_path: Path) -> None:
+    steps = Peers(4, SEED).run(60)
+    found = _results(library, tmp_path, steps, SAMPLE=16, SENT_BYTES=20)
+    assert found.requests == expected(steps, SOURCES).requests
+    assert set(found.samples) == {*range(1, 17), LONG}
+
+
 def test_the_netlist_does_the_same(tmp_path: Path) -> None:
     library = _library(tmp_path)
     library.replace_by_netlist("firm_rtps_node", NODE)
@@ -112,6 +132,10 @@ def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
         ("firm_net_keys", "TAIL", 16, "1 to 15"),
         ("firm_rtps_control", "PEERS", 0, "1 to 8"),
         ("firm_rtps_control", "PEERS", 9, "1 to 8"),
+        ("firm_rtps_control", "WRITERS", 1, "2 to 234"),
+        ("firm_rtps_control", "READERS", 9, "0 to 8"),
+        ("firm_rtps_control", "SAMPLE", 48, "powers of two, 2 to 128"),
+        ("firm_rtps_control", "SAMPLE", 256, "powers of two, 2 to 128"),
         ("firm_rtps_endpoint", "READERS", 9, "1 to 8"),
         ("firm_rtps_readers", "READERS", 9, "1 to 8"),
         ("firm_rtps_readers", "FIRST", 256, "0 to 256-READERS"),

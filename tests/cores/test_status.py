@@ -182,6 +182,27 @@ def test_the_counters_beside_a_tree(library: Library, subscribers: int, publishe
         assert result.exit_code == 0 and "PASS" in result.output, result.output
 
 
+def test_reserved_addresses_beside_a_tree_read_zero(tmp_path: Path) -> None:
+    configuration = registers_configuration(status_map("wide", 2, 1, DIGEST), SIGNATURES, 20)
+    registers = tmp_path / "wide_status.vhd"
+    registers.write_text(render(REGISTERS_TEMPLATE, configuration))
+    known = [(0x8000 + 0x40 * channel, signature) for channel, signature in enumerate(SIGNATURES)]
+    known += [(address + 4, "ffffffff") for address, _ in known]
+    reserved = [0x80C0, 0x80C4, 0x8100, 0x8104, 0x47FC0, 0x48000, 0x48004, 0x880C4, 0xFFFFC]
+    rows = [*known, *((address, "00000000") for address in reserved)]
+    (tmp_path / "script.txt").write_text("".join(f"{address:05x} {word}\n" for address, word in rows))
+    library = Library("firm", tmp_path)
+    library.analyse([registers, Path(__file__).with_name("status_registers_bench.vhd")])
+    result = library.run("status_registers_bench", options=("--ieee-asserts=disable-at-0", "--assert-level=error"))
+    assert result.exit_code == 0 and f"PASS {len(rows)}" in result.output, result.output
+
+
+def test_too_many_bits_of_an_address_are_refused(library: Library) -> None:
+    result = library.run("firm_status_frames", {"ADDRESS_BITS": 32})
+    assert result.exit_code != 0
+    assert "firm_status_frames: ADDRESS_BITS is 32; legal: 1 to 31" in result.output
+
+
 def test_too_many_channels_are_named(library: Library) -> None:
     result = library.run("firm_status_tree_counters", {"SUBSCRIBERS": 4000, "PUBLISHERS": 97})
     assert result.exit_code != 0

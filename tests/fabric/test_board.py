@@ -29,6 +29,8 @@ CORES = HERE.parent / "cores"
 PARTS = ("axis/package", "axis/axis", "net/mac", "net/responder", "net/udp", "net/rtps", "net/builder")
 HARDWARE = core_files(*PARTS)
 SAMPLES = 200
+# Samples that a peer sends at once. The TAP device drops frames after 500, and nobody sends them again at best effort.
+LOT = 50
 TYPES = {"count": "UInt32", "words": "String"}
 SPECIFICATION = """\
 project:
@@ -108,6 +110,8 @@ class Lab:
 def lab(program: Path, tmp_path: Path) -> Iterator[Lab]:
     if reason := _why_not():
         pytest.skip(reason)
+    if not Path("/dev/net/tun").exists():
+        pytest.skip("there is no /dev/net/tun")
     with ExitStack() as stack:
         yield Lab(program, tmp_path, stack)
 
@@ -179,12 +183,15 @@ def test_samples_of_both_peers_become_frames_once_and_in_order(lab: Lab) -> None
     print({name: peer.wait_until_matched() for name, peer in peers.items()})
     wait_for(board, 2, 4)
     sent: list[list[str | int]] = []
-    for place, peer in enumerate(peers.values()):
+    for place in range(len(peers)):
         # A value tells of whom it is; texts have many lengths.
         sent.append([1000 * place + number if number % 2 else f"{place} {'.' * number}" for number in range(SAMPLES)])
-        for value in sent[-1]:
-            peer.tell(["words" if isinstance(value, str) else "count", [value]])
-    found = list(map(sample, frames(board, 2 * SAMPLES)))
+    found: list[str | int] = []
+    for begin in range(0, SAMPLES, LOT):
+        for peer, values in zip(peers.values(), sent, strict=True):
+            for value in values[begin : begin + LOT]:
+                peer.tell(["words" if isinstance(value, str) else "count", [value]])
+        found += map(sample, frames(board, 2 * LOT))
     assert sorted(map(str, found)) == sorted(str(value) for values in sent for value in values)
     for values in sent:
         for kind in (str, int):

@@ -126,9 +126,10 @@ class Gate:
         return self.path.with_suffix(".reached")
 
     def wait(self) -> None:
-        """Wait in the model until the gate is opened."""
+        """Wait in the model until the gate is opened, or the node that started the model has ended."""
         self.reached.touch()
-        while not self.path.exists():
+        node = os.getppid()
+        while not self.path.exists() and os.getppid() == node:
             time.sleep(0.01)
 
     def open(self) -> None:

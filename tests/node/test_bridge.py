@@ -74,9 +74,9 @@ def test_a_python_of_ros_that_cannot_be_started(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("ros", "module"), [(1, "rospy"), (2, "rclpy")])
 def test_a_python_without_ros(ros: int, module: str, tmp_path: Path) -> None:
-    # Without its packages, this Python cannot import the modules of ROS.
+    # Without its packages and PYTHONPATH, this Python cannot import the modules of ROS.
     python = tmp_path / "python"
-    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" -S "$@"\n', encoding="utf-8")
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" -E -S "$@"\n', encoding="utf-8")
     python.chmod(0o755)
     with pytest.raises(CarrierError, match=f"python cannot import {module}, which ROS {ros} installs; .* install"):
         RosCarrier(ros, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=str(python)))

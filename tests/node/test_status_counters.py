@@ -407,8 +407,10 @@ def _running_node(transport: SimulatorTransport) -> Iterator[str]:
         assert answer
         return answer.data
 
-    with StatusServer(("node:robot",), access, print):
-        yield "node:robot"
+    # The whole machine shares the names of nodes.
+    name = f"node:robot{os.getpid()}"
+    with StatusServer((name,), access, print):
+        yield name
 
 
 @contextmanager

@@ -254,10 +254,17 @@ class Peer:
 
     def wait_until_published(self) -> None:
         """Wait until it has published all; nothing may come meanwhile."""
+        self._echo("sync")
+
+    def wait_until_acked(self) -> None:
+        """Wait until every subscriber has received all, in ROS 2; nothing may come meanwhile."""
+        self._echo("acked")
+
+    def _echo(self, word: str) -> None:
         assert self._process.stdin
-        self._process.stdin.write('{"sync": true}\n')
+        self._process.stdin.write(json.dumps({word: True}) + "\n")
         self._process.stdin.flush()
-        assert self._lines.get() == {"sync": True}
+        assert self._lines.get() == {word: True}
 
     def take(self) -> tuple[str, bytes]:
         """The next message: its topic and payload."""

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from typing import Any
 
 import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+
+# In s; longer than any call takes here, even on a busy machine.
+LONGEST = 60.0
 
 
 class LifecycleClient:
@@ -28,13 +30,20 @@ class LifecycleClient:
         for client in (self.change, self.state):
             while not client.wait_for_service(timeout_sec=1):
                 pass
-        # Who is seen may not see us yet.
-        time.sleep(0.5)
+        # Who is seen may not see us yet: a request or its response may be lost.
+        while not self.tried(self.state, GetState.Request(), 1):
+            pass
+
+    def tried(self, client: Any, request: Any, seconds: float) -> Any:
+        """The response, or nothing when it has not come in time."""
+        future = client.call_async(request)
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=seconds)
+        return future.result() if future.done() else None
 
     def call(self, client: Any, request: Any) -> Any:
-        future = client.call_async(request)
-        rclpy.spin_until_future_complete(self.node, future)
-        return future.result()
+        response = self.tried(client, request, LONGEST)
+        assert response, f"no response for {LONGEST} s"
+        return response
 
     def transit(self, name: str) -> tuple[bool, str]:
         """Whether the transition was successful, and the state after it."""

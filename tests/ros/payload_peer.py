@@ -6,7 +6,8 @@ The first topics are subscribed to, the others published. Words may follow a typ
 find somebody, and `depth=3`. A line `{"topic": ..., "payload": base64}` on its input is
 parsed by the message's own class and published; one like it on its output is a message that came, as that class
 serialises it. The first line on its output says that every topic has found somebody. A line `{"sync": ...}` comes back
-when all before it is published. It needs nothing but ROS.
+when all before it is published, and in ROS 2, `{"acked": true}` when every subscriber has received it. It needs nothing
+but ROS.
 """
 
 from __future__ import annotations
@@ -33,11 +34,14 @@ def say_message(topic: str, payload: bytes) -> None:
     say({"topic": topic, "payload": base64.b64encode(payload).decode()})
 
 
-def commands() -> Iterator[tuple[str, bytes]]:
+def commands(wait_until_acked: Callable[[], None] | None = None) -> Iterator[tuple[str, bytes]]:
     """The messages to publish, until the input ends."""
     for line in sys.stdin:
         command = json.loads(line)
         if "sync" in command:
+            say(command)
+        elif "acked" in command and wait_until_acked:
+            wait_until_acked()
             say(command)
         else:
             yield command["topic"], base64.b64decode(command["payload"])
@@ -131,10 +135,16 @@ class Ros2Peer:
             for topic in sought
         )
 
+    def wait_until_acked(self) -> None:
+        from rclpy.duration import Duration
+
+        for publisher in self.publishers.values():
+            assert publisher.wait_for_all_acked(Duration(seconds=60))
+
     def publish_all(self) -> None:
         from rclpy.serialization import deserialize_message
 
-        for topic, payload in commands():
+        for topic, payload in commands(self.wait_until_acked):
             self.publishers[topic].publish(deserialize_message(payload, self.types[topic]))
         self.rclpy.shutdown()
 

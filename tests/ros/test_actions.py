@@ -202,6 +202,7 @@ def test_a_client_that_dies_harms_nobody(place: Arm, language: str) -> None:
             place.gate.open()
             assert faults(place.version, json.loads(other.line())) == []
         finally:
+            place.gate.open()
             dying.end()
             other.end()
         check_counts(node, succeeded=2, canceled=1)

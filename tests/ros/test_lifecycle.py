@@ -20,7 +20,8 @@ from tests.ros.live_nodes import REPOSITORY, LiveNode, model_address
 from tests.ros.places import Place
 from tests.ros.test_services import Camera
 
-pytestmark = pytest.mark.check
+# Nodes of these tests have the same names.
+pytestmark = [pytest.mark.check, pytest.mark.xdist_group("lifecycle")]
 
 SPECIFICATION = """\
 project: {name: robot, width: 64}
@@ -91,9 +92,10 @@ def test_messages_pass_only_while_the_node_is_active(place: Place, kind: str) ->
         for first, second in (("configure", "activate"), ("deactivate", "activate")):
             if first == "deactivate":
                 assert manager.ask(first) == [True, "inactive"]
-            # It is ignored.
+            # It is ignored. A message and a request may overtake each other, so the message has to be taken before.
             peer.publish("/in", point())
-            peer.wait_until_published()
+            peer.wait_until_acked()
+            assert manager.ask("")[0] is True
             if first == "configure":
                 assert manager.ask("activate") == [False, "unconfigured"]
                 assert manager.ask(first) == [True, "inactive"]

@@ -141,8 +141,11 @@ both_kinds = pytest.mark.parametrize("kind", ["live", "cpp"])
 
 
 def state(task: Path) -> str:
-    """The letter of a thread's state in Linux."""
-    return (task / "stat").read_text().rpartition(")")[2].split()[0]
+    """The letter of a thread's state in Linux; `X` if it has ended."""
+    try:
+        return (task / "stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return "X"
 
 
 @contextmanager
@@ -152,8 +155,8 @@ def stopped(node: NodeProcess) -> Iterator[None]:
     if isinstance(node, LiveNode):
         (number,) = [found for line, found in node.children().items() if "node/bridge" in line]
     os.kill(number, signal.SIGSTOP)
-    # Each of its threads stops when it runs next.
-    while any(state(task) != "T" for task in Path(f"/proc/{number}/task").iterdir()):
+    # Each of its threads stops when it runs next, unless it ends.
+    while any(state(task) not in "TXZ" for task in Path(f"/proc/{number}/task").iterdir()):
         time.sleep(0.01)
     try:
         yield

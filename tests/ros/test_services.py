@@ -172,6 +172,7 @@ def test_a_client_that_dies_harms_nobody(place: Camera, language: str) -> None:
             place.gate.open()
             assert json.loads(other.line()) == {"wrong": [], "failed": []}
         finally:
+            place.gate.open()
             for client in (dying, other):
                 client.end()
         check_counts(node, 31, 0)

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,10 +62,8 @@ def _check_paced(results: list[dict[str, Any]], count: int) -> None:
 
 @pytest.mark.parametrize("number", MODELS)
 def test_the_interpreter_answers_rospy(tmp_path: Path, number: int) -> None:
-    with ros1(tmp_path) as ros:
-        board = interpreted(_node(ros), number, Manager(_first_three))
+    with ros1(tmp_path) as ros, closing(interpreted(_node(ros), number, Manager(_first_three))):
         _check_paced(paced(ros, 50, 2, [("/turn", "/place")]), 100)
-        board.close()
 
 
 @dataclass
@@ -91,9 +89,9 @@ def running(program: tuple[int, Path], tmp_path: Path) -> Iterator[Clocked]:
     with ros1(tmp_path) as ros:
         made, manager, log = _node(ros), Manager(_first_three), list[Frame]()
         board = clocked(made, program[0], manager, program[1], Stalls(SEED), log)
-        board.wait_until_listening()
-        yield Clocked(ros, made, board, manager, log, program[0])
-        board.close()
+        with closing(board):
+            board.wait_until_listening()
+            yield Clocked(ros, made, board, manager, log, program[0])
 
 
 class Recorded:
@@ -233,13 +231,14 @@ def test_a_thousand_points_at_100_hz_reach_three_subscribers(running: Clocked) -
 def test_a_new_master_is_found(program: tuple[int, Path], tmp_path: Path) -> None:
     (tmp_path / "first").mkdir()
     (tmp_path / "second").mkdir()
-    with ros1(tmp_path / "first") as ros:
-        board = clocked(_node(ros), program[0], Manager(_first_three), program[1], Stalls(SEED), [])
-        _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
-        port = int(_node(ros).master[1])
-    with ros1(tmp_path / "second", port) as ros:
-        _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
-    board.close()
+    with ExitStack() as stack:
+        with ros1(tmp_path / "first") as ros:
+            board = clocked(_node(ros), program[0], Manager(_first_three), program[1], Stalls(SEED), [])
+            stack.callback(board.close)
+            _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
+            port = int(_node(ros).master[1])
+        with ros1(tmp_path / "second", port) as ros:
+            _check_paced(paced(ros, 20, 1, [("/turn", "/place")]), 20)
 
 
 def test_answers_leave_while_messages_of_many_publishers_wait(program: tuple[int, Path]) -> None:
@@ -247,11 +246,13 @@ def test_answers_leave_while_messages_of_many_publishers_wait(program: tuple[int
     print(f"seed {SEED}")
     rng = random.Random(SEED)
     made = node(("127.0.0.1", free_port()), (TURN,), (PLACE,))
-    board = clocked(made, program[0], Manager(_thrice), program[1], Stalls(SEED, is_strict=True), [])
-    board.wait_until_listening()
-    running = Running(made, board, program[0])
-    publishers = [Publisher(TURN) for _ in range(3)]
-    with running.connect() as peer:
+    with ExitStack() as stack:
+        board = clocked(made, program[0], Manager(_thrice), program[1], Stalls(SEED, is_strict=True), [])
+        stack.callback(board.close)
+        board.wait_until_listening()
+        running = Running(made, board, program[0])
+        publishers = [stack.enter_context(closing(Publisher(TURN))) for _ in range(3)]
+        peer = stack.enter_context(running.connect())
         peer.sendall(header("callerid=/me", "md5sum=*", "topic=/place"))
         assert "error" not in header_of(peer)
         assert running.call("publisherUpdate", "/master", "/turn", [item.uri for item in publishers])[0] == 1
@@ -263,6 +264,3 @@ def test_answers_leave_while_messages_of_many_publishers_wait(program: tuple[int
                 item.send(payload)
             points = sorted(framed(0, payload[:24])[1:] for payload in 3 * sent)
             assert sorted(read(peer, 28) for _ in points) == points
-    for item in publishers:
-        item.close()
-    board.close()

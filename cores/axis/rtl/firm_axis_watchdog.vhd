@@ -17,7 +17,7 @@ entity firm_axis_watchdog is
   generic (
     WIDTH   : integer := 8;
     SOURCES : integer := 2;
-    -- Cycles with `tick`, but without a beat, within a frame, 1 or more.
+    -- Cycles with `tick` and without a beat, in the middle of a frame; 1 or more.
     LIMIT : integer := 1024;
     -- The memory is cleared by `clearing` and `cleared`, which several watchdogs share.
     SHARED_CLEARING : boolean := false
@@ -51,7 +51,7 @@ entity firm_axis_watchdog is
 
     -- For the scheduler: the frame ends without a beat of the source.
     cut : out std_logic;
-    -- In this cycle, the source that is ready to be taken is found to have stopped; its frame will be aborted.
+    -- Pulses when the source is found to have stopped, while its tready is high; its frame will be aborted.
     expires : out std_logic;
     -- Pulses for each aborted frame, one bit for each source.
     expired : out std_logic_vector(SOURCES-1 downto 0)
@@ -72,10 +72,10 @@ architecture rtl of firm_axis_watchdog is
   signal to_clear   : std_logic_vector(INDEX_BITS_USED-1 downto 0);  -- the next bit to clear
 
   signal inside_r : std_logic;                    -- a frame has begun
-  signal waited_r : natural range 0 to LIMIT-1;   -- such cycles in a row without a beat
+  signal waited_r : natural range 0 to LIMIT-1;   -- cycles with tick in a row without a beat
   signal cut_r    : std_logic;                    -- the frame is to end
   signal ends     : std_logic;                    -- it ends in this cycle
-  signal stops    : std_logic;                    -- the source has been silent for LIMIT such cycles
+  signal stops    : std_logic;                    -- the source has been silent for LIMIT cycles with tick
 
   signal accepted : std_logic;                    -- a beat may leave, or be dropped
   signal ready    : std_logic;

@@ -23,8 +23,8 @@ entity firm_manager_tree is
     TOP_POLICY : policy_t := ROUND_ROBIN;
     -- The upper byte of the id of the publisher at each place; IMPLICIT if place and id are equal.
     HIGHS : times_t := IMPLICIT;
-    -- Cycles after which a publisher that stops in the middle of a frame is cut off, and at most half as many more; 0:
-    -- never.
+    -- Cycles without a beat after which the frame of a publisher that stops in the middle of it is aborted, rounded up
+    -- to an even number, at least 2; or up to half as many more, since the groups share a timer. 0: never.
     WATCHDOG : integer := 0
   );
   port (
@@ -388,7 +388,7 @@ begin
           m_axis_tready => member_tready
         );
 
-      unwatched : if WATCHDOG = 0 generate
+      unwatched : if WATCHDOG <= 0 generate
         chosen_tdata             <= member_tdata;
         chosen_tkeep             <= member_tkeep;
         chosen_tuser(0 downto 0) <= member_tuser;

@@ -14,9 +14,11 @@ use firm.firm_rtps_pkg.all;
 entity firm_rtps_control is
   generic (
     PEERS   : integer := 8; -- 1 to 8
-    WRITERS : integer := 2; -- of the node: the first one is that of ros_discovery_info, the second one sends samples
-    READERS : integer := 0; -- of the node
-    SAMPLE  : integer := 64 -- bytes of the longest payload, a power of two
+    -- Of the node, 2 to 234: the first one is that of ros_discovery_info, the second one sends samples. With more, the
+    -- numbers of packets have no room.
+    WRITERS : integer := 2;
+    READERS : integer := 0; -- of the node, 0 to 8
+    SAMPLE  : integer := 64 -- bytes of the longest payload, a power of two, 2 to 128
   );
   port (
     clk   : in std_logic;
@@ -59,6 +61,7 @@ entity firm_rtps_control is
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
+    is_long       : out std_logic;  -- a pulse for each sample of more than SAMPLE bytes, which is dropped
 
     -- To firm_packet_builder. `packet` is a number of fusesoc_firm.fabric.packets.
     start               : out std_logic;
@@ -105,12 +108,12 @@ architecture rtl of firm_rtps_control is
 
   -- A peer's entry, and the same in the record, from RECORD_SOURCE_MAC on.
   constant ENTRY_BITS      : positive := 5;
-  constant AT_GRAPH_PORT   : natural := 6;  -- of the reader of ros_discovery_info
+  constant AT_GRAPH_PORT   : natural  := 6;   -- of the reader of ros_discovery_info
   constant AT_ADDRESS      : natural  := 8;   -- for discovery
   constant AT_PORT         : natural  := 12;
-  constant AT_USER_PORT    : natural := 14;
+  constant AT_USER_PORT    : natural  := 14;
   constant AT_PREFIX       : natural  := 16;
-  constant AT_USER_ADDRESS : natural := 28;
+  constant AT_USER_ADDRESS : natural  := 28;
   -- Bytes of the entry that become fields of the builder, at the same addresses; addresses of its other fields.
   constant ENTRY_FIELDS : natural := 28;
   constant AT_READER    : natural := 28;
@@ -128,10 +131,10 @@ architecture rtl of firm_rtps_control is
   constant MOST_REQUESTED : positive := 32;
 
   -- "ros_discovery_info", with its NUL.
-  constant GRAPH_TOPIC         : std_logic_vector(0 to 151) := x"726f735f646973636f766572795f696e666f00";
-  constant GRAPH_TOPIC_BYTES   : positive := 19;
-  constant NAME_PLACE          : natural := 4;  -- in the value, after the length
-  constant LOCATOR_BYTES       : natural := 24;
+  constant GRAPH_TOPIC       : std_logic_vector(0 to 151) := x"726f735f646973636f766572795f696e666f00";
+  constant GRAPH_TOPIC_BYTES : positive := 19;
+  constant NAME_PLACE        : natural  := 4;  -- in the value, after the length
+  constant LOCATOR_BYTES     : natural  := 24;
 
   subtype byte_t is std_logic_vector(7 downto 0);
   type memory_t is array (natural range <>) of byte_t;
@@ -242,6 +245,15 @@ begin
 
   assert PEERS >= 1 and PEERS <= 8
     report "firm_rtps_control: PEERS is " & integer'image(PEERS) & "; legal: 1 to 8"
+    severity failure;
+  assert WRITERS >= 2 and WRITERS <= 234
+    report "firm_rtps_control: WRITERS is " & integer'image(WRITERS) & "; legal: 2 to 234"
+    severity failure;
+  assert READERS >= 0 and READERS <= 8
+    report "firm_rtps_control: READERS is " & integer'image(READERS) & "; legal: 0 to 8"
+    severity failure;
+  assert SAMPLE >= 2 and SAMPLE <= 128 and 2**clog2(SAMPLE) = SAMPLE
+    report "firm_rtps_control: SAMPLE is " & integer'image(SAMPLE) & "; legal: powers of two, 2 to 128"
     severity failure;
 
   take  <= '1' when state_r = TAKING and due_r = '0' and leave_r = '0' else '0';
@@ -680,6 +692,7 @@ begin
         count_r <= count_r + 1;
         state_r <= WAIT_PACKET;
       elsif state_r = WAIT_PACKET then
+        index_r  <= (others => '0');
         second_r <= '0';
         if is_busy = '0' then
           next_packet;
@@ -694,8 +707,8 @@ begin
     end if;
   end process act;
 
-  start       <= '1' when state_r = BEGIN_PACKET else '0';
-  packet      <= std_logic_vector(packet_r);
+  start        <= '1' when state_r = BEGIN_PACKET else '0';
+  packet       <= std_logic_vector(packet_r);
   peers_known  <= used_r;
   is_announced <= '1' when state_r = TELL else '0';
   is_left      <= '1' when state_r = FORGET else '0';
@@ -786,11 +799,17 @@ begin
   keep_sample : process (clk)
   begin
     if rising_edge(clk) then
+      is_long <= '0';
       if s_axis_tvalid = '1' and has_sample_r = '0' then
-        size_of_sample_r <= size_of_sample_r + 1;
-        if s_axis_tlast = '1' then
-          has_sample_r <= '1';
-          number_r     <= number_r + 1;
+        if size_of_sample_r /= SAMPLE then
+          size_of_sample_r <= size_of_sample_r + 1;
+          if s_axis_tlast = '1' then
+            has_sample_r <= '1';
+            number_r     <= number_r + 1;
+          end if;
+        elsif s_axis_tlast = '1' then
+          is_long          <= '1';
+          size_of_sample_r <= (others => '0');
         end if;
       end if;
       if state_r = BEGIN_PACKET then
@@ -803,6 +822,7 @@ begin
         size_of_sample_r <= (others => '0');
       end if;
       if rst_n = '0' then
+        is_long          <= '0';
         has_sample_r     <= '0';
         size_of_sample_r <= (others => '0');
         number_r         <= (others => '0');

@@ -2,7 +2,7 @@
 -- Reads how a peer announces a writer (SEDP, a publication), and tells which of the node's readers match it: those with
 -- the same topic, type and hash of the type, if what the writer offers is enough for them.
 --
--- Of several parameters with the same id, the first one counts, as in the specification of the product's reference.
+-- Of several parameters with the same id, the first one counts, as in the reference participant (tests/fabric/participant.py).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -245,6 +245,7 @@ begin
     if rising_edge(clk) then
       mask_r <= mask;
       if hash_r = '1' then
+        -- The part begins with "typehash=", which is the same for all readers.
         if before_r = HASH_NAME_BYTES-1 then
           named_r <= mask(0);
         end if;
@@ -301,7 +302,8 @@ begin
           end if;
         elsif id = RTPS_REPRESENTATION then
           seen_coding_r <= '1';
-          if seen_coding_r = '0' and unsigned(size) >= WORD_BYTES and room = '1' and number_r /= 0 then
+          if seen_coding_r = '0' and unsigned(size) >= WORD_BYTES and room = '1'
+             and (beyond_r = '1' or number_r /= 0) then
             encodes_r <= found_r;
           end if;
         elsif id = RTPS_ENDPOINT_GUID then

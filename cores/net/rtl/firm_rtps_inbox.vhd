@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Holds back what a packet tells until the packet is known to be good, and gives it byte by byte to those that act on
--- it: the fields that firm_rtps_walker finds, and the payloads of the writers of discovery with their parameters.
+-- Holds the words of a packet until the packet is known to be good, then gives them one by one: bytes of the fields
+-- that firm_rtps_walker finds, and of the payloads of the writers of discovery, with their parameters.
 --
 -- After the last word of a submessage, its user may act on it before it takes the next word.
 library ieee;
@@ -36,12 +36,11 @@ entity firm_rtps_inbox is
     take        : in  std_logic;
     has_word    : out std_logic;
     has_field   : out std_logic;
-    has_payload : out std_logic;
     address     : out std_logic_vector(RECORD_BITS-1 downto 0);
     data        : out std_logic_vector(7 downto 0);
     is_end      : out std_logic;  -- the word is the last one of its submessage
 
-    -- The submessage that arrives is for this node. The words of others are forgotten.
+    -- The submessage that arrives is for this node. Words of other submessages are dropped.
     is_mine : out std_logic;
 
     -- Of the submessage, from its last word on.
@@ -181,7 +180,7 @@ begin
   word(7 downto 0)  <= field_data when field_valid = '1' else payload_data;
   ends_packet       <= is_whole or is_faulty or is_foreign or is_aborted;
   spoils(0)         <= is_foreign or is_aborted;
-  -- The destination is not needed any more.
+  -- Nothing of a submessage for another node is kept, but each packet needs its end.
   word_valid        <= '1' when ends_packet = '1' else
                        '0' when mine = '0' else
                        field_valid or is_submessage or (payload_valid and listens);
@@ -211,7 +210,6 @@ begin
   value       <= taken(7 downto 0);
   has_word    <= valid;
   has_field   <= '0' when shown = AT_PAYLOAD or shown = AT_NOTHING else '1';
-  has_payload <= '1' when shown = AT_PAYLOAD else '0';
   address     <= shown;
   data        <= value;
   is_end      <= taken(16);
@@ -243,13 +241,13 @@ begin
     end if;
   end process note_submessage;
 
-  kind    <= kind_r;
-  flags   <= flags_r;
-  writer  <= from_r;
-  number  <= number_r;
-  second  <= second_r;
+  kind     <= kind_r;
+  flags    <= flags_r;
+  writer   <= from_r;
+  number   <= number_r;
+  second   <= second_r;
   is_large <= large_r;
-  is_gone <= gone_r;
+  is_gone  <= gone_r;
 
   -- ------------------------------------------------------------------ parameters
 

@@ -9,12 +9,12 @@ use firm.firm_rtps_pkg.all;
 entity firm_rtps_node is
   generic (
     PEERS   : integer := 8;    -- 1 to 8
-    WRITERS : integer := 2;    -- see firm_rtps_control
+    WRITERS : integer := 2;    -- 2 to 234: see firm_rtps_control
     READERS : integer := 1;    -- 1 to 8
     SOURCES : integer := 8;    -- matched writers of peers, 1 to 32
-    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two
-    DEPTH   : integer := 2048; -- bytes of waiting packets of discovery, and as many of waiting payloads; a power of two
-    SAMPLES : integer := 16    -- that wait for the host, a power of two
+    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 128
+    DEPTH   : integer := 2048; -- bytes of waiting discovery, and of waiting payloads; a power of two, 4 to 65536
+    SAMPLES : integer := 16    -- that wait for the host, a power of two, 2 or more
   );
   port (
     clk   : in std_logic;
@@ -65,15 +65,18 @@ entity firm_rtps_node is
 
     peers_known   : out std_logic_vector(7 downto 0);
     sources_known : out std_logic_vector(SOURCES-1 downto 0);
-    -- Pulses: a packet of discovery, a peer, a matching writer, a sample without room.
-    is_lost      : out std_logic;
-    is_full      : out std_logic;
-    is_unmatched : out std_logic;
-    is_dropped   : out std_logic
+    -- Pulses.
+    is_lost      : out std_logic;  -- a packet of discovery without room
+    is_full      : out std_logic;  -- a peer without room
+    is_unmatched : out std_logic;  -- a writer that matches, without room
+    is_dropped   : out std_logic;  -- a sample without room, see firm_rtps_readers
+    is_long      : out std_logic   -- a sample to send, with more than SAMPLE bytes
   );
 end entity firm_rtps_node;
 
 architecture rtl of firm_rtps_node is
+
+  constant FIRST_READER : positive := 2;  -- 1 is the writer of ros_discovery_info
 
   signal field_valid   : std_logic;
   signal field_address : std_logic_vector(RECORD_BITS-1 downto 0);
@@ -171,7 +174,6 @@ begin
       take          => take,
       has_word      => has_word,
       has_field     => has_field,
-      has_payload   => open,
       address       => address,
       data          => data,
       is_end        => is_end,
@@ -228,7 +230,7 @@ begin
   u_readers : entity firm.firm_rtps_readers
     generic map (
       READERS => READERS,
-      FIRST   => 2,
+      FIRST   => FIRST_READER,
       SOURCES => SOURCES,
       BYTES   => DEPTH,
       SAMPLES => SAMPLES
@@ -310,6 +312,7 @@ begin
       s_axis_tvalid       => sample_tvalid,
       s_axis_tlast        => sample_tlast,
       s_axis_tready       => sample_tready,
+      is_long             => is_long,
       start               => start,
       packet              => packet,
       payload_bytes       => payload_bytes,

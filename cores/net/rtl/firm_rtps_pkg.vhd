@@ -26,7 +26,6 @@ package firm_rtps_pkg is
   constant RTPS_INLINE       : natural := 1;  -- of DATA and DATA_FRAG
   constant RTPS_PAYLOAD      : natural := 2;  -- of DATA
   constant RTPS_KEY          : natural := 3;  -- of DATA
-  constant RTPS_FRAGMENT_KEY : natural := 2;  -- of DATA_FRAG
 
   constant RTPS_SENTINEL    : std_logic_vector(15 downto 0) := x"0001";
   constant RTPS_KEY_HASH    : std_logic_vector(15 downto 0) := x"0070";
@@ -49,7 +48,7 @@ package firm_rtps_pkg is
   constant RECORD_KEY_HASH    : natural  := 96;  -- 16 bytes
   constant RECORD_KIND        : natural  := 112; -- 1 byte
   constant RECORD_FLAGS       : natural  := 113; -- 1 byte
-  -- Of the packet: written once. Between these two is room for what a participant tells of its addresses.
+  -- Of the packet. firm_rtps_control adds what a participant tells of its addresses, at 134 to 143 and 156 to 159.
   constant RECORD_SOURCE_MAC  : natural  := 128; -- 6 bytes, as on the line
   constant RECORD_SOURCE      : natural  := 144; -- 12 bytes: the sender's prefix
 

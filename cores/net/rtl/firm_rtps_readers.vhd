@@ -16,8 +16,8 @@ entity firm_rtps_readers is
     READERS : integer := 1;    -- of the node, 1 to 8
     FIRST   : integer := 2;    -- the number in the entity id of the first one; those of the others follow
     SOURCES : integer := 8;    -- matched writers, 1 to 32
-    BYTES   : integer := 2048; -- of payloads that wait, a power of two
-    SAMPLES : integer := 16    -- that wait, a power of two
+    BYTES   : integer := 2048; -- of payloads that wait, a power of two, 4 to 65536
+    SAMPLES : integer := 16    -- that wait, a power of two, 2 or more
   );
   port (
     clk   : in std_logic;
@@ -65,7 +65,8 @@ entity firm_rtps_readers is
 
     sources_known : out std_logic_vector(SOURCES-1 downto 0);
     is_full       : out std_logic;  -- a pulse for each matching writer without room
-    is_lost       : out std_logic   -- a pulse for each sample without room
+    -- A pulse for each sample without room, also one that is repeated or whose packet is aborted later.
+    is_lost : out std_logic
   );
 end entity firm_rtps_readers;
 
@@ -382,7 +383,7 @@ begin
           state_r <= JUDGING;
         end if;
       elsif state_r = JUDGING then
-        -- A place that gets another writer may be that of this sample.
+        -- The source's place may be getting another writer, so the sample is judged again.
         if notes_r = '1' then
           state_r <= IDLE;
         elsif is_new_r = '1' then
@@ -455,6 +456,7 @@ begin
 
   has_free   <= any(not sources_r);
   free       <= lowest(not sources_r, SOURCE_BITS);
+  -- Of several readers of one topic, only the first gets the samples.
   reader     <= lowest(matches, ID_BITS);
   guid_place <= std_logic_vector(index_r);
   is_busy    <= notes_r;
@@ -506,7 +508,7 @@ begin
     end if;
   end process note_writers;
 
-  -- A new writer begins with 1; after a sample, the next one follows. A memory needs that there is one write only.
+  -- A new writer begins with 1; after a sample, the next one follows. The memory has one write port.
   number_place <= to_r when notes_r = '1' else from_r;
   number_write <= '1' when notes_r = '1' or (state_r = JUDGING and is_new_r = '1') else '0';
   new_number   <= to_unsigned(1, NUMBER_BITS) when notes_r = '1' else next_r;

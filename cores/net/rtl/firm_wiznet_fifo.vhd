@@ -47,7 +47,7 @@ architecture rtl of firm_wiznet_fifo is
 
 begin
 
-  ready <= not level_r(6);
+  ready <= rst_n and not level_r(6);                      -- in reset, the source waits
   write <= s_axis_tvalid and ready;
   read  <= '1' when level_r /= 0 and (valid_r = '0' or m_axis_tready = '1') else '0';
   entry <= write and s_axis_tlast;

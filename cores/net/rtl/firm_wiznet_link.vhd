@@ -3,7 +3,6 @@
 -- chip's reset, its milliseconds, and streams of any width. The ROM outside makes it a node.
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
 
@@ -187,6 +186,9 @@ begin
     signal is_last   : std_logic;  -- the frame ends with the available bytes
     signal take      : std_logic;
 
+    signal ends_aborted : std_logic;
+    signal ends_broken  : std_logic;
+
   begin
 
     fill_lane : process (out_data)
@@ -231,7 +233,8 @@ begin
         window        => window,
         available     => available,
         is_last       => is_last,
-        is_aborted    => in_abort(0),
+        is_aborted    => ends_aborted,
+        is_broken     => ends_broken,
         shown         => open,
         ends          => open,
         take_valid    => take,
@@ -239,8 +242,9 @@ begin
         skip          => '0'
       );
 
-    in_data  <= window(7 downto 0);
-    -- A frame that ends without a byte is aborted.
+    in_data     <= window(7 downto 0);
+    -- A frame ends without a byte only if it is aborted or broken; a void byte carries the mark.
+    in_abort(0) <= ends_aborted or ends_broken;
     in_valid <= is_last when available = NONE else '1';
     in_last  <= is_last when available = NONE or available = ONE else '0';
     take     <= in_valid and in_ready;

@@ -27,7 +27,7 @@ entity firm_wiznet_sequencer is
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
-    is_taken      : in  std_logic;  -- the Manager has all bytes, so that 64 have room
+    is_taken      : in  std_logic;  -- the Manager has taken all bytes, so there is room for 64
 
     -- To firm_wiznet_access: requests, bytes to write, bytes that were read.
     request_valid   : out std_logic;

@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends packets to a node with two readers. A row of the file is a packet: the cycles before it, whether it is aborted
 -- (0 or 1), the number of bytes, and the bytes. Results go to a file. A frame to the host is `frame` and its bytes. An
--- answer to a heartbeat of discovery is `request`, the number of its packet, and the bytes of all fields.
+-- answer to a heartbeat of discovery is `request`, the number of its packet, and the bytes of all fields. A sample that
+-- the node sends is `sample` and the number of its bytes; one that it refuses is `long`.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -20,7 +21,9 @@ entity firm_rtps_node_tb is
     STALL_PERCENT : integer := 0;            -- the chance, each cycle, that the host takes nothing
     SOURCES       : integer := 8;
     DEPTH         : integer := 4096;
-    SAMPLES       : integer := 16
+    SAMPLES       : integer := 16;
+    SAMPLE        : integer := 64;
+    SENT_BYTES    : integer := 0             -- if not 0, samples of 1 to so many bytes are sent
   );
 end entity firm_rtps_node_tb;
 
@@ -31,9 +34,11 @@ architecture simulation of firm_rtps_node_tb is
   constant WANTS_TRANSIENT : std_logic_vector(READERS-1 downto 0) := "10";
   constant WRITERS         : positive := 2;
   constant FIELD_BYTES     : positive := 128;
+  constant USED_BYTES      : positive := 72; -- bytes that the node writes
   -- Of an answer: see firm_rtps_control.
-  constant ACKNOWLEDGE : natural := 12 + WRITERS + READERS;
-  constant REQUEST     : natural := 13 + WRITERS + READERS;
+  constant ACKNOWLEDGE  : natural := 12 + WRITERS + READERS;
+  constant REQUEST      : natural := 13 + WRITERS + READERS;
+  constant PLAIN_SAMPLE : natural := 7 + WRITERS + READERS;
 
   signal clk   : std_logic := '0';
   signal rst_n : std_logic;
@@ -58,6 +63,12 @@ architecture simulation of firm_rtps_node_tb is
   signal build_valid   : std_logic;
   signal build_address : std_logic_vector(6 downto 0);
   signal build_data    : std_logic_vector(7 downto 0);
+  signal payload_bytes : std_logic_vector(15 downto 0);
+
+  signal sample_valid : std_logic := '0';
+  signal sample_last  : std_logic := '0';
+  signal sample_ready : std_logic;
+  signal is_long      : std_logic;
 
 begin
 
@@ -88,7 +99,8 @@ begin
       READERS => READERS,
       SOURCES => SOURCES,
       DEPTH   => DEPTH,
-      SAMPLES => SAMPLES
+      SAMPLES => SAMPLES,
+      SAMPLE  => SAMPLE
     )
     port map (
       clk                 => clk,
@@ -110,12 +122,12 @@ begin
       frame_tlast         => m_tlast,
       frame_tready        => m_tready,
       sample_tdata        => x"00",
-      sample_tvalid       => '0',
-      sample_tlast        => '0',
-      sample_tready       => open,
+      sample_tvalid       => sample_valid,
+      sample_tlast        => sample_last,
+      sample_tready       => sample_ready,
       start               => start,
       packet              => packet,
-      payload_bytes       => open,
+      payload_bytes       => payload_bytes,
       is_busy             => '0',
       build_field_valid   => build_valid,
       build_field_address => build_address,
@@ -128,7 +140,8 @@ begin
       is_lost             => open,
       is_full             => open,
       is_unmatched        => open,
-      is_dropped          => open
+      is_dropped          => open,
+      is_long             => is_long
     );
 
   u_checker : entity firm.firm_axis_checker
@@ -173,6 +186,27 @@ begin
     wait;
   end process show_names;
 
+  -- ------------------------------------------------------------------ samples to send
+
+  send_samples : process
+    variable size : positive := 1;
+  begin
+    wait until rst_n = '1';
+    while SENT_BYTES > 0 and not done loop
+      for place in 1 to size loop
+        sample_valid <= '1';
+        sample_last  <= '0';
+        if place = size then
+          sample_last <= '1';
+        end if;
+        wait until (rising_edge(clk) and sample_ready = '1') or done;
+      end loop;
+      size := size mod SENT_BYTES + 1;
+    end loop;
+    sample_valid <= '0';
+    wait;
+  end process send_samples;
+
   -- ------------------------------------------------------------------ results
 
   stall : process
@@ -213,11 +247,21 @@ begin
         end if;
       end if;
       if build_valid = '1' then
+        assert unsigned(build_address) < USED_BYTES
+          report "a field has the address " & integer'image(to_integer(unsigned(build_address))) severity failure;
         fields(to_integer(unsigned(build_address))) := to_integer(unsigned(build_data));
+      end if;
+      if is_long = '1' then
+        write(row, string'("long"));
+        write_result(results, expected, EXPECTED_FILE, row);
+      end if;
+      if start = '1' and unsigned(packet) = PLAIN_SAMPLE then
+        write(row, "sample " & integer'image(to_integer(unsigned(payload_bytes))));
+        write_result(results, expected, EXPECTED_FILE, row);
       end if;
       if start = '1' and (unsigned(packet) = ACKNOWLEDGE or unsigned(packet) = REQUEST) then
         write(row, "request " & integer'image(to_integer(unsigned(packet))));
-        for index in 0 to 71 loop
+        for index in 0 to USED_BYTES-1 loop
           write(row, ' ' & integer'image(fields(index)));
         end loop;
         write_result(results, expected, EXPECTED_FILE, row);

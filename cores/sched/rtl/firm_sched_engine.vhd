@@ -414,8 +414,8 @@ begin
                    a_key when gets_key = '1' else
                    key_after_beat;
 
-  -- `moves and available`, prepared for each beat: the enable of the grant's many bits. If the task that finishes is
-  -- the only one left, it is also the next.
+  -- The same as moves and available, with beat and last in the last multiplexer, since they are late and this enables
+  -- many bits. If the task that finishes is the only one left, it is also the next.
   move_grant : process (beat, last, available, may_preempt, running_r)
   begin
     if beat = '0' then

@@ -111,7 +111,8 @@ module firm_sim_chip (
     forever begin
       #HALF_PERIOD clk = 1;
       #HALF_PERIOD clk = 0;
-      cycles = cycles + 1;
+      if (cycles != 32'h7fffffff)
+        cycles = cycles + 1;
       sample;
     end
   end

@@ -9,7 +9,7 @@
 --     d          the chip select becomes inactive
 --
 -- and reads a byte at file descriptor 3 after each 's', whose value is ignored, and after each 'a'. The simulation ends
--- with the file. docs/reference/network.md describes who starts it.
+-- with the file. `firm live` starts it (docs/reference/network.md).
 library ieee;
 use ieee.std_logic_1164.all;
 

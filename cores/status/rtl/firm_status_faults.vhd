@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Collects the faults of many channels: a fault waits in the one place of its channel, and leaves as the number of the
--- channel and the code. One leaves in three cycles at most, those of the lowest channels first. A fault that finds its
--- channel's place taken is not counted, and `lost` pulses.
+-- channel and the code. One leaves in three cycles, those of the lowest channels first. A second fault of a channel
+-- before its first one has left is not counted, and `lost` pulses. Alone, a fault leaves within six cycles.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -28,7 +28,8 @@ entity firm_status_faults is
     fault   : out std_logic;
     channel : out std_logic_vector(index_bits(CHANNELS)-1 downto 0);
     code    : out std_logic_vector(3 downto 0);
-    lost    : out std_logic
+    -- A pulse if a fault found its channel's place taken.
+    lost : out std_logic
   );
 end entity firm_status_faults;
 

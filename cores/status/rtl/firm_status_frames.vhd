@@ -13,7 +13,7 @@ entity firm_status_frames is
     WIDTH : integer := 8;
     -- Bytes of a frame's id, 1 or 2.
     ID_BYTES : integer := 1;
-    -- At most 31.
+    -- 1 to 31.
     ADDRESS_BITS : integer := 16
   );
   port (
@@ -136,6 +136,9 @@ begin
   assert ID_BYTES = 1 or ID_BYTES = 2
     report "firm_status_frames: ID_BYTES is " & integer'image(ID_BYTES) & "; legal: 1, 2"
     severity failure;
+  assert ADDRESS_BITS >= 1 and ADDRESS_BITS <= 31
+    report "firm_status_frames: ADDRESS_BITS is " & integer'image(ADDRESS_BITS) & "; legal: 1 to 31"
+    severity failure;
 
   u_slice : entity firm.firm_axis_register_slice
     generic map (
@@ -171,7 +174,7 @@ begin
   parts_of_ids : if IS_SPLIT generate
     may_begin <= is_first_r and not has_begun_r and not in_tlast and is_equal(in_tdata(7 downto 0), 255);
     is_status <= (has_begun_r and is_equal(in_tdata(7 downto 0), 255)) when is_first_r = '1' else is_status_r;
-    returns   <= has_begun_r and not is_status;
+    returns   <= has_begun_r and in_tvalid and not is_status;
 
     keep_first_byte : process (clk)
     begin
@@ -180,7 +183,7 @@ begin
           has_begun_r <= '0';
         elsif takes = '1' then
           has_begun_r <= may_begin;
-        elsif in_tvalid = '1' and returns = '1' and inner_s_axis_tready = '1' then
+        elsif returns = '1' and inner_s_axis_tready = '1' then
           has_begun_r <= '0';
         end if;
       end if;
@@ -208,7 +211,7 @@ begin
       elsif takes = '1' and may_begin = '0' then
         is_first_r  <= in_tlast;
         is_status_r <= is_status;
-      elsif in_tvalid = '1' and returns = '1' and inner_s_axis_tready = '1' then
+      elsif returns = '1' and inner_s_axis_tready = '1' then
         is_first_r  <= '0';
         is_status_r <= '0';
       end if;

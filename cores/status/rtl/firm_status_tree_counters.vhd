@@ -51,7 +51,7 @@ entity firm_status_tree_counters is
     fault         : out std_logic;
     fault_channel : out std_logic_vector(11 downto 0);
     fault_code    : out std_logic_vector(3 downto 0);
-    lost          : out std_logic;
+    lost          : out std_logic;  -- a pulse if a fault found its channel's place taken
 
     -- The counter of the time stamps; zeros without them.
     cycles : out std_logic_vector(31 downto 0);
@@ -116,6 +116,15 @@ begin
   assert SUBSCRIBERS >= 1 and PUBLISHERS >= 1 and CHANNELS <= MOST_CHANNELS
     report "firm_status_tree_counters: SUBSCRIBERS is " & integer'image(SUBSCRIBERS) & " and PUBLISHERS is " &
     integer'image(PUBLISHERS) & "; legal: 1 or more each, and at most " & integer'image(MOST_CHANNELS) & " together"
+    severity failure;
+  assert COUNT_BITS >= 1 and COUNT_BITS <= 32
+    report "firm_status_tree_counters: COUNT_BITS is " & integer'image(COUNT_BITS) & "; legal: 1 to 32"
+    severity failure;
+  assert FAULT_BITS >= 1 and FAULT_BITS <= 32
+    report "firm_status_tree_counters: FAULT_BITS is " & integer'image(FAULT_BITS) & "; legal: 1 to 32"
+    severity failure;
+  assert WAIT_BITS >= 1 and WAIT_BITS <= 32
+    report "firm_status_tree_counters: WAIT_BITS is " & integer'image(WAIT_BITS) & "; legal: 1 to 32"
     severity failure;
 
   -- From the host.
@@ -313,7 +322,7 @@ begin
     end generate above;
   end generate name_channel;
 
-  -- Reading. The indices of other tables are meaningless, but within the tables.
+  -- Reading. An index that belongs to another table is meaningless, but within the range of its own.
   channel    <= unsigned(read_address(15 downto 4));
   fault_read <= std_logic_vector(resize(unsigned(read_address), CHANNEL_BITS+4));
   sub_read   <= read_address(SUB_BITS+3 downto 4);
@@ -333,7 +342,7 @@ begin
     if rising_edge(clk) then
       read_word <= (others => '0');
       if is_known_r = '0' then
-        read_word <= (others => '0');
+        null;
       elsif word_r = FRAMES and is_sub_r = '1' then
         read_word(COUNT_BITS-1 downto 0) <= sub_frames;
       elsif word_r = FRAMES then

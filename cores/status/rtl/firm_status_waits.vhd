@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Measures how long each of many sources waits at most, with two bits of registers and a word of memory for each. The
 -- sources are visited in turn, one in a cycle: if a source has waited since its last visit, its wait is longer by a
--- turn, of so many cycles as sources, rounded up to a power of two. So a wait of that many cycles may count or not, and
--- the result is at most two turns too low.
+-- turn, of so many cycles as sources, rounded up to a power of two. So the result is less than two
+-- turns too low.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -46,7 +46,7 @@ architecture rtl of firm_status_waits is
 
   signal turn_r     : unsigned(TURN_BITS-1 downto 0);
   signal visited    : std_logic_vector(2**TURN_BITS-1 downto 0);
-  signal waited_r   : std_logic_vector(2**TURN_BITS-1 downto 0) := (others => '0');  -- since the last visit
+  signal waited_r   : std_logic_vector(2**TURN_BITS-1 downto 0) := (others => '0');  -- without a pause since its last visit
   signal has_waited : std_logic_vector(0 downto 0);
 
   -- The visit of the last cycle, whose words have been read.

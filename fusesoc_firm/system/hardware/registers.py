@@ -146,6 +146,7 @@ def registers_configuration(registers: RegisterMap, signatures: Sequence[str], a
         "address_bits": address_bits,
         "has_signature_memory": has_signature_memory,
         "signature_bits": signature_bits,
+        "channel_count": len(signatures),
         "last_signature": len(words) - 1,
         "signatures": [{"channel": number, "word": word} for number, word in enumerate(words)],
         "reads": read,

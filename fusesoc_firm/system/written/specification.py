@@ -194,7 +194,8 @@ class Project(Section):
         is_asked=False,
     )
     status: Text = key(
-        "access to the status registers, if the system has any: frames of the id 255, or a port for AXI4-Lite",
+        "access to the status registers, if the system has any: frames of the status id (255, or 65,535 with "
+        "idBytes: 2), or a port for AXI4-Lite",
         choices=(NO_STATUS, *STATUS),
         default=Text(NO_STATUS),
     )
