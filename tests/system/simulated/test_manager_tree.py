@@ -79,16 +79,18 @@ def test_requests_of_the_status_are_found_among_other_frames(tmp_path: Path, wid
         "lost": 0,
         "shape": 0x01000001 | publishers << 12,
     }
-    words = [("magic", 0x4D524946)] * 60 + [*expected.items()]
-    frames += [(read_request(registers[name].address, 2), "status") for name, _ in words]
-    answers = [*[("magic", 0x4D524946)] * len(asked), *words]
+    magic = (registers["magic"].address, 0x4D524946)
+    # Reserved addresses are those of channel 0 without their highest bits.
+    reserved = [(address + word, 0) for address in (0x48000, 0x88000) for word in (0, 4, 0x34)]
+    words = [magic] * 60 + [(registers[name].address, word) for name, word in expected.items()] + reserved
+    frames += [(read_request(address, 2), "status") for address, _ in words]
+    answers = [magic] * len(asked) + words
     found: list[tuple[int, bytes]] = []
     for place, (frame, kind) in enumerate(frames):
         if kind == "good":
             found += [(place, pack_frame(number, frame[6:], 2)) for number in range(publishers)]
         elif kind == "status":
-            name, word = answers.pop(0)
-            found.append((place, status_answer(registers[name].address, word, 2)))
+            found.append((place, status_answer(*answers.pop(0), 2)))
     aborted = [place for place, (_, kind) in enumerate(frames) if kind == "aborted"]
     write_stimulus(tmp_path / "system" / "stimulus.txt", [frame for frame, _ in frames], aborted, id_bytes=2)
     write_expected(tmp_path / "system" / "expected.txt", found, len(unknown))
