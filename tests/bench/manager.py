@@ -72,9 +72,9 @@ _NOTES = {
         {schedulers.SHORTEST_TIME} to {schedulers.LONGEST_TIME} cycles. For a bar, LUTs as RAM count as LUTs. The
         dissertation's values are from table 4.1.""",
     _TREE_TITLE: f"""Round robin in and among {_TREE_SIDE} groups of {_TREE_SIDE} publishers, with all schedulers and
-        one subscriber. The bar of 10 LUT per channel includes the LUTs as RAM. The status is that of
-        {_STATUS_CHANNELS} subscribers and as many publishers, all of which may report faults; its budget was 16 LUT and
-        12 FF for a subscriber and a publisher together, and 600 of each.""",
+        one subscriber. For all bars, LUTs as RAM count as LUTs. The status is that of {_STATUS_CHANNELS} subscribers
+        and {_STATUS_CHANNELS} publishers, all of which may report faults. Its bar is 600 LUT and 600 FF, and 16 LUT and
+        12 FF for each pair of a subscriber and a publisher.""",
     _COMBINED_TITLE: """The times are the same as for the schedulers above. The dissertation's values are from
         table 4.5.""",
 }

@@ -126,8 +126,9 @@ class Gate:
         return self.path.with_suffix(".reached")
 
     def wait(self) -> None:
-        """Wait in the model until the gate is opened, or the node that started the model has ended."""
+        """Wait in the model until the gate is opened, or its parent has ended."""
         self.reached.touch()
+        # The shell between them has to run the model by `exec`.
         node = os.getppid()
         while not self.path.exists() and os.getppid() == node:
             time.sleep(0.01)

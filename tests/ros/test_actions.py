@@ -53,8 +53,8 @@ class Arm(Place):
     @property
     def model(self) -> str:
         """The address of the model of the hardware."""
-        script = HERE / "action_simulator.py"
-        return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {script} {self.version} {self.gate.path} --width 32"
+        command = f"{sys.executable} {HERE / 'action_simulator.py'} {self.version} {self.gate.path}"
+        return f"pipe:exec env PYTHONPATH={REPOSITORY} {command} --width 32"
 
     @property
     def hardware(self) -> str:

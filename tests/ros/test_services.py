@@ -77,7 +77,7 @@ class Camera(Place):
         """The address of the model of the hardware."""
         script = HERE / "service_simulator.py"
         command = f"{sys.executable} {script} {self.system} {self.version} {self.gate.path}"
-        return f"pipe:env PYTHONPATH={REPOSITORY} {command} --width 32"
+        return f"pipe:exec env PYTHONPATH={REPOSITORY} {command} --width 32"
 
 
 @pytest.fixture(scope="module", params=versions("services"))
