@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import ctypes.util
+import itertools
 import json
 import os
 import queue
@@ -15,6 +16,7 @@ import sys
 import threading
 import time
 import xmlrpc.client
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
@@ -236,6 +238,8 @@ class Peer:
             command, env=ros.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         self._lines: queue.Queue[dict[str, Any]] = queue.Queue()
+        # Messages that came while an echo was awaited.
+        self._kept: deque[dict[str, Any]] = deque()
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
@@ -252,23 +256,35 @@ class Peer:
         self._process.stdin.write(json.dumps(line) + "\n")
         self._process.stdin.flush()
 
+    def publish_until_back(self, topic: str, payload: bytes) -> tuple[int, bytes]:
+        """Publish a message until a payload comes: how often it was published, and that payload.
+
+        A node that the peer has found may not have found the peer yet.
+        """
+        for count in itertools.count(1):
+            self.publish(topic, payload)
+            with suppress(queue.Empty):
+                return count, base64.b64decode(self._lines.get(timeout=2)["payload"])
+        raise AssertionError
+
     def wait_until_published(self) -> None:
-        """Wait until it has published all; nothing may come meanwhile."""
+        """Wait until it has published all."""
         self._echo("sync")
 
     def wait_until_acked(self) -> None:
-        """Wait until every subscriber has received all, in ROS 2; nothing may come meanwhile."""
+        """Wait until every subscriber has received all, in ROS 2."""
         self._echo("acked")
 
     def _echo(self, word: str) -> None:
         assert self._process.stdin
         self._process.stdin.write(json.dumps({word: True}) + "\n")
         self._process.stdin.flush()
-        assert self._lines.get() == {word: True}
+        while (line := self._lines.get()) != {word: True}:
+            self._kept.append(line)
 
     def take(self) -> tuple[str, bytes]:
         """The next message: its topic and payload."""
-        line = self._lines.get()
+        line = self._kept.popleft() if self._kept else self._lines.get()
         return line["topic"], base64.b64decode(line["payload"])
 
     def kill(self) -> None:

@@ -201,8 +201,8 @@ def test_all_that_is_lost_is_counted(place: Place, kind: str) -> None:
     with place.node(kind) as node, Peer(place.ros, {"/image_out": image}, {"/image_in": f"{image} depth=3"}) as peer:
         peer.wait_until_connected()
         # The first number that arrives is the one from which the node counts.
-        peer.publish("/image_in", place.image(0))
-        assert place.number(peer.take()[1]) == 0
+        first, back = peer.publish_until_back("/image_in", place.image(0))
+        assert place.number(back) == 0
         with stopped(node):
             for number in range(1, MESSAGES):
                 peer.publish("/image_in", place.image(number))
@@ -213,9 +213,10 @@ def test_all_that_is_lost_is_counted(place: Place, kind: str) -> None:
             came.append(place.number(peer.take()[1]))
         assert node.stop() == 0
     received, dropped, sent, lost = counts(node, "image_in")
-    assert received + lost == MESSAGES + 1
+    # Those before the node and the peer had found each other do not count.
+    assert MESSAGES + 1 <= received + lost <= MESSAGES + first
     assert received == dropped + sent
-    assert len(came) == sent and came == sorted(came)
+    assert sent - first < len(came) <= sent and came == sorted(came)
     assert lost > 0
 
 
