@@ -2,7 +2,8 @@
 -- Reads how a peer announces a writer (SEDP, a publication), and tells which of the node's readers match it: those with
 -- the same topic, type and hash of the type, if what the writer offers is enough for them.
 --
--- Of several parameters with the same id, the first one counts, as in the reference participant (tests/fabric/participant.py).
+-- Of several parameters with the same id, the first one counts, as in the reference participant
+-- (tests/fabric/participant.py).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -46,7 +46,8 @@ architecture rtl of firm_status_waits is
 
   signal turn_r     : unsigned(TURN_BITS-1 downto 0);
   signal visited    : std_logic_vector(2**TURN_BITS-1 downto 0);
-  signal waited_r   : std_logic_vector(2**TURN_BITS-1 downto 0) := (others => '0');  -- without a pause since its last visit
+  -- Without a pause since its last visit.
+  signal waited_r   : std_logic_vector(2**TURN_BITS-1 downto 0) := (others => '0');
   signal has_waited : std_logic_vector(0 downto 0);
 
   -- The visit of the last cycle, whose words have been read.
