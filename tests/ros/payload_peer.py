@@ -19,6 +19,7 @@ import json
 import sys
 import threading
 import time
+import xmlrpc.client
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -62,8 +63,10 @@ class Ros1Peer:
         from roslib.message import get_message_class
 
         rospy.init_node("peer", anonymous=True, disable_signals=True)
+        self.name = rospy.get_name()
         self.publishers = {}
         self.sought = []
+        self.heard = []
         for topic, text in published.items():
             wish = Wish(text)
             message = get_message_class(wish.type)
@@ -74,6 +77,7 @@ class Ros1Peer:
             wish = Wish(text)
             subscriber = rospy.Subscriber(topic, get_message_class(wish.type), self.take, topic, tcp_nodelay=True)
             self.sought += [] if wish.is_latched else [subscriber]
+            self.heard.append((subscriber.resolved_name, subscriber))
 
     def take(self, message: Any, topic: str) -> None:
         buffer = io.BytesIO()
@@ -81,7 +85,16 @@ class Ros1Peer:
         say_message(topic, buffer.getvalue())
 
     def is_connected(self) -> bool:
-        return all(end.get_num_connections() for end in self.sought)
+        return all(end.get_num_connections() for end in self.sought) and self.is_known()
+
+    def is_known(self) -> bool:
+        """Whether all publishers have this node among their connections: they answer before they add it."""
+        ends = [(topic, link.endpoint_id) for topic, end in self.heard for link in [*end.impl.connections]]
+        try:
+            infos = [(topic, xmlrpc.client.ServerProxy(uri).getBusInfo(self.name)[2]) for topic, uri in ends]
+        except OSError:
+            return False
+        return all(any([*item[1:3], item[4]] == [self.name, "o", topic] for item in info) for topic, info in infos)
 
     def run(self) -> None:
         while not self.is_connected():

@@ -49,8 +49,7 @@ def test_roslaunch_starts_the_node(tmp_path: Path) -> None:
             node.wait_until_said("robot is a node of ROS 1")
             peer.wait_until_connected()
             payload = struct.pack("<3d", 1.0, -2.0, 3.5)
-            peer.publish("/raw", payload)
-            assert peer.take() == ("/arm/out", payload)
+            assert peer.publish_until_back("/raw", payload)[1] == payload
             assert "/raw -> in" in node.said() and "out -> /arm/out" in node.said()
             node.stop()
             assert "received" in node.said()
