@@ -57,6 +57,12 @@ class Wish:
         self.depth = int(next((word[len("depth=") :] for word in words if word.startswith("depth=")), 1000))
 
 
+def bus_info(uri: str, name: str) -> list[list[Any]]:
+    """The connections of the node at an address."""
+    node: Any = xmlrpc.client.ServerProxy(uri)
+    return list(node.getBusInfo(name)[2])
+
+
 class Ros1Peer:
     def __init__(self, subscribed: dict[str, str], published: dict[str, str]) -> None:
         import rospy
@@ -91,7 +97,7 @@ class Ros1Peer:
         """Whether all publishers have this node among their connections: they answer before they add it."""
         ends = [(topic, link.endpoint_id) for topic, end in self.heard for link in [*end.impl.connections]]
         try:
-            infos = [(topic, xmlrpc.client.ServerProxy(uri).getBusInfo(self.name)[2]) for topic, uri in ends]
+            infos = [(topic, bus_info(uri, self.name)) for topic, uri in ends]
         except OSError:
             return False
         return all(any([*item[1:3], item[4]] == [self.name, "o", topic] for item in info) for topic, info in infos)
