@@ -89,33 +89,30 @@ def live_inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
 
 def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a live simulation, whose start sets the seed and the stall rate. May raise `InputError`."""
-    system = loaded.system
-    _check_simulator(system, str(request.parameters["simulator"]), "live")
+    _check_simulator(loaded.system, str(request.parameters["simulator"]), "live")
     _refuse_node(loaded)
-    environment = environment_files(_environment(request), system)
-    configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
-    files = _surroundings(loaded, environment)
-    if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
-        files |= _vhdl_bench(configuration)
-    else:
-        files |= _verilog_bench(configuration, system)
-    return GeneratedCore(f"Live simulation of system {system.name}", files)
+    files = _with_open_end(request, loaded, TEST_BENCH_TEMPLATE, VERILOG_BENCH_TEMPLATE)
+    return GeneratedCore(f"Live simulation of system {loaded.system.name}", files)
 
 
 def network_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a simulated board whose chip is at the other end of a pipe. May raise `InputError`."""
-    system = loaded.system
-    _check_simulator(system, str(request.parameters["simulator"]), "network")
-    if system.network is None:
+    _check_simulator(loaded.system, str(request.parameters["simulator"]), "network")
+    if loaded.system.network is None:
         fail(f"the product 'network' needs one of the interconnects {', '.join(CHIPS)}")
+    files = _with_open_end(request, loaded, NODE_BENCH_TEMPLATE, VERILOG_NODE_BENCH_TEMPLATE)
+    return GeneratedCore(f"Simulated board of system {loaded.system.name}", files)
+
+
+def _with_open_end(request: Request, loaded: LoadedSystem, vhdl: str, verilog: str) -> dict[str, GeneratedFile]:
+    """Return the files of a simulation that runs until its user ends it; `vhdl` and `verilog` are its benches."""
+    system = loaded.system
     environment = environment_files(_environment(request), system)
     configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
     files = _surroundings(loaded, environment)
     if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
-        files |= _vhdl_bench(configuration, NODE_BENCH_TEMPLATE)
-    else:
-        files |= _verilog_bench(configuration, system, template=VERILOG_NODE_BENCH_TEMPLATE)
-    return GeneratedCore(f"Simulated board of system {system.name}", files)
+        return files | _vhdl_bench(configuration, vhdl)
+    return files | _verilog_bench(configuration, system, template=verilog)
 
 
 def _refuse_node(loaded: LoadedSystem) -> None:

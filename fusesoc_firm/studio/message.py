@@ -78,7 +78,7 @@ def has_pose(frame: Frame) -> bool:
 def pose_of(frame: Frame, payload: bytes) -> list[float] | None:
     """Return the pose in a message: x, y and z of its place, then x, y, z and w of its rotation, a unit quaternion.
 
-    It is None if the message has no such fields, or if its numbers are no pose.
+    It is None if the message has no such fields, or if its numbers are not those of a pose.
     """
     if not has_pose(frame):
         return None

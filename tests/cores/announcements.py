@@ -203,7 +203,7 @@ class Peers:
         self._send(peer, self._destination(), beat)
 
     def _skip(self, peer: _Peer) -> None:
-        """Samples of discovery that are no longer there."""
+        """Samples of discovery that their writer no longer has."""
         chosen = self._chance.choice(list(DISCOVERY))
         start = self._chance.randrange(1, peer.told[chosen] + 3)
         end = start + self._chance.randrange(1, 4)

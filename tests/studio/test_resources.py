@@ -109,7 +109,7 @@ def tool(folder: Path, name: str, text: str) -> None:
 
 
 def has_ended(number: int) -> bool:
-    """Whether there is no such process; an orphan of a container without an init process stays as a zombie."""
+    """Whether a process has ended. In a container without an init process, an orphan stays as a zombie."""
     try:
         return " Z " in Path(f"/proc/{number}/stat").read_text(encoding="utf-8")
     except (FileNotFoundError, ProcessLookupError):

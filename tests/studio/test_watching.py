@@ -184,7 +184,7 @@ def test_poses_are_drawn(tmp_path: Path, scheme: str) -> None:
             found = await page.evaluate(axis.format("body", body))
             assert found == pytest.approx([sign * part for part in await page.evaluate(axis.format("world", world))])
         assert await violations(page) == []
-        # The view turns by the keyboard; at the first message, there is no way yet.
+        # The keyboard turns the view. The first message has no earlier poses.
         before = await page.evaluate(axis.format("body", 0))
         await page.evaluate("document.querySelector('.pose input').focus()")
         await page.press("ArrowDown")

@@ -114,7 +114,7 @@ class Ros2(Ros):
         """Send the response; a call that failed has none in ROS 2."""
         from rclpy.serialization import deserialize_message
 
-        # A node that is no longer active has no clients.
+        # An inactive node has no clients.
         if payload is None or service not in self._services:
             return
         try:
