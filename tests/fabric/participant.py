@@ -477,7 +477,9 @@ class Participant:
 
     def _match(self, peer: Peer, endpoint: Endpoint, entity: bytes, facts: ParameterList) -> None:
         known: list[Source | Sink] = [*self.sources, *self.sinks]
-        if any(_is(item, peer, entity) and _ours(item) is endpoint for item in known):
+        # A known endpoint keeps the topic with which it was announced first.
+        same = [_ours(item) for item in known if _is(item, peer, entity)]
+        if any(ours is endpoint or ours.topic != endpoint.topic for ours in same):
             return
         if len(known) == self._limits.matches:
             self.counts["endpoints without room"] += 1
