@@ -9,6 +9,7 @@ a converter fails or a bar is missed; messages that are not converted yet are no
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable
 
@@ -65,6 +66,8 @@ def main() -> int:
     arguments = parser.parse_args()
     if unknown := set(arguments.parts) - set(figures.parts()):
         parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(figures.parts())}")
+    # Users' Python keeps compiled modules, so that of the measured programs does.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sections = {}
     is_good = True
     for part in figures.parts():

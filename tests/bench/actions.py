@@ -10,7 +10,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -33,6 +32,7 @@ from tests.bench.store import APPLICATIONS
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.hdl.ghdl import REPOSITORY
+from tests.processes import program
 
 TITLE = "Unchanged steps of builds"
 CONVERTERS = 30
@@ -264,7 +264,7 @@ def run(command: Sequence[str], folder: Path, machine: str, url: str, token: str
     events = folder / "events"
     before, start = processor_time(), time.monotonic()
     subprocess.run(
-        [sys.executable, "-m", "fusesoc_firm.cli", *command, "--events", str(events)],
+        [program("firm"), *command, "--events", str(events)],
         cwd=folder,
         env={**os.environ, **variables},
         check=True,

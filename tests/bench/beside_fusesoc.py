@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, Tell
 from tests.hdl.ghdl import REPOSITORY
 from tests.house.test_random_edits import FOREIGN, Library, open_logic, serv
+from tests.processes import program
 
 LAUNCHER_TITLE = "The launcher on a small simulation"
 LAUNCHER_COLUMNS = ("what", "runs", "without, s", "launcher, s", "difference, s", "bar, s", "result")
@@ -62,7 +62,7 @@ _BENCH_CORE, _BENCH_TARGET = "award-winning:serv:servant", "verilator_tb"
 _BENCH_OPTIONS = ("--uart_baudrate=57600", "--firmware=serv/sw/hello_uart.hex", "--timeout=100000000")
 _BENCH_PRINTS = "Hi, I'm Servant!"
 _TESTED = "firm test"
-_FIRM_TEST = (sys.executable, "-m", "fusesoc_firm.cli", "test")
+_FIRM_TEST = (program("firm"), "test")
 _FIRST_BAR = 1.1
 
 
@@ -193,7 +193,7 @@ def run_fusesoc(folder: Path, arguments: Sequence[str], launcher: str | None) ->
         variables["EDALIZE_LAUNCHER"] = launcher
     before = processor_time()
     subprocess.run(
-        [str(Path(sys.executable).parent / "fusesoc"), *arguments],
+        [program("fusesoc"), *arguments],
         cwd=folder,
         env={**kept, **variables},
         check=True,

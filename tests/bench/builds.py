@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from fusesoc_firm.tools.library_path import library_root
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.hdl.ghdl import REPOSITORY
+from tests.processes import program
 
 TITLE = "200 converters, generated with an empty store"
 CONVERTERS = 200
@@ -108,8 +108,8 @@ def write_library(folder: Path, cores: int) -> None:
 
 def _rows(layout: Layout, folder: Path, pattern: str) -> list[tuple[str, ...]]:
     cores = [f"bench:lib:c{core}" for core in range(layout.cores)]
-    fusesoc = [str(Path(sys.executable).parent / "fusesoc"), "run", "--setup", "--target=default"]
-    firm = [sys.executable, "-m", "fusesoc_firm.cli", "build", "--setup", "--target", "default"]
+    fusesoc = [program("fusesoc"), "run", "--setup", "--target=default"]
+    firm = [program("firm"), "build", "--setup", "--target", "default"]
     has_plain = layout.has_speed_up and re.search(pattern, f"{layout.name} {_PLAIN}")
     plain = run(fusesoc, [[core] for core in cores], folder, 2) if has_plain else None
     first: list[tuple[str, ...]] = [(layout.name, _PLAIN, "2", *plain.cells(), "", "", "")] if plain else []

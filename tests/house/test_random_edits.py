@@ -13,7 +13,6 @@ import random
 import re
 import shutil
 import subprocess
-import sys
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +23,7 @@ from fusesoc_firm.action.contents import Contents
 from fusesoc_firm.action.trace import can_trace
 from fusesoc_firm.action.tree import tree_of
 from tests.hdl.ghdl import REPOSITORY
+from tests.processes import program
 
 pytestmark = pytest.mark.skipif(not can_trace(), reason="strace is not installed or not permitted")
 
@@ -66,7 +66,7 @@ class Library:
             "FUSESOC_FIRM_CACHE": str(self.folder / store),
             "FUSESOC_FIRM_ACTIONS_TWICE": "0",
         }
-        command = [sys.executable, "-m", "fusesoc_firm.cli", "build", *self.builds, "--cached", "--build-only"]
+        command = [program("firm"), "build", *self.builds, "--cached", "--build-only"]
         done = subprocess.run(
             [*command, "--build-root", root, "--events", str(events), *options],
             cwd=self.folder,
