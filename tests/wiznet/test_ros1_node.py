@@ -7,6 +7,7 @@ import random
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import time
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from fusesoc_firm.fabric.ros1 import Node, image
+from fusesoc_firm.fabric.wiznet.chip import Status
 from fusesoc_firm.fabric.wiznet.chips import MODELS
 from tests.ros.cpp_nodes import Ros, missing_ros1, ros1
 from tests.ros.live_nodes import paced
@@ -197,6 +199,64 @@ def test_the_tools_of_ros_know_the_hardware(running: Clocked, tmp_path: Path) ->
     while "/fabric" in _tool(ros, "rosnode", "list").stdout:
         time.sleep(0.1)
     assert "/place" not in _tool(ros, "rostopic", "list", "-p").stdout
+
+
+def _line(ros: Ros, begin: str, *words: str) -> str:
+    """The first line of a tool's output that begins so; then the tool ends."""
+    variables = {**ros.environment, "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(words, env=variables, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as tool:
+        assert tool.stdout
+        found = next((line for line in tool.stdout if line.startswith(begin)), "")
+        tool.kill()
+    return found
+
+
+@pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"one of {', '.join(TOOLS)} is not installed")
+def test_the_tools_of_ros_publish_and_measure(running: Clocked) -> None:
+    ros = running.ros
+    _tool(ros, "rostopic", "pub", "--once", "/turn", "geometry_msgs/Quaternion", "{x: 1, y: 2, z: 3, w: 4}")
+    running.board.wait_until(lambda: (0, struct.pack("<4d", 1, 2, 3, 4)) in running.manager.taken)
+    words = [ros.python, str(ROS / "paced_peer.py"), "1", "20", "120", '[["/turn", "/place"]]']
+    with subprocess.Popen(words, env=dict(ros.environment), stdout=subprocess.DEVNULL) as peer:
+        rate = float(_line(ros, "average rate: ", "rostopic", "hz", "/place").partition(": ")[2])
+        size = _line(ros, "\tmean: ", "rostopic", "bw", "/place").split()[1]
+        peer.send_signal(signal.SIGKILL)
+    # A busy machine delivers more slowly, and catches up.
+    assert 5 < rate < 80
+    assert size == "24.00B"
+
+
+@pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"one of {', '.join(TOOLS)} is not installed")
+def test_five_subscribers_are_served_at_once(running: Clocked) -> None:
+    ros, rng = running.ros, random.Random(SEED)
+    words = ["rostopic", "echo", "-p", "-n", "10", "/place"]
+    with ExitStack() as stack:
+        peers = [
+            stack.enter_context(subprocess.Popen(words, env=dict(ros.environment), stdout=subprocess.PIPE, text=True))
+            for _ in range(5)
+        ]
+        while sum(item.status == Status.ESTABLISHED for item in running.board.chip.sockets) < len(peers):
+            time.sleep(0.05)
+        while any(peer.poll() is None for peer in peers):
+            running.board.send(0, struct.pack("<3d", rng.random(), 0, 0))
+            time.sleep(0.05)
+        for peer in peers:
+            assert len(peer.communicate()[0].splitlines()) == 11
+
+
+@pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"one of {', '.join(TOOLS)} is not installed")
+def test_another_node_with_its_name_takes_its_place(running: Clocked) -> None:
+    ros = running.ros
+    words = ["rostopic", "pub", "/turn", "geometry_msgs/Quaternion", "{w: 1}", "__name:=fabric"]
+    with subprocess.Popen(words, env=dict(ros.environment), stdout=subprocess.DEVNULL) as other:
+        # The hardware stops for good.
+        running.board.wait_until(lambda: running.board.listening() == 0)
+        while "/place" in _tool(ros, "rostopic", "list").stdout:
+            time.sleep(0.1)
+        listed = _tool(ros, "rostopic", "list", "-v").stdout
+        assert " * /turn [geometry_msgs/Quaternion] 1 publisher" in listed
+        assert f"Pid: {other.pid}" in _tool(ros, "rosnode", "info", "/fabric").stdout
+        other.kill()
 
 
 def test_a_killed_peer_disturbs_nobody(running: Clocked) -> None:
