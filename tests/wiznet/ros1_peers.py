@@ -8,12 +8,14 @@ import time
 import xmlrpc.client
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.fabric.ros1 import Node
 from tests.wiznet.peers import free_port
-from tests.wiznet.ros1 import Board, Manager, endpoint, interpreted, node
+from tests.wiznet.ros1 import Board, Manager, Stalls, clocked, endpoint, interpreted, node
 
+_SEED = 20261126  # of the stalls
 LONGEST_SECONDS = 60  # a busy machine is slow
 
 
@@ -45,14 +47,15 @@ class Running:
         self.board.wait_until(lambda: len(turns) > begin + 10 and max(turns[-10:]) <= most_bytes)
 
 
-def running_node(chip: int) -> Iterator[Running]:
-    """Run a node without a master, with two topics each way."""
+def running_node(chip: int, program: Path | None = None) -> Iterator[Running]:
+    """Run a node without a master, with two topics each way: interpreted, or by a program of the hardware."""
     made = node(
         ("127.0.0.1", free_port()),
         (endpoint("/turn", "geometry_msgs", "Quaternion"), endpoint("/turn/2", "geometry_msgs", "Point")),
         (endpoint("/place", "geometry_msgs", "Point"), endpoint("/turn", "geometry_msgs", "Quaternion")),
     )
-    board = interpreted(made, chip, Manager(lambda _number, _payload: iter(())))
+    manager = Manager(lambda _number, _payload: iter(()))
+    board = clocked(made, chip, manager, program, Stalls(_SEED), []) if program else interpreted(made, chip, manager)
     board.wait_until_listening()
     yield Running(made, board, chip)
     board.close()

@@ -1,4 +1,4 @@
-"""The node of ROS 1 and its peers' dialects of XML-RPC and TCPROS, as the interpreter runs it on both chips."""
+"""The node of ROS 1 and its peers' dialects of XML-RPC and TCPROS: interpreted on both chips, and as hardware."""
 
 from __future__ import annotations
 
@@ -8,22 +8,33 @@ import struct
 import xmlrpc.client
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from fusesoc_firm.fabric.wiznet.chips import MODELS
-from tests.wiznet.ros1 import framed
+from tests.wiznet.ros1 import framed, hardware
 from tests.wiznet.ros1_peers import Running, header, header_of, pause, read, running_node
 
 SEED = 20261126
+HARDWARE = 5500
 QUATERNION = "a779879fadf0160734f906b8c19c7004"
 POINT = "4a842b65f413084dc2b10fb484ea7f17"
 
 
-@pytest.fixture(params=MODELS, ids="w{}".format)
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return hardware(HARDWARE, tmp_path_factory.mktemp("hardware"))
+
+
+@pytest.fixture(params=[*MODELS, pytest.param(None, marks=pytest.mark.thorough)], ids=str)
 def running(request: pytest.FixtureRequest) -> Iterator[Running]:
-    yield from running_node(request.param)
+    """Interpreted on each chip; None is the hardware, on one of them."""
+    if request.param:
+        yield from running_node(request.param)
+    else:
+        yield from running_node(HARDWARE, request.getfixturevalue("program"))
 
 
 def _rospy(method: str, *parameters: Any) -> bytes:
