@@ -1,36 +1,36 @@
 """What the page gets of a run: its news over a WebSocket, the record, single messages and their pictures.
 
-The page asks for the next news when it has shown the last ones, so a slow page gets fewer; the run never waits for it.
+The page gets reports by itself and confirms them when it has shown them, several at once: an answer to a question for
+each picture would take the run more time. A slow page gets fewer reports; the run never waits for it.
 """
 
 from __future__ import annotations
 
 import asyncio
-import time
+import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from math import inf
 from typing import Any
 
 from aiohttp import WSMsgType, web
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.node.watch import Count, Seen
+from fusesoc_firm.node.watch import Seen
 from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, has_pose, numbers_of, picture_of, pose_of
+from fusesoc_firm.studio.reports import Reports, row
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
-from fusesoc_firm.studio.run import RUNNING, Run, SimulatedRun, Wishes
+from fusesoc_firm.studio.run import Run, SimulatedRun, Wishes
 from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Topic
 from fusesoc_firm.tools.simulators import fitting
 
-# The least time between two news, and the number of messages in one and in an answer about the record.
-_SECONDS = 0.05
-# The time for which counts and percentiles of a run are sent again, since these sort all latencies.
-_COUNT_SECONDS = 0.5
-_MOST_NEW, _MOST_ROWS = 20, 200
+# The time between two reports, and the number of reports that a page need not have shown.
+_SECONDS, _MOST_AHEAD = 0.05, 20
+# The number of messages in an answer about the record.
+_MOST_ROWS = 200
 # The number of bursts and of points in an answer.
 _MOST_GRANTS, _MOST_POINTS = 500, 500
 # The number of beats in a wave.
@@ -39,6 +39,10 @@ _MOST_BEATS = 24
 LATENCY, BYTES = "latency", "bytes"
 # The highest rate of messages a second that the page may ask for.
 _MOST_RATE = 100_000
+# What a page may send: the number of reports that it has shown since it said so last.
+_SHOWN = {str(count) for count in range(1, _MOST_AHEAD + 1)}
+# Reports are plain data without circles.
+_IN_JSON = json.JSONEncoder(check_circular=False, separators=(",", ":")).encode
 _CONTROLS = ("pause", "resume", "step", "stop")
 
 
@@ -50,8 +54,6 @@ class Live:
         self._workspace = workspace
         self._count = 0
         self._sockets: set[web.WebSocketResponse] = set()
-        self._counts: dict[str, Any] = {}
-        self._counted = -inf
         self._file = ""
         self.run: Run | None = None
 
@@ -62,7 +64,6 @@ class Live:
         self.run = run
         self._file = self._workspace.name(run.spec)
         self._count += 1
-        self._counted = -inf
 
     def requests(self) -> Requests:
         """Return the requests."""
@@ -92,17 +93,18 @@ class Live:
     # --- requests --------------------------------------------------------------------------------------------------
 
     async def _watch(self, request: web.Request) -> web.WebSocketResponse:
-        """Send news each time that the page asks with the number of the last message it knows."""
+        """Send reports as long as the page confirms them; it sends how many it has shown."""
         # Compression would cost more than loopback saves.
         socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024, compress=False)
         await socket.prepare(request)
         self._sockets.add(socket)
-        asked: asyncio.Queue[int] = asyncio.Queue()
-        sender = asyncio.create_task(self._send(socket, asked))
+        ahead = asyncio.Semaphore(_MOST_AHEAD)
+        sender = asyncio.create_task(self._send(socket, ahead))
         try:
             async for message in socket:
-                if message.type == WSMsgType.TEXT and message.data.lstrip("-").isdecimal() and asked.empty():
-                    asked.put_nowait(int(message.data))
+                if message.type == WSMsgType.TEXT and message.data in _SHOWN:
+                    for _ in range(int(message.data)):
+                        ahead.release()
         finally:
             self._sockets.discard(socket)
             sender.cancel()
@@ -121,59 +123,21 @@ class Live:
             self._sockets.discard(socket)
         return socket
 
-    async def _send(self, socket: web.WebSocketResponse, asked: asyncio.Queue[int]) -> None:
-        """Answer each question as soon as there is something new."""
-        known: object = None
+    async def _send(self, socket: web.WebSocketResponse, ahead: asyncio.Semaphore) -> None:
+        """Send what is new, at most every `_SECONDS` and as far `ahead` of the page as it may be."""
+        reports, now = Reports(), asyncio.get_running_loop().time
         while True:
-            after = await asked.get()
-            while (now := self._mark()) == known:
+            await ahead.acquire()
+            while (report := reports.next(self.run, self._count, self._file)) is None:
                 await asyncio.sleep(_SECONDS)
-            known = now
-            await socket.send_json(self._news(after))
-            await asyncio.sleep(_SECONDS)
-
-    def _mark(self) -> object:
-        """Return a value that changes with what the page shows."""
-        run = self.run
-        if not run:
-            return None, 0
-        is_paused = run.control is not None and not run.control.is_open
-        return self._count, run.state, run.text, is_paused, run.watch.since(-1, 0).last, {**run.watch.loads()}
-
-    def _news(self, after: int) -> dict[str, Any]:
-        run = self.run
-        if not run:
-            return {"run": None}
-        watch, clock = run.watch, run.system.clock
-        is_paused = run.control is not None and not run.control.is_open
-        if run.state != RUNNING or is_paused or time.monotonic() >= self._counted + _COUNT_SECONDS:
-            self._counts = {block: _counted(count) for block, count in watch.counts().items()}
-            self._counted = time.monotonic()
-        news = watch.since(after, _MOST_NEW)
-        return {
-            "run": {
-                "number": self._count,
-                "file": self._file,
-                "title": run.title,
-                "state": run.state,
-                "text": run.text,
-                "isPaused": is_paused,
-                "isControlled": run.control is not None,
-                "clock": None if clock is None else float(clock),
-                "first": watch.first,
-                "last": news.last,
-            },
-            "seconds": time.monotonic() - watch.start_ns / 1e9,
-            "counts": self._counts,
-            "loads": {block: vars(load) for block, load in watch.loads().items()},
-            "messages": [*map(_row, news.messages)],
-            "skipped": news.skipped,
-        }
+            await socket.send_json(report, dumps=_IN_JSON)
+            # To the next of regular times, so that the work between them does not delay them.
+            await asyncio.sleep(_SECONDS - now() % _SECONDS)
 
     async def _record(self, request: web.Request) -> web.Response:
         """Return the rows of the record before a message."""
         rows = self._current().watch.before(number_of(request, "before"), _MOST_ROWS)
-        return in_json({"messages": [*map(_row, rows)]})
+        return in_json({"messages": [*map(row, rows)]})
 
     async def _message(self, request: web.Request) -> web.Response:
         """Return the fields of a message."""
@@ -181,7 +145,7 @@ class Live:
         frame = run.topics[seen.block].frame
         found = await asyncio.to_thread(fields_of, frame, seen.payload)
         kinds = {"hasPicture": has_picture(frame), "hasPose": has_pose(frame)}
-        return in_json({"row": _row(seen), "type": str(frame.message), **kinds, **found})
+        return in_json({"row": row(seen), "type": str(frame.message), **kinds, **found})
 
     async def _picture(self, request: web.Request) -> web.Response:
         """Return the picture in a message."""
@@ -288,19 +252,6 @@ def _value(frame: Frame, seen: Seen, field: str) -> float | None:
     if field == LATENCY:
         return seen.latency.wall_ns if seen.latency.cycles is None else seen.latency.cycles
     return numbers_of(frame, seen.payload).get(field)
-
-
-def _counted(count: Count) -> dict[str, Any]:
-    """Return the counts of a block as plain data; `asdict` copies deeply, which would take most of a report's time."""
-    percentiles = {"cycles": count.cycles, "wall_ns": count.wall_ns}
-    return vars(count) | {name: found and vars(found) for name, found in percentiles.items()}
-
-
-def _row(seen: Seen) -> tuple[object, ...]:
-    """Return a message without its content: number, block, time, bytes, cause, cycles, and ns of the wall clock."""
-    latency = seen.latency
-    row = (seen.number, seen.block, seen.time_ns / 1e9, len(seen.payload))
-    return *row, latency.cause, latency.cycles, latency.wall_ns
 
 
 def _wishes(body: Mapping[str, Any]) -> Wishes:

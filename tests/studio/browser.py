@@ -18,7 +18,8 @@ import aiohttp
 PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 # The limit for everything that the page should do; a busy machine needs a part of it.
 _SECONDS = 20
-_KEYS = {"Enter": 13, "Tab": 9, "Escape": 27, "Delete": 46, "Backspace": 8, "ArrowDown": 40, "End": 35}
+_KEYS = {"Enter": 13, "Tab": 9, "Escape": 27, "Delete": 46, "Backspace": 8, "Home": 36, "End": 35}
+_KEYS |= {"ArrowLeft": 37, "ArrowRight": 39, "ArrowDown": 40}
 _CONTROL, _SHIFT = 2, 8
 
 

@@ -6,7 +6,7 @@ import asyncio
 import io
 import json
 import math
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -45,47 +45,38 @@ def control(studio: Studio, what: str) -> None:
     assert ask(studio, "POST", "api/control", {"do": what})[0] == 200
 
 
-def following(studio: Studio, steps: Callable[[Callable[[int], Awaitable[News]]], Awaitable[None]]) -> None:
-    """Do steps with a function that asks for the news after a message."""
-
-    async def all_steps() -> None:
-        async with aiohttp.ClientSession() as session, session.ws_connect(f"{studio.address}api/watch") as socket:
-
-            async def news(after: int) -> News:
-                await socket.send_str(str(after))
-                return dict(await socket.receive_json(timeout=600))
-
-            await steps(news)
-
-    asyncio.run(all_steps())
+async def reports(address: str) -> AsyncIterator[News]:
+    """Yield what a page gets, which confirms each report."""
+    async with aiohttp.ClientSession() as session, session.ws_connect(f"{address}api/watch") as socket:
+        while True:
+            yield dict(await socket.receive_json(timeout=600))
+            await socket.send_str("1")
 
 
 def until(studio: Studio, condition: Callable[[News], bool]) -> News:
-    """Return the first news that fulfil a condition."""
-    found: News = {}
+    """Return the first state of a run that fulfils a condition, as a page knows it from all reports."""
 
-    async def steps(news: Callable[[int], Awaitable[News]]) -> None:
-        while not found:
-            now = await news(-1)
-            if condition(now):
-                found.update(now)
+    async def steps() -> News:
+        known: News = {}
+        async for report in reports(studio.address):
+            if "run" in report and (report["run"] or {}).get("number") != (known.get("run") or {}).get("number"):
+                known = {}
+            known.setdefault("messages", []).extend(report.pop("messages", []))
+            known |= report.pop("figures", {}) | report
+            if condition({"last": -1, "counts": {}} | known):
+                return known
+        raise AssertionError("the server has ended")
 
-    following(studio, steps)
-    return found
+    return asyncio.run(steps())
 
 
 def test_a_run_is_told_to_its_end(studio: Studio) -> None:
-    assert until(studio, lambda _: True) == {"run": None}
+    assert until(studio, lambda _: True) == {"run": None, "messages": []}
     begin(studio)
     news = until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
     run = news["run"]
-    assert (run["file"], run["isControlled"], run["clock"], run["first"], run["last"]) == (
-        "robot.yaml",
-        True,
-        1e8,
-        0,
-        5,
-    )
+    assert (run["file"], run["isControlled"], run["clock"]) == ("robot.yaml", True, 1e8)
+    assert (news["first"], news["last"], news["skipped"]) == (0, 5, 0)
     assert {name: count["messages"] for name, count in news["counts"].items()} == dict.fromkeys(
         ["point", "text", "image", "point_out", "text_out", "image_out"], 1
     )
@@ -111,10 +102,10 @@ def test_it_pauses_steps_and_ends(studio: Studio) -> None:
         control(studio, "step")
         # A message and its response.
         expected = 2 * number - 1
-        now = until(studio, lambda now: bool(now["run"]["last"] >= expected))  # noqa: B023
-        assert (now["run"]["last"], now["run"]["isPaused"]) == (expected, True)
+        now = until(studio, lambda now: bool(now["last"] >= expected))  # noqa: B023
+        assert (now["last"], now["run"]["isPaused"]) == (expected, True)
     control(studio, "resume")
-    until(studio, lambda now: now["run"]["last"] > 20)
+    until(studio, lambda now: now["last"] > 20)
     control(studio, "pause")
     assert until(studio, lambda now: now["run"]["isPaused"])["run"]["state"] == "running"
     control(studio, "stop")
@@ -122,7 +113,7 @@ def test_it_pauses_steps_and_ends(studio: Studio) -> None:
     counts = {name: count["messages"] for name, count in ended["counts"].items()}
     assert counts["point"] == counts["point_out"]
     # The record stays.
-    assert ask(studio, "GET", f"api/message?number={ended['run']['last']}")[0] == 200
+    assert ask(studio, "GET", f"api/message?number={ended['last']}")[0] == 200
 
 
 def test_messages_of_services_and_actions_are_played(tmp_path: Path) -> None:
@@ -153,42 +144,68 @@ blocks:
         assert news["run"]["state"] == "ended", news
         counts = {name: count["messages"] for name, count in news["counts"].items()}
         assert counts == {"enable_request": 3, "enable_response": 3}
-        found = ask(studio, "GET", f"api/message?number={news['run']['last']}")[2]
+        found = ask(studio, "GET", f"api/message?number={news['last']}")[2]
         assert (found["type"], found["fields"]) == ("demo_msgs/Enable_Response", [["success", "True"]])
 
 
-def test_a_page_that_does_not_ask_holds_nothing_up(studio: Studio) -> None:
+def test_a_page_that_confirms_nothing_holds_nothing_up(studio: Studio) -> None:
     begin(studio, isEndless=True)
 
-    async def steps(news: Callable[[int], Awaitable[News]]) -> None:
-        first = await news(-1)
-        while not first["run"] or first["run"]["last"] < 0:
-            first = await news(-1)
-        known = first["run"]["last"]
-        while (await asyncio.to_thread(ask, studio, "GET", f"api/message?number={known + 500}"))[0] != 200:
-            await asyncio.sleep(0.01)
-        later = await news(known)
-        assert len(later["messages"]) <= 20
-        assert later["skipped"] == later["run"]["last"] - known - len(later["messages"])
-        assert later["skipped"] >= 450
-        assert [row[0] for row in later["messages"]] == [*range(later["messages"][0][0], later["run"]["last"] + 1)]
+    async def steps() -> None:
+        async with aiohttp.ClientSession() as session, session.ws_connect(f"{studio.address}api/watch") as socket:
+            last = -1
+            for _ in range(20):
+                last = (await socket.receive_json(timeout=600)).get("last", last)
+            while (await asyncio.to_thread(ask, studio, "GET", f"api/message?number={last + 500}"))[0] != 200:
+                await asyncio.sleep(0.01)
+            with pytest.raises(TimeoutError):
+                await socket.receive(timeout=0.2)
+            await socket.send_str("1")
+            later = await socket.receive_json(timeout=600)
+            assert len(later["messages"]) <= 20
+            assert later["skipped"] == later["last"] - last - len(later["messages"])
+            assert later["skipped"] >= 450
+            assert [row[0] for row in later["messages"]] == [*range(later["messages"][0][0], later["last"] + 1)]
 
-    following(studio, steps)
+    asyncio.run(steps())
     control(studio, "stop")
 
 
-def test_at_most_twenty_news_a_second(studio: Studio) -> None:
+def test_at_most_twenty_reports_a_second(studio: Studio) -> None:
     begin(studio, isEndless=True)
 
-    async def steps(news: Callable[[int], Awaitable[News]]) -> None:
-        start = asyncio.get_running_loop().time()
-        last = -1
-        for _ in range(10):
-            run = (await news(last))["run"]
-            last = run["last"] if run else -1
-        assert asyncio.get_running_loop().time() - start >= 9 * 0.05
+    async def steps() -> None:
+        start, count = asyncio.get_running_loop().time(), 0
+        async for _ in reports(studio.address):
+            count += 1
+            if count == 10:
+                break
+        # The first may come at any time, the others every 50 ms.
+        assert asyncio.get_running_loop().time() - start >= 8 * 0.05
 
-    following(studio, steps)
+    asyncio.run(steps())
+    control(studio, "stop")
+
+
+def test_a_report_contains_only_what_is_new(studio: Studio) -> None:
+    begin(studio, isPaused=True)
+    until(studio, lambda now: now["run"] and now["run"]["state"] == "running")
+
+    async def steps() -> None:
+        is_stepped = False
+        async for report in reports(studio.address):
+            assert report
+            assert ("run" in report) != is_stepped
+            assert ("messages" in report) == ("last" in report)
+            if not is_stepped:
+                assert report.keys() == {"run", "figures"}
+                await asyncio.to_thread(control, studio, "step")
+                is_stepped = True
+            # The last figures follow the last message, also of a run that is paused.
+            if report.get("figures", {}).get("counts", {}).get("point_out", {}).get("messages") == 1:
+                return
+
+    asyncio.run(steps())
     control(studio, "stop")
 
 
@@ -245,7 +262,7 @@ def test_a_simulator_that_fails_ends_the_run(spec: Path, fault: str) -> None:
 
 def test_another_run_ends_the_first(studio: Studio) -> None:
     begin(studio, isEndless=True)
-    until(studio, lambda now: now["run"] and now["run"]["last"] > 5)
+    until(studio, lambda now: now["run"] and now["last"] > 5)
     first = studio.live.run
     begin(studio)
     assert first

@@ -77,7 +77,7 @@ def button(name: str) -> str:
 
 
 def view(name: str) -> str:
-    """The script that finds the button of a view below the picture."""
+    """The script that finds the button of a view."""
     return f"[...document.querySelectorAll('.text > [role=group] button')].find(item => item.textContent === '{name}')"
 
 
@@ -472,6 +472,38 @@ def test_the_picture_stays_in_view_when_it_grows(robot: Path, tmp_path: Path) ->
         whole = "document.querySelector('.picture').getBoundingClientRect()"
         await page.until(f"{boxes}.length === 17")
         await page.until(f"{boxes}.every(box => box.top >= {whole}.top && box.bottom <= {whole}.bottom)")
+
+    run(robot, tmp_path, steps)
+
+
+def test_the_file_is_beside_the_picture_in_a_wide_window(robot: Path, tmp_path: Path) -> None:
+    """The divider between them is moved by keys and by the mouse; the picture stays whole."""
+
+    async def steps(page: Page) -> None:
+        picture, text = (f"document.querySelector('{name}').getBoundingClientRect()" for name in (".picture", ".text"))
+        share = "Number(document.querySelector('.divider').ariaValueNow)"
+        boxes = "[...document.querySelectorAll('.svelte-flow__node')].map(node => node.getBoundingClientRect())"
+        is_whole = f"{boxes}.every(box => box.left >= {picture}.left && box.right <= {picture}.right)"
+        is_beside = f"{picture}.right <= {text}.left && {picture}.top === {text}.top"
+        await page.until(f"{is_beside} && {share} === 40 && {is_whole}")
+        await page.evaluate("document.querySelector('.divider').focus()")
+        await page.press("ArrowLeft")
+        await page.until(f"{share} === 45")
+        await page.press("Home", "ArrowLeft")
+        await page.until(f"{share} === 80 && {text}.width > 3 * {picture}.width && {is_whole}")
+        await page.press("End", "ArrowRight")
+        await page.until(f"{share} === 15 && {picture}.width > 3 * {text}.width && {is_whole}")
+        await page.drag(".divider", ".block.accelerator")
+        await page.until(f"{share} > 40 && {share} < 60 && {is_whole}")
+        # The other views need the whole width, as the file does in a narrow window.
+        is_below = f"{picture}.bottom <= {text}.top && {picture}.left === {text}.left && {is_whole}"
+        await page.until(f"({view('messages')}.click(), true)")
+        await page.until(f"{is_below} && document.querySelector('.messages') !== null")
+        await page.until(f"({view('file')}.click(), true)")
+        await page.until(is_beside)
+        window = {"width": 1000, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+        await page.call("Emulation.setDeviceMetricsOverride", **window)
+        await page.until(is_below)
 
     run(robot, tmp_path, steps)
 

@@ -42,8 +42,9 @@ def test_a_replay_is_watched(tmp_path: Path) -> None:
             async with aiohttp.ClientSession() as session, session.ws_connect(f"{base}api/watch") as socket:
                 state = ""
                 while state != "ended":
-                    await socket.send_str("-1")
-                    state = (await socket.receive_json(timeout=300))["run"]["state"]
+                    report = await socket.receive_json(timeout=300)
+                    state = report["run"]["state"] if "run" in report else state
+                    await socket.send_str("1")
 
         body = Request(f"{base}api/control", b'{"do": "resume"}', {"Content-Type": "application/json"})
         with urlopen(body, timeout=60) as answer:

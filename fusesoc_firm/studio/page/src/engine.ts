@@ -16,7 +16,7 @@ const OPTIONS = {
 };
 // A browser translates what has run several times to faster code.
 const WARM_UPS = 5;
-const engine = new ELK({ workerFactory: () => new Worker(worker) });
+const engine = new ELK({ workerFactory: () => new Worker(worker), algorithms: ["layered"] });
 let isAwaited = false;
 
 /** Return a graph with the places of its children. */

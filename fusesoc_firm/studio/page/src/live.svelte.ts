@@ -14,8 +14,6 @@ export interface Run {
   isPaused: boolean;
   isControlled: boolean;
   clock: number | null;
-  first: number;
-  last: number;
 }
 
 interface Percentiles {
@@ -39,17 +37,25 @@ interface Load {
   lost: number;
 }
 
-/** What the server sends when it is asked; see fusesoc_firm/studio/live.py. */
-interface News {
-  run: Run | null;
+interface Figures {
   seconds: number;
   counts: Record<string, Count>;
   loads: Record<string, Load>;
-  messages: Row[];
-  skipped: number;
+}
+
+/** What is new of a run; what is not new is left out. See fusesoc_firm/studio/reports.py. */
+interface Report {
+  run?: Run | null;
+  first?: number;
+  last?: number;
+  skipped?: number;
+  messages?: Row[];
+  figures?: Figures;
 }
 
 const MOST_ROWS = 200;
+// The server sends up to 20 reports that are not confirmed.
+const CONFIRMED = 10;
 // The seconds over which rates are averaged.
 const WINDOW = 1;
 
@@ -69,6 +75,9 @@ export function latency(cycles: number | null, wall: number | null, clock: numbe
 
 export class Live {
   run = $state.raw<Run | null>(null);
+  /** The numbers of the oldest message in the record and of the newest one. */
+  first = $state(0);
+  last = $state(-1);
   rows = $state.raw<Row[]>([]);
   skipped = $state(0);
   /** The words at the wire of each block. */
@@ -78,7 +87,7 @@ export class Live {
   /** The longest of the latest latencies of each block, in cycles. */
   longest = $state.raw<Record<string, number>>({});
   isFollowing = $state(true);
-  #history: { seconds: number; counts: Record<string, Count> }[] = [];
+  #history: Figures[] = [];
 
   /** Follow the run until the returned function is called; connects again if the server was restarted. */
   follow(): () => void {
@@ -86,14 +95,19 @@ export class Live {
     let isOver = false;
     const open = () => {
       const made = (socket = new WebSocket(address("watch")));
-      let last = -1;
-      made.onopen = () => made.send(String(last));
+      let waiting: Report[] = [];
+      let unconfirmed = 0;
+      const showAll = () => {
+        for (const report of waiting) this.#take(report);
+        unconfirmed += waiting.length;
+        waiting = [];
+        if (unconfirmed < CONFIRMED || made.readyState !== WebSocket.OPEN) return;
+        made.send(String(unconfirmed));
+        unconfirmed = 0;
+      };
       made.onmessage = (event) => {
-        const news: News = JSON.parse(event.data);
-        this.#take(news);
-        last = news.run?.last ?? -1;
-        // The next news is asked for when this one is shown; a hidden page asks for none.
-        requestAnimationFrame(() => made.readyState === WebSocket.OPEN && made.send(String(last)));
+        // All that came are shown by the next picture; a hidden page has none, and soon gets no more reports.
+        if (waiting.push(JSON.parse(event.data)) === 1) requestAnimationFrame(showAll);
       };
       made.onclose = () => isOver || setTimeout(open, 2000);
     };
@@ -104,32 +118,40 @@ export class Live {
     };
   }
 
-  #take(news: News) {
-    const isNew = news.run?.number !== this.run?.number;
+  #take({ run, first, last, skipped, messages, figures }: Report) {
+    const isNew = run !== undefined && run?.number !== this.run?.number;
     if (isNew) {
       this.#history = [];
-      [this.rows, this.skipped, this.isFollowing] = [[], 0, true];
+      [this.rows, this.skipped, this.isFollowing, this.first, this.last] = [[], 0, true, 0, -1];
     }
-    this.run = news.run;
-    if (!news.run) return;
-    this.skipped += isNew ? 0 : news.skipped;
-    if (this.isFollowing && news.messages.length) this.rows = [...this.rows, ...news.messages].slice(-MOST_ROWS);
-    const first = this.#history.findIndex((item) => item.seconds >= news.seconds - WINDOW);
-    this.#history = [...this.#history.slice(Math.max(0, first - 1)), { seconds: news.seconds, counts: news.counts }];
-    this.words = this.#wordsOf(news, news.run);
-    const timed = Object.entries(news.counts).filter(([, count]) => count.cycles);
-    this.longest = Object.fromEntries(timed.map(([name, count]) => [name, count.cycles!.maximum]));
-    this.crowded = new Set(Object.keys(news.loads).filter((name) => news.loads[name].waiting >= news.loads[name].capacity));
+    if (run !== undefined) this.run = run;
+    if (messages) {
+      // What had passed before the page looked is not missing in the list.
+      this.skipped += this.last < 0 ? 0 : skipped!;
+      [this.first, this.last] = [first!, last!];
+      if (this.isFollowing) this.rows = [...this.rows, ...messages].slice(-MOST_ROWS);
+    }
+    if (figures && this.run) this.#show(figures, this.run);
   }
 
-  #wordsOf(news: News, run: Run): Record<string, string> {
+  #show(figures: Figures, run: Run) {
+    const begin = this.#history.findIndex((item) => item.seconds >= figures.seconds - WINDOW);
+    this.#history = [...this.#history.slice(Math.max(0, begin - 1)), figures];
+    this.words = this.#wordsOf(figures, run);
+    const timed = Object.entries(figures.counts).filter(([, count]) => count.cycles);
+    this.longest = Object.fromEntries(timed.map(([name, count]) => [name, count.cycles!.maximum]));
+    const { loads } = figures;
+    this.crowded = new Set(Object.keys(loads).filter((name) => loads[name].waiting >= loads[name].capacity));
+  }
+
+  #wordsOf({ seconds: now, counts, loads }: Figures, run: Run): Record<string, string> {
     const oldest = this.#history[0];
-    const seconds = news.seconds - oldest.seconds;
+    const seconds = now - oldest.seconds;
     const found: Record<string, string> = {};
-    for (const [name, count] of Object.entries(news.counts)) {
+    for (const [name, count] of Object.entries(counts)) {
       const rate = seconds > 0 ? (count.messages - (oldest.counts[name]?.messages ?? 0)) / seconds : 0;
       const words = [run.state === "running" && !run.isPaused ? `${quantity(rate)}/s` : `${count.messages} messages`];
-      const load = news.loads[name];
+      const load = loads[name];
       if (load?.waiting) words.push(`${load.waiting} of ${load.capacity} wait`);
       for (const kind of ["dropped", "refused", "lost"] as const) if (load?.[kind]) words.push(`${load[kind]} ${kind}`);
       const times = count.cycles ?? count.wall_ns;

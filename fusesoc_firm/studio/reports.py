@@ -1,0 +1,114 @@
+"""Reports of a run to one page, each with what is new since the report before.
+
+A report is made for every picture that the page shows. What changes less often is left out of most reports, so that
+watching costs the run little.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from math import inf
+from typing import Any
+
+from fusesoc_firm.node.watch import Count, Seen
+from fusesoc_firm.studio.run import RUNNING, Run
+
+# The number of messages in a report.
+_MOST_NEW = 20
+# The time between two figures of a run, since these sort all latencies.
+_FIGURE_SECONDS = 0.5
+
+
+class Reports:
+    """The reports to one page, which begins without any knowledge."""
+
+    def __init__(self) -> None:
+        """Begin before the first report."""
+        self._state: Mapping[str, Any] | None = None
+        self._is_first = True
+        self._last, self._reported = -1, -inf
+        self._is_stale = False
+
+    def next(self, run: Run | None, number: int, file: str) -> dict[str, Any] | None:
+        """Return what is new of the run with this number, of a file; None if nothing is.
+
+        `run` is the state of the run, which is None without a run; `messages` are the newest messages, after `skipped`
+        others; `figures` are counts and loads of all blocks. A report leaves out each of them if it is not new.
+        """
+        state = state_of(run, number, file) if run else None
+        report: dict[str, Any] = {}
+        if self._is_first or state != self._state:
+            report["run"] = state
+            if state is None or self._state is None or state["number"] != self._state["number"]:
+                self._last = -1
+            self._is_first, self._state = False, state
+        if run:
+            self._add_messages(run, report)
+            self._add_figures(run, report)
+        return report or None
+
+    def _add_messages(self, run: Run, report: dict[str, Any]) -> None:
+        news = run.watch.since(self._last, _MOST_NEW)
+        if news.last != self._last:
+            report |= {"first": run.watch.first, "last": news.last, "skipped": news.skipped}
+            report["messages"] = [*map(row, news.messages)]
+            self._last, self._is_stale = news.last, True
+
+    def _add_figures(self, run: Run, report: dict[str, Any]) -> None:
+        # Without new messages, the rates of a run fall.
+        is_changing = self._is_stale or (run.state == RUNNING and not is_paused(run))
+        now = time.monotonic()
+        if "run" in report or (is_changing and now >= self._reported + _FIGURE_SECONDS):
+            report["figures"] = figures(run)
+            self._reported, self._is_stale = now, False
+
+
+def state_of(run: Run, number: int, file: str) -> dict[str, Any]:
+    """Return what a user calls the state of a run."""
+    clock = run.system.clock
+    return {
+        "number": number,
+        "file": file,
+        "title": run.title,
+        "state": run.state,
+        "text": run.text,
+        "isPaused": is_paused(run),
+        "isControlled": run.control is not None,
+        "clock": None if clock is None else float(clock),
+    }
+
+
+def is_paused(run: Run) -> bool:
+    """Whether the user has paused a run."""
+    return run.control is not None and not run.control.is_open
+
+
+def figures(run: Run) -> dict[str, Any]:
+    """Return counts and loads of all blocks of a run, and the time for which they hold."""
+    watch = run.watch
+    return {
+        "seconds": time.monotonic() - watch.start_ns / 1e9,
+        "counts": {block: _counted(count) for block, count in watch.counts().items()},
+        "loads": {block: vars(load) for block, load in watch.loads().items()},
+    }
+
+
+def row(seen: Seen) -> tuple[object, ...]:
+    """Return a message without its content: number, block, time, bytes, cause, cycles, and ns of the wall clock."""
+    latency = seen.latency
+    return (
+        seen.number,
+        seen.block,
+        seen.time_ns / 1e9,
+        len(seen.payload),
+        latency.cause,
+        latency.cycles,
+        latency.wall_ns,
+    )
+
+
+def _counted(count: Count) -> dict[str, Any]:
+    """Return the counts of a block as plain data; `asdict` copies deeply, which would take most of a report's time."""
+    percentiles = {"cycles": count.cycles, "wall_ns": count.wall_ns}
+    return vars(count) | {name: found and vars(found) for name, found in percentiles.items()}
