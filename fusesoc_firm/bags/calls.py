@@ -49,9 +49,9 @@ class EventType:
             return None
         names = (*events, *interface.exchanged)
         closures = [library.closure(name) for name in names]
-        frames = map(frame_of, names, closures)
-        spelled = (f"{name.package}/{interface.kind}/{name.name}" for name in names[:2])
-        return cls(*spelled, signature(names[0], closures[0]), *frames)
+        event, request, response = map(frame_of, names, closures)
+        spelled, requests = (f"{name.package}/{interface.kind}/{name.name}" for name in names[:2])
+        return cls(spelled, requests, signature(names[0], closures[0]), event, request, response)
 
 
 @dataclass(frozen=True)

@@ -6,19 +6,21 @@ import json
 import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import get_types_from_idl
 from rosbags.typesys.store import Typestore
 
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.text.diagnostics import InputError
-from tests.replay.replays import load, open_writer, read, store_of
+from tests.replay.replays import load, read, store_of
 from tests.ros.service_simulator import HERE
 
 SERVICE = "sensor_msgs/srv/SetCameraInfo"
@@ -52,6 +54,15 @@ def store() -> Typestore:
     return found
 
 
+def write_events(path: Path, topic: str, signature: str, events: Iterable[bytes]) -> Path:
+    """Write a bag with events; rosbags does not write the definitions of services."""
+    with Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection(topic, EVENT, msgdef="", rihs01=signature)
+        for number, payload in enumerate(events):
+            writer.write(connection, 10**18 + 10**6 * number, payload)
+    return path
+
+
 class Recorder:
     """Events of calls; a call's number is also its width."""
 
@@ -71,16 +82,13 @@ class Recorder:
         self.events.append(bytes(self.store.serialize_cdr(message, EVENT)))
 
     def written(self, path: Path, signature: str) -> Path:
-        """Write the events; rosbags does not write the definitions of services."""
-        with open_writer(path, "mcap") as writer:
-            connection = writer.add_connection(self.topic, EVENT, msgdef="", rihs01=signature)
-            for number, payload in enumerate(self.events):
-                writer.write(connection, 10**18 + 10**6 * number, payload)
-        return path
+        """Write the events to a bag."""
+        return write_events(path, self.topic, signature, self.events)
 
     def responses(self, path: Path) -> list[tuple[str, bool, str]]:
         """The responses in a bag."""
-        found = [(topic, self.store.deserialize_cdr(data, RESPONSE)) for topic, _, _, data in read(path)]
+        items = [(topic, data) for topic, _, _, data in read(path)]
+        found: list[tuple[str, Any]] = [(topic, self.store.deserialize_cdr(data, RESPONSE)) for topic, data in items]
         return [(topic, message.success, message.status_message) for topic, message in found]
 
     def request(self, width: int, text: str) -> Any:
@@ -140,8 +148,8 @@ def test_each_call_is_replayed_once(
     assert said["responses"] == [{**names, "as_recorded": 1, "different": 1, "missing": 2}]
     assert said["dropped"] == []
     answers = [(0, "call"), (2, "other")]
-    told = [("/set_camera_info_response", call % 2 == 1, text) for call, text in answers]
-    assert recorder.responses(tmp_path / "out.mcap") == told
+    expected = [("/set_camera_info_response", call % 2 == 1, text) for call, text in answers]
+    assert recorder.responses(tmp_path / "out.mcap") == expected
 
 
 def test_calls_of_another_name_are_mapped(tmp_path: Path, store: Typestore) -> None:

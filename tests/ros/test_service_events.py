@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.replay.replays import open_writer
-from tests.replay.test_calls import EVENT, HASH, TOPIC, replay_calls
+from tests.replay.test_calls import HASH, TOPIC, replay_calls, write_events
 from tests.ros.cpp_nodes import missing_ros, ros2
 
 CALLS = 20
@@ -31,12 +30,9 @@ def test_calls_that_rclpy_records_are_replayed(
     assert done.returncode == 0, done.stderr[-2000:]
     signature, events = json.loads(done.stdout)
     assert signature == HASH
-    with open_writer(tmp_path / "calls", "mcap") as writer:
-        connection = writer.add_connection(TOPIC, EVENT, msgdef="", rihs01=signature)
-        for number, event in enumerate(events):
-            writer.write(connection, 10**18 + number, base64.b64decode(event))
+    source = write_events(tmp_path / "calls", TOPIC, signature, map(base64.b64decode, events))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
-    replay_calls(tmp_path, tmp_path / "calls")
+    replay_calls(tmp_path, source)
     said = json.loads(capsys.readouterr().out)
     assert [row["count"] for row in (*said["in"], *said["out"])] == [CALLS, CALLS]
     (counts,) = said["responses"]
