@@ -55,6 +55,15 @@ class EventType:
 
 
 @dataclass(frozen=True)
+class _Kinds:
+    """The values of `event_type` of the requests and responses to use, and the number of these requests."""
+
+    request: int
+    response: int
+    count: int
+
+
+@dataclass(frozen=True)
 class _Calls:
     """The recorded calls of a service: the stream of their requests, and the values of `event_type` to use."""
 
@@ -101,38 +110,39 @@ def with_calls(
     """Return the bag with the calls of services that the hardware serves; `names` are the topics of their requests.
 
     A stream of requests has the topic of its service's requests, or that of the events if no service has its name.
-    Raise `InputError` if a definition differs, if no event contains its request, or if the bag is damaged.
+    Events without requests remain. Raise `InputError` if a definition differs, or if the bag is damaged.
     """
     types: dict[str, EventType] = {}
     topics: dict[str, str] = {}
+    recorded = {stream.type for stream in bag.streams}
     for service in services:
-        if found := EventType.of(service, libraries[service.ros]):
-            types[found.name] = found
+        name = f"{service.type.package}/{InterfaceKind.SERVICE}/{service.type.name}_Event"
+        if name in recorded and (found := EventType.of(service, libraries[service.ros])):
+            types[name] = found
             topics[absolute_name(f"{service.ros_name}/{EVENTS}")] = names[service.request]
     streams: dict[Stream, int] = {}
     calls: dict[Stream, _Calls] = {}
     for stream, count in bag.streams.items():
-        if (type_ := types.get(stream.type)) is None:
-            streams[stream] = count
-        else:
+        type_ = types.get(stream.type)
+        kinds = _kinds_in(bag, stream, type_) if type_ else None
+        if type_ and kinds:
             requests = Stream(topics.get(absolute_name(stream.topic), stream.topic), type_.request_name, "", "")
-            calls[stream], streams[requests] = _calls_in(bag, stream, type_, requests)
+            calls[stream] = _Calls(type_, requests, kinds.request, kinds.response)
+            streams[requests] = kinds.count
+        else:
+            streams[stream] = count
     return BagOfCalls(**{**vars(bag), "streams": streams}, calls=calls)
 
 
-def _calls_in(bag: Bag, stream: Stream, type_: EventType, requests: Stream) -> tuple[_Calls, int]:
-    """Return the calls in a stream of events, and their number."""
+def _kinds_in(bag: Bag, stream: Stream, type_: EventType) -> _Kinds | None:
+    """Return which events of a stream to use, or None if no event contains its request. May raise `InputError`."""
     if stream.signature and stream.signature != type_.signature:
         text = f"its definition of {type_.name} differs from the system's: {stream.signature}, not {type_.signature}"
         fail(f"topic {stream.topic} in {bag.path}: {text}")
     recorded = (item for item in bag.messages([stream.topic]) if item.stream == stream)
     events = map(partial(_decoded, bag, type_=type_), recorded)
     told = [event["info"]["event_type"] for event in events if event["request"]]
-    request, response = next((end for end in _ENDS if end[0] in told), (None, None))
-    if request is None or response is None:
-        hint = "record with the introspection state CONTENTS"
-        fail(f"topic {stream.topic} in {bag.path}: no event contains the request of its call", hint=hint)
-    return _Calls(type_, requests, request, response), told.count(request)
+    return next((_Kinds(*end, told.count(end[0])) for end in _ENDS if end[0] in told), None)
 
 
 def _decoded(bag: Bag, recorded: Recorded, type_: EventType) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -173,10 +172,10 @@ def test_a_call_that_began_before_the_bag_has_no_request(
     assert (counts["as_recorded"], counts["different"], counts["missing"]) == (0, 0, 0)
 
 
-def test_events_without_contents_are_refused(tmp_path: Path, store: Typestore) -> None:
+def test_events_without_contents_are_no_calls(tmp_path: Path, store: Typestore) -> None:
     recorder = Recorder(store)
     recorder.add(RECEIVED, 1, "call", has_contents=False)
-    with pytest.raises(InputError, match=rf"topic {re.escape(TOPIC)} .*no event contains the request"):
+    with pytest.raises(InputError, match="contains no topic for the system"):
         replayed(tmp_path, recorder)
 
 
