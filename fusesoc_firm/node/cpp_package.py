@@ -39,7 +39,7 @@ _PACKAGE_TEMPLATE = "node/package.xml"
 class _Dialect:
     """The parts of a package that depend on the version of ROS.
 
-    The first of `headers` and `middleware` name the C++ class that carries bytes; `build_tool`, `library` and `cmake`
+    The first of `headers` and `middleware` name the C++ class that carries bytes; `build_tool`, `libraries` and `cmake`
     describe the package's build. Only ROS 2 looks up a message's type in an installed package.
     """
 
@@ -47,7 +47,7 @@ class _Dialect:
     middleware: str
     signature: str
     build_tool: str
-    library: str
+    libraries: tuple[str, ...]
     cmake: str
     needs_messages: bool
 
@@ -58,16 +58,16 @@ _DIALECTS = {
         "Ros1",
         "MD5 sum",
         "catkin",
-        "roscpp",
+        ("roscpp",),
         "node/catkin.cmake",
         needs_messages=False,
     ),
     2: _Dialect(
-        ("ros2.hpp", "rcl.hpp", "ros2_services.hpp"),
+        ("ros2.hpp", "rcl.hpp", "ros2_lifecycle.hpp", "ros2_services.hpp"),
         "Ros2",
         "hash",
         "ament_cmake",
-        "rcl",
+        ("rcl", "rcl_lifecycle", "lifecycle_msgs"),
         "node/ament.cmake",
         needs_messages=True,
     ),
@@ -96,7 +96,7 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
         "package": package,
         "name": description.name,
         "build_tool": dialect.build_tool,
-        "library": dialect.library,
+        "libraries": [*dialect.libraries],
         "launcher": LAUNCHERS[version],
         "message_packages": sorted(packages) if dialect.needs_messages else [],
         "has_build_type": dialect.needs_messages,

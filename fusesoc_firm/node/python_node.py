@@ -66,7 +66,7 @@ def _package(description: NodeDescription, ros: int, script: str, *, is_linked: 
         "package": package,
         "name": description.name,
         "build_tool": build_tool,
-        "library": library,
+        "libraries": [library],
         "launcher": LAUNCHERS[ros],
         "message_packages": sorted(messages),
         "has_build_type": ros == 2,

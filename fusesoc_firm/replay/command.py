@@ -8,14 +8,18 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
+from fusesoc_firm.bags.calls import BagOfCalls, with_calls
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
+from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, Stream, open_bag
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
@@ -26,7 +30,7 @@ from fusesoc_firm.node.watch import Control, Latency, Watch
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
 from fusesoc_firm.simulation.functions import Functions, importable_sources
 from fusesoc_firm.simulation.software_run import stimulated
-from fusesoc_firm.system.derived.model import Topic, absolute_name
+from fusesoc_firm.system.derived.model import ServiceEnd, Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 
@@ -101,7 +105,8 @@ def replay(
     subscribers = renamed(stimulated(system), settings.names)
     publishers = renamed(published(system), settings.names)
     topics = {item.block: _recorded(item, loaded) for item in publishers}
-    with open_bag(source.path) as bag:
+    with open_bag(source.path) as opened:
+        bag = _with_calls(opened, loaded, subscribers)
         form = _form(target, bag.form)
         _check_speaks(publishers, target.path, form)
         routes = _routes(bag, loaded, subscribers, settings.names)
@@ -128,7 +133,7 @@ def replay(
 class _Replay:
     """A replay in progress: the numbers of messages played from each stream and sent by each block."""
 
-    bag: Bag
+    bag: BagOfCalls
     routes: Mapping[Stream, Route]
     run: SystemRun
     topics: Mapping[str, RecordedTopic]
@@ -137,6 +142,8 @@ class _Replay:
     settings: Settings
     played: Counter[Stream] = field(default_factory=Counter)
     sent: Counter[str] = field(default_factory=Counter)
+    # The system's responses to the calls in the bag, by stream and number of the request; None without a response.
+    answers: dict[tuple[Stream, int], Sent | None] = field(default_factory=dict)
     refused: int = 0
     errors: int = 0
     is_over: bool = False
@@ -176,6 +183,8 @@ class _Replay:
         except (StuckError, TransportError) as error:
             faults.append(f"the rest of the bag was not replayed: {error}")
             self.is_over = True
+        if recorded.stream in self._calls:
+            self.answers[recorded.stream, recorded.number] = self._answer(route)
         for sent in self.run.sent:
             self._record(sent)
         self.run.sent.clear()
@@ -183,6 +192,26 @@ class _Replay:
         for fault in faults:
             self._report(f"{recorded.stream.topic}, message {recorded.number}, at {seconds(recorded.stamp)}: {fault}")
         faults.clear()
+
+    @cached_property
+    def _calls(self) -> set[Stream]:
+        """The streams of requests."""
+        return {calls.requests for calls in self.bag.calls.values()}
+
+    def _answer(self, route: Route) -> Sent | None:
+        """Return the response to the call that was sent last."""
+        requests = {item.block for item in route.subscribers}
+        responses = {service.response for service in self.run.system.services if service.request in requests}
+        return next((sent for sent in self.run.sent if sent.topic.block in responses), None)
+
+    def _compared(self, stream: Stream) -> dict[str, Any]:
+        """Return how many of the system's responses are as recorded, are different, and are missing."""
+        answers = [(key, sent) for key, sent in self.answers.items() if key[0] == stream]
+        pairs = [(sent, self.bag.responses[key]) for key, sent in answers if sent and key in self.bag.responses]
+        equal = sum(_value(sent.topic, sent.payload) == _value(sent.topic, recorded) for sent, recorded in pairs)
+        missing = sum(sent is None for _, sent in answers)
+        counts = {"as_recorded": equal, "different": len(pairs) - equal, "missing": missing}
+        return {"topic": stream.topic, "type": stream.type} | counts
 
     def _seen(self, subscriber: Topic, recorded: Recorded) -> int | None:
         watch = self.settings.watch
@@ -210,7 +239,10 @@ class _Replay:
             tqdm.write(f"error: {self.bag.path}: {fault}", file=sys.stderr)
 
     def summary(self, path: Path) -> dict[str, Any]:
-        """Return the numbers of received, sent and dropped messages by topic, and the first errors."""
+        """Return the numbers of received, sent and dropped messages by topic, and the first errors.
+
+        The responses to calls are compared with those that the bag contains.
+        """
         return {
             "bag": str(path),
             "in": [
@@ -227,6 +259,7 @@ class _Replay:
                 for stream, count in self.bag.streams.items()
                 if stream not in self.routes
             ],
+            "responses": [self._compared(stream) for stream in self.routes if stream in self._calls],
             "errors": self.errors,
             "messages_with_errors": self.refused,
             "first_errors": self.shown,
@@ -245,10 +278,27 @@ class _Replay:
             print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
         for row in found["dropped"]:
             print(f"no subscriber for {row['topic']} ({row['type']}): {row['count']}")
+        for row in found["responses"]:
+            counts = f"{row['as_recorded']} as recorded, {row['different']} different, {row['missing']} missing"
+            print(f"responses to {row['topic']}: {counts}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out,"
             f" {sum(row['count'] for row in found['dropped'])} dropped, {self.errors} errors, {found['cycles']} cycles"
         )
+
+
+def _value(topic: Topic, payload: bytes) -> bytes:
+    """Return the payload of a response with defaults in padding and unused fields, or unchanged if it is not valid."""
+    try:
+        return encode_used(topic.frame, decode(topic.frame, payload))
+    except CodecError:
+        return payload
+
+
+def _with_calls(bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic]) -> BagOfCalls:
+    """Return a bag with the calls of the system's servers. May raise `InputError`."""
+    servers = [item for item in loaded.system.services if item.end is ServiceEnd.SERVER and item.ros is bag.form.ros]
+    return with_calls(bag, servers, loaded.libraries, {item.block: item.name for item in subscribers})
 
 
 def _count(topic: str, type_: str, count: int) -> dict[str, Any]:

@@ -8,7 +8,6 @@ namespace {
 class Alone {
  public:
   static constexpr unsigned kVersion = 1;
-  static constexpr bool kHasQuality = false;
   static constexpr bool kCountsDrops = true;
   static constexpr std::size_t kUnlimited = 0;
   static constexpr bool kTellsFailures = true;

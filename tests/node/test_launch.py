@@ -52,8 +52,11 @@ def package(folder: Path, ros: str, language: str) -> Path:
 def test_a_package_names_what_it_needs(tmp_path: Path, language: str, ros: str, needed: set[str]) -> None:
     files = package(tmp_path, ros, language)
     tree = ET.parse(files / "package.xml").getroot()
-    library = {"cpp": {"ROS": "roscpp", "ROS2": "rcl"}, "python": {"ROS": "rospy", "ROS2": "rclpy"}}[language][ros]
-    assert {node.text for node in tree if node.tag.endswith("depend")} == {*needed, library}
+    libraries = {
+        "cpp": {"ROS": ["roscpp"], "ROS2": ["rcl", "rcl_lifecycle", "lifecycle_msgs"]},
+        "python": {"ROS": ["rospy"], "ROS2": ["rclpy"]},
+    }
+    assert {node.text for node in tree if node.tag.endswith("depend")} == {*needed, *libraries[language][ros]}
     lines = (files / "CMakeLists.txt").read_text(encoding="utf-8")
     assert "install(DIRECTORY launch DESTINATION" in lines
     if language == "python":

@@ -316,6 +316,7 @@ def test_the_summary_as_json(tmp_path: Path, capsys: Captured) -> None:
         "in": [{"topic": "/p", "type": "geometry_msgs/msg/Point", "count": 12, "blocks": ["p"]}],
         "out": [{"topic": "/p_out", "type": "geometry_msgs/msg/Point", "count": 11, "block": "p_out"}],
         "dropped": [{"topic": "/s", "type": STRING, "count": 1}],
+        "responses": [],
         "errors": 1,
         "messages_with_errors": 1,
         "first_errors": [

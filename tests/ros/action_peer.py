@@ -13,9 +13,10 @@ import json
 import os
 import random
 import threading
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
+
+from seen import Finders
 
 HELD = 0x70
 # In s; longer than any goal takes here, even on a busy machine.
@@ -94,10 +95,9 @@ class Ros2Client:
             cancel_service_qos_profile=deep,
             feedback_sub_qos_profile=deep,
         )
-        while not self.client.wait_for_server(timeout_sec=1):
-            pass
-        # Who is seen may not see us yet.
-        time.sleep(0.5)
+        finders = Finders(self.node)
+        while not (self.client.server_is_ready() and finders.are_all()):
+            rclpy.spin_once(self.node, timeout_sec=0.02)
         words = ("SUCCEEDED", "CANCELED", "ABORTED", "UNKNOWN")
         self.states = {getattr(GoalStatus, f"STATUS_{word}"): word for word in words}
 

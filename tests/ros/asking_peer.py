@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import json
 import sys
-import threading
 import time
 from collections.abc import Sequence
 from typing import Any
+
+from seen import Finders, are_known
 
 SERVICE, NAMES, TEXTS = "/set_camera_info", "/name_in", "/name_out"
 
@@ -37,8 +38,8 @@ def ros1(names: Sequence[str]) -> list[str]:
     subscriber = rospy.Subscriber(TEXTS, String, lambda message: found.append(message.data))
     while not (publisher.get_num_connections() and subscriber.get_num_connections()):
         time.sleep(0.02)
-    # A publisher knows a subscriber a moment after that knows it.
-    time.sleep(0.5)
+    while not are_known(rospy.get_name(), [subscriber]):
+        time.sleep(0.02)
     for name in names:
         publisher.publish(String(name))
     while len(found) < len(names):
@@ -64,16 +65,11 @@ def ros2(names: Sequence[str]) -> list[str]:
     node.create_service(SetCameraInfo, SERVICE, serve)
     publisher = node.create_publisher(String, NAMES, 100)
     node.create_subscription(String, TEXTS, lambda message: found.append(message.data), 100)
-
-    def publish() -> None:
-        while not (publisher.get_subscription_count() and node.count_publishers(TEXTS)):
-            time.sleep(0.02)
-        # Who is seen may not see us yet.
-        time.sleep(0.5)
-        for name in names:
-            publisher.publish(String(data=name))
-
-    threading.Thread(target=publish, daemon=True).start()
+    finders = Finders(node)
+    while not (publisher.get_subscription_count() and node.count_publishers(TEXTS) and finders.are_all()):
+        rclpy.spin_once(node, timeout_sec=0.02)
+    for name in names:
+        publisher.publish(String(data=name))
     while len(found) < len(names):
         rclpy.spin_once(node, timeout_sec=0.1)
     return found

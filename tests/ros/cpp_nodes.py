@@ -32,7 +32,15 @@ DEBIAN_PYTHON = "/usr/bin/python3"
 ROS2 = Path(os.environ.get("FIRM_ROS2") or Path(sys.prefix) / "ros2")
 _OPTIONS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-pthread"]
 _ROS1_MODULES = ("rospy", "geometry_msgs", "sensor_msgs", "std_msgs")
-_ROS2_LIBRARIES = ("rcl", "rcl_yaml_param_parser", "rcutils", "rmw", "rosidl_runtime_c")
+_ROS2_LIBRARIES = (
+    "rcl",
+    "rcl_lifecycle",
+    "lifecycle_msgs__rosidl_generator_c",
+    "rcl_yaml_param_parser",
+    "rcutils",
+    "rmw",
+    "rosidl_runtime_c",
+)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ import rclpy
 from sensor_msgs.msg import CameraInfo, Image
 
 _LONGEST_SECONDS = 60
+_AGAIN_SECONDS = 5
 
 
 class Way:
@@ -40,14 +41,12 @@ class Way:
     def is_connected(self, node: Any) -> bool:
         return bool(self.publisher.get_subscription_count() and node.count_publishers(self.subscription.topic_name))
 
-    def send(self, message: Any) -> float:
-        """Return the seconds until the response; `answer` is the response."""
+    def send(self, message: Any, longest: float) -> float | None:
+        """Return the seconds until the response if it comes in time; `answer` is the response."""
         self.came.clear()
         begun = time.perf_counter()
         self.publisher.publish(message)
-        if not self.came.wait(_LONGEST_SECONDS):
-            sys.exit("no response")
-        return self.at - begun
+        return self.at - begun if self.came.wait(longest) else None
 
 
 def main(folder: Path, rows: int, columns: int, count: int) -> None:
@@ -57,16 +56,19 @@ def main(folder: Path, rows: int, columns: int, count: int) -> None:
     images, infos = Way(node, Image, "image_raw"), Way(node, CameraInfo, "camera_info")
     while not (images.is_connected(node) and infos.is_connected(node)):
         time.sleep(0.02)
-    # Who is seen may not see us yet.
-    time.sleep(0.5)
     info = CameraInfo(height=rows, width=columns, k=[1.5] * 9, p=[-0.25] * 12)
     info.roi.x_offset = 3
-    infos.send(info)
+    # A node that this one has found may not have found it yet. It finds the images' topic before.
+    while infos.send(info, _AGAIN_SECONDS) is None:
+        pass
     seconds = []
     for number in range(count):
         image = Image(height=rows, width=columns, encoding="rgb8", step=3 * columns)
         image.data.frombytes((folder / f"{number}.in").read_bytes())
-        seconds.append(images.send(image))
+        taken = images.send(image, _LONGEST_SECONDS)
+        if taken is None:
+            sys.exit("no response")
+        seconds.append(taken)
         (folder / f"{number}.out").write_bytes(images.answer.data.tobytes())
     found, answer = infos.answer, images.answer
     calibration = [found.height, found.width, [*found.k], [*found.p], found.roi.x_offset]

@@ -13,10 +13,13 @@ from __future__ import annotations
 import array
 import json
 import math
+import os
 import sys
 import threading
 import time
 from typing import Any
+
+from seen import Counts, Finders, are_known
 
 _TURN = 6000
 _IMAGE_BYTES = 1_000_000
@@ -38,13 +41,22 @@ class Ros1:
     def is_connected(self, publisher: Any, subscriber: Any) -> bool:
         return bool(publisher.get_num_connections() and subscriber.get_num_connections())
 
+    def are_known(self, subscribers: list[Any]) -> bool:
+        """Whether the other sides know the subscribers."""
+        return bool(are_known(self.rospy.get_name(), subscribers))
+
+    def show_counts(self) -> None:
+        """ROS 1 does not need it."""
+
 
 class Ros2:
     def __init__(self) -> None:
         import rclpy
 
         rclpy.init()
-        self.node = rclpy.create_node("paced")
+        self.node = rclpy.create_node(f"paced_{os.getpid()}")
+        self.finders: Finders | None = None
+        self.counts: Counts | None = None
         threading.Thread(target=rclpy.spin, args=(self.node,), daemon=True).start()
 
     def publisher(self, topic: str, message: Any) -> Any:
@@ -55,6 +67,16 @@ class Ros2:
 
     def is_connected(self, publisher: Any, subscriber: Any) -> bool:
         return bool(publisher.get_subscription_count() and self.node.count_publishers(subscriber.topic_name))
+
+    def are_known(self, _: list[Any]) -> bool:
+        """Whether the other sides know all subscribers."""
+        self.finders = self.finders or Finders(self.node)
+        return bool(self.finders.are_all())
+
+    def show_counts(self) -> None:
+        """Publish what tells another peer that it is known."""
+        self.counts = self.counts or Counts(self.node)
+        self.counts.publish()
 
 
 class Angles:
@@ -122,8 +144,8 @@ class Way:
 def run(ros: Any, rate: int, seconds: float, ways: list[Way]) -> None:
     while not all(ros.is_connected(way.publisher, way.subscriber) for way in ways):
         time.sleep(0.02)
-    # Who is seen may not see us yet.
-    time.sleep(0.5)
+    while not ros.are_known([way.subscriber for way in ways]):
+        time.sleep(0.02)
     start, steps = time.perf_counter(), round(rate * seconds) * len(ways)
     for step in range(steps):
         time.sleep(max(0.0, start + step / rate / len(ways) - time.perf_counter()))
@@ -135,9 +157,11 @@ def run(ros: Any, rate: int, seconds: float, ways: list[Way]) -> None:
 
 
 def echo(ros: Any, kind: Any, sent: str, received: str) -> None:
+    ros.show_counts()
     publisher = ros.publisher(received, kind.received)
     subscriber = ros.subscriber(sent, kind.sent, lambda message: publisher.publish(kind.answer(message)))
     while subscriber:
+        ros.show_counts()
         time.sleep(1)
 
 
@@ -151,4 +175,4 @@ if __name__ == "__main__":
         run(middleware, int(sys.argv[2]), float(sys.argv[3]), pairs)
     # rclpy's thread is still at work.
     sys.stdout.flush()
-    __import__("os")._exit(0)
+    os._exit(0)

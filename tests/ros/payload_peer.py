@@ -19,9 +19,10 @@ import json
 import sys
 import threading
 import time
-import xmlrpc.client
 from collections.abc import Callable, Iterator
 from typing import Any
+
+from seen import Finders, are_known
 
 _output = threading.Lock()
 
@@ -57,12 +58,6 @@ class Wish:
         self.depth = int(next((word[len("depth=") :] for word in words if word.startswith("depth=")), 1000))
 
 
-def bus_info(uri: str, name: str) -> list[list[Any]]:
-    """The connections of the node at an address."""
-    node: Any = xmlrpc.client.ServerProxy(uri)
-    return list(node.getBusInfo(name)[2])
-
-
 class Ros1Peer:
     def __init__(self, subscribed: dict[str, str], published: dict[str, str]) -> None:
         import rospy
@@ -83,7 +78,7 @@ class Ros1Peer:
             wish = Wish(text)
             subscriber = rospy.Subscriber(topic, get_message_class(wish.type), self.take, topic, tcp_nodelay=True)
             self.sought += [] if wish.is_latched else [subscriber]
-            self.heard.append((subscriber.resolved_name, subscriber))
+            self.heard.append(subscriber)
 
     def take(self, message: Any, topic: str) -> None:
         buffer = io.BytesIO()
@@ -91,16 +86,7 @@ class Ros1Peer:
         say_message(topic, buffer.getvalue())
 
     def is_connected(self) -> bool:
-        return all(end.get_num_connections() for end in self.sought) and self.is_known()
-
-    def is_known(self) -> bool:
-        """Whether all publishers have this node among their connections: they answer before they add it."""
-        ends = [(topic, link.endpoint_id) for topic, end in self.heard for link in [*end.impl.connections]]
-        try:
-            infos = [(topic, bus_info(uri, self.name)) for topic, uri in ends]
-        except OSError:
-            return False
-        return all(any([*item[1:3], item[4]] == [self.name, "o", topic] for item in info) for topic, info in infos)
+        return all(end.get_num_connections() for end in self.sought) and are_known(self.name, self.heard)
 
     def run(self) -> None:
         while not self.is_connected():
@@ -132,6 +118,8 @@ class Ros2Peer:
         }
         for topic in subscribed:
             self.node.create_subscription(self.types[topic], topic, self.taker(topic), self.quality(topic))
+        self.sought = [topic for topic, wish in self.wishes.items() if not wish.is_latched]
+        self.finders = Finders(self.node)
 
     def quality(self, topic: str) -> Any:
         from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -146,13 +134,14 @@ class Ros2Peer:
         return lambda message: say_message(topic, serialize_message(message))
 
     def is_connected(self) -> bool:
-        sought = [topic for topic, wish in self.wishes.items() if not wish.is_latched]
-        return all(
+        """Whether every topic that is not latched has found a node, and been found."""
+        are_there = all(
             self.node.count_publishers(topic)
             if topic in self.subscribed
             else self.publishers[topic].get_subscription_count()
-            for topic in sought
+            for topic in self.sought
         )
+        return are_there and (not self.sought or self.finders.are_all())
 
     def wait_until_acked(self) -> None:
         from rclpy.duration import Duration
@@ -169,9 +158,7 @@ class Ros2Peer:
 
     def run(self) -> None:
         while not self.is_connected():
-            time.sleep(0.02)
-        # Who is seen may not see us yet.
-        time.sleep(0.5)
+            self.rclpy.spin_once(self.node, timeout_sec=0.02)
         say({"connected": True})
         threading.Thread(target=self.publish_all, daemon=True).start()
         while self.rclpy.ok():

@@ -14,8 +14,9 @@ import argparse
 import json
 import os
 import random
-import time
 from typing import Any
+
+from seen import Finders
 
 # In s; longer than any call takes here, even on a busy machine.
 LONGEST = 60.0
@@ -55,10 +56,9 @@ class Ros2Client:
         self.make = SetCameraInfo.Request
         # Responses to all clients reach each client; the 10 of the default are too few for one that has to wait.
         self.client = self.node.create_client(SetCameraInfo, service, qos_profile=QoSProfile(depth=1000))
-        while not self.client.wait_for_service(timeout_sec=1):
-            pass
-        # Who is seen may not see us yet.
-        time.sleep(0.5)
+        finders = Finders(self.node)
+        while not (self.client.service_is_ready() and finders.are_all()):
+            rclpy.spin_once(self.node, timeout_sec=0.02)
 
     def distortion(self, request: Any) -> str:
         return "d"

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from tests.ros.cpp_nodes import Client, NodeProcess, Peer, missing_ros, running_ros
+from tests.ros.cpp_nodes import Client, Node, NodeProcess, Peer, missing_ros, running_ros
 from tests.ros.live_nodes import REPOSITORY, LiveNode, model_address
 from tests.ros.places import Place
 from tests.ros.test_services import Camera
@@ -64,29 +64,36 @@ def managed(place: Place, node: str, service: str = "") -> Iterator[Manager]:
         manager.end()
 
 
-def node_of(place: Place, kind: str) -> NodeProcess:
-    """A node with an echo: `firm live`, or a generated one."""
-    spec = place.folder / "robot.yaml"
-    spec.write_text(SPECIFICATION, encoding="utf-8")
+def node_of(place: Place, spec: Path, transport: str, kind: str) -> NodeProcess:
+    """The node of a system: `firm live`, or a generated one in Python or C++, named as the system."""
+    if kind == "cpp":
+        options = ["--drain", "100", "--lifecycle", "--ros-args", "-r", f"__node:={spec.stem}"]
+        return Node(place.ros, place.program(spec), transport, *options)
     command = ["live", str(spec)]
-    if kind == "generated":
-        package = place.folder / "package"
+    if kind == "python":
+        package = place.folder / f"{spec.stem}_python"
         if not package.exists():
             assert main(["system", "node", str(spec), "--language", "python", "-o", str(package)]) == 0
         (script,) = package.rglob("*_node.py")
         command = [str(script)]
-    options = ["--transport", model_address("--width", "64"), "--lifecycle"]
-    return LiveNode(place.ros, place.folder / "node.log", [*command, *options])
+    return LiveNode(place.ros, place.folder / "node.log", [*command, "--transport", transport, "--lifecycle"])
 
 
 def point() -> bytes:
     return b"\0\1\0\0" + struct.pack("<3d", *(random.random() for _ in range(3)))
 
 
-@pytest.mark.parametrize("kind", ["live", "generated"])
+@pytest.mark.parametrize("kind", ["live", "python", "cpp"])
 def test_messages_pass_only_while_the_node_is_active(place: Place, kind: str) -> None:
+    spec = place.folder / "robot.yaml"
+    spec.write_text(SPECIFICATION, encoding="utf-8")
+    transport = model_address("--width", "64")
     topics = {"/out": "geometry_msgs/msg/Point"}, {"/in": "geometry_msgs/msg/Point"}
-    with node_of(place, kind) as node, Peer(place.ros, *topics) as peer, managed(place, "/robot") as manager:
+    with (
+        node_of(place, spec, transport, kind) as node,
+        Peer(place.ros, *topics) as peer,
+        managed(place, "/robot") as manager,
+    ):
         peer.wait_until_connected()
         assert manager.ask("") == [True, "unconfigured"]
         for first, second in (("configure", "activate"), ("deactivate", "activate")):
@@ -108,17 +115,16 @@ def test_messages_pass_only_while_the_node_is_active(place: Place, kind: str) ->
         assert manager.ask("cleanup") == [True, "unconfigured"]
         assert manager.ask("unconfigured_shutdown") == [True, ""]
         assert node.wait() == 0
-        assert re.search(r"^in +2 +0 +2 +0 +0$", node.said(), re.MULTILINE), node.said()
+        counts = r"^in +2 +0 +2 +0 +0$" if kind != "cpp" else "^robot_node: 2 received, 0 dropped, 2 sent, 2 published"
+        assert re.search(counts, node.said(), re.MULTILINE), node.said()
 
 
-def test_services_are_there_only_while_the_node_is_active(place: Place) -> None:
+@pytest.mark.parametrize("kind", ["live", "cpp"])
+def test_services_are_there_only_while_the_node_is_active(place: Place, kind: str) -> None:
     camera = Camera(place.ros, place.folder)
-    spec = str(camera.specification())
     service = "/set_camera_info"
     with (
-        LiveNode(
-            place.ros, place.folder / "node.log", ["live", spec, "--transport", camera.model, "--lifecycle"]
-        ) as node,
+        node_of(place, camera.specification(), camera.model, kind) as node,
         managed(place, "/camera", service) as manager,
     ):
         assert manager.ask("configure") == [True, "inactive"]
@@ -137,7 +143,8 @@ def test_services_are_there_only_while_the_node_is_active(place: Place) -> None:
             assert manager.ask("-") == "-"
         assert manager.ask("inactive_shutdown") == [True, ""]
         assert node.wait() == 0
-        assert re.search(r"^set_camera_info +10 +10 +0 +0$", node.said(), re.MULTILINE), node.said()
+        counts = r" +10 +10 +0 +0" if kind != "cpp" else ": 10 called, 10 answered, 0 failed, 0 unasked"
+        assert re.search(f"^set_camera_info{counts}$", node.said(), re.MULTILINE), node.said()
 
 
 def test_ros_1_has_no_lifecycle(tmp_path: Path) -> None:

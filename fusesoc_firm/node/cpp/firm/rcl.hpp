@@ -97,12 +97,17 @@ inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
   return support;
 }
 
+// Return the type support of a service's type. Throws MiddlewareError if its package is not installed.
+inline const rosidl_service_type_support_t* service_support(const TypeName& type) {
+  using Get = const rosidl_service_type_support_t* (*)();
+  return reinterpret_cast<Get>(
+      symbol(type, "__rosidl_typesupport_c.so", "rosidl_typesupport_c__get_service_type_support_handle__", ""))();
+}
+
 // Return the type support of a service. Throws MiddlewareError like `type_support`.
 inline const rosidl_service_type_support_t* service_support(const Service& service) {
-  using Get = const rosidl_service_type_support_t* (*)();
   const TypeName type{"service", service.type, service.name};
-  const auto* support = reinterpret_cast<Get>(
-      symbol(type, "__rosidl_typesupport_c.so", "rosidl_typesupport_c__get_service_type_support_handle__", ""))();
+  const auto* support = service_support(type);
   check_hash(*support, type, service.signature);
   return support;
 }

@@ -76,7 +76,6 @@ class RawCallback : public ros::SubscriptionCallbackHelper {
 class Ros1 {
  public:
   static constexpr unsigned kVersion = 1;
-  static constexpr bool kHasQuality = false;
   // Only messages with a Header have numbers.
   static constexpr bool kCountsDrops = false;
   static constexpr std::size_t kUnlimited = 0;

@@ -41,6 +41,7 @@
 #include <vector>
 
 #include <firm/rcl.hpp>
+#include <firm/ros2_lifecycle.hpp>
 #include <firm/ros2_services.hpp>
 #include <firm/topic.hpp>
 
@@ -50,7 +51,6 @@ namespace firm {
 class Ros2 {
  public:
   static constexpr unsigned kVersion = 2;
-  static constexpr bool kHasQuality = true;
   // All messages have numbers.
   static constexpr bool kCountsDrops = true;
   static constexpr std::size_t kUnlimited = 0;
@@ -70,6 +70,7 @@ class Ros2 {
 
   ~Ros2() {
     unsubscribe();
+    lifecycle_.reset();
     servers_.clear();
     clients_.clear();
     for (auto& publisher : publishers_) ignore(rcl_publisher_fini(&publisher->rcl, &node_));
@@ -115,6 +116,13 @@ class Ros2 {
     return found;
   }
 
+  // Become a node with lifecycle states: only while it is active does it carry the messages and calls of what is created
+  // after this call. Throws MiddlewareError.
+  void manage() {
+    is_active_ = false;
+    lifecycle_ = std::make_unique<Lifecycle>(node_, [this](bool is_active) { change(is_active); });
+  }
+
   // Pass every message of a topic to `handler`, in the thread that calls spin(). Throws MiddlewareError.
   void subscribe(const Topic& topic, const Quality& quality, MessageHandler handler) {
     auto made = std::make_unique<Subscription>(quality.depth, topic.type, std::move(handler));
@@ -128,12 +136,14 @@ class Ros2 {
   // Pass every call of a service to `handler`, in the thread that calls spin(). Throws MiddlewareError.
   void serve(const Service& service, CallHandler handler) {
     servers_.push_back(std::make_unique<RawServer>(node_, service, std::move(handler)));
+    if (is_active_) servers_.back()->open();
   }
 
   // Return a function that calls a service. Throws MiddlewareError.
   CallHandler caller(const Service& service) {
     clients_.push_back(std::make_unique<RawClient>(node_, service));
-    return [client = clients_.back().get()](Bytes payload, AnswerHandler answer) {
+    return [this, client = clients_.back().get()](Bytes payload, AnswerHandler answer) {
+      if (!is_active_) return answer({std::nullopt, "the node is not active"});
       client->call(payload, std::move(answer));
     };
   }
@@ -166,7 +176,9 @@ class Ros2 {
     check_rcl(rcl_publisher_init(&made->rcl, &node_, type_support(topic), topic.name.c_str(), &options),
               "advertise " + topic.name);
     publishers_.push_back(std::move(made));
-    return [publisher = &publishers_.back()->rcl, name = topic.name](const std::uint8_t* data, std::size_t size) {
+    return [this, publisher = &publishers_.back()->rcl, name = topic.name, is_managed = lifecycle_ != nullptr](
+               const std::uint8_t* data, std::size_t size) {
+      if (is_managed && !is_active_) return;
       rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
       // It is only read; the structure serves both directions.
       message.buffer = const_cast<std::uint8_t*>(data);
@@ -178,17 +190,17 @@ class Ros2 {
   // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end. Throws MiddlewareError.
   bool spin(std::chrono::milliseconds duration) {
     look_at_peers();
-    const std::size_t servers = is_serving_ ? servers_.size() : 0;
-    if (subscriptions_.empty() && servers == 0 && clients_.empty()) {
+    const auto servers = waiting_servers();
+    if (subscriptions_.empty() && servers.empty() && clients_.empty()) {
       // rcl does not wait on an empty set.
       std::this_thread::sleep_for(duration);
       return rcl_context_is_valid(&context_);
     }
-    check_rcl(rcl_wait_set_resize(&waiting_, subscriptions_.size(), 0, 0, clients_.size(), servers, 0),
+    check_rcl(rcl_wait_set_resize(&waiting_, subscriptions_.size(), 0, 0, clients_.size(), servers.size(), 0),
               "wait for messages");
     check_rcl(rcl_wait_set_clear(&waiting_), "wait for messages");
-    for (std::size_t index = 0; index < servers; ++index) {
-      check_rcl(rcl_wait_set_add_service(&waiting_, servers_[index]->rcl(), nullptr), "wait for calls");
+    for (const auto& server : servers) {
+      check_rcl(rcl_wait_set_add_service(&waiting_, server.rcl, nullptr), "wait for calls");
     }
     for (const auto& client : clients_) {
       check_rcl(rcl_wait_set_add_client(&waiting_, client->rcl(), nullptr), "wait for responses");
@@ -203,15 +215,16 @@ class Ros2 {
     }
     check_rcl(result, "wait for messages");
     for (std::size_t index = 0; index < subscriptions_.size(); ++index) {
-      if (waiting_.subscriptions[index] != nullptr) subscriptions_[index]->take_all();
-    }
-    for (std::size_t index = 0; index < servers; ++index) {
-      if (waiting_.services[index] != nullptr) servers_[index]->take();
+      if (waiting_.subscriptions[index] != nullptr) subscriptions_[index]->take_all(is_active_);
     }
     for (std::size_t index = 0; index < clients_.size(); ++index) {
       if (waiting_.clients[index] != nullptr) clients_[index]->take();
     }
-    return rcl_context_is_valid(&context_);
+    // Those of the lifecycle, which open and close the others, are last.
+    for (std::size_t index = 0; index < servers.size(); ++index) {
+      if (waiting_.services[index] != nullptr) servers[index].take();
+    }
+    return rcl_context_is_valid(&context_) && !(lifecycle_ && lifecycle_->is_finalized());
   }
 
   // Return how many messages are missing between those that arrived, by the numbers of each publisher.
@@ -235,6 +248,27 @@ class Ros2 {
   }
 
  private:
+  // Begin or cease to carry messages. Clients see that an inactive node has no services and no actions. Throws
+  // MiddlewareError.
+  void change(bool is_active) {
+    is_active_ = false;
+    for (const auto& server : servers_) server->close();
+    if (!is_active) return;
+    for (const auto& server : servers_) server->open();
+    is_active_ = true;
+  }
+
+  // Return the services whose requests are taken.
+  std::vector<Lifecycle::Server> waiting_servers() const {
+    std::vector<Lifecycle::Server> found;
+    if (!is_serving_) return found;
+    for (const auto& server : servers_) {
+      if (server->is_open()) found.push_back({server->rcl(), [taken = server.get()] { taken->take(); }});
+    }
+    if (lifecycle_) found.insert(found.end(), lifecycle_->servers().begin(), lifecycle_->servers().end());
+    return found;
+  }
+
   // Return whether a name in a parameter file means this node: `*` stands for a part of a name, `**` for any parts.
   bool is_meant(std::string pattern) const {
     if (pattern.empty() || pattern[0] != '/') pattern = "/" + pattern;
@@ -285,22 +319,26 @@ class Ros2 {
     Subscription(const Subscription&) = delete;
     Subscription& operator=(const Subscription&) = delete;
 
-    // Take no more than its queue holds, so that a peer that never stops does not starve others.
-    void take_all() {
+    // Take no more than its queue holds, so that a peer that never stops does not starve others. A node that is not
+    // active ignores the messages.
+    void take_all(bool is_active) {
       for (std::size_t number = 0; number < depth; ++number) {
         rmw_message_info_t info = rmw_get_zero_initialized_message_info();
         const rcl_ret_t result = rcl_take_serialized_message(&rcl, &message, &info, nullptr);
         if (result == RCL_RET_SUBSCRIPTION_TAKE_FAILED) return rcl_reset_error();
         check_rcl(result, "take a message");
-        count_missing(info);
+        const std::uint64_t missing = count_missing(info);
+        if (!is_active) continue;
+        lost += missing;
         handler(message.buffer, message.buffer_length);
       }
     }
 
-    void count_missing(const rmw_message_info_t& info) {
-      if (info.publication_sequence_number == RMW_MESSAGE_INFO_SEQUENCE_NUMBER_UNSUPPORTED) return;
+    // Return how many messages are missing before one.
+    std::uint64_t count_missing(const rmw_message_info_t& info) {
+      if (info.publication_sequence_number == RMW_MESSAGE_INFO_SEQUENCE_NUMBER_UNSUPPORTED) return 0;
       const auto* bytes = reinterpret_cast<const char*>(info.publisher_gid.data);
-      lost += gaps.missing(std::string(bytes, sizeof info.publisher_gid.data), info.publication_sequence_number);
+      return gaps.missing(std::string(bytes, sizeof info.publisher_gid.data), info.publication_sequence_number);
     }
 
     const std::size_t depth;
@@ -386,6 +424,8 @@ class Ros2 {
   std::vector<std::unique_ptr<Publisher>> publishers_;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
   bool is_serving_ = true;
+  std::atomic<bool> is_active_{true};
+  std::unique_ptr<Lifecycle> lifecycle_;
   std::vector<std::unique_ptr<RawServer>> servers_;
   std::vector<std::unique_ptr<RawClient>> clients_;
 };

@@ -91,19 +91,32 @@ class TypedMessage {
 // 10 is too few on a busy machine.
 constexpr std::size_t kServiceDepth = 1000;
 
-// A server of the hardware. take() is called by the thread that spins; answers come from any thread.
+// A server of the hardware, which clients see while it is open. Answers come from any thread; the thread that spins calls
+// the other functions.
 class RawServer {
  public:
-  // Throws MiddlewareError.
   RawServer(rcl_node_t& node, const Service& service, CallHandler handler)
-      : node_(node), service_(service), handler_(std::move(handler)) {
+      : node_(node), service_(service), handler_(std::move(handler)) {}
+
+  ~RawServer() { close(); }
+
+  // Throws MiddlewareError.
+  void open() {
     rcl_service_options_t options = rcl_service_get_default_options();
     options.qos.depth = kServiceDepth;
-    check_rcl(rcl_service_init(&rcl_, &node_, service_support(service), service.name.c_str(), &options),
-              "serve " + service.name);
+    const auto* support = service_support(service_);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    check_rcl(rcl_service_init(&rcl_, &node_, support, service_.name.c_str(), &options), "serve " + service_.name);
+    is_open_ = true;
   }
 
-  ~RawServer() { ignore(rcl_service_fini(&rcl_, &node_)); }
+  // Calls without an answer get none.
+  void close() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (std::exchange(is_open_, false)) ignore(rcl_service_fini(&rcl_, &node_));
+  }
+
+  bool is_open() const { return is_open_; }
 
   RawServer(const RawServer&) = delete;
   RawServer& operator=(const RawServer&) = delete;
@@ -127,6 +140,8 @@ class RawServer {
     try {
       TypedMessage response(service_.response_type, service_.name);
       response.deserialise(*answer.payload);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!is_open_) return;
       check_rcl(rcl_send_response(&rcl_, &header, response.structure()), "respond to a call of " + service_.name);
     } catch (const MiddlewareError& error) {
       // The client has gone, or the response is malformed.
@@ -137,6 +152,8 @@ class RawServer {
   rcl_node_t& node_;
   const Service service_;
   const CallHandler handler_;
+  std::mutex mutex_;  // protects the members below while answers come
+  bool is_open_ = false;
   rcl_service_t rcl_ = rcl_get_zero_initialized_service();
 };
 

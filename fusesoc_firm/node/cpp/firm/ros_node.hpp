@@ -87,6 +87,7 @@ struct NodeArguments {
   Overflow overflow = Overflow::kDropOldest;
   std::chrono::seconds drain{10};
   bool restarts = false;
+  bool is_managed = false;  // the node has lifecycle states
   std::string trace;
   bool wants_help = false;
 
@@ -121,7 +122,7 @@ Value word_of(const std::string& option, const std::string& text, const std::map
 // The parameters of the node that have the effect of an option.
 inline const std::vector<std::string>& parameter_names() {
   static const std::vector<std::string> names{"transport", "status", "software", "depth", "overflow",
-                                              "drain",     "restart", "trace",   "qos"};
+                                              "drain",     "restart", "trace",   "lifecycle", "qos"};
   return names;
 }
 
@@ -129,7 +130,7 @@ inline const std::vector<std::string>& parameter_names() {
 inline std::vector<std::string> options_of(const std::map<std::string, std::string>& parameters) {
   std::vector<std::string> words;
   for (const auto& [name, text] : parameters) {
-    const bool is_switch = name == "restart";
+    const bool is_switch = name == "restart" || name == "lifecycle";
     if (is_switch && !word_of<bool>("the parameter " + name, text, {{"false", false}, {"true", true}})) continue;
     words.push_back("--" + name);
     if (!is_switch) words.push_back(text);
@@ -137,9 +138,9 @@ inline std::vector<std::string> options_of(const std::map<std::string, std::stri
   return words;
 }
 
-// Parse the arguments that ROS has left; `has_quality` tells whether topics of this ROS have a quality of service.
-// Throws UsageError.
-inline NodeArguments parse_arguments(const System& system, bool has_quality, const std::vector<std::string>& words) {
+// Parse the arguments that ROS has left; only nodes of ROS 2 have a quality of service and lifecycle states. Throws
+// UsageError.
+inline NodeArguments parse_arguments(const System& system, bool is_ros2, const std::vector<std::string>& words) {
   NodeArguments arguments;
   for (std::size_t index = 0; index < words.size(); ++index) {
     const std::string option = words[index];
@@ -170,7 +171,9 @@ inline NodeArguments parse_arguments(const System& system, bool has_quality, con
       arguments.restarts = true;
     } else if (option == "--trace") {
       arguments.trace = value();
-    } else if (option == "--qos" && has_quality) {
+    } else if (option == "--lifecycle" && is_ros2) {
+      arguments.is_managed = true;
+    } else if (option == "--qos" && is_ros2) {
       arguments.is_reliable = word_of<bool>(option, value(), {{"best_effort", false}, {"reliable", true}});
     } else {
       throw UsageError("unknown option '" + option + "'");
@@ -185,7 +188,7 @@ inline void check_complete(const System& system, const NodeArguments& arguments)
   if (arguments.software.empty() && system.has_software()) throw UsageError("--software is missing");
 }
 
-inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool has_quality) {
+inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool is_ros2) {
   out << "Carries messages between topics and the hardware of the system " << system.name << ".\n\n"
       << "usage: " << system.name << "_node --transport ADDRESS [OPTION ...] [ROS ARGUMENTS]\n\n"
       << "  --transport ADDRESS  the transport to the hardware: pipe:COMMAND (a simulator), uart:DEVICE:BAUD[:rtscts],\n"
@@ -204,7 +207,10 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
       << "  --drain SECONDS      time limit for pending messages when the node ends (10)\n"
       << "  --restart            reopen the transport each time it fails\n"
       << "  --trace FILE         write each step of each message to FILE, as CSV\n";
-  if (has_quality) out << "  --qos WORD           reliability of all topics: reliable or best_effort (default: each topic's)\n";
+  if (is_ros2) {
+    out << "  --qos WORD           reliability of all topics: reliable or best_effort (default: each topic's)\n"
+        << "  --lifecycle          start with lifecycle states, and carry messages only while active\n";
+  }
   out << "  --help               print this help\n\n"
       << "Each option except --help is also a parameter of the node, such as transport; the command line has priority.\n"
       << ros_arguments << "\n\ntopics to the hardware:\n";
@@ -508,6 +514,11 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
     trace.open(arguments.trace);
     if (!trace) throw UsageError("cannot write '" + arguments.trace + "'");
   }
+  // It is published in every state.
+  Diagnosis diagnosis(ros, system.diagnostics);
+  if constexpr (Ros::kVersion == 2) {
+    if (arguments.is_managed) ros.manage();
+  }
   std::map<std::string, MessageHandler> publish;
   for (const auto& topic : system.publishers) {
     publish[topic.name] = ros.advertise(topic, arguments.quality_of(topic));
@@ -533,7 +544,6 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
     watch.emplace([&](std::uint32_t address) { return word_at(engines, address); }, system.channels);
   }
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
-  Diagnosis diagnosis(ros, system.diagnostics);
   while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
     engines.actions().tick();
     diagnosis.tell([&] {
@@ -565,14 +575,15 @@ int run(const System& system, int argc, char** argv) {
     handle_signals();
     Ros ros(argc, argv, system.name + "_node");
     const std::vector<std::string> given(argv + 1, argv + argc);
-    if (parse_arguments(system, Ros::kHasQuality, given).wants_help) {
-      print_help(std::cout, system, Ros::kArguments, Ros::kHasQuality);
+    constexpr bool is_ros2 = Ros::kVersion == 2;
+    if (parse_arguments(system, is_ros2, given).wants_help) {
+      print_help(std::cout, system, Ros::kArguments, is_ros2);
       return 0;
     }
     if (!ros.start([] { return is_interrupted != 0; })) return 0;
     std::vector<std::string> words = options_of(ros.parameters(parameter_names()));
     words.insert(words.end(), given.begin(), given.end());
-    const NodeArguments arguments = parse_arguments(system, Ros::kHasQuality, words);
+    const NodeArguments arguments = parse_arguments(system, is_ros2, words);
     check_complete(system, arguments);
     return serve(ros, system, arguments);
   } catch (const UsageError& fault) {

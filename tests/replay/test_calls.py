@@ -1,0 +1,186 @@
+"""Bags with the service events of ROS 2 are replayed: the requests go to the hardware, its responses are compared."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
+from rosbags.typesys import get_types_from_idl
+from rosbags.typesys.store import Typestore
+
+from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.replay.command import Settings, Source, Target, replay
+from fusesoc_firm.text.diagnostics import InputError
+from tests.replay.replays import load, read, store_of
+from tests.ros.service_simulator import HERE
+
+SERVICE = "sensor_msgs/srv/SetCameraInfo"
+REQUEST, RESPONSE, EVENT = (f"{SERVICE}_{end}" for end in ("Request", "Response", "Event"))
+TOPIC = "/set_camera_info/_service_event"
+# The values of event_type.
+SENT, RECEIVED, ANSWERED, TAKEN = range(4)
+SERVER, CLIENT = 7, 9
+
+
+# rclpy tells it of the topic of the events.
+HASH = "RIHS01_e3b4e21ddd26871166e6ae7f342856dfcd3ac033c7eac99db6bfe515fba3d693"
+IDL = """
+module sensor_msgs { module srv {
+  struct SetCameraInfo_Request { sensor_msgs::msg::CameraInfo camera_info; };
+  struct SetCameraInfo_Response { boolean success; string status_message; };
+  struct SetCameraInfo_Event {
+    service_msgs::msg::ServiceEventInfo info;
+    sequence<sensor_msgs::srv::SetCameraInfo_Request, 1> request;
+    sequence<sensor_msgs::srv::SetCameraInfo_Response, 1> response;
+  };
+}; };
+"""
+
+
+@pytest.fixture
+def store() -> Typestore:
+    """The types of the service's events, as rosbags makes them."""
+    found = store_of("mcap")
+    found.register(get_types_from_idl(IDL))
+    return found
+
+
+def write_events(path: Path, topic: str, signature: str, events: Iterable[bytes]) -> Path:
+    """Write a bag with events; rosbags does not write the definitions of services."""
+    with Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection(topic, EVENT, msgdef="", rihs01=signature)
+        for number, payload in enumerate(events):
+            writer.write(connection, 10**18 + 10**6 * number, payload)
+    return path
+
+
+class Recorder:
+    """Events of calls; a call's number is also its width."""
+
+    def __init__(self, store: Typestore, topic: str = TOPIC) -> None:
+        self.store, self.topic = store, topic
+        self.events: list[bytes] = []
+
+    def add(self, kind: int, call: int, text: str, gid: int = SERVER, *, has_contents: bool = True) -> None:
+        """Add an event; `text` is that of the request, or of the response."""
+        types = self.store.types
+        time = types["builtin_interfaces/msg/Time"](call, 0)
+        info = types["service_msgs/msg/ServiceEventInfo"](kind, time, np.full(16, gid, np.uint8), call)
+        is_request = kind in (SENT, RECEIVED)
+        parts = [self.request(call, text)] if is_request else [types[RESPONSE](call % 2 == 1, text)]
+        parts = parts if has_contents else []
+        message = types[EVENT](info, parts if is_request else [], [] if is_request else parts)
+        self.events.append(bytes(self.store.serialize_cdr(message, EVENT)))
+
+    def written(self, path: Path, signature: str) -> Path:
+        """Write the events to a bag."""
+        return write_events(path, self.topic, signature, self.events)
+
+    def responses(self, path: Path) -> list[tuple[str, bool, str]]:
+        """The responses in a bag."""
+        items = [(topic, data) for topic, _, _, data in read(path)]
+        found: list[tuple[str, Any]] = [(topic, self.store.deserialize_cdr(data, RESPONSE)) for topic, data in items]
+        return [(topic, message.success, message.status_message) for topic, message in found]
+
+    def request(self, width: int, text: str) -> Any:
+        types = self.store.types
+        header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](1, 2), "camera")
+        region = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
+        k, r, p = np.zeros(9), np.zeros(9), np.zeros(12)
+        info = types["sensor_msgs/msg/CameraInfo"](header, 3, width, text, np.zeros(5), k, r, p, 0, 0, region)
+        return types[REQUEST](info)
+
+
+def replay_calls(folder: Path, source: Path, names: Mapping[str, str] | None = None) -> Path:
+    """Replay a bag through the model of the service in hardware; the bag that is written."""
+    text = (HERE / "camera/camera.yaml").read_text(encoding="utf-8").replace("paths: msg", f"paths: {HERE}/camera/msg")
+    text = text.replace("middleware: ROS", "middleware: ROS2").replace("SetCameraInfoRe", "SetCameraInfo_Re")
+    (folder / "camera.yaml").write_text(text, encoding="utf-8")
+    (folder / "store_settings.vhd").touch()
+    command = [sys.executable, str(HERE / "service_simulator.py"), "camera", "2", str(folder / "gate"), "--width", "32"]
+    target, settings = folder / "out.mcap", Settings(names or {}, 1000, is_json=True)
+    replay(load(folder / "camera.yaml"), Source(source), Target(target), settings, lambda: Simulator(command))
+    return target
+
+
+def replayed(
+    folder: Path, recorder: Recorder, names: Mapping[str, str] | None = None, signature: str = HASH
+) -> list[tuple[str, bool, str]]:
+    """Replay events; the responses in the bag that is written."""
+    return recorder.responses(replay_calls(folder, recorder.written(folder / "in", signature), names))
+
+
+@pytest.fixture(autouse=True)
+def path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The model's simulator needs this repository."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+
+
+@pytest.mark.parametrize("ends", [[SERVER], [CLIENT], [SERVER, CLIENT]])
+def test_each_call_is_replayed_once(
+    tmp_path: Path, store: Typestore, ends: Sequence[int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Server and client number their calls differently; each call in the bag is one to the hardware."""
+    recorder = Recorder(store)
+    texts = ["call", "refused", "other", "silent"]
+    for call, text in enumerate(texts):
+        # The server's response to `other` was another one; the hardware refuses `refused` and does not answer `silent`.
+        answer = "changed" if text == "other" else text
+        for kind, told, end in (
+            (SENT, text, CLIENT), (RECEIVED, text, SERVER), (ANSWERED, answer, SERVER), (TAKEN, answer, CLIENT)
+        ):  # fmt: skip
+            if end in ends:
+                recorder.add(kind, call, told, end)
+    with pytest.raises(InputError, match="1 of 4 messages had errors"):
+        replayed(tmp_path, recorder)
+    said = json.loads(capsys.readouterr().out)
+    names = {"topic": "/set_camera_info_request", "type": REQUEST}
+    assert said["in"] == [{**names, "count": 4, "blocks": ["set_camera_info_request"]}]
+    assert said["responses"] == [{**names, "as_recorded": 1, "different": 1, "missing": 2}]
+    assert said["dropped"] == []
+    answers = [(0, "call"), (2, "other")]
+    expected = [("/set_camera_info_response", call % 2 == 1, text) for call, text in answers]
+    assert recorder.responses(tmp_path / "out.mcap") == expected
+
+
+def test_calls_of_another_name_are_mapped(tmp_path: Path, store: Typestore) -> None:
+    """The only events of the service's type belong to it, also if `--map` names them."""
+    for number, names in enumerate(({}, {"set_camera_info_request": "/left/_service_event"})):
+        recorder = Recorder(store, "/left/_service_event")
+        recorder.add(RECEIVED, 3, "call")
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        assert replayed(folder, recorder, names) == [("/set_camera_info_response", True, "call")]
+
+
+def test_a_call_that_began_before_the_bag_has_no_request(
+    tmp_path: Path, store: Typestore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorder = Recorder(store)
+    recorder.add(ANSWERED, 1, "before")
+    recorder.add(RECEIVED, 2, "after")
+    assert [text for *_, text in replayed(tmp_path, recorder)] == ["after"]
+    (counts,) = json.loads(capsys.readouterr().out)["responses"]
+    assert (counts["as_recorded"], counts["different"], counts["missing"]) == (0, 0, 0)
+
+
+def test_events_without_contents_are_no_calls(tmp_path: Path, store: Typestore) -> None:
+    recorder = Recorder(store)
+    recorder.add(RECEIVED, 1, "call", has_contents=False)
+    with pytest.raises(InputError, match="contains no topic for the system"):
+        replayed(tmp_path, recorder)
+
+
+def test_events_of_another_definition_are_refused(tmp_path: Path, store: Typestore) -> None:
+    recorder = Recorder(store)
+    recorder.add(RECEIVED, 1, "call")
+    with pytest.raises(InputError, match=r"its definition of .* differs from the system's: RIHS01_"):
+        replayed(tmp_path, recorder, signature=f"RIHS01_{64 * '0'}")

@@ -1,0 +1,65 @@
+"""Whether nodes have found the ends of a peer: an end that a peer has connected may be unknown at the other side.
+
+It needs nothing but ROS.
+"""
+
+from __future__ import annotations
+
+import xmlrpc.client
+from collections.abc import Iterable
+from typing import Any
+
+_TOPIC = "/diagnostics"
+
+
+def are_known(name: str, subscribers: Iterable[Any]) -> bool:
+    """Whether all publishers of ROS 1 have the node `name` among their connections: they answer before they add it.
+
+    A node in fabric lists no connections.
+    """
+    links = [(end.resolved_name, link.endpoint_id) for end in subscribers for link in [*end.impl.connections]]
+    try:
+        infos = [(topic, _bus_info(uri, name)) for topic, uri in links]
+    except OSError:
+        return False
+    return all(not info or any([*item[1:3], item[4]] == [name, "o", topic] for item in info) for topic, info in infos)
+
+
+def _bus_info(uri: str, name: str) -> list[list[Any]]:
+    """The connections of the node at an address."""
+    node: Any = xmlrpc.client.ServerProxy(uri)
+    return list(node.getBusInfo(name)[2])
+
+
+class Finders:
+    """The nodes of ROS 2 that publish their counts and have found all that a peer created before this object.
+
+    A process announces its readers one after another, so whoever sends to the last one has found the others.
+    """
+
+    def __init__(self, node: Any) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray
+
+        self._node = node
+        self._names: set[str] = set()
+        node.create_subscription(DiagnosticArray, _TOPIC, self._take, 10)
+
+    def _take(self, message: Any) -> None:
+        self._names |= {status.name for status in message.status if status.name.endswith(": node")}
+
+    def are_all(self) -> bool:
+        """Whether each node with counts has found the peer; the node of the peer must spin."""
+        return 0 < int(self._node.count_publishers(_TOPIC)) <= len(self._names)
+
+
+class Counts:
+    """Counts of a node of ROS 2 that has none of its own, for `Finders`."""
+
+    def __init__(self, node: Any) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+        self._publisher = node.create_publisher(DiagnosticArray, _TOPIC, 10)
+        self._message = DiagnosticArray(status=[DiagnosticStatus(name=f"{node.get_name()}: node")])
+
+    def publish(self) -> None:
+        self._publisher.publish(self._message)
