@@ -57,8 +57,9 @@ def rows(tell: Tell, pattern: str) -> dict[tuple[str, ...], tuple[str, ...]]:
             continue
         command = [sys.executable, "-m", "pytest", "-q", "-s", "-m", "", "-p", "no:cacheprovider", case.test]
         done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+        # A test that captures its output keeps the seed for a failure.
         seed = _SEED.search(done.stdout)
-        if done.returncode == 0 and not seed:
+        if " 1 skipped" in done.stdout or "\n1 skipped" in done.stdout:
             tell(f"{case.title}: skipped")
             continue
         result = MET if done.returncode == 0 else FAILED
