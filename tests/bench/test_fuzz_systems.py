@@ -99,7 +99,7 @@ def test_ids_of_two_bytes() -> None:
     judge = Judge([QUATERNION], is_ros2=True, late=LATE, id_bytes=2)
     back = Record("F", 0, b"\0\0" + FIRST.body)
     judge.judge([FIRST, replace(FIRST, trouble=Trouble.NULL_BEAT, shown=None)], [back, ID])
-    with pytest.raises(WrongError, match="frames of .256., who are nobody"):
+    with pytest.raises(WrongError, match=r"frames of \{256\}, who are nobody"):
         judge.judge([FIRST], [Record("F", 0, b"\0\1" + FIRST.body)])
 
 

@@ -18,8 +18,8 @@ entity firm_status_tally is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- The table is zero; after reset this takes a cycle for each counter. Until then, operations are lost, and zeros are
-    -- read.
+    -- The table is zero; after reset this takes a cycle for each counter. Until then, operations are lost, and reading
+    -- gives zeros.
     is_clear : out std_logic;
 
     op_valid   : in std_logic;
