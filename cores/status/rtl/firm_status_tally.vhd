@@ -42,7 +42,7 @@ architecture rtl of firm_status_tally is
   constant LAST_INDEX : std_logic_vector(INDEX_BITS-1 downto 0) := (others => '1');
 
   type memory_t is array (natural range 0 to 2**INDEX_BITS-1) of std_logic_vector(WORD_BITS-1 downto 0);
-  -- Cleared after reset; initial values as well would take Yosys hours for 32,768 counters.
+  -- Cleared after reset. Initial values as well would slow Yosys down by far if there are thousands of counters.
   signal memory : memory_t;
 
   -- Clearing after reset.
