@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from fusesoc_firm.frame.faults import Fault
+from fusesoc_firm.system.derived.ids import ONE_BYTE
 from tests.bench.fuzz import fuzz_frame
 from tests.bench.payloads import Payloads
 
@@ -16,6 +17,8 @@ ENCODING = bytes.fromhex("00010000")
 # The remainder by 8 of a number to which the accelerator does not respond.
 SILENT = 4
 _RECORD_HEAD = 6
+# Of a frame without a whole id: unknown.
+_NO_ID = 1 << 16
 
 
 class Trouble(IntEnum):
@@ -49,10 +52,9 @@ class Sent:
         assert self.shown is not None
         return int.from_bytes(self.shown["data"], "little")
 
-    @property
-    def record(self) -> bytes:
+    def record(self, id_bytes: int) -> bytes:
         """What the bench reads."""
-        return bytes((self.trouble, self.beat, self.id)) + self.body
+        return bytes((self.trouble, self.beat)) + self.id.to_bytes(id_bytes, "little") + self.body
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class Judge:
     payloads: list[Payloads]
     is_ros2: bool
     late: int
+    id_bytes: int = ONE_BYTE
     dropped: int = field(default=0, init=False)
 
     def judge(self, sent: list[Sent], records: list[Record]) -> None:
@@ -106,18 +109,18 @@ class Judge:
         """Judge what happened between two resets. A reset ends a part that is not whole: its last frames are gone."""
         frames = defaultdict[int, list[Sent]](list)
         for item in sent:
-            frames[item.id].append(item)
+            frames[self._id(item)].append(item)
         answers = defaultdict[int, list[bytes]](list)
         errors = defaultdict[int, Counter[int]](Counter)
         for record in records:
             if record.kind == "F":
-                answers[record.data[0]].append(record.data[1:])
+                answers[self._id_of(record)].append(record.data[self.id_bytes :])
             elif record.kind == "E":
                 errors[record.channel][record.data[0]] += 1
         number_id = len(self.payloads)
         unknown = sum(len(items) for id_, items in frames.items() if id_ > number_id)
         _check_count("unknown ids", unknown, sum(record.kind == "I" for record in records), is_whole=is_whole)
-        if wrong := {record.data[0] for record in records if record.kind in "FA"} - {*range(number_id + 1)}:
+        if wrong := {self._id_of(record) for record in records if record.kind in "FA"} - {*range(number_id + 1)}:
             raise WrongError(f"frames of {wrong}, who are nobody")
         for id_, payloads in enumerate(self.payloads):
             _check_returned(payloads, frames[id_], answers[id_], is_whole=is_whole)
@@ -127,6 +130,14 @@ class Judge:
         self._check_errors_of_numbers(
             frames[number_id], len(answers[number_id]), errors[number_id], errors[self.late], is_whole=is_whole
         )
+
+    def _id(self, sent: Sent) -> int:
+        """The id of a frame to the system; the second byte is missing if the frame begins with an empty beat."""
+        has_id = self.id_bytes == ONE_BYTE or sent.trouble is not Trouble.NULL_BEAT or sent.beat > 0
+        return sent.id if has_id else _NO_ID
+
+    def _id_of(self, record: Record) -> int:
+        return int.from_bytes(record.data[: self.id_bytes], "little")
 
     def _check_numbers(self, sent: list[Sent], answers: list[bytes], *, is_whole: bool) -> None:
         """Each answer is that of a number, in order."""
@@ -171,9 +182,9 @@ def _check_returned(payloads: Payloads, sent: list[Sent], answers: list[bytes], 
             raise WrongError(f"delivered as good: {answer.hex()}")
         item = good.popleft()
         if not _is_equal(payloads, item, answer):
-            raise WrongError(f"{item.record.hex()} came back as {answer.hex()}")
+            raise WrongError(f"{item.record(ONE_BYTE).hex()} came back as {answer.hex()}")
     if is_whole and good:
-        raise WrongError(f"{len(good)} good frames are lost, the last one {good[-1].record.hex()}")
+        raise WrongError(f"{len(good)} good frames are lost, the last one {good[-1].record(ONE_BYTE).hex()}")
 
 
 def _is_equal(payloads: Payloads, sent: Sent, body: bytes) -> bool:

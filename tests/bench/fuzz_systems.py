@@ -19,6 +19,7 @@ from itertools import count
 from pathlib import Path
 
 from fusesoc_firm.message.middleware import Middleware, middleware_of
+from fusesoc_firm.system.derived.ids import ONE_BYTE, TWO_BYTES
 from fusesoc_firm.text.render import render
 from tests.bench.designs import ports_of
 from tests.bench.fuzz import FuzzFrame, fuzz_frame, trouble
@@ -36,7 +37,7 @@ STALLS = (0, 10, 40)
 _BATCH = 20_000
 _ENTITY = "fuzzed_system"
 _HERE = Path(__file__).parent
-_COLUMNS = ("bits", "ROS", "messages", "broken", "good", "resets", "dropped", "cycles", "result")
+_COLUMNS = ("bits", "id bytes", "ROS", "messages", "broken", "good", "resets", "dropped", "cycles", "result")
 _NOTE = f"""
     The messages come back, and numbers go to an accelerator that misbehaves; the watchdog waits {WATCHDOG} cycles.
     Each broken frame is reported once, by its converter or, if its id is unknown, by the Manager. Good frames come back
@@ -58,6 +59,7 @@ class System:
     ros: int
     messages: tuple[str, ...]
     overflow: str
+    id_bytes: int = ONE_BYTE
 
     @property
     def middleware(self) -> Middleware:
@@ -70,7 +72,8 @@ class System:
     @property
     def name(self) -> str:
         """The name of its row."""
-        return f"system of {self.width} bits"
+        ids = ", ids of two bytes" if self.id_bytes == TWO_BYTES else ""
+        return f"system of {self.width} bits{ids}"
 
     @property
     def types(self) -> str:
@@ -91,7 +94,7 @@ class System:
         ]
         return "\n".join(
             [
-                f"project: {{name: fuzzed, width: {self.width}, watchdog: {WATCHDOG}}}",
+                f"project: {{name: fuzzed, width: {self.width}, idBytes: {self.id_bytes}, watchdog: {WATCHDOG}}}",
                 "accelerators:",
                 "- name: mischief",
                 "  type: VHDL",
@@ -116,6 +119,10 @@ SYSTEMS = (
     System(128, 2, ("geometry_msgs/PoseArray", "sensor_msgs/Image"), "drop_oldest"),
     System(256, 2, ("sensor_msgs/CompressedImage", "geometry_msgs/Pose"), "drop_newest"),
     System(512, 1, ("std_msgs/String", "sensor_msgs/JointState"), "block"),
+    System(8, 1, ("geometry_msgs/Quaternion", "std_msgs/String"), "drop_oldest", TWO_BYTES),
+    System(16, 2, ("geometry_msgs/PoseArray", "std_msgs/Header"), "block", TWO_BYTES),
+    System(64, 2, ("std_msgs/String", "sensor_msgs/JointState"), "drop_newest", TWO_BYTES),
+    System(256, 1, ("geometry_msgs/Pose", "std_msgs/String"), "block", TWO_BYTES),
 )
 
 
@@ -151,7 +158,7 @@ def measure(seed: int, tell: Tell, broken: int = BROKEN_FRAMES, written: str = "
 
     `tell` hears of each batch. The other rows are taken from the text `written` of docs/figures.
     """
-    known = known_rows(written, TITLE, _COLUMNS)
+    known = known_rows(written, TITLE, _COLUMNS, keys=3)
     lines = []
     for system in SYSTEMS:
         key = _key(system)
@@ -178,7 +185,8 @@ def fuzz(system: System, folder: Path, broken: int, seed: int, tell: Tell) -> Ta
     for batch in count():
         if total.broken >= broken or total.fault:
             break
-        total += program.run(f"{seed} {system.width} {batch}", min(_BATCH, 2 * broken))
+        seed_of_batch = f"{seed} {system.width} {batch}" + " two" * (system.id_bytes == TWO_BYTES)
+        total += program.run(seed_of_batch, min(_BATCH, 2 * broken))
         tell(f"{system.name}, seed {seed}, batch {batch}: {total.broken} broken frames")
     return total
 
@@ -199,14 +207,15 @@ class Program:
     def send(self, sent: list[Sent], source: random.Random, seed: str) -> Tally:
         """Send these frames and judge what happens; `source` draws stalls, and faults name `seed`."""
         folder = self.path.parent
-        frames = b"".join(len(item.record).to_bytes(4, "little") + item.record for item in sent)
+        records = [item.record(self.system.id_bytes) for item in sent]
+        frames = b"".join(len(record).to_bytes(4, "little") + record for record in records)
         (folder / "frames").write_bytes(frames)
         command = [str(self.path), "frames", "records", str(source.getrandbits(63)), str(source.choice(STALLS))]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode:
             return Tally(fault=f"seed '{seed}': {done.stderr.strip()}")
         payloads = [_payloads(self.system.middleware, message) for message in self.system.messages]
-        judge = Judge(payloads, self.system.ros == 2, self.errors - 1)
+        judge = Judge(payloads, self.system.ros == 2, self.errors - 1, self.system.id_bytes)
         fault = ""
         try:
             judge.judge(sent, [*read_records((folder / "records").read_bytes())])
@@ -227,7 +236,8 @@ def build(system: System, folder: Path) -> Program:
     work.analyse(files)
     top = (folder / "core" / f"{_ENTITY}.vhd").read_text(encoding="ascii")
     (errors,) = (port.bits for port in ports_of(top) if port.name == "frame_error")
-    values = {"entity": _ENTITY, "lanes": system.width // 8, "errors": errors}
+    lanes = system.width // 8
+    values = {"entity": _ENTITY, "lanes": lanes, "kept": min(lanes, system.id_bytes), "errors": errors}
     return Program(system, verilate(work, _ENTITY, render("fuzz_system.cpp", values, _HERE)), errors)
 
 
@@ -236,18 +246,21 @@ def _frame(system: System, source: random.Random) -> Sent:
     id_ = source.choice([*range(system.number_id), *range(system.number_id + 1)])
     body = _number(system, source) if id_ == system.number_id else _message(system, id_, source)
     if source.random() < 0.02:
-        id_ = source.randrange(system.number_id + 1, 256)
+        id_ = source.randrange(system.number_id + 1, 256**system.id_bytes)
     if not body.body and system.width == 8:
         # An id alone reaches no converter.
         return _frame(system, source)
-    what, beat = _beat_trouble(system.width // 8, len(body.body) + 1, source)
+    what, beat = _beat_trouble(system, system.id_bytes + len(body.body), source)
     is_good = what is Trouble.NONE and id_ <= system.number_id
     return Sent(id_, body.body, what, beat, body.shown if is_good else None)
 
 
-def _beat_trouble(lanes: int, size: int, source: random.Random) -> tuple[Trouble, int]:
+def _beat_trouble(system: System, size: int, source: random.Random) -> tuple[Trouble, int]:
     """What happens to a frame of so many bytes, and to which beat of it."""
+    lanes = system.width // 8
     beats = min(-(-size // lanes), _MOST_BEAT)
+    # A beat of nothing but the id cannot be short and have it.
+    first = int(lanes == system.id_bytes)
     chance = source.random()
     if chance < 0.0005:
         return Trouble.RESET, source.randrange(beats)
@@ -255,9 +268,9 @@ def _beat_trouble(lanes: int, size: int, source: random.Random) -> tuple[Trouble
         return Trouble.ABORT, 0
     if lanes > 1 and chance < 0.1:
         return Trouble.NULL_BEAT, source.randrange(beats)
-    if lanes > 1 and beats > 1 and chance < 0.2:
+    if lanes > 1 and beats > first + 1 and chance < 0.2:
         # A beat that is full before it is hit.
-        return source.choice((Trouble.GAP, Trouble.SHORT)), source.randrange(beats - 1)
+        return source.choice((Trouble.GAP, Trouble.SHORT)), source.randrange(first, beats - 1)
     return Trouble.NONE, 0
 
 
@@ -291,4 +304,4 @@ def _drawn(ros: Middleware, message: str) -> tuple[bytes, ...]:
 
 
 def _key(system: System) -> tuple[str, ...]:
-    return (str(system.width), str(system.ros))
+    return (str(system.width), str(system.id_bytes), str(system.ros))

@@ -94,6 +94,15 @@ def test_what_is_wrong(records: list[Record], message: str) -> None:
         _judge(SENT, records)
 
 
+def test_ids_of_two_bytes() -> None:
+    """A frame that begins with an empty beat has no id; a frame of channel 256 is not one of channel 0."""
+    judge = Judge([QUATERNION], is_ros2=True, late=LATE, id_bytes=2)
+    back = Record("F", 0, b"\0\0" + FIRST.body)
+    judge.judge([FIRST, replace(FIRST, trouble=Trouble.NULL_BEAT, shown=None)], [back, ID])
+    with pytest.raises(WrongError, match=r"frames of \{256\}, who are nobody"):
+        judge.judge([FIRST], [Record("F", 0, b"\0\1" + FIRST.body)])
+
+
 def test_a_reset_takes_what_is_under_way() -> None:
     """What comes back before it is still judged, and after it everything."""
     reset = Record("R", 0, (3).to_bytes(4, "little"))
@@ -180,16 +189,17 @@ def test_a_broken_beat_at_every_place_costs_its_frame_alone(tmp_path: Path, widt
 
 
 # A program of a wide system takes minutes to compile.
-_SAMPLE = (8, 32, 256)
+_SAMPLE = ((8, 1), (32, 1), (256, 1), (16, 2))
+
+
+def _mark(system: System) -> pytest.MarkDecorator:
+    return pytest.mark.check if (system.width, system.id_bytes) in _SAMPLE else pytest.mark.thorough
 
 
 @needs_verilator
 @pytest.mark.parametrize(
     "system",
-    [
-        pytest.param(system, marks=pytest.mark.check if system.width in _SAMPLE else pytest.mark.thorough)
-        for system in fuzz_systems.SYSTEMS
-    ],
+    [pytest.param(system, marks=_mark(system)) for system in fuzz_systems.SYSTEMS],
     ids=lambda system: system.name,
 )
 def test_a_thousand_broken_frames(tmp_path: Path, system: System) -> None:

@@ -21,6 +21,7 @@ _SHORT = {
     "SOURCES": "N",
     "FRAMES": "F",
     "LIMIT": "L",
+    "WATCHDOG": "L",
     "MAX_LENGTH": "M",
     "DEPTH": "D",
 }

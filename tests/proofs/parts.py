@@ -1,4 +1,4 @@
-"""The proofs of parts: queue, watchdog, the tree of Managers, and the store of Ethernet frames."""
+"""The proofs of parts: queue, watchdog, the tree of Managers with and without one, and the store of Ethernet frames."""
 
 from __future__ import annotations
 
@@ -149,17 +149,19 @@ _REFUSED = Proof(
     converter=Converter(1, "std_msgs/String", SUBSCRIBER, 8),
 )
 
+_TREE_CORES = (
+    "axis/package",
+    "axis/axis",
+    "sched/package",
+    *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
+    *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
+    "manager/tree",
+)
+
 _TREE_TO_HOST = Proof(
     "manager_tree",
     "small_tree",
-    (
-        "axis/package",
-        "axis/axis",
-        "sched/package",
-        *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
-        *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
-        "manager/tree",
-    ),
+    _TREE_CORES,
     sizes=({"PUBLISHERS": 4}, {"PUBLISHERS": 2}),
     depth=10,
     mutations=(
@@ -200,6 +202,31 @@ _TREE_TO_HOST = Proof(
     is_bounded=True,
 )
 
+_WATCHED_TREE = Proof(
+    "tree_watchdog",
+    "small_tree",
+    _TREE_CORES,
+    sizes=({"PUBLISHERS": 3, "WATCHDOG": 2}, {"PUBLISHERS": 2, "WATCHDOG": 4}),
+    depth=13,
+    mutations=(
+        Mutation(_TREE, "ends     <= cut or member_tlast;", "ends     <= member_tlast;", ("frees_the_group",)),
+        Mutation(_WATCHDOG, "cut_r    <= '1';", "cut_r    <= '0';", ("frees_the_channel",)),
+        Mutation(_WATCHDOG, "not clears and not late and", "not clears and", ("abort_ends_one_frame",)),
+        Mutation(
+            _TREE, "tick     <= '1' when counted_r = PERIOD-1 else '0';", "tick     <= '1';", ("no_hasty_abort",), 1
+        ),
+        Mutation(
+            _TREE,
+            "<= pub_ready(FIRST+SIZE-1 downto FIRST);",
+            "<= not pub_ready(FIRST+SIZE-1 downto FIRST);",
+            ("each_abort_is_reported",),
+        ),
+    ),
+    sources=("small_tree.vhd",),
+    trace=13,
+    is_bounded=True,
+)
+
 _STORE = "firm_mac_store.vhd"
 
 _STORED = Proof(
@@ -226,4 +253,4 @@ _STORED = Proof(
     is_bounded=True,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _STORED)
+PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _WATCHED_TREE, _STORED)

@@ -41,13 +41,17 @@ architecture rtl of firm_status_faults is
   constant COLUMNS      : positive := 2**COLUMN_BITS;
   constant ROWS         : positive := (CHANNELS + COLUMNS - 1) / COLUMNS;
   constant PLACES       : positive := ROWS*COLUMNS;
-  constant NO_CHANNEL   : std_logic_vector(CHANNELS-1 downto 0) := (others => '0');
   constant NO_ROW       : std_logic_vector(ROWS-1 downto 0) := (others => '0');
+  -- As many channels as a table of six inputs can check for a fault and a waiting fault each.
+  constant CHECKED      : positive := 3;
+  constant CHECKS       : positive := (CHANNELS + CHECKED - 1) / CHECKED;
+  constant NO_CHECK     : std_logic_vector(CHECKS-1 downto 0) := (others => '0');
 
   signal waiting_r : std_logic_vector(PLACES-1 downto 0) := (others => '0');
   signal codes_r   : std_logic_vector(4*CHANNELS-1 downto 0);
   signal taken     : std_logic_vector(PLACES-1 downto 0);
-  signal refused_r : std_logic_vector(CHANNELS-1 downto 0);
+  signal refused_r : std_logic_vector(CHECKS-1 downto 0);
+  signal enabled_r : std_logic;
 
   -- A row that has a fault is found, then the fault in the row, then it leaves.
   signal row_waits   : std_logic_vector(ROWS-1 downto 0);
@@ -98,23 +102,29 @@ begin
     );
 
   take_faults : process (clk)
+    variable refused : std_logic_vector(CHECKS-1 downto 0);
   begin
     if rising_edge(clk) then
+      refused   := NO_CHECK;
+      enabled_r <= enable;
       for number in 0 to CHANNELS-1 loop
-        refused_r(number) <= frame_error(number) and enable and waiting_r(number) and not taken(number);
-        if frame_error(number) = '1' and (waiting_r(number) = '0' or taken(number) = '1') then
+        refused(number/CHECKED) := refused(number/CHECKED) or (frame_error(number) and waiting_r(number));
+        if waiting_r(number) = '1' then
+          waiting_r(number) <= not taken(number);
+        elsif frame_error(number) = '1' then
+          waiting_r(number)                     <= enable;
           codes_r(4*number+3 downto 4*number) <= frame_error_code(4*number+3 downto 4*number);
         end if;
-        waiting_r(number) <= (frame_error(number) and enable) or (waiting_r(number) and not taken(number));
       end loop;
+      refused_r <= refused;
       if rst_n = '0' then
         waiting_r <= (others => '0');
-        refused_r <= (others => '0');
+        enabled_r <= '0';
       end if;
     end if;
   end process take_faults;
 
-  lost <= '0' when refused_r = NO_CHANNEL else '1';
+  lost <= '0' when refused_r = NO_CHECK else enabled_r;
 
   step : process (clk)
   begin

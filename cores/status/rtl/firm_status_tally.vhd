@@ -18,7 +18,8 @@ entity firm_status_tally is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- The table is zero; after reset this takes a cycle for each counter. Until then, operations are lost.
+    -- The table is zero; after reset this takes a cycle for each counter. Until then, operations are lost, and reading
+    -- gives zeros.
     is_clear : out std_logic;
 
     op_valid   : in std_logic;
@@ -41,7 +42,8 @@ architecture rtl of firm_status_tally is
   constant LAST_INDEX : std_logic_vector(INDEX_BITS-1 downto 0) := (others => '1');
 
   type memory_t is array (natural range 0 to 2**INDEX_BITS-1) of std_logic_vector(WORD_BITS-1 downto 0);
-  signal memory : memory_t := (others => (others => '0'));
+  -- Cleared after reset. Initial values as well would slow Yosys down by far if there are thousands of counters.
+  signal memory : memory_t;
 
   -- Clearing after reset.
   signal clear_r       : std_logic_vector(INDEX_BITS-1 downto 0) := (others => '0');
@@ -102,6 +104,10 @@ begin
       if rising_edge(clk) then
         word_r    <= memory(to_integer(unsigned(op_index)));
         read_word <= memory(to_integer(unsigned(read_index)));
+        if is_clear_r /= '1' then
+          word_r    <= (others => '0');
+          read_word <= (others => '0');
+        end if;
       end if;
     end process read_memory;
   end generate own_port;
@@ -118,6 +124,9 @@ begin
     begin
       if rising_edge(clk) then
         word_r     <= memory(to_integer(unsigned(index)));
+        if is_clear_r /= '1' then
+          word_r <= (others => '0');
+        end if;
         was_read_r <= not op_valid;
         kept_r     <= read_word;
       end if;

@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A Manager of Managers to be proved: its publishers are in two groups, and those of the second have the upper byte 1.
+-- With a WATCHDOG, stopped publishers are cut off.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -7,7 +8,8 @@ use firm.firm_sched_pkg.all;
 
 entity small_tree is
   generic (
-    PUBLISHERS : integer := 4
+    PUBLISHERS : integer := 4;
+    WATCHDOG   : integer := 0
   );
   port (
     clk             : in  std_logic;
@@ -22,7 +24,8 @@ entity small_tree is
     pub_axis_tuser  : in  std_logic_vector(PUBLISHERS-1 downto 0);
     pub_axis_tvalid : in  std_logic_vector(PUBLISHERS-1 downto 0);
     pub_axis_tlast  : in  std_logic_vector(PUBLISHERS-1 downto 0);
-    pub_axis_tready : out std_logic_vector(PUBLISHERS-1 downto 0)
+    pub_axis_tready : out std_logic_vector(PUBLISHERS-1 downto 0);
+    expired         : out std_logic_vector(PUBLISHERS-1 downto 0)
   );
 end entity small_tree;
 
@@ -51,7 +54,8 @@ begin
       SIZES       => SIZES,
       POLICIES    => POLICIES,
       TOP_POLICY  => ROUND_ROBIN,
-      HIGHS       => highs_of_places
+      HIGHS       => highs_of_places,
+      WATCHDOG    => WATCHDOG
     )
     port map (
       clk             => clk,
@@ -81,7 +85,8 @@ begin
       pub_axis_tvalid => pub_axis_tvalid,
       pub_axis_tlast  => pub_axis_tlast,
       pub_axis_tready => pub_axis_tready,
-      id_error        => open
+      id_error        => open,
+      expired         => expired
     );
 
 end architecture rtl;
