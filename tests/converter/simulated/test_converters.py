@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,8 @@ _KINDS = (
 # bits), in one with some payload (64), and where a whole frame does (512).
 SAMPLE = [case(ros, name, 8) for ros in (ROS1, ROS2) for name in [*_FROM_DISTRIBUTIONS[ros], *AWKWARD[ros]]]
 SAMPLE += [case(ros, name, width) for width in WIDTHS if width > 8 for ros, name in _KINDS]
+# Frames of many beats.
+SAMPLE += [case(ROS1, "awkward_msgs/Large", width) for width in (16, 64, 512)]
 TROUBLED = [case(ros, name, width) for width in (8, 16, 64, 512) for ros, name in _KINDS]
 NETLISTS = [
     case(ROS1, "std_msgs/Empty", 8),
@@ -55,6 +58,7 @@ NETLISTS = [
     case(ROS2, "awkward_msgs/Words", 8),
     case(ROS2, "awkward_msgs/Gaps", 16),
     case(ROS2, "awkward_msgs/Carry254", 64),
+    case(ROS1, "awkward_msgs/Large", 64),
     case(ROS1, "geometry_msgs/Quaternion", 512),
 ]
 FLOWS = {
@@ -65,6 +69,7 @@ FLOWS = {
 }
 # The Manager's slices, its scheduler, the subscriber, and the register of a message.
 PIPELINE_CYCLES = 6
+_WITHDRAWN = "withdrawn_publisher_tb"
 
 
 @pytest.fixture(scope="module")
@@ -153,6 +158,19 @@ def test_every_length_of_a_frame(bench: ConverterBench, tmp_path: Path, ros: Mid
     # A good frame follows each of them, to reveal the effects of a broken one.
     mixed = [each for sent in frames for each in (sent, pair.sent(pair.payload(source)))]
     pair.run(tmp_path, mixed, SEED=SEED, STALL_PERCENT=20)
+
+
+@pytest.mark.parametrize("width", [8, 64])
+def test_a_message_is_withdrawn_within_its_frame(bench: ConverterBench, tmp_path: Path, width: int) -> None:
+    """The frame is aborted, and the next message is sent whole."""
+    pair = bench.pair(ROS1, "awkward_msgs/Large", width)
+    pair.library.analyse([Path(__file__).with_name(f"{_WITHDRAWN}.vhd")])
+    print(f"seed {SEED}")
+    result = pair.library.run(_WITHDRAWN, {"WIDTH": width, "SEED": SEED}, directory=tmp_path)
+    assert result.exit_code == 0, result.output
+    ((frames, aborted),) = re.findall(r"frames (\d+), aborted (\d+)", result.output)
+    assert int(frames) >= 30
+    assert int(aborted) >= 10
 
 
 def test_any_byte_but_zero_is_true(bench: ConverterBench, tmp_path: Path) -> None:
