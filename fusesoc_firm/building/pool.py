@@ -8,9 +8,11 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fusesoc_firm.building.build import Build, Limits, Outcome, ignore
@@ -138,7 +140,7 @@ def _end(items: list[_Running]) -> None:
         _signal(item.process, signal.SIGTERM)
     for item in items:
         item.process.join(max(0.0, patience - time.monotonic()))
-        while time.monotonic() < patience and _signal(item.process, signal.SIGTERM):
+        while time.monotonic() < patience and _signal(item.process, signal.SIGTERM) and not _has_ended(item.process):
             time.sleep(_END_POLL_SECONDS)
         _signal(item.process, signal.SIGKILL)
         item.process.join()
@@ -156,3 +158,14 @@ def _signal(process: BaseProcess, number: signal.Signals) -> bool:
             os.kill(process.pid, number)
         return process.is_alive()
     return True
+
+
+def _has_ended(process: BaseProcess) -> bool:
+    """Return whether only zombies are left of a build's processes, as of those in a sandbox, which the system reaps."""
+    states = set()
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        # It may end now; a program's name may contain anything.
+        with suppress(OSError):
+            state, _, group, *_ = status.read_text(errors="replace").rpartition(")")[2].split()
+            states |= {state} if group == str(process.pid) else set()
+    return states == {"Z"}
