@@ -6,9 +6,10 @@ The two ends number their calls differently, so only the events of one end are u
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 from fusesoc_firm.frame.codec import CodecError, decode, encode
@@ -20,7 +21,7 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import InterfaceKind
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.system.derived.model import Service, absolute_name
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.diagnostics import InputError, fail
 
 EVENTS = "_service_event"
 # The values of `event_type` for a request and a response, by end (service_msgs/ServiceEventInfo); a server's are those
@@ -56,11 +57,12 @@ class EventType:
 
 @dataclass(frozen=True)
 class _Kinds:
-    """The values of `event_type` of the requests and responses to use, and the number of these requests."""
+    """The values of `event_type` of requests and responses; how many requests and invalid events there are."""
 
     request: int
     response: int
     count: int
+    invalid: int
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class _Calls:
 class BagOfCalls(Bag):
     """A bag with calls: a stream of requests replaces each stream of events.
 
-    While the messages are read, `responses` gets the recorded responses by the stream and the number of their request.
+    While the messages are read, `responses` gets each recorded response, by the stream and the number of its request.
     """
 
     calls: Mapping[Stream, _Calls]
@@ -93,7 +95,9 @@ class BagOfCalls(Bag):
             if calls is None:
                 yield recorded
                 continue
-            event = _decoded(self, recorded, calls.type)
+            event = _decoded(recorded, calls.type)
+            if event is None:
+                continue
             key = (calls.requests, *event["info"]["client_gid"], event["info"]["sequence_number"])
             if event["info"]["event_type"] == calls.request and event["request"]:
                 number = numbers[key] = counts[calls.requests] = counts.get(calls.requests, -1) + 1
@@ -101,7 +105,7 @@ class BagOfCalls(Bag):
                 yield Recorded(calls.requests, number, recorded.stamp, payload)
             elif event["info"]["event_type"] == calls.response and event["response"] and key in numbers:
                 payload = encode(calls.type.response, event["response"][0])
-                self.responses[calls.requests, numbers[key]] = payload
+                self.responses[calls.requests, numbers.pop(key)] = payload
 
 
 def with_calls(
@@ -110,7 +114,8 @@ def with_calls(
     """Return the bag with the calls of services that the hardware serves; `names` are the topics of their requests.
 
     A stream of requests has the topic of its service's requests, or that of the events if no service has its name.
-    Events without requests remain. Raise `InputError` if a definition differs, or if the bag is damaged.
+    Events without requests remain, and the number of invalid ones. Raise `InputError` if the definition of a service's
+    events differs.
     """
     types: dict[str, EventType] = {}
     topics: dict[str, str] = {}
@@ -124,29 +129,44 @@ def with_calls(
     calls: dict[Stream, _Calls] = {}
     for stream, count in bag.streams.items():
         type_ = types.get(stream.type)
+        if type_ and stream.signature not in ("", type_.signature):
+            if absolute_name(stream.topic) in topics or stream.topic in names.values():
+                text = f"its definition of {type_.name} differs from the system's"
+                fail(f"topic {stream.topic} in {bag.path}: {text}: {stream.signature}, not {type_.signature}")
+            type_ = None
         kinds = _kinds_in(bag, stream, type_) if type_ else None
         if type_ and kinds:
             requests = Stream(topics.get(absolute_name(stream.topic), stream.topic), type_.request_name, "", "")
             calls[stream] = _Calls(type_, requests, kinds.request, kinds.response)
             streams[requests] = kinds.count
+            if kinds.invalid:
+                streams[stream] = kinds.invalid
         else:
             streams[stream] = count
     return BagOfCalls(**{**vars(bag), "streams": streams}, calls=calls)
 
 
 def _kinds_in(bag: Bag, stream: Stream, type_: EventType) -> _Kinds | None:
-    """Return which events of a stream to use, or None if no event contains its request. May raise `InputError`."""
-    if stream.signature and stream.signature != type_.signature:
-        text = f"its definition of {type_.name} differs from the system's: {stream.signature}, not {type_.signature}"
-        fail(f"topic {stream.topic} in {bag.path}: {text}")
-    recorded = (item for item in bag.messages([stream.topic]) if item.stream == stream)
-    events = map(partial(_decoded, bag, type_=type_), recorded)
-    told = [event["info"]["event_type"] for event in events if event["request"]]
-    return next((_Kinds(*end, told.count(end[0])) for end in _ENDS if end[0] in told), None)
+    """Return which events of a stream to use, or None if no event contains its request.
+
+    Only the events before a damage count, which the replay reports.
+    """
+    told: Counter[int] = Counter()
+    invalid = 0
+    with suppress(InputError):
+        for recorded in bag.messages([stream.topic]):
+            if recorded.stream != stream:
+                continue
+            if (event := _decoded(recorded, type_)) is None:
+                invalid += 1
+            elif event["request"]:
+                told[event["info"]["event_type"]] += 1
+    return next((_Kinds(*end, told[end[0]], invalid) for end in _ENDS if told[end[0]]), None)
 
 
-def _decoded(bag: Bag, recorded: Recorded, type_: EventType) -> dict[str, Any]:
+def _decoded(recorded: Recorded, type_: EventType) -> dict[str, Any] | None:
+    """Return an event, or None if its payload is invalid."""
     try:
         return decode(type_.event, recorded.payload)
-    except CodecError as error:
-        fail(f"{bag.path}: {recorded.stream.topic}, message {recorded.number}: {error}")
+    except CodecError:
+        return None

@@ -98,7 +98,7 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
         "build_tool": dialect.build_tool,
         "libraries": [*dialect.libraries],
         "launcher": LAUNCHERS[version],
-        "message_packages": sorted(packages) if dialect.needs_messages else [],
+        "message_packages": sorted(packages - {*dialect.libraries}) if dialect.needs_messages else [],
         "has_build_type": dialect.needs_messages,
     }
     return {

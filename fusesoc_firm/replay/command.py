@@ -36,6 +36,8 @@ from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 
 # The maximum number of lines about rejected messages; further messages are only counted.
 _SHOWN = 100
+# What became of a response of the system to a recorded call, in the summary's words.
+_EQUAL, _DIFFERENT, _MISSING, _NOT_RECORDED = "as_recorded", "different", "missing", "not_recorded"
 
 
 @dataclass(frozen=True)
@@ -142,8 +144,10 @@ class _Replay:
     settings: Settings
     played: Counter[Stream] = field(default_factory=Counter)
     sent: Counter[str] = field(default_factory=Counter)
-    # The system's responses to the calls in the bag, by stream and number of the request; None without a response.
-    answers: dict[tuple[Stream, int], Sent | None] = field(default_factory=dict)
+    # The system's responses that are not yet compared, by stream and number of the request.
+    answers: dict[tuple[Stream, int], Sent] = field(default_factory=dict)
+    # The numbers of calls of each stream by how the system responded.
+    compared: Counter[tuple[Stream, str]] = field(default_factory=Counter)
     refused: int = 0
     errors: int = 0
     is_over: bool = False
@@ -184,7 +188,11 @@ class _Replay:
             faults.append(f"the rest of the bag was not replayed: {error}")
             self.is_over = True
         if recorded.stream in self._calls:
-            self.answers[recorded.stream, recorded.number] = self._answer(route)
+            self._compare()
+            if answer := self._answer(route):
+                self.answers[recorded.stream, recorded.number] = answer
+            else:
+                self.compared[recorded.stream, _MISSING] += 1
         for sent in self.run.sent:
             self._record(sent)
         self.run.sent.clear()
@@ -204,14 +212,20 @@ class _Replay:
         responses = {service.response for service in self.run.system.services if service.request in requests}
         return next((sent for sent in self.run.sent if sent.topic.block in responses), None)
 
+    def _compare(self) -> None:
+        """Compare the system's responses with those that were read since."""
+        for key, recorded in self.bag.responses.items():
+            if sent := self.answers.pop(key, None):
+                is_equal = _value(sent.topic, sent.payload) == _value(sent.topic, recorded)
+                self.compared[key[0], _EQUAL if is_equal else _DIFFERENT] += 1
+        self.bag.responses.clear()
+
     def _compared(self, stream: Stream) -> dict[str, Any]:
-        """Return how many of the system's responses are as recorded, are different, and are missing."""
-        answers = [(key, sent) for key, sent in self.answers.items() if key[0] == stream]
-        pairs = [(sent, self.bag.responses[key]) for key, sent in answers if sent and key in self.bag.responses]
-        equal = sum(_value(sent.topic, sent.payload) == _value(sent.topic, recorded) for sent, recorded in pairs)
-        missing = sum(sent is None for _, sent in answers)
-        counts = {"as_recorded": equal, "different": len(pairs) - equal, "missing": missing}
-        return {"topic": stream.topic, "type": stream.type} | counts
+        """Return how many of the system's responses are as recorded, different, missing, and not recorded."""
+        self._compare()
+        counts = {kind: self.compared[stream, kind] for kind in (_EQUAL, _DIFFERENT, _MISSING)}
+        rest = {_NOT_RECORDED: sum(key[0] == stream for key in self.answers)}
+        return {"topic": stream.topic, "type": stream.type} | counts | rest
 
     def _seen(self, subscriber: Topic, recorded: Recorded) -> int | None:
         watch = self.settings.watch
@@ -279,8 +293,8 @@ class _Replay:
         for row in found["dropped"]:
             print(f"no subscriber for {row['topic']} ({row['type']}): {row['count']}")
         for row in found["responses"]:
-            counts = f"{row['as_recorded']} as recorded, {row['different']} different, {row['missing']} missing"
-            print(f"responses to {row['topic']}: {counts}")
+            counts = (f"{row[kind]} {kind.replace('_', ' ')}" for kind in (_EQUAL, _DIFFERENT, _MISSING, _NOT_RECORDED))
+            print(f"responses to {row['topic']}: {', '.join(counts)}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out,"
             f" {sum(row['count'] for row in found['dropped'])} dropped, {self.errors} errors, {found['cycles']} cycles"

@@ -14,9 +14,10 @@ import os
 import sys
 import sysconfig
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
+from importlib.util import source_from_cache
 from pathlib import Path
 
 from fusesoc_firm.store.facts import Fact, state
@@ -146,7 +147,7 @@ def _note(path: object, *, is_file: bool) -> None:
     # A number denotes a file that is already open, and None denotes the current folder.
     if not isinstance(path, str | bytes) or (text := os.fsdecode(path)) == ":memory:":
         return
-    absolute, reads = _absolute(text), _current[-1]
+    absolute, reads = _source(_absolute(text)), _current[-1]
     if any(absolute in paths for paths in _partly):
         return
     # An archive may also be on Python's path.
@@ -160,6 +161,14 @@ def _note_state(found: dict[str, str | None], kind: str, path: str) -> None:
         # Computing the state reads the file, which must not be recorded again.
         found[path] = None
         found[path] = state(kind, path)
+
+
+def _source(path: str) -> str:
+    """Return the source of byte code, which Python reads in place of the source that another run has compiled."""
+    if path.endswith(".pyc"):
+        with suppress(ValueError):
+            return source_from_cache(path)
+    return path
 
 
 def _absolute(path: str) -> str:

@@ -1,7 +1,7 @@
 """Reports of a run to one page, each with what is new since the report before.
 
-A report is made for every picture that the page shows. What changes less often is left out of most reports, so that
-watching costs the run little.
+Reports are frequent, so that the page moves. What changes less often is left out of most of them, so that watching
+costs the run little.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ class Reports:
         self._is_first = True
         self._last, self._reported = -1, -inf
         self._is_stale = False
+        self._loads: Mapping[str, Any] = {}
 
     def next(self, run: Run | None, number: int, file: str) -> dict[str, Any] | None:
         """Return what is new of the run with this number, of a file; None if nothing is.
@@ -56,12 +57,13 @@ class Reports:
             self._last, self._is_stale = news.last, True
 
     def _add_figures(self, run: Run, report: dict[str, Any]) -> None:
-        # Without new messages, the rates of a run fall.
-        is_changing = self._is_stale or (run.state == RUNNING and not is_paused(run))
+        # Queues may change without a message, and without new messages, the rates of a run fall.
+        is_running = run.state == RUNNING and not is_paused(run)
+        is_changing = is_running or self._is_stale or run.watch.loads() != self._loads
         now = time.monotonic()
         if "run" in report or (is_changing and now >= self._reported + _FIGURE_SECONDS):
             report["figures"] = figures(run)
-            self._reported, self._is_stale = now, False
+            self._reported, self._is_stale, self._loads = now, False, {**run.watch.loads()}
 
 
 def state_of(run: Run, number: int, file: str) -> dict[str, Any]:

@@ -81,6 +81,13 @@ def test_the_table_of_a_node_for_ros_2() -> None:
     assert "include/firm/ros2.hpp" in files and "include/firm/ros1.hpp" not in files
 
 
+def test_a_package_is_named_once(tmp_path: Path) -> None:
+    """The library of a node for ROS 2 needs a package of messages as well."""
+    text = specification(loop("state", "lifecycle_msgs/State", "ROS2"))
+    listed = cpp_package(written(tmp_path, text))["package.xml"]
+    assert listed.count("depend>lifecycle_msgs<") == 1
+
+
 @pytest.mark.parametrize("topic", ["/arm/left", "arm/left", "groundtruth"])
 def test_a_topic_of_its_own_name_keeps_it(tmp_path: Path, topic: str) -> None:
     """ROS resolves a relative one; a block's name is one, also where VHDL would not have it."""

@@ -144,7 +144,7 @@ def test_each_call_is_replayed_once(
     said = json.loads(capsys.readouterr().out)
     names = {"topic": "/set_camera_info_request", "type": REQUEST}
     assert said["in"] == [{**names, "count": 4, "blocks": ["set_camera_info_request"]}]
-    assert said["responses"] == [{**names, "as_recorded": 1, "different": 1, "missing": 2}]
+    assert said["responses"] == [{**names, "as_recorded": 1, "different": 1, "missing": 2, "not_recorded": 0}]
     assert said["dropped"] == []
     answers = [(0, "call"), (2, "other")]
     expected = [("/set_camera_info_response", call % 2 == 1, text) for call, text in answers]
@@ -169,7 +169,19 @@ def test_a_call_that_began_before_the_bag_has_no_request(
     recorder.add(RECEIVED, 2, "after")
     assert [text for *_, text in replayed(tmp_path, recorder)] == ["after"]
     (counts,) = json.loads(capsys.readouterr().out)["responses"]
-    assert (counts["as_recorded"], counts["different"], counts["missing"]) == (0, 0, 0)
+    assert [counts[kind] for kind in ("as_recorded", "different", "missing", "not_recorded")] == [0, 0, 0, 1]
+
+
+def test_an_invalid_event_is_dropped_and_counted(
+    tmp_path: Path, store: Typestore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorder = Recorder(store)
+    recorder.add(RECEIVED, 1, "first")
+    recorder.events.append(recorder.events[0][:-1])
+    recorder.add(RECEIVED, 2, "second")
+    assert [text for *_, text in replayed(tmp_path, recorder)] == ["first", "second"]
+    said = json.loads(capsys.readouterr().out)
+    assert said["dropped"] == [{"topic": TOPIC, "type": EVENT, "count": 1}]
 
 
 def test_events_without_contents_are_no_calls(tmp_path: Path, store: Typestore) -> None:

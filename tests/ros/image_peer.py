@@ -59,8 +59,10 @@ def main(folder: Path, rows: int, columns: int, count: int) -> None:
     info = CameraInfo(height=rows, width=columns, k=[1.5] * 9, p=[-0.25] * 12)
     info.roi.x_offset = 3
     # A node that this one has found may not have found it yet. It finds the images' topic before.
+    latest = time.monotonic() + _LONGEST_SECONDS
     while infos.send(info, _AGAIN_SECONDS) is None:
-        pass
+        if time.monotonic() > latest:
+            sys.exit("no response")
     seconds = []
     for number in range(count):
         image = Image(height=rows, width=columns, encoding="rgb8", step=3 * columns)

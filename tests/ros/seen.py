@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from typing import Any
 
 _TOPIC = "/diagnostics"
+_PROCESS_OF_FABRIC = 1
 
 
 def are_known(name: str, subscribers: Iterable[Any]) -> bool:
@@ -19,20 +20,22 @@ def are_known(name: str, subscribers: Iterable[Any]) -> bool:
     """
     links = [(end.resolved_name, link.endpoint_id) for end in subscribers for link in [*end.impl.connections]]
     try:
-        infos = [(topic, _bus_info(uri, name)) for topic, uri in links]
+        return all(_is_known(name, topic, uri) for topic, uri in links)
     except OSError:
         return False
-    return all(not info or any([*item[1:3], item[4]] == [name, "o", topic] for item in info) for topic, info in infos)
 
 
-def _bus_info(uri: str, name: str) -> list[list[Any]]:
-    """The connections of the node at an address."""
-    node: Any = xmlrpc.client.ServerProxy(uri)
-    return list(node.getBusInfo(name)[2])
+def _is_known(name: str, topic: str, uri: str) -> bool:
+    """Whether the publisher at an address has a node among the connections of a topic, or is in fabric."""
+    publisher: Any = xmlrpc.client.ServerProxy(uri)
+    links = publisher.getBusInfo(name)[2]
+    if not links and publisher.getPid(name)[2] == _PROCESS_OF_FABRIC:
+        return True
+    return any([*link[1:3], link[4]] == [name, "o", topic] for link in links)
 
 
 class Finders:
-    """The nodes of ROS 2 that publish their counts and have found all that a peer created before this object.
+    """The nodes of ROS 2 that publish their counts and have found the readers that a peer created before this object.
 
     A process announces its readers one after another, so whoever sends to the last one has found the others.
     """

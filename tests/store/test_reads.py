@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import py_compile
 import subprocess
 import sys
 from pathlib import Path
 
+from fusesoc_firm.simulation.user_code import load_function
 from fusesoc_firm.store.own_code import PACKAGE
+from fusesoc_firm.store.reads import Reads, noted
 
 # A separate process, in which Python's paths have not been requested yet. Since Python 3.13, `sysconfig` opens files
 # for this; here it does so in every version.
@@ -42,3 +45,15 @@ def test_what_noting_itself_reads_does_not_call_it_again(tmp_path: Path) -> None
         check=False,
     )
     assert (done.stdout, done.stderr) == (f"{files[1]}\n", "")
+
+
+def test_compiled_code_stands_for_its_source(tmp_path: Path) -> None:
+    """Another program of the user may have imported the module before."""
+    model = tmp_path / "model.py"
+    model.write_text("def respond(): ...\n")
+    py_compile.compile(str(model))
+    assert (tmp_path / "__pycache__").is_dir()
+    reads = Reads()
+    with noted(reads):
+        load_function(model, "respond", "the model", "", "")
+    assert [*reads.files] == [str(model)]

@@ -7,6 +7,7 @@ import io
 import json
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -16,7 +17,10 @@ import pytest
 from matplotlib import image as pictures
 
 from fusesoc_firm.frame.codec import encode
+from fusesoc_firm.node.watch import Control, Load
 from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
+from fusesoc_firm.studio.reports import Reports
+from fusesoc_firm.studio.run import Run
 from fusesoc_firm.studio.server import Studio
 from tests.studio.played import HOSTILE, modelled, write_system
 from tests.studio.served import load, served
@@ -207,6 +211,23 @@ def test_a_report_contains_only_what_is_new(studio: Studio) -> None:
 
     asyncio.run(steps())
     control(studio, "stop")
+
+
+def test_a_load_that_changes_without_a_message_is_reported(spec: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So it does when the hardware refuses the message of a step."""
+    monkeypatch.setattr("fusesoc_firm.studio.reports.time.monotonic", count().__next__)
+    run = Run(load(spec, spec.read_text(encoding="utf-8")), spec, "", Control())
+    assert run.control
+    run.control.pause()
+    reports, loads = Reports(), {"point": Load(1, 100, 0, 0, 0)}
+    run.watch.measure(lambda: loads)
+    assert reports.next(run, 1, "robot.yaml")
+    assert reports.next(run, 1, "robot.yaml") is None
+    loads["point"] = Load(0, 100, 0, 1, 0)
+    report = reports.next(run, 1, "robot.yaml")
+    assert report
+    assert report["figures"]["loads"]["point"]["refused"] == 1
+    assert reports.next(run, 1, "robot.yaml") is None
 
 
 def test_the_record_goes_back(studio: Studio) -> None:

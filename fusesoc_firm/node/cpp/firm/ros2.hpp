@@ -254,7 +254,12 @@ class Ros2 {
     is_active_ = false;
     for (const auto& server : servers_) server->close();
     if (!is_active) return;
-    for (const auto& server : servers_) server->open();
+    try {
+      for (const auto& server : servers_) server->open();
+    } catch (const MiddlewareError&) {
+      for (const auto& server : servers_) server->close();
+      throw;
+    }
     is_active_ = true;
   }
 

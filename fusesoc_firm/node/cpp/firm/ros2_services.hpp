@@ -95,8 +95,9 @@ constexpr std::size_t kServiceDepth = 1000;
 // the other functions.
 class RawServer {
  public:
+  // Throws MiddlewareError.
   RawServer(rcl_node_t& node, const Service& service, CallHandler handler)
-      : node_(node), service_(service), handler_(std::move(handler)) {}
+      : node_(node), service_(service), handler_(std::move(handler)), support_(service_support(service)) {}
 
   ~RawServer() { close(); }
 
@@ -104,10 +105,10 @@ class RawServer {
   void open() {
     rcl_service_options_t options = rcl_service_get_default_options();
     options.qos.depth = kServiceDepth;
-    const auto* support = service_support(service_);
     const std::lock_guard<std::mutex> lock(mutex_);
-    check_rcl(rcl_service_init(&rcl_, &node_, support, service_.name.c_str(), &options), "serve " + service_.name);
+    check_rcl(rcl_service_init(&rcl_, &node_, support_, service_.name.c_str(), &options), "serve " + service_.name);
     is_open_ = true;
+    ++opening_;
   }
 
   // Calls without an answer get none.
@@ -130,18 +131,19 @@ class RawServer {
     const rcl_ret_t result = rcl_take_request(&rcl_, &header, request.structure());
     if (result == RCL_RET_SERVICE_TAKE_FAILED) return rcl_reset_error();
     check_rcl(result, "take a request of " + service_.name);
-    handler_(request.serialised(), [this, header](const Answer& answer) { respond(header, answer); });
+    handler_(request.serialised(),
+             [this, header, opening = opening_](const Answer& answer) { respond(header, opening, answer); });
   }
 
  private:
-  // ROS 2 has no answer for a call that fails.
-  void respond(rmw_request_id_t header, const Answer& answer) {
+  // ROS 2 has no answer for a call that fails. A call of an earlier opening gets none either.
+  void respond(rmw_request_id_t header, unsigned opening, const Answer& answer) {
     if (!answer.payload) return;
     try {
       TypedMessage response(service_.response_type, service_.name);
       response.deserialise(*answer.payload);
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (!is_open_) return;
+      if (!is_open_ || opening != opening_) return;
       check_rcl(rcl_send_response(&rcl_, &header, response.structure()), "respond to a call of " + service_.name);
     } catch (const MiddlewareError& error) {
       // The client has gone, or the response is malformed.
@@ -152,8 +154,10 @@ class RawServer {
   rcl_node_t& node_;
   const Service service_;
   const CallHandler handler_;
+  const rosidl_service_type_support_t* const support_;
   std::mutex mutex_;  // protects the members below while answers come
   bool is_open_ = false;
+  unsigned opening_ = 0;
   rcl_service_t rcl_ = rcl_get_zero_initialized_service();
 };
 

@@ -97,8 +97,13 @@ export class Live {
       const made = (socket = new WebSocket(address("watch")));
       let waiting: Report[] = [];
       let unconfirmed = 0;
+      // The server reports to each connection as if the page knew nothing.
+      let isFirst = true;
       const showAll = () => {
-        for (const report of waiting) this.#take(report);
+        for (const report of waiting) {
+          this.#take(report, isFirst);
+          isFirst = false;
+        }
         unconfirmed += waiting.length;
         waiting = [];
         if (unconfirmed < CONFIRMED || made.readyState !== WebSocket.OPEN) return;
@@ -118,8 +123,8 @@ export class Live {
     };
   }
 
-  #take({ run, first, last, skipped, messages, figures }: Report) {
-    const isNew = run !== undefined && run?.number !== this.run?.number;
+  #take({ run, first, last, skipped, messages, figures }: Report, isFirst: boolean) {
+    const isNew = isFirst || (run !== undefined && run?.number !== this.run?.number);
     if (isNew) {
       this.#history = [];
       [this.rows, this.skipped, this.isFollowing, this.first, this.last] = [[], 0, true, 0, -1];
