@@ -189,7 +189,7 @@ class _Painter:
 
     def _node(self, graph: Digraph, name: str, kind: str, lines: Iterable[str]) -> None:
         style = "filled,rounded" if kind in ("accelerator", "software") else "filled"
-        graph.node(name, _title(lines), {"class": kind}, style=style, fillcolor=self._colours.fills[kind])
+        graph.node(name, _title(lines), _attributes={"class": kind}, style=style, fillcolor=self._colours.fills[kind])
 
 
 def _has_chain(system: DerivedSystem) -> bool:
