@@ -30,6 +30,8 @@ class Trouble(IntEnum):
     SHORT = 3
     ABORT = 4
     RESET = 5
+    # It ends before the second byte of its id.
+    ONE_BYTE = 6
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Sent:
 
     def record(self, id_bytes: int) -> bytes:
         """What the bench reads."""
-        return bytes((self.trouble, self.beat)) + self.id.to_bytes(id_bytes, "little") + self.body
+        frame = self.id.to_bytes(id_bytes, "little") + self.body
+        return bytes((self.trouble, self.beat)) + (frame[:1] if self.trouble is Trouble.ONE_BYTE else frame)
 
 
 @dataclass(frozen=True)
@@ -132,8 +135,9 @@ class Judge:
         )
 
     def _id(self, sent: Sent) -> int:
-        """The id of a frame to the system; the second byte is missing if the frame begins with an empty beat."""
-        has_id = self.id_bytes == ONE_BYTE or sent.trouble is not Trouble.NULL_BEAT or sent.beat > 0
+        """The id of a frame to the system; it has none if it begins with an empty beat or ends too early."""
+        begins_empty = sent.trouble is Trouble.NULL_BEAT and sent.beat == 0
+        has_id = self.id_bytes == ONE_BYTE or not (begins_empty or sent.trouble is Trouble.ONE_BYTE)
         return sent.id if has_id else _NO_ID
 
     def _id_of(self, record: Record) -> int:

@@ -1,8 +1,9 @@
 """Broken frames through whole systems: converters, Manager and accelerators, of which one misbehaves.
 
 A system's messages come back as they went in: its converters are connected to each other. Frames are broken as for a
-single converter, have an unknown id, are aborted, or have a beat that is empty, short or with a gap. Resets hit them in
-the middle. Numbers go to an accelerator that responds too late, with too little, too much, or not at all.
+single converter, have an unknown id or only the first byte of one of two, are aborted, or have a beat that is empty,
+short or with a gap. Resets hit them in the middle. Numbers go to an accelerator that responds too late, with too
+little, too much, or not at all.
 
 Each batch has a seed of its own: that of the bench, the width and its number.
 """
@@ -246,13 +247,20 @@ def _frame(system: System, source: random.Random) -> Sent:
     id_ = source.choice([*range(system.number_id), *range(system.number_id + 1)])
     body = _number(system, source) if id_ == system.number_id else _message(system, id_, source)
     if source.random() < 0.02:
-        id_ = source.randrange(system.number_id + 1, 256**system.id_bytes)
+        id_ = _unknown_id(system, source)
     if not body.body and system.width == 8:
         # An id alone reaches no converter.
         return _frame(system, source)
     what, beat = _beat_trouble(system, system.id_bytes + len(body.body), source)
     is_good = what is Trouble.NONE and id_ <= system.number_id
     return Sent(id_, body.body, what, beat, body.shown if is_good else None)
+
+
+def _unknown_id(system: System, source: random.Random) -> int:
+    """An id that nobody has; half of those of two bytes differ from a known one only in the upper byte."""
+    if system.id_bytes == TWO_BYTES and source.random() < 0.5:
+        return source.randrange(system.number_id + 1) + 256 * source.randrange(1, 256)
+    return source.randrange(system.number_id + 1, 256**system.id_bytes)
 
 
 def _beat_trouble(system: System, size: int, source: random.Random) -> tuple[Trouble, int]:
@@ -271,6 +279,8 @@ def _beat_trouble(system: System, size: int, source: random.Random) -> tuple[Tro
     if lanes > 1 and beats > first + 1 and chance < 0.2:
         # A beat that is full before it is hit.
         return source.choice((Trouble.GAP, Trouble.SHORT)), source.randrange(first, beats - 1)
+    if system.id_bytes == TWO_BYTES and 0.2 <= chance < 0.21:
+        return Trouble.ONE_BYTE, 0
     return Trouble.NONE, 0
 
 

@@ -95,10 +95,13 @@ def test_what_is_wrong(records: list[Record], message: str) -> None:
 
 
 def test_ids_of_two_bytes() -> None:
-    """A frame that begins with an empty beat has no id; a frame of channel 256 is not one of channel 0."""
+    """A frame that begins with an empty beat, or is one byte, has no id; one of channel 256 is not one of channel 0."""
     judge = Judge([QUATERNION], is_ros2=True, late=LATE, id_bytes=2)
     back = Record("F", 0, b"\0\0" + FIRST.body)
     judge.judge([FIRST, replace(FIRST, trouble=Trouble.NULL_BEAT, shown=None)], [back, ID])
+    one_byte = replace(FIRST, trouble=Trouble.ONE_BYTE, shown=None)
+    assert one_byte.record(id_bytes=2) == bytes((Trouble.ONE_BYTE, 0, 0))
+    judge.judge([FIRST, one_byte], [back, ID])
     with pytest.raises(WrongError, match=r"frames of \{256\}, who are nobody"):
         judge.judge([FIRST], [Record("F", 0, b"\0\1" + FIRST.body)])
 

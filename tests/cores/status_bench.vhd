@@ -12,6 +12,7 @@
 --   c 0 0            read the counter of the time stamps
 --   i CYCLES KIND    unknown ids (0) or errors of the link (1) in so many cycles
 --   q 0 LEVEL        the line of interrupts has this level
+--   z 0 0            a reset; the counters are not clear then
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -267,6 +268,15 @@ begin
           end loop;
           id_error   <= '0';
           link_error <= '0';
+        when 'z' =>
+          rst_n <= '0';
+          for cycle in 1 to 4 loop
+            wait until rising_edge(clk);
+          end loop;
+          rst_n <= '1';
+          wait until rising_edge(clk);
+          assert is_clear = '0'
+            report "line " & integer'image(row) & ": the counters are already clear" severity failure;
         when others =>
           for cycle in 1 to 8 loop
             wait until rising_edge(clk);

@@ -1,6 +1,7 @@
 -- The counters beside a Manager of Managers: random beats, waits and faults of SUBSCRIBERS and PUBLISHERS, and a reading
 -- of every word, compared with what happened. SEED decides everything. If CROWDED, faults may find their places taken;
--- then every fault is counted or lost.
+-- then every fault is counted or lost. At the end, a second reset: all words are zero before the tables are clear; and
+-- faults while counting is off, which are not lost ones.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -26,6 +27,7 @@ architecture simulation of status_tree_bench is
 
   signal clk     : std_logic := '0';
   signal rst_n   : std_logic := '0';
+  signal enable  : std_logic := '1';
   signal is_over : boolean   := false;
 
   signal is_clear, fault, lost             : std_logic;
@@ -53,7 +55,7 @@ begin
     port map (
       clk              => clk,
       rst_n            => rst_n,
-      enable           => '1',
+      enable           => enable,
       is_clear         => is_clear,
       sub_offered      => sub_offered,
       sub_beat         => sub_beat,
@@ -233,6 +235,43 @@ begin
       " pulses" severity failure;
     assert CROWDED or losses = 0
       report "faults were lost" severity failure;
+
+    rst_n <= '0';
+    for cycle in 1 to 4 loop
+      wait until rising_edge(clk);
+    end loop;
+    rst_n <= '1';
+    -- Waits are first, since they are cleared first; in the reverse of the order of clearing.
+    for word in 14 downto 1 loop
+      for channel in CHANNELS-1 downto 0 loop
+        read_address <= std_logic_vector(to_unsigned(16*channel + word, 16));
+        wait until falling_edge(clk);
+        assert unsigned(read_word) = 0
+          report "a word is not zero after reset, close to " & integer'image(word) & " of channel " &
+          integer'image(channel) severity failure;
+      end loop;
+    end loop;
+    if is_clear = '0' then
+      wait until is_clear = '1';
+    end if;
+
+    -- The first one is counted. It still waits when counting ends.
+    wait until falling_edge(clk);
+    frame_error(0)               <= '1';
+    frame_error_code(3 downto 0) <= x"1";
+    wait until falling_edge(clk);
+    enable <= '0';
+    for cycle in 1 to 9 loop
+      wait until falling_edge(clk);
+      if cycle = 2 then
+        frame_error(0) <= '0';
+      end if;
+      assert lost = '0'
+        report "a fault that is not counted is lost" severity failure;
+    end loop;
+    read(0, 1, found);
+    assert found = 1
+      report integer'image(found) & " faults instead of one" severity failure;
     report "PASS " & integer'image(counted) & " of " & integer'image(injected);
     is_over <= true;
     wait;

@@ -169,6 +169,16 @@ def test_faults_frames_and_waits_are_counted_in_their_channels(library: Library,
     script.run(library, tmp_path)
 
 
+def test_a_counter_is_zero_after_a_second_reset_before_it_is_cleared(library: Library, tmp_path: Path) -> None:
+    """The last word of the table of faults is cleared last, in the 64th cycle; it is read in about the twentieth."""
+    script = Script()
+    script.act("f", 2, 12)
+    script.read("publisher[0].faults[11]", 1)
+    script.act("z", 0, 0)
+    script.read("publisher[0].faults[11]", 0)
+    script.run(library, tmp_path)
+
+
 @pytest.mark.parametrize("is_crowded", [False, True])
 @pytest.mark.parametrize(
     ("subscribers", "publishers"), [(3, 5), (1, 1), (2, 3), pytest.param(9, 40, marks=pytest.mark.check)]

@@ -202,28 +202,45 @@ _TREE_TO_HOST = Proof(
     is_bounded=True,
 )
 
+_REPORT = "pub_ready(FIRST+SIZE-1 downto FIRST);"
 _WATCHED_TREE = Proof(
     "tree_watchdog",
     "small_tree",
     _TREE_CORES,
     sizes=({"PUBLISHERS": 3, "WATCHDOG": 2}, {"PUBLISHERS": 2, "WATCHDOG": 4}),
-    depth=13,
+    depth=12,
     mutations=(
-        Mutation(_TREE, "ends     <= cut or member_tlast;", "ends     <= member_tlast;", ("frees_the_group",)),
-        Mutation(_WATCHDOG, "cut_r    <= '1';", "cut_r    <= '0';", ("frees_the_channel",)),
-        Mutation(_WATCHDOG, "not clears and not late and", "not clears and", ("abort_ends_one_frame",)),
+        Mutation(_WATCHDOG, "not clears and not late and", "not clears and", ("begins_with_its_id",)),
+        Mutation(_WATCHDOG, "m_axis_tlast    <= '1';", "m_axis_tlast    <= '0';", ("abort_ends_one_frame",)),
+        Mutation(_WATCHDOG, 'm_axis_tuser    <= "1";', 'm_axis_tuser    <= "0";', ("whole_without_abort",)),
+        Mutation(_TREE, "high          => granted_high,", 'high          => x"00",', ("upper_byte_is_inserted",)),
+        Mutation(
+            _TREE, "sent_tuser(8 downto 1) <= granted_high;", 'sent_tuser(8 downto 1) <= x"00";', ("tid_is_the_id",)
+        ),
         Mutation(
             _TREE, "tick     <= '1' when counted_r = PERIOD-1 else '0';", "tick     <= '1';", ("no_hasty_abort",), 1
         ),
-        Mutation(
-            _TREE,
-            "<= pub_ready(FIRST+SIZE-1 downto FIRST);",
-            "<= not pub_ready(FIRST+SIZE-1 downto FIRST);",
-            ("each_abort_is_reported",),
-        ),
+        Mutation(_WATCHDOG, "inside_r = '1' and ready = '1'", "inside_r = '1'", ("no_hasty_abort",)),
+        Mutation(_TREE, _REPORT, f"not {_REPORT}", ("each_abort_is_reported",)),
+        Mutation(_TREE, f"<= {_REPORT}", "<= (others => '1');", ("no_report_invented",)),
     ),
     sources=("small_tree.vhd",),
-    trace=13,
+    trace=12,
+    is_bounded=True,
+)
+
+_WATCHED_TREE_LIMITS = Proof(
+    "tree_watchdog_limits",
+    "small_tree",
+    _TREE_CORES,
+    sizes=({"PUBLISHERS": 3, "WATCHDOG": 2}, {"PUBLISHERS": 3, "WATCHDOG": 4}),
+    depth=23,
+    mutations=(
+        Mutation(_TREE, "ends     <= cut or member_tlast;", "ends     <= member_tlast;", ("frees_the_group",), 1),
+        Mutation(_WATCHDOG, "cut_r    <= '1';", "cut_r    <= '0';", ("frees_the_channel",), 1),
+    ),
+    sources=("small_tree.vhd",),
+    trace=23,
     is_bounded=True,
 )
 
@@ -253,4 +270,4 @@ _STORED = Proof(
     is_bounded=True,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _WATCHED_TREE, _STORED)
+PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _WATCHED_TREE, _WATCHED_TREE_LIMITS, _STORED)

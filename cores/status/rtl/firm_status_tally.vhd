@@ -124,11 +124,12 @@ begin
     begin
       if rising_edge(clk) then
         word_r     <= memory(to_integer(unsigned(index)));
-        if is_clear_r /= '1' then
-          word_r <= (others => '0');
-        end if;
         was_read_r <= not op_valid;
         kept_r     <= read_word;
+        if is_clear_r /= '1' then
+          word_r <= (others => '0');
+          kept_r <= (others => '0');
+        end if;
       end if;
     end process read_memory;
   end generate shared_port;

@@ -18,7 +18,7 @@ entity firm_status_waits is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- The table is zero; after reset this takes a turn.
+    -- The table is zero; after reset this takes a turn. Until then, reading gives zeros.
     is_clear : out std_logic;
 
     -- Waits are measured.
@@ -137,6 +137,9 @@ begin
       current(to_integer(place_r)) <= new_current;
       longest(to_integer(place_r)) <= new_longest;
       read_r                       <= longest(to_integer(unsigned(read_index)));
+      if keeps_r /= '1' then
+        read_r <= (others => '0');
+      end if;
     end if;
   end process write_memory;
 
