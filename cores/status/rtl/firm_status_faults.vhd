@@ -42,8 +42,8 @@ architecture rtl of firm_status_faults is
   constant ROWS         : positive := (CHANNELS + COLUMNS - 1) / COLUMNS;
   constant PLACES       : positive := ROWS*COLUMNS;
   constant NO_ROW       : std_logic_vector(ROWS-1 downto 0) := (others => '0');
-  -- As many channels as a table of six inputs can check for a fault and a waiting fault each.
-  constant CHECKED      : positive := 3;
+  -- As many channels as a table of six inputs can check for a fault and a waiting one that stays.
+  constant CHECKED      : positive := 2;
   constant CHECKS       : positive := (CHANNELS + CHECKED - 1) / CHECKED;
   constant NO_CHECK     : std_logic_vector(CHECKS-1 downto 0) := (others => '0');
 
@@ -108,12 +108,13 @@ begin
       refused   := NO_CHECK;
       enabled_r <= enable;
       for number in 0 to CHANNELS-1 loop
-        refused(number/CHECKED) := refused(number/CHECKED) or (frame_error(number) and waiting_r(number));
-        if waiting_r(number) = '1' then
-          waiting_r(number) <= not taken(number);
-        elsif frame_error(number) = '1' then
-          waiting_r(number)                     <= enable;
-          codes_r(4*number+3 downto 4*number) <= frame_error_code(4*number+3 downto 4*number);
+        refused(number/CHECKED) := refused(number/CHECKED)
+                                   or (frame_error(number) and waiting_r(number) and not taken(number));
+        if waiting_r(number) = '0' or taken(number) = '1' then
+          waiting_r(number) <= frame_error(number) and enable;
+          if frame_error(number) = '1' then
+            codes_r(4*number+3 downto 4*number) <= frame_error_code(4*number+3 downto 4*number);
+          end if;
         end if;
       end loop;
       refused_r <= refused;
