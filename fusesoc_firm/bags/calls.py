@@ -67,12 +67,11 @@ class _Kinds:
 
 @dataclass(frozen=True)
 class _Calls:
-    """The recorded calls of a service: the stream of their requests, and the values of `event_type` to use."""
+    """The recorded calls of a service: the stream of their requests, and the events to use."""
 
     type: EventType
     requests: Stream
-    request: int
-    response: int
+    kinds: _Kinds
 
 
 @dataclass(frozen=True)
@@ -99,11 +98,11 @@ class BagOfCalls(Bag):
             if event is None:
                 continue
             key = (calls.requests, *event["info"]["client_gid"], event["info"]["sequence_number"])
-            if event["info"]["event_type"] == calls.request and event["request"]:
+            if event["info"]["event_type"] == calls.kinds.request and event["request"]:
                 number = numbers[key] = counts[calls.requests] = counts.get(calls.requests, -1) + 1
                 payload = encode(calls.type.request, event["request"][0])
                 yield Recorded(calls.requests, number, recorded.stamp, payload)
-            elif event["info"]["event_type"] == calls.response and event["response"] and key in numbers:
+            elif event["info"]["event_type"] == calls.kinds.response and event["response"] and key in numbers:
                 payload = encode(calls.type.response, event["response"][0])
                 self.responses[calls.requests, numbers.pop(key)] = payload
 
@@ -137,7 +136,7 @@ def with_calls(
         kinds = _kinds_in(bag, stream, type_) if type_ else None
         if type_ and kinds:
             requests = Stream(topics.get(absolute_name(stream.topic), stream.topic), type_.request_name, "", "")
-            calls[stream] = _Calls(type_, requests, kinds.request, kinds.response)
+            calls[stream] = _Calls(type_, requests, kinds)
             streams[requests] = kinds.count
             if kinds.invalid:
                 streams[stream] = kinds.invalid

@@ -20,6 +20,7 @@ from fusesoc_firm.store.own_code import PACKAGE
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.hdl.ghdl import REPOSITORY
+from tests.processes import program
 
 RUN_TITLE = "A second run of the applications' target `sim`"
 EDIT_TITLE = "An edit in a project of 60 messages"
@@ -124,7 +125,7 @@ def set_up(
     configuration.write_text("".join(f"[library.l{n}]\nlocation = {path}\n" for n, path in enumerate(libraries)))
     done = subprocess.run(
         [
-            str(Path(sys.executable).with_name("fusesoc")),
+            program("fusesoc"),
             *("--config", str(configuration), "run", "--setup", f"--target={target}"),
             *("--build-root", str(folder / "build"), core),
         ],

@@ -14,9 +14,10 @@ import pytest
 
 from fusesoc_firm import __version__
 from fusesoc_firm.tools import manifest
+from tests.processes import program
 
 ROOT = Path(__file__).resolve().parents[2]
-FUSESOC = Path(sys.executable).parent / "fusesoc"
+FUSESOC = Path(program("fusesoc"))
 CORES = ("quat2euler", "quat2euler_hls")
 # Tests of one core share a store and a build folder, so one worker must run them.
 shared = [pytest.param(core, marks=pytest.mark.xdist_group(f"main_job_{core}")) for core in CORES]

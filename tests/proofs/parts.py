@@ -158,6 +158,11 @@ _TREE_CORES = (
     "manager/tree",
 )
 
+# The upper byte of an id gets lost before the host, or beside its frame.
+_WITHOUT_HIGHS = (
+    Mutation(_TREE, "high          => granted_high,", 'high          => x"00",', ("upper_byte_is_inserted",)),
+    Mutation(_TREE, "sent_tuser(8 downto 1) <= granted_high;", 'sent_tuser(8 downto 1) <= x"00";', ("tid_is_the_id",)),
+)
 _TREE_TO_HOST = Proof(
     "manager_tree",
     "small_tree",
@@ -180,10 +185,7 @@ _TREE_TO_HOST = Proof(
             "when extra_r = '1' else not s_axis_tdata;",
             ("begins_with_its_id",),
         ),
-        Mutation(_TREE, "high          => granted_high,", 'high          => x"00",', ("upper_byte_is_inserted",)),
-        Mutation(
-            _TREE, "sent_tuser(8 downto 1) <= granted_high;", 'sent_tuser(8 downto 1) <= x"00";', ("tid_is_the_id",)
-        ),
+        *_WITHOUT_HIGHS,
         Mutation(
             "firm_axis_register_slice.vhd",
             "<= skid_r when skidded = '1' else arriving",
@@ -213,10 +215,7 @@ _WATCHED_TREE = Proof(
         Mutation(_WATCHDOG, "not clears and not late and", "not clears and", ("begins_with_its_id",)),
         Mutation(_WATCHDOG, "m_axis_tlast    <= '1';", "m_axis_tlast    <= '0';", ("abort_ends_one_frame",)),
         Mutation(_WATCHDOG, 'm_axis_tuser    <= "1";', 'm_axis_tuser    <= "0";', ("whole_without_abort",)),
-        Mutation(_TREE, "high          => granted_high,", 'high          => x"00",', ("upper_byte_is_inserted",)),
-        Mutation(
-            _TREE, "sent_tuser(8 downto 1) <= granted_high;", 'sent_tuser(8 downto 1) <= x"00";', ("tid_is_the_id",)
-        ),
+        *_WITHOUT_HIGHS,
         Mutation(
             _TREE, "tick     <= '1' when counted_r = PERIOD-1 else '0';", "tick     <= '1';", ("no_hasty_abort",), 1
         ),

@@ -37,7 +37,7 @@ def _is_known(name: str, topic: str, uri: str) -> bool:
 class Finders:
     """The nodes of ROS 2 that publish their counts and have found the readers that a peer created before this object.
 
-    A process announces its readers one after another, so whoever sends to the last one has found the others.
+    A process announces its readers in the order of their creation. A node that sends to the last one has found all.
     """
 
     def __init__(self, node: Any) -> None:
