@@ -5,24 +5,17 @@ Peers, node and echo run at the same time on one machine: the figures depend on 
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 import statistics
 import subprocess
 import tempfile
-import time
 from bisect import bisect_left
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.frame.defaults import completed
-from fusesoc_firm.frame.encoder import encode
-from fusesoc_firm.node.transport.simulator import Simulator
-from fusesoc_firm.node.transport.transport import Burst
-from fusesoc_firm.simulation.simulator import build_simulator
-from fusesoc_firm.system.message_sources import load_beside
 from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.ros.cpp_nodes import DEBIAN_PYTHON, ROS2, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import PACED_PEER, LiveNode, paced, specification
@@ -47,9 +40,10 @@ _IMAGE_RATE, _IMAGE_SECONDS = 2, 20.0
 _IMAGE_COLUMNS = ("node", "sent", "median, ms", "simulator, ms", "rest to echo", "bar", "result")
 _IMAGES_NOTE = f"""
     The peer and the echo exchange sensor_msgs/Image with {_IMAGE_BYTES:,} bytes of data at {_IMAGE_RATE} Hz. The system
-    forwards them at 64 bits; Verilator needs about 125,000 cycles for each. 'simulator' is the median for the same
-    frame through the simulator's pipe alone, without node and ROS. 'rest to echo' is what the node takes beside it, as
-    a multiple of the echo's median. To pass, all images must return unchanged and in order.
+    forwards them at 64 bits; Verilator needs about 125,000 cycles for each. 'simulator' is the median of the time from
+    a frame's entry into the simulator's pipe to the return of its response, by the node's trace. 'rest to echo' is
+    what the node and ROS take beside it, as a multiple of the echo's median. To pass, all images must return unchanged
+    and in order.
     """
 _IMAGES_SPECIFICATION = """\
 project: {{name: images, width: 64}}
@@ -60,6 +54,7 @@ blocks:
 """
 _WAY = ("/QuaternionToEuler_sub", "/QuaternionToEuler_pub")
 _IMAGE_WAY, _ECHO_WAY = ("/image_in", "/image_out"), ("/echo_sub", "/echo_pub")
+_TRACE = "trace.csv"
 # Angles are right to this, in rad.
 _TOLERANCE = 1e-9
 
@@ -133,7 +128,7 @@ def _images(version: int) -> list[tuple[str, ...]]:
         spec = folder / "images.yaml"
         spec.write_text(_IMAGES_SPECIFICATION.format(ros="ROS" if version == 1 else "ROS2"), encoding="utf-8")
         live, echo = _run(ros, folder, spec, 10, _IMAGE_RATE, _IMAGE_SECONDS, "images")
-        simulated = _seconds_of_simulator(spec, folder / "simulators")
+        simulated = _seconds_of_simulator(folder / _TRACE)
     middle, plain = (statistics.median(way["seconds"]) for way in (live, echo))
     rest = (middle - simulated) / plain
     most = _MOST_ECHOES[_NODES[version][0]]
@@ -150,6 +145,8 @@ def _run(ros: Ros, folder: Path, spec: Path, depth: int, rate: int, seconds: flo
     """The responses of the node of a system and of the echo."""
     command = ["live", str(spec), "--tool", "verilator", "--queue", str(depth)]
     command += ["--build-root", str(folder / "simulators")]
+    if kind:
+        command += ["--trace", str(folder / _TRACE)]
     ways = [_IMAGE_WAY if kind else _WAY, _ECHO_WAY]
     with LiveNode(ros, folder / "node.log", command) as node:
         node.wait_until_ready()
@@ -164,21 +161,11 @@ def _run(ros: Ros, folder: Path, spec: Path, depth: int, rate: int, seconds: flo
     return found
 
 
-def _seconds_of_simulator(spec: Path, root: Path) -> float:
-    """The median time of a frame with an image through the simulator alone, at its pipe."""
-    built = build_simulator(spec, "verilator", build_root=root)
-    loaded = load_beside(spec, [], None)
-    layout = loaded.system.subscribers[0].frame
-    frame = pack_frame(0, encode(layout, completed(layout, {"data": bytes(_IMAGE_BYTES)})))
-    found = []
-    with Simulator(built.command(), built.folder) as simulator:
-        for _ in range(round(_IMAGE_RATE * _IMAGE_SECONDS)):
-            start = time.perf_counter()
-            simulator.request(frame)
-            while not any(isinstance(event, Burst) for event in simulator.run(2**20)):
-                continue
-            found.append(time.perf_counter() - start)
-    return statistics.median(found)
+def _seconds_of_simulator(trace: Path) -> float:
+    """The median time of a frame in the simulator and its pipe, by the trace of a node."""
+    with trace.open(encoding="utf-8", newline="") as rows:
+        ways = [int(row["came_ns"]) - int(row["sent_ns"]) for row in csv.DictReader(rows)]
+    return statistics.median(ways) / 1e9
 
 
 def _is_among(value: float, ascending: list[float]) -> bool:
