@@ -24,7 +24,7 @@ from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.actions import NodeActions
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.calls import NodeCalls
-from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Lost, Published, Taken
+from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Event, Lost, Published, Taken
 from fusesoc_firm.node.description import (
     Crossing,
     NodeDescription,
@@ -147,7 +147,7 @@ class Node:
         self._is_wanted_to_end = threading.Event()
         self._drains = threading.Event()
         self._is_over = threading.Event()
-        self._fault: TransportError | CarrierError | None = None
+        self._fault: BaseException | None = None
         self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
         self._offered = self._declined = self._handled = 0
         self._is_counted = False
@@ -186,7 +186,10 @@ class Node:
         sender, receiver = self._start(self._send), self._start(self._receive)
         self._start(self._diagnose)
         self._is_wanted_to_end.wait()
-        latest = time.monotonic() + self._settings.drain
+        # Without one of its threads, the node cannot process what it has received.
+        is_whole = self._fault is None or isinstance(self._fault, TransportError | CarrierError)
+        latest = time.monotonic() + (self._settings.drain if is_whole else 0.0)
+        self._actions.give_up()
         for carrier in carriers.values():
             carrier.stop()
         for carrier in carriers.values():
@@ -239,11 +242,17 @@ class Node:
             raise TransportError(NO_ANSWER)
 
     def _start(self, work: Callable[[], None]) -> threading.Thread:
-        thread = threading.Thread(target=work, daemon=True)
+        def guarded() -> None:
+            try:
+                work()
+            except BaseException as error:  # noqa: BLE001 - the run would wait for what the thread no longer does
+                self._fail(error)
+
+        thread = threading.Thread(target=guarded, daemon=True)
         thread.start()
         return thread
 
-    def _fail(self, error: TransportError | CarrierError) -> None:
+    def _fail(self, error: BaseException) -> None:
         """End the run with an error; ignore the errors of a transport or carrier that is being closed."""
         with self._lock:
             if not self._is_over.is_set():
@@ -288,23 +297,27 @@ class Node:
         """Handle the events of a carrier."""
         try:
             for event in carrier.receive():
-                if isinstance(event, Published):
-                    self._note_published(event)
-                elif isinstance(event, Lost):
-                    self._note_lost(event)
-                elif isinstance(event, Called):
-                    if not self._actions.called(event):
-                        self._calls.called(event)
-                elif isinstance(event, Answered):
-                    self._calls.answered(event)
-                elif not self._actions.taken(event):
-                    self._take_message(event)
+                self._take_event(event)
         except CarrierError as error:
             self._fail(error)
         except ClosedError:
             # The time limit for ending the node has passed.
             return
         self.stop()
+
+    def _take_event(self, event: Event) -> None:
+        if isinstance(event, Published):
+            self._note_published(event)
+        elif isinstance(event, Lost):
+            self._note_lost(event)
+        elif isinstance(event, Called):
+            if not self._actions.called(event):
+                self._calls.called(event)
+        elif isinstance(event, Answered):
+            if not self._actions.answered(event):
+                self._calls.answered(event)
+        elif not self._actions.taken(event):
+            self._take_message(event)
 
     def _note_lost(self, event: Lost) -> None:
         # The messages of actions have no input of their own.

@@ -221,7 +221,10 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
     out << (service.is_server ? "service of" : "service called by") << " the hardware:\n  " << service.name << "  "
         << service.type << "\n";
   }
-  for (const auto& action : system.actions) out << "action of the hardware:\n  " << action.name << "\n";
+  for (const auto& action : system.actions) {
+    out << (action.is_server ? "action of the hardware:\n  " : "action to which the hardware sends goals:\n  ")
+        << action.name << "\n";
+  }
   out << "\nSIGINT and SIGTERM end the node after all pending messages; a second signal ends the node at once.\n"
       << "exit status: 0, 1 if the hardware or ROS failed, 2 for an invalid command line\n";
 }
@@ -309,7 +312,8 @@ class Engines {
       };
     }
     for (const auto& action : system.actions) {
-      for (const unsigned publisher : {action.feedback, action.result}) {
+      const bool is_server = action.is_server;
+      for (const unsigned publisher : {is_server ? action.feedback : action.goal, is_server ? action.result : action.cancel}) {
         from_hardware_.at(publisher) = [this, publisher](const std::uint8_t* payload, std::size_t size) {
           actions_.take(publisher, payload, size);
         };
@@ -351,7 +355,7 @@ class Engines {
     };
   }
 
-  // Serve and call all services, and serve all actions, with a middleware.
+  // Serve and call all services, and exchange the goals of all actions, with a middleware.
   template <typename Ros>
   void connect(Ros& ros) {
     calls_.connect(ros);
@@ -483,7 +487,7 @@ inline void print_calls(const std::string& block, const CallStatistics& counted)
 inline void print_goals(const std::string& block, const GoalStatistics& counted) {
   std::cerr << block << ": " << counted.goals << " goals, " << counted.succeeded << " succeeded, " << counted.canceled
             << " canceled, " << counted.aborted << " aborted, " << counted.rejected << " rejected, " << counted.unasked
-            << " unasked" << std::endl;
+            << " unasked, " << counted.lost << " lost" << std::endl;
 }
 
 // The services and actions while they are connected to a middleware, which outlives them.
