@@ -3,12 +3,13 @@
     node = Node(description, open_transport, settings)
     node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails permanently
 
-A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next) and
-is sent as a frame. If no message waits and the hardware is ready, the thread that takes the message sends it. The
-response returns as bursts, which are joined. If software is part of the system, the thread that delivers a message
-calls the software's functions. While a function runs, the node takes no burst from the hardware; the hardware stalls as
-with any accelerator that is not ready. A function's output never waits for space in a queue, since this could cause a
-deadlock: if the output's queue to the hardware is full, a message is dropped and counted.
+A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next; the
+two subscribers of an action share one) and is sent as a frame. If no message waits and the hardware is ready, the
+thread that takes the message sends it. The response returns as bursts, which are joined. If software is part of the
+system, the thread that delivers a message calls the software's functions. While a function runs, the node takes no
+burst from the hardware; the hardware stalls as with any accelerator that is not ready. A function's output never waits
+for space in a queue, since this could cause a deadlock: if the output's queue to the hardware is full, a message is
+dropped and counted.
 """
 
 from __future__ import annotations
@@ -95,8 +96,9 @@ class NodeSettings:
 
 @dataclass(frozen=True)
 class _Message:
-    """A message in a subscriber's queue."""
+    """A message in a queue, for the input with this number."""
 
+    number: int
     payload: bytes
     entry: Entry | None
 
@@ -137,6 +139,11 @@ class Node:
         self._watch = settings.watch
         self._inputs = description.inputs
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
+        # A result must not overtake feedback, nor a cancellation its goal.
+        pairs = [
+            (item.cancel, item.goal) if item.is_server else (item.result, item.feedback) for item in description.actions
+        ]
+        self._shared_queues = {self._numbers[second]: self._numbers[first] for second, first in pairs}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
         self._status = StatusExchange(self._put_status_request) if description.has_status_frames else None
@@ -166,6 +173,10 @@ class Node:
             waiting = self._queues.waiting(number)
             found[item.block] = Load(waiting, self._depth(item), dropped, counts.refused, counts.lost)
         return found
+
+    def _queue_of(self, number: int) -> int:
+        """Return the number of the queue of an input."""
+        return self._shared_queues.get(number, number)
 
     def _depth(self, item: NodeTopic | Crossing) -> int:
         return self._settings.depth or (item.depth if isinstance(item, NodeTopic) else DEFAULT_DEPTH)
@@ -235,7 +246,7 @@ class Node:
 
     def _put_status_request(self, request: bytes) -> None:
         try:
-            is_there = self._queues.put(len(self._inputs), _Message(request, None), 0.0)
+            is_there = self._queues.put(len(self._inputs), _Message(len(self._inputs), request, None), 0.0)
         except ClosedError:
             raise TransportError("the node is ending") from None
         if not is_there:
@@ -341,16 +352,16 @@ class Node:
             seen = self._watch.saw(item.block, payload, received_ns - self._watch.start_ns)
             if entry:
                 entry.seen = seen
-        message = _Message(payload, entry)
+        message = _Message(number, payload, entry)
         with self._lock:
             is_alone = not self._waiting()
             counts.received += 1
             self._offered += 1
         if is_alone and self._software is None and self._hardware.transport.is_ready():
-            self._queues.pass_by(number)
+            self._queues.pass_by(self._queue_of(number))
             self._handle(number, message)
             return
-        is_there = self._queues.put(number, message, timeout)
+        is_there = self._queues.put(self._queue_of(number), message, timeout)
         if not is_there and self._settings.overflow is Overflow.BLOCK:
             # No other thread counts this message.
             with self._lock:
@@ -365,9 +376,11 @@ class Node:
             return self._offered - self._declined - self._handled - dropped
 
     def _send(self) -> None:
-        for number, message in self._queues:
-            is_request = number == len(self._inputs)
-            if not (self._send_status_request(message.payload) if is_request else self._handle(number, message)):
+        for _, message in self._queues:
+            is_request = message.number == len(self._inputs)
+            if not (
+                self._send_status_request(message.payload) if is_request else self._handle(message.number, message)
+            ):
                 return
 
     def _handle(self, number: int, message: _Message) -> bool:

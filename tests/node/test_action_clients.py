@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 import struct
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -233,6 +234,23 @@ def test_goals_are_sent_one_after_another(peer: Make) -> None:
     ]
     assert server.canceled() == []
     assert re.search("^count +2 +1 +0 +1 +0$", server.run.node.statistics.text(), re.MULTILINE)
+
+
+def test_a_result_does_not_overtake_feedback(tmp_path: Path) -> None:
+    """The hardware takes nothing for a while, so feedback and the result wait in the node."""
+    server = Peer(tmp_path, 1)
+    server.order(5)
+    identity = server.accept()
+    assert server.asker.hardware
+    gate = server.asker.hardware._gate = threading.Event()
+    for number in range(5):
+        server.feed(identity, number)
+    server.finish(identity, 3, 5)
+    until(lambda: server.run.node._offered == 6)
+    gate.set()
+    until(server.results)
+    server.run.stop()
+    assert [item for item, _ in server.received()] == [1, 1, 1, 1, 1, 2]
 
 
 def test_hardware_cancels_its_goal(peer: Make) -> None:

@@ -291,6 +291,12 @@ class Engines {
     for (const auto& topic : system.subscribers) {
       if (topic.id) configuration.queue_depths[*topic.id] = arguments.quality_of(topic).depth;
     }
+    for (const auto& action : system.actions) {
+      // A result must not overtake feedback, nor a cancellation its goal.
+      const auto [first, second] = action.is_server ? std::pair(action.goal, action.cancel)
+                                                    : std::pair(action.feedback, action.result);
+      configuration.shared_queues[second] = first;
+    }
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
     configuration.has_status = system.has_status_frames();
@@ -330,6 +336,7 @@ class Engines {
     configuration.on_rejected = configuration.on_aborted = nullptr;
     configuration.on_restart = configuration.on_rest = nullptr;
     configuration.queue_depths.clear();
+    configuration.shared_queues.clear();
     software_ = std::make_unique<Node>(configuration, "software:" + arguments.software, by_id(from_software_));
     for (unsigned id = 0; id < inputs.size(); ++id) {
       if (inputs[id].converter) from_hardware_.at(*inputs[id].converter) = into(*software_, id);
