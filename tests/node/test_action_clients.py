@@ -6,7 +6,6 @@ import random
 import re
 import struct
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from fusesoc_firm.frame.defaults import completed
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.node.action_types import CANCEL, CANCEL_GOAL, FEEDBACK, GET_RESULT, GOAL, RESULT, SEND_GOAL, STATES
-from fusesoc_firm.node.calls import MOST_WAITING
+from fusesoc_firm.node.calls import MOST_WAITING, CallLine
 from fusesoc_firm.node.carrier import Answer, Call
 from fusesoc_firm.node.description import describe
 from fusesoc_firm.node.node import HardwareListener, NodeSettings
@@ -353,16 +352,31 @@ def test_a_goal_of_a_silent_server_is_lost_and_canceled(peer: Make) -> None:
     assert "lost goals: 1" in server.run.node.statistics.text()
 
 
-def test_states_and_feedback_extend_the_time_limit(peer: Make) -> None:
-    server = peer(time_limit=2.0)
+def test_states_feedback_and_a_cancellation_extend_the_time_limit(peer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of another client's goal do not."""
+    extended: list[CallLine] = []
+
+    def extend(line: CallLine) -> None:
+        extended.append(line)
+
+    monkeypatch.setattr(CallLine, "extend", extend)
+    server = peer()
     server.order(4)
     identity = server.accept()
-    for number in range(30):
-        server.feed(identity, number) if number % 2 else server.tell_states(b"z" * 16, identity)
-        until(lambda: len([1 for item, _ in server.received() if item == 1]) == (number + 1) // 2)  # noqa: B023
-        time.sleep(0.1)
-    server.finish(identity, SUCCEEDED[server.version], 4)
-    until(lambda: server.results() == [(SUCCEEDED[server.version], 4)])
+    # The answer to the goal in ROS 2, and its state in ROS 1.
+    until(lambda: len(extended) == 1)
+    server.tell_states(b"z" * 16)
+    server.feed(b"z" * 16, 1)
+    server.tell_states(b"z" * 16, identity)
+    until(lambda: len(extended) == 2)
+    server.feed(identity, 2)
+    until(server.received)
+    assert len(extended) == 3
+    server.order_cancel()
+    until(server.canceled)
+    assert len(extended) == 4
+    server.finish(identity, CANCELED[server.version], 4)
+    until(server.results)
     server.run.stop()
 
 
@@ -419,14 +433,24 @@ def test_restarted_hardware_gets_no_result_of_goals_before(peer: Make) -> None:
     server.run.stop()
 
 
-def test_goals_are_canceled_when_the_node_ends(peer: Make) -> None:
+def test_goals_are_canceled_when_the_node_ends(peer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While ROS still takes messages."""
     server = peer()
+    canceled: list[list[bytes]] = []
+
+    def stop() -> None:
+        canceled.append(server.canceled())
+        stop_carrier()
+
+    stop_carrier = server.run.carrier.stop
+    monkeypatch.setattr(server.run.carrier, "stop", stop)
     server.order(4)
     identity = server.accept()
     server.feed(identity, 1)
     until(server.received)
     server.run.stop()
-    assert server.canceled() == [server.cancellation(identity)]
+    assert canceled == [[server.cancellation(identity)]]
+    assert server.canceled() == canceled[0]
     assert server.run.is_complete
 
 
