@@ -6,7 +6,7 @@ The two ends number their calls differently, so only the events of one end are u
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -20,13 +20,15 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import InterfaceKind
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.system.derived.model import Service, absolute_name
+from fusesoc_firm.system.derived.model import Service, ServiceEnd, absolute_name
 from fusesoc_firm.text.diagnostics import InputError, fail
 
 EVENTS = "_service_event"
 # The values of `event_type` for a request and a response, by end (service_msgs/ServiceEventInfo); a server's are those
 # that the hardware would record.
 _ENDS = ((1, 2), (0, 3))
+# What tells a call from others: the writer of the request and its number.
+_Key = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class EventType:
 
     name: str
     request_name: str
+    response_name: str
     signature: str
     event: Frame
     request: Frame
@@ -51,8 +54,8 @@ class EventType:
         names = (*events, *interface.exchanged)
         closures = [library.closure(name) for name in names]
         event, request, response = map(frame_of, names, closures)
-        spelled, requests = (f"{name.package}/{interface.kind}/{name.name}" for name in names[:2])
-        return cls(spelled, requests, signature(names[0], closures[0]), event, request, response)
+        events_name, requests, responses = (f"{name.package}/{interface.kind}/{name.name}" for name in names)
+        return cls(events_name, requests, responses, signature(names[0], closures[0]), event, request, response)
 
 
 @dataclass(frozen=True)
@@ -67,82 +70,191 @@ class _Kinds:
 
 @dataclass(frozen=True)
 class _Calls:
-    """The recorded calls of a service: the stream of their requests, and the events to use."""
+    """The recorded calls of a service: its block, the stream of the messages to the hardware, and the events to use."""
 
+    service: Service
     type: EventType
-    requests: Stream
+    stream: Stream
     kinds: _Kinds
+
+    @property
+    def is_served(self) -> bool:
+        """Whether the messages to the hardware are requests."""
+        return self.service.end is ServiceEnd.SERVER
+
+    def part_of(self, recorded: Recorded) -> tuple[_Key, bytes | None, bytes | None] | None:
+        """Return the key of the call and its request or its response, if the event is valid and has one of them."""
+        event = _decoded(recorded, self.type)
+        if event is None:
+            return None
+        key = (*event["info"]["client_gid"], event["info"]["sequence_number"])
+        if event["info"]["event_type"] == self.kinds.request and event["request"]:
+            return key, encode(self.type.request, event["request"][0]), None
+        if event["info"]["event_type"] == self.kinds.response and event["response"]:
+            return key, None, encode(self.type.response, event["response"][0])
+        return None
 
 
 @dataclass(frozen=True)
 class BagOfCalls(Bag):
-    """A bag with calls: a stream of requests replaces each stream of events.
+    """A bag with calls: a stream of messages to the hardware replaces each stream of events in `calls`.
 
-    While the messages are read, `responses` gets each recorded response, by the stream and the number of its request.
+    These messages are requests to services that the hardware serves, and responses of others. While the messages are
+    read, `responses` gets each recorded response of the former, by the stream and the number of its request. The events
+    in `asked` are those of services that the hardware calls, by the blocks of their requests.
     """
 
     calls: Mapping[Stream, _Calls]
+    asked: Mapping[str, tuple[Stream, _Calls]]
     responses: dict[tuple[Stream, int], bytes] = field(default_factory=dict)
 
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
-        """Yield messages like `Bag`, and each request of the calls once. Raise `InputError` if the bag is damaged."""
-        own = {stream.topic for stream, calls in self.calls.items() if calls.requests.topic in topics}
-        numbers: dict[tuple[Any, ...], int] = {}
-        counts: dict[Stream, int] = {}
+        """Yield messages like `Bag`, and each message of the calls once. Raise `InputError` if the bag is damaged."""
+        own = {stream.topic for stream, calls in self.calls.items() if calls.stream.topic in topics}
+        numbers: dict[_Key, int] = {}
+        counts: Counter[Stream] = Counter()
         for recorded in super().messages({*topics, *own}, stop):
             calls = self.calls.get(recorded.stream)
             if calls is None:
                 yield recorded
                 continue
-            event = _decoded(recorded, calls.type)
-            if event is None:
+            if (part := calls.part_of(recorded)) is None:
                 continue
-            key = (calls.requests, *event["info"]["client_gid"], event["info"]["sequence_number"])
-            if event["info"]["event_type"] == calls.kinds.request and event["request"]:
-                number = numbers[key] = counts[calls.requests] = counts.get(calls.requests, -1) + 1
-                payload = encode(calls.type.request, event["request"][0])
-                yield Recorded(calls.requests, number, recorded.stamp, payload)
-            elif event["info"]["event_type"] == calls.kinds.response and event["response"] and key in numbers:
-                payload = encode(calls.type.response, event["response"][0])
-                self.responses[calls.requests, numbers.pop(key)] = payload
+            key, request, response = (calls.stream, *part[0]), *part[1:]
+            if request is not None:
+                numbers[key] = counts[calls.stream]
+                counts[calls.stream] += 1
+                if calls.is_served:
+                    yield Recorded(calls.stream, numbers[key], recorded.stamp, request)
+            elif response is not None and key in numbers:
+                number = numbers.pop(key)
+                if calls.is_served:
+                    self.responses[calls.stream, number] = response
+                else:
+                    yield Recorded(calls.stream, number, recorded.stamp, response)
+
+    def exchanges(self, block: str) -> Iterator[tuple[bytes, bytes | None]]:
+        """Yield each recorded request to a service that the hardware calls, and its response if there is one.
+
+        `block` is that of the requests. Raise `InputError` if the bag is damaged.
+        """
+        stream, calls = self.asked[block]
+        waiting: deque[tuple[_Key, bytes]] = deque()
+        responses: dict[_Key, bytes] = {}
+        for recorded in Bag.messages(self, [stream.topic]):
+            part = calls.part_of(recorded) if recorded.stream == stream else None
+            if part is None:
+                continue
+            key, request, response = part
+            if request is not None:
+                waiting.append((key, request))
+            elif response is not None:
+                responses[key] = response
+            while waiting and waiting[0][0] in responses:
+                key, request = waiting.popleft()
+                yield request, responses.pop(key)
+        for key, request in waiting:
+            yield request, responses.get(key)
 
 
 def with_calls(
-    bag: Bag, services: Iterable[Service], libraries: Mapping[Middleware, MessageLibrary], names: Mapping[str, str]
+    bag: Bag,
+    services: Iterable[Service],
+    libraries: Mapping[Middleware, MessageLibrary],
+    names: Mapping[str, str],
+    *,
+    plays_responses: bool,
 ) -> BagOfCalls:
-    """Return the bag with the calls of services that the hardware serves; `names` are the topics of their requests.
+    """Return the bag with the calls of services; `names` are the topics of the messages to the hardware.
 
-    A stream of requests has the topic of its service's requests, or that of the events if no service has its name.
-    Events without requests remain, and the number of invalid ones. Raise `InputError` if the definition of a service's
-    events differs.
+    A stream of these messages has the topic in `names`, or that of the events if no service has its name. With
+    `plays_responses`, the responses to calls of the hardware are among the messages of the bag. Events without requests
+    remain, and the number of invalid ones. Raise `InputError` if the definition of a service's events differs.
     """
-    types: dict[str, EventType] = {}
-    topics: dict[str, str] = {}
-    recorded = {stream.type for stream in bag.streams}
-    for service in services:
-        name = f"{service.type.package}/{InterfaceKind.SERVICE}/{service.type.name}_Event"
-        if name in recorded and (found := EventType.of(service, libraries[service.ros])):
-            types[name] = found
-            topics[absolute_name(f"{service.ros_name}/{EVENTS}")] = names[service.request]
+    known = _Known.of(bag, services, libraries, names)
     streams: dict[Stream, int] = {}
     calls: dict[Stream, _Calls] = {}
+    asked: dict[str, tuple[Stream, _Calls]] = {}
     for stream, count in bag.streams.items():
-        type_ = types.get(stream.type)
-        if type_ and stream.signature not in ("", type_.signature):
-            if absolute_name(stream.topic) in topics or stream.topic in names.values():
+        made = known.calls(bag, stream)
+        if made is None:
+            streams[stream] = count
+            continue
+        if made.is_served or plays_responses:
+            calls[stream] = made
+            streams[made.stream] = made.kinds.count
+        elif made.service.request in asked:
+            streams[stream] = count
+        else:
+            asked[made.service.request] = stream, made
+        if made.kinds.invalid:
+            streams[stream] = made.kinds.invalid
+    return BagOfCalls(**{**vars(bag), "streams": streams}, calls=calls, asked=asked)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """The services of a system whose events a bag contains, by the topics of their events, and the events' types."""
+
+    services: list[Service]
+    types: dict[str, EventType]
+    events: dict[str, Service]
+    names: Mapping[str, str]
+
+    @classmethod
+    def of(
+        cls,
+        bag: Bag,
+        services: Iterable[Service],
+        libraries: Mapping[Middleware, MessageLibrary],
+        names: Mapping[str, str],
+    ) -> _Known:
+        recorded = {stream.type for stream in bag.streams}
+        known = cls([], {}, {}, names)
+        for service in services:
+            name = _event_name(service)
+            if service.ros is not bag.form.ros or name not in recorded:
+                continue
+            if found := known.types.get(name) or EventType.of(service, libraries[service.ros]):
+                known.services.append(service)
+                known.types[name] = found
+                known.events[absolute_name(f"{service.ros_name}/{EVENTS}")] = service
+        return known
+
+    def calls(self, bag: Bag, stream: Stream) -> _Calls | None:
+        """Return the calls in a stream, or None if it has none. Raise `InputError` if its definition differs."""
+        topic, type_ = absolute_name(stream.topic), self.types.get(stream.type)
+        if type_ is None:
+            return None
+        if stream.signature not in ("", type_.signature):
+            if topic in self.events or topic in self.names.values():
                 text = f"its definition of {type_.name} differs from the system's"
                 fail(f"topic {stream.topic} in {bag.path}: {text}: {stream.signature}, not {type_.signature}")
-            type_ = None
-        kinds = _kinds_in(bag, stream, type_) if type_ else None
-        if type_ and kinds:
-            requests = Stream(topics.get(absolute_name(stream.topic), stream.topic), type_.request_name, "", "")
-            calls[stream] = _Calls(type_, requests, kinds)
-            streams[requests] = kinds.count
-            if kinds.invalid:
-                streams[stream] = kinds.invalid
-        else:
-            streams[stream] = count
-    return BagOfCalls(**{**vars(bag), "streams": streams}, calls=calls)
+            return None
+        service, kinds = self._service(topic, stream.type), _kinds_in(bag, stream, type_)
+        if service is None or kinds is None:
+            return None
+        given = self.names[_entering(service)] if topic in self.events else stream.topic
+        name = type_.request_name if service.end is ServiceEnd.SERVER else type_.response_name
+        return _Calls(service, type_, Stream(given, name, "", ""), kinds)
+
+    def _service(self, topic: str, event: str) -> Service | None:
+        """Return the service of a topic: that with its name, else that to which it is mapped, else the only one."""
+        found = [item for item in self.services if _event_name(item) == event]
+        mapped = [item for item in found if self.names[_entering(item)] == topic]
+        servers = [item for item in found if item.end is ServiceEnd.SERVER]
+        # A topic that could belong to several servers is an error of the routes.
+        rest = servers or (found if len(found) == 1 else [])
+        return self.events.get(topic) or next(iter(mapped or rest), None)
+
+
+def _event_name(service: Service) -> str:
+    return f"{service.type.package}/{InterfaceKind.SERVICE}/{service.type.name}_Event"
+
+
+def _entering(service: Service) -> str:
+    """Return the block of the messages to the hardware."""
+    return service.request if service.end is ServiceEnd.SERVER else service.response
 
 
 def _kinds_in(bag: Bag, stream: Stream, type_: EventType) -> _Kinds | None:

@@ -8,13 +8,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from fusesoc_firm.bags.calls import with_calls
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.message.bag_reader import BAGS, Bag, Stream, open_bag
 from fusesoc_firm.message.joint import signature_of_text
+from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived.model import Topic, absolute_name
+from fusesoc_firm.system.derived.model import Service, Topic, absolute_name
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
 AnyTopic = TypeVar("AnyTopic", bound=Topic)
@@ -161,13 +163,19 @@ def _is_signature(text: str) -> bool:
 
 
 def read_bag(
-    path: Path, subscribers: Sequence[Topic], hint: str = BAGS
+    path: Path,
+    subscribers: Sequence[Topic],
+    hint: str = BAGS,
+    services: Sequence[Service] = (),
+    libraries: Mapping[Middleware, MessageLibrary] | None = None,
 ) -> Iterator[tuple[Topic, bytes, dict[str, Any]]]:
     """Yield the subscriber, payload and decoded value of each routed message in chronological order.
 
-    May raise `InputError`.
+    The calls of `services` are messages, too. May raise `InputError`.
     """
-    with open_bag(path, hint) as bag:
+    with open_bag(path, hint) as opened:
+        names = {item.block: item.name for item in subscribers}
+        bag = with_calls(opened, services, libraries or {}, names, plays_responses=True)
         routes = routes_of(bag, subscribers)
         for stream, route in routes.items():
             if route.misfit:

@@ -16,7 +16,7 @@ from fusesoc_firm.node.languages import LANGUAGES, Place
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
 
 if TYPE_CHECKING:
-    from fusesoc_firm.system.derived.model import DerivedSystem
+    from fusesoc_firm.system.system_core import LoadedSystem
 
 
 def add_system(commands: Any) -> None:
@@ -174,7 +174,7 @@ def _check_as_json(arguments: argparse.Namespace) -> None:
         loaded = load(arguments)
         warnings = loaded.warnings
         warnings += check_sources(loaded, arguments.spec)
-        _check_stimuli(loaded.system, arguments.stimuli)
+        _check_stimuli(loaded, arguments.stimuli)
         memory_of(loaded.system, loaded.libraries)
     except InputError as error:
         faults = error.diagnostics
@@ -194,7 +194,7 @@ def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -
     loaded = load(arguments)
     print_warnings(check_sources(loaded, arguments.spec))
     system = loaded.system
-    _check_stimuli(system, stimuli)
+    _check_stimuli(loaded, stimuli)
     memory = memory_of(system, loaded.libraries)
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
     for line in default_lengths(system):
@@ -203,13 +203,12 @@ def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -
         print(f"the node needs {len(memory)} bytes of memory for its program and texts")
 
 
-def _check_stimuli(system: DerivedSystem, paths: Iterable[Path]) -> None:
+def _check_stimuli(loaded: LoadedSystem, paths: Iterable[Path]) -> None:
     """Raise `InputError` for the first file with a message that the system does not accept."""
-    from fusesoc_firm.simulation.software_run import stimulated
-    from fusesoc_firm.simulation.stimuli import read_stimuli
+    from fusesoc_firm.simulation.software_run import system_stimuli
 
     for path in paths:
-        read_stimuli(path, stimulated(system))
+        system_stimuli(path, loaded)
 
 
 def _show_system(arguments: argparse.Namespace) -> None:
@@ -309,8 +308,7 @@ def _report_system(arguments: argparse.Namespace) -> None:
 
 
 def _write_page(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.simulation.software_run import stimulated
-    from fusesoc_firm.simulation.stimuli import read_stimuli
+    from fusesoc_firm.simulation.software_run import system_stimuli
     from fusesoc_firm.system.views.diagram import dark_style, diagram
     from fusesoc_firm.system.views.page import page
     from fusesoc_firm.text.outputs import check_output, write
@@ -320,7 +318,7 @@ def _write_page(arguments: argparse.Namespace) -> None:
     loaded = load(arguments)
     path = arguments.stimuli or loaded.folder / "stimuli.yaml"
     is_known = arguments.stimuli is not None or path.exists()
-    stimuli = read_stimuli(path, stimulated(loaded.system)) if is_known else []
+    stimuli = system_stimuli(path, loaded) if is_known else []
     messages = [(item.subscriber.block, item.message) for item in stimuli]
     drawn = picture(diagram(loaded.system), "svg", dark_style()).decode()
     reports = sorted(loaded.folder.glob("build/*/*/report.json"))

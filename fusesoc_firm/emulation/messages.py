@@ -9,8 +9,7 @@ from pathlib import Path
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.request.request import CoreFolders
 from fusesoc_firm.simulation.reference import responses
-from fusesoc_firm.simulation.software_run import Traffic, answered, stimulated, traffic
-from fusesoc_firm.simulation.stimuli import read_stimuli
+from fusesoc_firm.simulation.software_run import Traffic, answered, system_stimuli, traffic
 from fusesoc_firm.system.message_sources import MessageSources, core_of
 from fusesoc_firm.system.scaffold.core_file import EMULATED
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_keys
@@ -38,6 +37,6 @@ def emulated_traffic(spec: Path, loaded: LoadedSystem, given: Mapping[str, Path 
             files[name] = core.path.parent / value
         else:
             fail(f"no core beside {spec} names its {name}", hint=f"name them with --{name}")
-    stimuli = read_stimuli(files["stimuli"], stimulated(loaded.system))
+    stimuli = system_stimuli(files["stimuli"], loaded)
     answers = responses(files["model"], stimuli, answered(loaded.system))
     return traffic(loaded.system, loaded.folder, stimuli, answers)

@@ -32,6 +32,8 @@ class State(Enum):
     CANCELED = "canceled"
     ABORTED = "aborted"
     REJECTED = "rejected"
+    # The server of a goal that the hardware has sent does not tell its end.
+    LOST = "lost"
 
     @property
     def has_ended(self) -> bool:
@@ -46,6 +48,7 @@ _ROS1_STATES = {
     State.SUCCEEDED: 3,
     State.ABORTED: 4,
     State.REJECTED: 5,
+    State.LOST: 9,
 }
 _ROS1_ENDS = {2: State.CANCELED, 3: State.SUCCEEDED, 4: State.ABORTED, 5: State.REJECTED, 8: State.CANCELED}
 _ROS1_PENDING, _ROS1_PREEMPTED, _ROS1_RECALLED = 0, 2, 8
@@ -57,6 +60,7 @@ _ROS2_STATES = {
     State.CANCELED: 5,
     State.ABORTED: 6,
     State.REJECTED: 0,
+    State.LOST: 0,
 }
 _ROS2_ENDS = {0: State.REJECTED, 4: State.SUCCEEDED, 5: State.CANCELED, 6: State.ABORTED}
 
@@ -66,6 +70,12 @@ class Reference(NamedTuple):
 
     id: bytes
     stamp: Stamp
+
+    def means(self, goal: Reference) -> bool:
+        """Return whether a cancellation concerns a goal: one by its id, all until a time, or all."""
+        if not any(self.id) and not any(self.stamp):
+            return True
+        return goal.id == self.id or (any(self.stamp) and goal.stamp <= self.stamp)
 
 
 class Status(NamedTuple):
@@ -81,7 +91,10 @@ class Messages(Protocol):
     """The messages of a version of ROS."""
 
     def goal(self, payload: bytes) -> Reference:
-        """Return the id and the stamp of a goal."""
+        """Return the id and the stamp of a goal, or of the goal that feedback or a result of ROS 1 concerns."""
+
+    def renamed(self, payload: bytes, goal: Reference) -> bytes:
+        """Return a goal, feedback or a result of ROS 1 with another id."""
 
     def cancellation(self, payload: bytes) -> Reference:
         """Return the goals that a cancellation concerns."""
@@ -101,6 +114,9 @@ class Messages(Protocol):
     def states(self, goals: Iterable[Status]) -> bytes:
         """Return the states of all goals."""
 
+    def listed(self, payload: bytes) -> set[bytes]:
+        """Return the ids of the goals whose states a message contains."""
+
 
 class Ros1Messages:
     """The messages of actionlib (ROS 1)."""
@@ -109,8 +125,13 @@ class Ros1Messages:
         self._count = 0
 
     def goal(self, payload: bytes) -> Reference:
-        """Return the id and the stamp of a goal."""
+        """Return the id and the stamp of a goal, or of the goal that feedback or a result concerns."""
         return _goal_id(payload, _after_header(payload))[0]
+
+    def renamed(self, payload: bytes, goal: Reference) -> bytes:
+        """Return a goal, feedback or a result with another id."""
+        place = _after_header(payload)
+        return payload[:place] + self.cancel(goal) + payload[_goal_id(payload, place)[1] :]
 
     def cancellation(self, payload: bytes) -> Reference:
         """Return the goals that a cancellation concerns."""
@@ -140,6 +161,15 @@ class Ros1Messages:
         found = [self._status(status) for status in goals]
         return self._header() + struct.pack("<I", len(found)) + b"".join(found)
 
+    def listed(self, payload: bytes) -> set[bytes]:
+        """Return the ids of the goals whose states a message contains."""
+        place, found = _after_header(payload) + 4, set()
+        for _ in range(_number(payload, place - 4)):
+            goal, end = _goal_id(payload, place)
+            found.add(goal.id)
+            place = _text_at(payload, end + 1)[1]
+        return found
+
     def _header(self) -> bytes:
         self._count += 1
         return struct.pack("<I", self._count & 0xFFFFFFFF) + struct.pack("<II", *now()) + _text(b"")
@@ -161,8 +191,13 @@ class Ros2Messages:
     """The messages of actions in ROS 2, in CDR."""
 
     def goal(self, payload: bytes) -> Reference:
-        """Return the id and the stamp of a goal."""
+        """Return the id of a goal, or of the goal that feedback concerns."""
         return Reference(_uuid(payload), NO_STAMP)
+
+    def renamed(self, payload: bytes, goal: Reference) -> bytes:
+        """Return a goal or feedback with another id."""
+        _uuid(payload)
+        return payload[: _ID.start] + goal.id + payload[_ID.stop :]
 
     def cancellation(self, payload: bytes) -> Reference:
         """Return the goals that a cancellation concerns."""
@@ -174,8 +209,7 @@ class Ros2Messages:
 
     def feedback(self, status: Status, payload: bytes) -> bytes:
         """Return the hardware's feedback, as feedback for a goal."""
-        _uuid(payload)
-        return payload[: _ID.start] + status.goal.id + payload[_ID.stop :]
+        return self.renamed(payload, status.goal)
 
     def state(self, payload: bytes) -> State:
         """Return the state in the hardware's result; a state that does not end a goal counts as aborted."""
@@ -194,6 +228,18 @@ class Ros2Messages:
             found += bytes(-len(found) % 4) + struct.pack("<iIb", *status.goal.stamp, _ROS2_STATES[status.state])
         return _CDR + struct.pack("<I", len(known)) + bytes(found)
 
+    def listed(self, payload: bytes) -> set[bytes]:
+        """Return the ids of the goals whose states a message contains."""
+        place, found = _ID.start + 4, set()
+        for _ in range(_number(payload, _ID.start)):
+            end = place + _UUID_BYTES
+            # Padding and a stamp are before the state.
+            state = end + -end % 4 + 8
+            _byte(payload, state)
+            found.add(payload[place:end])
+            place = state + 1
+        return found
+
     def accepted(self, stamp: Stamp | None) -> bytes:
         """Return the response to a goal; without a stamp, it is rejected."""
         return _CDR + struct.pack("<?3xiI", stamp is not None, *(stamp or NO_STAMP))
@@ -202,6 +248,18 @@ class Ros2Messages:
         """Return the response to a cancellation: a return code of action_msgs/CancelGoal, and the goals."""
         found = [self._info(goal) for goal in goals]
         return _CDR + struct.pack("<b3xI", code, len(found)) + b"".join(found)
+
+    def is_accepted(self, payload: bytes) -> bool:
+        """Return whether a response to a goal accepts it."""
+        return bool(_byte(payload, _STATE_BYTE))
+
+    def request(self, goal: Reference) -> bytes:
+        """Return the request for the result of a goal."""
+        return _CDR + goal.id
+
+    def is_unknown(self, payload: bytes) -> bool:
+        """Return whether a result is that of an unknown goal."""
+        return not _byte(payload, _STATE_BYTE)
 
     def requested(self, payload: bytes) -> bytes:
         """Return the id of the goal whose result a client requests."""
@@ -226,6 +284,11 @@ def _numbers(form: str, payload: bytes, place: int) -> tuple[int, int]:
     except struct.error:
         raise ValueError("the message is too short") from None
     return first, second
+
+
+def _number(payload: bytes, place: int) -> int:
+    _byte(payload, place + 3)
+    return int.from_bytes(payload[place : place + 4], "little")
 
 
 def _byte(payload: bytes, place: int) -> int:

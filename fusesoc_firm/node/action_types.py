@@ -14,10 +14,10 @@ from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.node.services import NodeService
 from fusesoc_firm.node.topics import NodeTopic, node_topic
 from fusesoc_firm.system.derived.actions import action_messages
-from fusesoc_firm.system.derived.model import Action
+from fusesoc_firm.system.derived.model import Action, ServiceEnd
 from fusesoc_firm.system.system_core import LoadedSystem
 
-# The numbers of an action's topics: those of clients of actionlib, and those of the node.
+# The numbers of an action's topics: those to its server in ROS 1, and those to its clients.
 GOAL, CANCEL = range(2)
 STATES, FEEDBACK, RESULT = range(3)
 # The numbers of an action's services in ROS 2.
@@ -27,16 +27,18 @@ _CANCEL_GOAL = "action_msgs/srv/CancelGoal"
 
 @dataclass(frozen=True)
 class NodeAction:
-    """An action that a node serves: its name in ROS, and the blocks of its converters.
+    """An action that a node serves, or to which it sends goals: its name in ROS, and the blocks of its converters.
 
-    An action of ROS 1 consists of `subscribers` and `publishers`, one of ROS 2 of `services` and `publishers`; all are
-    in the order of the numbers above. If the hardware sends nothing about its goal for `time_limit` seconds, the goal
-    fails; after `accept_limit` seconds, it is accepted. `no_result` is the payload of a result without contents.
+    A server subscribes to the topics of goals in ROS 1 and publishes those to clients; a client does the reverse. In
+    ROS 2, `services` are in the place of the former. All are in the order of the numbers above. If the side with the
+    goal sends nothing about it for `time_limit` seconds, the goal fails; a server accepts it after `accept_limit`
+    seconds. `no_result` is the payload of a result without contents.
     """
 
     block: str
     name: str
     ros: int
+    is_server: bool
     goal: str
     cancel: str
     feedback: str
@@ -54,17 +56,21 @@ def node_action(action: Action, loaded: LoadedSystem) -> NodeAction:
     library = loaded.libraries[action.ros]
     names = action_messages(action.type, action.ros)
     is_first = action.ros is ROS1
+    is_server = action.end is ServiceEnd.SERVER
+    to_server = _topics_to_server(action, names, library) if is_first else ()
+    to_clients = _topics_to_clients(action, names, library)
     result = frame_of(names["result"], library.closure(names["result"]))
     return NodeAction(
         action.block,
         action.ros_name,
         action.ros.number,
+        is_server,
         action.goal,
         action.cancel,
         action.feedback,
         action.result,
-        _ros1_subscribers(action, names, library) if is_first else (),
-        _publishers(action, names, library),
+        to_server if is_server else to_clients,
+        to_clients if is_server else to_server,
         () if is_first else _ros2_services(action, library),
         action.time_limit,
         action.accept_limit,
@@ -72,21 +78,22 @@ def node_action(action: Action, loaded: LoadedSystem) -> NodeAction:
     )
 
 
-def _ros1_subscribers(action: Action, names: dict[str, MessageName], library: MessageLibrary) -> tuple[NodeTopic, ...]:
+def _topics_to_server(action: Action, names: dict[str, MessageName], library: MessageLibrary) -> tuple[NodeTopic, ...]:
     return tuple(
         node_topic(block, f"{action.ros_name}/{end}", names[end], library)
         for end, block in (("goal", action.goal), ("cancel", action.cancel))
     )
 
 
-def _publishers(action: Action, names: dict[str, MessageName], library: MessageLibrary) -> tuple[NodeTopic, ...]:
+def _topics_to_clients(action: Action, names: dict[str, MessageName], library: MessageLibrary) -> tuple[NodeTopic, ...]:
     is_first = action.ros is ROS1
     folder = action.ros_name if is_first else f"{action.ros_name}/_action"
     states = MessageName("actionlib_msgs" if is_first else "action_msgs", "GoalStatusArray")
     # As rcl_action: late subscribers receive the last states.
     quality: dict[str, Any] = {} if is_first else {"is_transient_local": True, "depth": 1}
     found = [
-        replace(node_topic(action.block, f"{folder}/status", states, library), **quality),
+        # Lost states count as lost feedback.
+        replace(node_topic(action.feedback, f"{folder}/status", states, library), **quality),
         node_topic(action.feedback, f"{folder}/feedback", names["feedback"], library),
     ]
     if is_first:
@@ -111,7 +118,7 @@ def _service(action: Action, name: str, type_: str, signature: str) -> NodeServi
         type_,
         action.ros.number,
         signature,
-        is_server=True,
+        is_server=action.end is ServiceEnd.SERVER,
         request=action.goal,
         response=action.result,
         request_type=f"{type_}_Request",

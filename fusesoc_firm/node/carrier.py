@@ -187,6 +187,7 @@ class RosCarrier:
             "subscribers": _numbered(ros, description.taken_topics, len(description.subscribers), options),
             "publishers": _numbered(ros, description.given_topics, len(description.publishers), options),
             "services": _services(ros, description.all_services),
+            "groups": [*_groups(ros, description)],
             "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
@@ -304,6 +305,15 @@ def _numbered(ros: int, topics: Sequence[NodeTopic], blocks: int, options: RosOp
         for number, topic in enumerate(topics)
         if topic.ros == ros
     ]
+
+
+def _groups(ros: int, description: NodeDescription) -> Iterator[list[int]]:
+    """Yield the numbers of the topics to each client of an action; the first one, of states, tells of a server."""
+    number = len(description.subscribers)
+    for action in description.actions:
+        if action.ros == ros and not action.is_server:
+            yield [*range(number, number + len(action.subscribers))]
+        number += len(action.subscribers)
 
 
 def _services(ros: int, services: Sequence[NodeService]) -> list[dict[str, object]]:

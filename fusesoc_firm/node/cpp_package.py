@@ -210,6 +210,7 @@ def _action(description: NodeDescription, item: NodeAction) -> dict[str, Any]:
     ids = _ids(description)
     return {
         "block": item.block,
+        "is_server": _word(item.is_server),
         **{end: ids[getattr(item, end)] for end in ("goal", "cancel", "feedback", "result")},
         "name": item.name,
         "subscribers": [*map(_row, item.subscribers)],

@@ -3,12 +3,13 @@
     node = Node(description, open_transport, settings)
     node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails permanently
 
-A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next) and
-is sent as a frame. If no message waits and the hardware is ready, the thread that takes the message sends it. The
-response returns as bursts, which are joined. If software is part of the system, the thread that delivers a message
-calls the software's functions. While a function runs, the node takes no burst from the hardware; the hardware stalls as
-with any accelerator that is not ready. A function's output never waits for space in a queue, since this could cause a
-deadlock: if the output's queue to the hardware is full, a message is dropped and counted.
+A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next; the
+two subscribers of an action share one) and is sent as a frame. If no message waits and the hardware is ready, the
+thread that takes the message sends it. The response returns as bursts, which are joined. If software is part of the
+system, the thread that delivers a message calls the software's functions. While a function runs, the node takes no
+burst from the hardware; the hardware stalls as with any accelerator that is not ready. A function's output never waits
+for space in a queue, since this could cause a deadlock: if the output's queue to the hardware is full, a message is
+dropped and counted.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.actions import NodeActions
 from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.calls import NodeCalls
-from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Lost, Published, Taken
+from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Event, Lost, Published, Taken
 from fusesoc_firm.node.description import (
     Crossing,
     NodeDescription,
@@ -95,8 +96,9 @@ class NodeSettings:
 
 @dataclass(frozen=True)
 class _Message:
-    """A message in a subscriber's queue."""
+    """A message in a queue, for the input with this number."""
 
+    number: int
     payload: bytes
     entry: Entry | None
 
@@ -137,6 +139,11 @@ class Node:
         self._watch = settings.watch
         self._inputs = description.inputs
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
+        # A result must not overtake feedback, nor a cancellation its goal.
+        pairs = [
+            (item.cancel, item.goal) if item.is_server else (item.result, item.feedback) for item in description.actions
+        ]
+        self._shared_queues = {self._numbers[second]: self._numbers[first] for second, first in pairs}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
         self._status = StatusExchange(self._put_status_request) if description.has_status_frames else None
@@ -147,7 +154,7 @@ class Node:
         self._is_wanted_to_end = threading.Event()
         self._drains = threading.Event()
         self._is_over = threading.Event()
-        self._fault: TransportError | CarrierError | None = None
+        self._fault: BaseException | None = None
         self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
         self._offered = self._declined = self._handled = 0
         self._is_counted = False
@@ -166,6 +173,10 @@ class Node:
             waiting = self._queues.waiting(number)
             found[item.block] = Load(waiting, self._depth(item), dropped, counts.refused, counts.lost)
         return found
+
+    def _queue_of(self, number: int) -> int:
+        """Return the number of the queue of an input."""
+        return self._shared_queues.get(number, number)
 
     def _depth(self, item: NodeTopic | Crossing) -> int:
         return self._settings.depth or (item.depth if isinstance(item, NodeTopic) else DEFAULT_DEPTH)
@@ -186,7 +197,10 @@ class Node:
         sender, receiver = self._start(self._send), self._start(self._receive)
         self._start(self._diagnose)
         self._is_wanted_to_end.wait()
-        latest = time.monotonic() + self._settings.drain
+        # Without one of its threads, the node cannot process what it has received.
+        is_whole = self._fault is None or isinstance(self._fault, TransportError | CarrierError)
+        latest = time.monotonic() + (self._settings.drain if is_whole else 0.0)
+        self._actions.give_up()
         for carrier in carriers.values():
             carrier.stop()
         for carrier in carriers.values():
@@ -232,18 +246,24 @@ class Node:
 
     def _put_status_request(self, request: bytes) -> None:
         try:
-            is_there = self._queues.put(len(self._inputs), _Message(request, None), 0.0)
+            is_there = self._queues.put(len(self._inputs), _Message(len(self._inputs), request, None), 0.0)
         except ClosedError:
             raise TransportError("the node is ending") from None
         if not is_there:
             raise TransportError(NO_ANSWER)
 
     def _start(self, work: Callable[[], None]) -> threading.Thread:
-        thread = threading.Thread(target=work, daemon=True)
+        def guarded() -> None:
+            try:
+                work()
+            except BaseException as error:  # noqa: BLE001 - the run would wait for what the thread no longer does
+                self._fail(error)
+
+        thread = threading.Thread(target=guarded, daemon=True)
         thread.start()
         return thread
 
-    def _fail(self, error: TransportError | CarrierError) -> None:
+    def _fail(self, error: BaseException) -> None:
         """End the run with an error; ignore the errors of a transport or carrier that is being closed."""
         with self._lock:
             if not self._is_over.is_set():
@@ -288,23 +308,27 @@ class Node:
         """Handle the events of a carrier."""
         try:
             for event in carrier.receive():
-                if isinstance(event, Published):
-                    self._note_published(event)
-                elif isinstance(event, Lost):
-                    self._note_lost(event)
-                elif isinstance(event, Called):
-                    if not self._actions.called(event):
-                        self._calls.called(event)
-                elif isinstance(event, Answered):
-                    self._calls.answered(event)
-                elif not self._actions.taken(event):
-                    self._take_message(event)
+                self._take_event(event)
         except CarrierError as error:
             self._fail(error)
         except ClosedError:
             # The time limit for ending the node has passed.
             return
         self.stop()
+
+    def _take_event(self, event: Event) -> None:
+        if isinstance(event, Published):
+            self._note_published(event)
+        elif isinstance(event, Lost):
+            self._note_lost(event)
+        elif isinstance(event, Called):
+            if not self._actions.called(event):
+                self._calls.called(event)
+        elif isinstance(event, Answered):
+            if not self._actions.answered(event):
+                self._calls.answered(event)
+        elif not self._actions.taken(event):
+            self._take_message(event)
 
     def _note_lost(self, event: Lost) -> None:
         # The messages of actions have no input of their own.
@@ -328,16 +352,16 @@ class Node:
             seen = self._watch.saw(item.block, payload, received_ns - self._watch.start_ns)
             if entry:
                 entry.seen = seen
-        message = _Message(payload, entry)
+        message = _Message(number, payload, entry)
         with self._lock:
             is_alone = not self._waiting()
             counts.received += 1
             self._offered += 1
         if is_alone and self._software is None and self._hardware.transport.is_ready():
-            self._queues.pass_by(number)
+            self._queues.pass_by(self._queue_of(number))
             self._handle(number, message)
             return
-        is_there = self._queues.put(number, message, timeout)
+        is_there = self._queues.put(self._queue_of(number), message, timeout)
         if not is_there and self._settings.overflow is Overflow.BLOCK:
             # No other thread counts this message.
             with self._lock:
@@ -352,9 +376,11 @@ class Node:
             return self._offered - self._declined - self._handled - dropped
 
     def _send(self) -> None:
-        for number, message in self._queues:
-            is_request = number == len(self._inputs)
-            if not (self._send_status_request(message.payload) if is_request else self._handle(number, message)):
+        for _, message in self._queues:
+            is_request = message.number == len(self._inputs)
+            if not (
+                self._send_status_request(message.payload) if is_request else self._handle(message.number, message)
+            ):
                 return
 
     def _handle(self, number: int, message: _Message) -> bool:

@@ -127,7 +127,10 @@ def _service(service: NodeService) -> dict[str, Any]:
 def _action(action: NodeAction) -> dict[str, Any]:
     return {
         **{name: str(getattr(action, name)) for name in ("block", "name", "goal", "cancel", "feedback", "result")},
-        **{name: repr(getattr(action, name)) for name in ("ros", "time_limit", "accept_limit", "no_result")},
+        **{
+            name: repr(getattr(action, name))
+            for name in ("ros", "is_server", "time_limit", "accept_limit", "no_result")
+        },
         "subscribers": [*map(_topic, action.subscribers)],
         "publishers": [*map(_topic, action.publishers)],
         "services": [*map(_service, action.services)],

@@ -133,10 +133,12 @@ def _actions(carrier: RosCarrier, description: NodeDescription) -> Iterator[str]
     """Yield a line for each action; the name of one of its topics or services begins with its name."""
     topic, service = len(description.subscribers), len(description.services)
     for action in description.actions:
-        name = carrier.subscribers.get(topic) if action.subscribers else carrier.services.get(service)
+        name = carrier.services.get(service) if action.services else carrier.subscribers.get(topic)
         topic, service = topic + len(action.subscribers), service + len(action.services)
         if name:
-            yield f"  action {name.removesuffix('/goal').removesuffix('/_action/send_goal')} -> {action.block}"
+            for ending in ("/goal", "/status", "/_action/send_goal"):
+                name = name.removesuffix(ending)
+            yield f"  action {name} -> {action.block}" if action.is_server else f"  {action.block} -> action {name}"
 
 
 def _service(name: str, service: NodeService) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 
-from fusesoc_firm.node.actions import GoalCounts
+from fusesoc_firm.node.action_end import GoalCounts
 from fusesoc_firm.node.calls import CallCounts
 from fusesoc_firm.node.description import NodeDescription
 
@@ -77,7 +77,7 @@ class Statistics:
         """Return the number of dropped, lost and refused messages, of failed calls and goals, faults and restarts."""
         inputs = sum(item.dropped + item.refused + item.lost for item in self.inputs.values())
         calls = sum(item.failed + item.unasked for item in self.services.values())
-        goals = sum(item.aborted + item.rejected + item.unasked for item in self.actions.values())
+        goals = sum(item.aborted + item.rejected + item.unasked + item.lost for item in self.actions.values())
         return inputs + calls + goals + self.faults + self.software_faults + self.restarts
 
     def text(self) -> str:
@@ -103,6 +103,7 @@ class Statistics:
         ]
         notes = {
             "feedback and results for no goal": sum(item.unasked for item in self.actions.values()),
+            "lost goals": sum(item.lost for item in self.actions.values()),
             "faults on the route from the hardware": self.faults,
             "faults in software": self.software_faults,
             "restarts": self.restarts,

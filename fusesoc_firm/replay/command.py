@@ -6,6 +6,7 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -148,6 +149,8 @@ class _Replay:
     answers: dict[tuple[Stream, int], Sent] = field(default_factory=dict)
     # The numbers of calls of each stream by how the system responded.
     compared: Counter[tuple[Stream, str]] = field(default_factory=Counter)
+    # The numbers of the hardware's requests by their blocks and by how they compare with the recorded ones.
+    asked: Counter[tuple[str, str]] = field(default_factory=Counter)
     refused: int = 0
     errors: int = 0
     is_over: bool = False
@@ -184,6 +187,7 @@ class _Replay:
         try:
             for subscriber in () if route.misfit else route.subscribers:
                 self.run.take(subscriber, recorded.payload, recorded.stamp, self._seen(subscriber, recorded))
+            self._answer_calls()
         except (StuckError, TransportError) as error:
             faults.append(f"the rest of the bag was not replayed: {error}")
             self.is_over = True
@@ -204,7 +208,34 @@ class _Replay:
     @cached_property
     def _calls(self) -> set[Stream]:
         """The streams of requests."""
-        return {calls.requests for calls in self.bag.calls.values()}
+        return {calls.stream for calls in self.bag.calls.values()}
+
+    def _answer_calls(self) -> None:
+        """Give the hardware the recorded responses to its calls, which may lead to further calls."""
+        for sent in self.run.sent:
+            exchanges = self._asked.get(sent.topic.block)
+            if exchanges is None:
+                continue
+            request, response = next(exchanges, (None, None))
+            if request is None:
+                self.asked[sent.topic.block, _NOT_RECORDED] += 1
+                continue
+            self.asked[sent.topic.block, _verdict(sent, request)] += 1
+            if response is not None:
+                taker = self._takers[sent.topic.block]
+                self.run.take(taker, response, sent.cause.stamp, self._seen_at(taker, response, sent.cause.stamp))
+
+    @cached_property
+    def _asked(self) -> Mapping[str, Iterator[tuple[bytes, bytes | None]]]:
+        """The recorded calls of services that the hardware calls, in their order, by the blocks of requests."""
+        return {block: self.bag.exchanges(block) for block in self.bag.asked}
+
+    @cached_property
+    def _takers(self) -> Mapping[str, Topic]:
+        """The topics of responses to the hardware, by the blocks of requests."""
+        topics = {item.block: item for item in self.run.system.subscribers}
+        services = [item for item in self.run.system.services if item.end is ServiceEnd.CLIENT]
+        return {item.request: topics[item.response] for item in services}
 
     def _answer(self, route: Route) -> Sent | None:
         """Return the response to the call that was sent last."""
@@ -216,8 +247,7 @@ class _Replay:
         """Compare the system's responses with those that were read since."""
         for key, recorded in self.bag.responses.items():
             if sent := self.answers.pop(key, None):
-                is_equal = _value(sent.topic, sent.payload) == _value(sent.topic, recorded)
-                self.compared[key[0], _EQUAL if is_equal else _DIFFERENT] += 1
+                self.compared[key[0], _verdict(sent, recorded)] += 1
         self.bag.responses.clear()
 
     def _compared(self, stream: Stream) -> dict[str, Any]:
@@ -227,9 +257,24 @@ class _Replay:
         rest = {_NOT_RECORDED: sum(key[0] == stream for key in self.answers)}
         return {"topic": stream.topic, "type": stream.type} | counts | rest
 
+    def _requests(self, block: str) -> dict[str, Any]:
+        """Return how many of the hardware's requests are as recorded, different, missing, and not recorded."""
+        counts = {kind: self.asked[block, kind] for kind in (_EQUAL, _DIFFERENT)}
+        missing = 0
+        # A damaged bag is already reported.
+        with suppress(InputError):
+            for _ in self._asked[block]:
+                missing += 1
+        counts |= {_MISSING: missing, _NOT_RECORDED: self.asked[block, _NOT_RECORDED]}
+        _, calls = self.bag.asked[block]
+        return {"topic": self.topics[block].name, "type": calls.type.request_name} | counts
+
     def _seen(self, subscriber: Topic, recorded: Recorded) -> int | None:
+        return self._seen_at(subscriber, recorded.payload, recorded.stamp)
+
+    def _seen_at(self, subscriber: Topic, payload: bytes, stamp: int) -> int | None:
         watch = self.settings.watch
-        return watch.saw(subscriber.block, recorded.payload, recorded.stamp - self.bag.start) if watch else None
+        return watch.saw(subscriber.block, payload, stamp - self.bag.start) if watch else None
 
     def _end(self) -> None:
         """End the simulation, and report its errors."""
@@ -274,6 +319,7 @@ class _Replay:
                 if stream not in self.routes
             ],
             "responses": [self._compared(stream) for stream in self.routes if stream in self._calls],
+            "requests": [self._requests(block) for block in self.bag.asked],
             "errors": self.errors,
             "messages_with_errors": self.refused,
             "first_errors": self.shown,
@@ -292,13 +338,20 @@ class _Replay:
             print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
         for row in found["dropped"]:
             print(f"no subscriber for {row['topic']} ({row['type']}): {row['count']}")
-        for row in found["responses"]:
+        verdicts = [(f"responses to {row['topic']}", row) for row in found["responses"]]
+        verdicts += [(f"requests on {row['topic']}", row) for row in found["requests"]]
+        for title, row in verdicts:
             counts = (f"{row[kind]} {kind.replace('_', ' ')}" for kind in (_EQUAL, _DIFFERENT, _MISSING, _NOT_RECORDED))
-            print(f"responses to {row['topic']}: {', '.join(counts)}")
+            print(f"{title}: {', '.join(counts)}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out,"
             f" {sum(row['count'] for row in found['dropped'])} dropped, {self.errors} errors, {found['cycles']} cycles"
         )
+
+
+def _verdict(sent: Sent, recorded: bytes) -> str:
+    """Return whether a message of the system is as recorded; only fields that the hardware sends count."""
+    return _EQUAL if _value(sent.topic, sent.payload) == _value(sent.topic, recorded) else _DIFFERENT
 
 
 def _value(topic: Topic, payload: bytes) -> bytes:
@@ -310,9 +363,9 @@ def _value(topic: Topic, payload: bytes) -> bytes:
 
 
 def _with_calls(bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic]) -> BagOfCalls:
-    """Return a bag with the calls of the system's servers. May raise `InputError`."""
-    servers = [item for item in loaded.system.services if item.end is ServiceEnd.SERVER and item.ros is bag.form.ros]
-    return with_calls(bag, servers, loaded.libraries, {item.block: item.name for item in subscribers})
+    """Return a bag with the calls of the system's services. May raise `InputError`."""
+    names = {item.block: item.name for item in subscribers}
+    return with_calls(bag, loaded.system.services, loaded.libraries, names, plays_responses=False)
 
 
 def _count(topic: str, type_: str, count: int) -> dict[str, Any]:
@@ -362,11 +415,12 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
 
 
 def _routes(
-    bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
+    bag: BagOfCalls, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
 ) -> dict[Stream, Route]:
     """Return the route of each stream. Raise `InputError` if there is no route, or if a requested topic is missing."""
     faults = Diagnostics()
-    topics = {absolute_name(stream.topic) for stream in bag.streams}
+    asked = [stream for stream, _ in bag.asked.values()]
+    topics = {absolute_name(stream.topic) for stream in (*bag.streams, *asked)}
     for item in subscribers:
         if item.block in names and item.name not in topics:
             faults.error(f"{bag.path} has no topic {item.name} for '{item.block}'", hint=nearest(item.name, topics))

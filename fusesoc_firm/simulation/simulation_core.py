@@ -16,8 +16,7 @@ from fusesoc_firm.simulation.environment import environment_files
 from fusesoc_firm.simulation.host_files import expected_text, stimulus_text
 from fusesoc_firm.simulation.kernel_library import kernel_files
 from fusesoc_firm.simulation.reference import Response, responses
-from fusesoc_firm.simulation.software_run import answered, stimulated, traffic
-from fusesoc_firm.simulation.stimuli import read_stimuli
+from fusesoc_firm.simulation.software_run import answered, system_stimuli, traffic
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system import system_core
 from fusesoc_firm.system.derived.model import DerivedSystem
@@ -57,7 +56,7 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "sim")
     _refuse_node(loaded)
-    stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
+    stimuli = system_stimuli(_path(request, "stimuli"), loaded)
     answers = responses(_path(request, "model"), stimuli, answered(system))
     found = traffic(system, loaded.folder, stimuli, answers)
     seed, stall_percent = request.parameters["seed"], request.parameters["stall_percent"]

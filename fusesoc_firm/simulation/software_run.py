@@ -20,8 +20,9 @@ from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.values import shown
 from fusesoc_firm.simulation.functions import Functions, Message, importable_sources
 from fusesoc_firm.simulation.reference import Response
-from fusesoc_firm.simulation.stimuli import Stimulus
+from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
 from fusesoc_firm.system.derived.model import AcceleratorType, Converter, DerivedSystem, End, MessageSide, Topic
+from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 
@@ -39,6 +40,11 @@ def stimulated(system: DerivedSystem) -> list[Topic]:
     blocks = {item.block for item in converters}
     topics = [item for item in system.software.subscribers if item.block not in blocks]
     return [*converters, *topics, *sent_elsewhere(system)]
+
+
+def system_stimuli(path: Path, loaded: LoadedSystem) -> list[Stimulus]:
+    """Return the stimuli of a system in a file or bag. May raise `InputError`."""
+    return read_stimuli(path, stimulated(loaded.system), loaded.system.services, loaded.libraries)
 
 
 def answered(system: DerivedSystem) -> list[Topic]:

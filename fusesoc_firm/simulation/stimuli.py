@@ -9,7 +9,7 @@ Fields may be omitted; they are sent with their defaults, or as zero or empty, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,10 @@ import yaml
 
 from fusesoc_firm.frame.codec import decode, encode
 from fusesoc_firm.frame.defaults import completed
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.simulation.yaml_message import read_message
-from fusesoc_firm.system.derived.model import Topic
+from fusesoc_firm.system.derived.model import Service, Topic
 from fusesoc_firm.text.diagnostics import Diagnostics, fail, nearest
 from fusesoc_firm.text.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
 
@@ -37,8 +39,16 @@ class Stimulus:
     message: dict[str, Any]
 
 
-def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
-    """Return all messages in a file or bag, in order. May raise `InputError`, also for a file without messages."""
+def read_stimuli(
+    path: Path,
+    subscribers: Sequence[Topic],
+    services: Sequence[Service] = (),
+    libraries: Mapping[Middleware, MessageLibrary] | None = None,
+) -> list[Stimulus]:
+    """Return all messages in a file or bag, in order. May raise `InputError`, also for a file without messages.
+
+    The calls of `services` in a bag are messages, too.
+    """
     if not path.exists():
         fields = "{<field>: <value>, ...}"
         items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
@@ -54,7 +64,7 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
         from fusesoc_firm.message.bag_reader import BAGS
 
         hint = f"stimuli are a YAML file (.yaml, .yml) or a bag; {BAGS}"
-        stimuli = [_recorded(path, *message) for message in read_bag(path, subscribers, hint)]
+        stimuli = [_recorded(path, *message) for message in read_bag(path, subscribers, hint, services, libraries)]
     if not stimuli:
         names = ", ".join(subscriber.block for subscriber in subscribers)
         fail(f"{path} contains no message for {names}")

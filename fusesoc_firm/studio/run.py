@@ -19,8 +19,8 @@ from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Watch
 from fusesoc_firm.request.core_reader import CoreFile
 from fusesoc_firm.simulation.simulator import BuiltSimulator
-from fusesoc_firm.simulation.software_run import stimulated, taken_elsewhere
-from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
+from fusesoc_firm.simulation.software_run import stimulated, system_stimuli, taken_elsewhere
+from fusesoc_firm.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -156,7 +156,7 @@ def stimuli_of(spec: Path, loaded: LoadedSystem) -> list[Stimulus]:
     if not core or not name:
         missing = f"{core.path.name} names no stimuli" if core else f"no core beside {spec.name} generates this system"
         fail(missing, hint=f"write a core: firm system core {spec.name} --stimuli stimuli.yaml")
-    return read_stimuli(core.path.parent / name, stimulated(loaded.system))
+    return system_stimuli(core.path.parent / name, loaded)
 
 
 def _stimuli(core: CoreFile) -> str | None:

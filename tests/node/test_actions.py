@@ -20,8 +20,8 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.node.action_server import MOST_KEPT
 from fusesoc_firm.node.action_types import CANCEL, CANCEL_GOAL, FEEDBACK, GET_RESULT, GOAL, RESULT, SEND_GOAL, STATES
-from fusesoc_firm.node.actions import MOST_KEPT
 from fusesoc_firm.node.calls import CallLine
 from fusesoc_firm.node.carrier import Call
 from fusesoc_firm.node.description import NodeDescription, describe

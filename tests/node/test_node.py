@@ -268,6 +268,47 @@ def test_a_carrier_that_is_gone_ends_the_node(tmp_path: Path) -> None:
     assert isinstance(run.error, CarrierError)
 
 
+class BrokenTransport(FakeHardware):
+    """Hardware whose transport has a fault in its code, in one method."""
+
+    broken = ""
+
+    def send(self, frame: bytes) -> None:
+        if self.broken == "send":
+            raise KeyError("send")
+        super().send(frame)
+
+    def receive(self, timeout: float | None = None) -> Burst | None:
+        if self.broken == "receive":
+            raise KeyError("receive")
+        return super().receive(timeout)
+
+
+@pytest.mark.parametrize("method", ["send", "receive"])
+def test_an_unexpected_exception_ends_the_node(tmp_path: Path, method: str) -> None:
+    """Whichever thread it ends: the run ends with it, and does not wait for what the thread no longer does."""
+    hardware: list[BrokenTransport] = []
+
+    def opened(listener: HardwareListener) -> FakeHardware:
+        hardware.append(BrokenTransport(echo, listener))
+        return hardware[0]
+
+    run = Run(describe(pairs(tmp_path)), opened)
+    hardware[0].broken = method
+    run.carrier.give(0, POINTS[0])
+    run.wait()
+    assert isinstance(run.error, KeyError)
+    assert run.error.args == (method,)
+
+
+def test_an_unexpected_exception_of_a_carrier_ends_the_node(tmp_path: Path) -> None:
+    """It tells of messages of a topic that the node does not have."""
+    run = Run(describe(pairs(tmp_path)), Bench().open)
+    run.carrier.lose(99, 1)
+    run.wait()
+    assert isinstance(run.error, IndexError)
+
+
 def test_a_carrier_that_ends_stops_the_node(tmp_path: Path) -> None:
     """Such as by `rosnode kill`."""
     run = Run(describe(pairs(tmp_path)), Bench().open)

@@ -18,8 +18,10 @@ from rosbags.typesys.store import Typestore
 
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
+from fusesoc_firm.simulation.software_run import system_stimuli
+from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
-from tests.replay.replays import load, read, store_of
+from tests.replay.replays import STRING, load, read, store_of
 from tests.ros.service_simulator import HERE
 
 SERVICE = "sensor_msgs/srv/SetCameraInfo"
@@ -99,15 +101,23 @@ class Recorder:
         return types[REQUEST](info)
 
 
-def replay_calls(folder: Path, source: Path, names: Mapping[str, str] | None = None) -> Path:
-    """Replay a bag through the model of the service in hardware; the bag that is written."""
-    text = (HERE / "camera/camera.yaml").read_text(encoding="utf-8").replace("paths: msg", f"paths: {HERE}/camera/msg")
+def system(folder: Path, name: str) -> LoadedSystem:
+    """A system of tests/ros/camera for ROS 2."""
+    text = (HERE / f"camera/{name}.yaml").read_text(encoding="utf-8").replace("paths: msg", f"paths: {HERE}/camera/msg")
     text = text.replace("middleware: ROS", "middleware: ROS2").replace("SetCameraInfoRe", "SetCameraInfo_Re")
-    (folder / "camera.yaml").write_text(text, encoding="utf-8")
-    (folder / "store_settings.vhd").touch()
-    command = [sys.executable, str(HERE / "service_simulator.py"), "camera", "2", str(folder / "gate"), "--width", "32"]
-    target, settings = folder / "out.mcap", Settings(names or {}, 1000, is_json=True)
-    replay(load(folder / "camera.yaml"), Source(source), Target(target), settings, lambda: Simulator(command))
+    (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    for source in ("store_settings.vhd", "ask.vhd"):
+        (folder / source).touch()
+    return load(folder / f"{name}.yaml")
+
+
+def replay_calls(
+    folder: Path, source: Path, names: Mapping[str, str] | None = None, name: str = "camera", *, is_json: bool = True
+) -> Path:
+    """Replay a bag through the model of a service in hardware, or of hardware that calls one; what is written."""
+    command = [sys.executable, str(HERE / "service_simulator.py"), name, "2", str(folder / "gate"), "--width", "32"]
+    target, settings = folder / "out.mcap", Settings(names or {}, 1000, is_json=is_json)
+    replay(system(folder, name), Source(source), Target(target), settings, lambda: Simulator(command))
     return target
 
 
@@ -196,3 +206,93 @@ def test_events_of_another_definition_are_refused(tmp_path: Path, store: Typesto
     recorder.add(RECEIVED, 1, "call")
     with pytest.raises(InputError, match=r"its definition of .* differs from the system's: RIHS01_"):
         replayed(tmp_path, recorder, signature=f"RIHS01_{64 * '0'}")
+
+
+class Asked(Recorder):
+    """Recorded calls of hardware that sends nothing but a text in each request (camera/asking.yaml)."""
+
+    def request(self, width: int, text: str) -> Any:
+        types = self.store.types
+        header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](0, 0), "")
+        region = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
+        k, r, p = np.zeros(9), np.zeros(9), np.zeros(12)
+        info = types["sensor_msgs/msg/CameraInfo"](header, 0, 0, text, np.zeros(0), k, r, p, 0, 0, region)
+        return types[REQUEST](info)
+
+    def written_with_names(self, path: Path, names: Iterable[str]) -> Path:
+        """Write a bag with the events, all of them after the names that lead to the calls."""
+        with Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            connection = writer.add_connection("/name_in", STRING, typestore=self.store)
+            for number, name in enumerate(names):
+                message = self.store.types[STRING](name)
+                writer.write(connection, 10**18 + number, bytes(self.store.serialize_cdr(message, STRING)))
+            connection = writer.add_connection(self.topic, EVENT, msgdef="", rihs01=HASH)
+            for number, payload in enumerate(self.events):
+                writer.write(connection, 10**18 + 10**6 * (number + 1), payload)
+        return path
+
+    def told(self, path: Path) -> list[str]:
+        """What the hardware has told of the responses."""
+        items = [data for topic, _, _, data in read(path) if topic == "/name_out"]
+        found: list[Any] = [self.store.deserialize_cdr(data, STRING) for data in items]
+        return [message.data for message in found]
+
+
+LEFT = "/left/_service_event"
+
+
+@pytest.mark.parametrize(("topic", "names"), [(TOPIC, {}), (LEFT, {}), (LEFT, {"set_camera_info_response": LEFT})])
+def test_hardware_gets_the_recorded_responses_to_its_calls(
+    tmp_path: Path, store: Typestore, topic: str, names: Mapping[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its requests are compared; one had no response, and for one nothing is recorded."""
+    recorder = Asked(store, topic)
+    for call, (request, response) in enumerate([("one", "eno"), ("other", "owt"), ("three", "")]):
+        recorder.add(SENT, call, request, CLIENT)
+        recorder.add(RECEIVED, 9 - call, request, SERVER)
+        if response:
+            recorder.add(ANSWERED, 9 - call, response, SERVER)
+            recorder.add(TAKEN, call, response, CLIENT)
+    source = recorder.written_with_names(tmp_path / "in", ["one", "two", "three", "four"])
+    target = replay_calls(tmp_path, source, names, "asking")
+    assert recorder.told(target) == ["eno", "owt"]
+    said = json.loads(capsys.readouterr().out)
+    row = {"topic": "/set_camera_info_request", "type": REQUEST}
+    assert said["requests"] == [{**row, "as_recorded": 2, "different": 1, "missing": 0, "not_recorded": 1}]
+    assert said["dropped"] == []
+
+
+def test_recorded_requests_that_the_hardware_does_not_make_are_missing(
+    tmp_path: Path, store: Typestore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorder = Asked(store)
+    for call in range(3):
+        recorder.add(SENT, call, "one", CLIENT)
+        recorder.add(TAKEN, call, "eno", CLIENT)
+    source = recorder.written_with_names(tmp_path / "in", ["one"])
+    replay_calls(tmp_path, source, {}, "asking", is_json=False)
+    text = "requests on /set_camera_info_request: 1 as recorded, 0 different, 2 missing, 0 not recorded"
+    assert text in capsys.readouterr().out
+
+
+def test_calls_are_stimuli_of_a_simulation(tmp_path: Path, store: Typestore) -> None:
+    """Requests of a service that the hardware serves, and responses of one that it calls."""
+    served = Recorder(store)
+    for call, text in enumerate(("first", "second")):
+        served.add(RECEIVED, call, text)
+        served.add(ANSWERED, call, text)
+    found = system_stimuli(served.written(tmp_path / "served", HASH), system(tmp_path, "camera"))
+    told = [(item.subscriber.block, item.message["camera_info"]["distortion_model"]) for item in found]
+    assert told == [("set_camera_info_request", "first"), ("set_camera_info_request", "second")]
+    asked = Asked(store)
+    for call, text in enumerate(("one", "two")):
+        asked.add(SENT, call, text, CLIENT)
+        asked.add(TAKEN, call, text[::-1], CLIENT)
+    source = asked.written_with_names(tmp_path / "asked", ["one"])
+    found = system_stimuli(source, system(tmp_path, "asking"))
+    expected: list[tuple[str, dict[str, Any]]] = [("name_in", {"data": "one"})]
+    expected += [
+        ("set_camera_info_response", {"success": n % 2 == 1, "status_message": text})
+        for n, text in enumerate(("eno", "owt"))
+    ]
+    assert [(item.subscriber.block, item.message) for item in found] == expected

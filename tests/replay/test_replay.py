@@ -317,6 +317,7 @@ def test_the_summary_as_json(tmp_path: Path, capsys: Captured) -> None:
         "out": [{"topic": "/p_out", "type": "geometry_msgs/msg/Point", "count": 11, "block": "p_out"}],
         "dropped": [{"topic": "/s", "type": STRING, "count": 1}],
         "responses": [],
+        "requests": [],
         "errors": 1,
         "messages_with_errors": 1,
         "first_errors": [

@@ -60,6 +60,9 @@ _TRANSLATION = [
     ("status.status, result.result", "status, result.sequence"),
     ("actionlib/Test", "test_msgs/Fibonacci"),
     ("{goal: {goal:", "{goal: {order:"),
+    ('FIELD = "goal"', 'FIELD = "order"'),
+    ('"nsec": 0', '"nanosec": 0'),
+    ("planning.vhd", "ros2/planning.vhd"),
 ]
 
 

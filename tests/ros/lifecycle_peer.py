@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from typing import Any
 
 import rclpy
@@ -54,17 +55,22 @@ class LifecycleClient:
         has_ended = name.endswith("shutdown")
         return is_done, "" if has_ended else self.call(self.state, GetState.Request()).current_state.label
 
-    def wait_for_service(self, name: str, *, is_wanted: bool) -> None:
+    def wait_for_service(self, name: str, *, is_wanted: bool) -> bool:
+        """Wait until a service is there, or is not; return whether that has come in time."""
+        latest = time.monotonic() + LONGEST
         while any(found == name for found, _ in self.node.get_service_names_and_types()) != is_wanted:
             rclpy.spin_once(self.node, timeout_sec=0.05)
+            if time.monotonic() > latest:
+                return False
+        return True
 
 
 def main() -> None:
     client = LifecycleClient(sys.argv[1])
     for line in map(str.strip, sys.stdin):
         if line in ("+", "-"):
-            client.wait_for_service(sys.argv[2], is_wanted=line == "+")
-            print(json.dumps(line), flush=True)
+            has_come = client.wait_for_service(sys.argv[2], is_wanted=line == "+")
+            print(json.dumps(line if has_come else f"no {line} for {LONGEST} s"), flush=True)
         else:
             print(json.dumps(client.transit(line)), flush=True)
 

@@ -120,6 +120,40 @@ def test_messages_pass_only_while_the_node_is_active(place: Place, kind: str) ->
 
 
 @pytest.mark.parametrize("kind", ["live", "cpp"])
+def test_a_transient_local_message_waits_until_the_node_is_active(place: Place, kind: str) -> None:
+    """It passes once, also if it came while the node was inactive again. Later messages follow it."""
+    spec = place.folder / "latched.yaml"
+    quality = "message: geometry_msgs/Point, qos: {durability: transient_local}, outgoing"
+    text = SPECIFICATION.replace("name: robot", "name: latched")
+    spec.write_text(text.replace("message: geometry_msgs/Point, outgoing", quality), encoding="utf-8")
+    topics = {"/out": "geometry_msgs/msg/Point"}, {"/in": "geometry_msgs/msg/Point latched"}
+    with (
+        node_of(place, spec, model_address("--width", "64"), kind) as node,
+        Peer(place.ros, *topics) as peer,
+        managed(place, "/latched") as manager,
+    ):
+        peer.wait_until_connected()
+        assert manager.ask("configure") == [True, "inactive"]
+        for _ in range(2):
+            payloads = [point() for _ in range(3)]
+            for payload in payloads[:2]:
+                peer.publish("/in", payload)
+            # The node's reader has them.
+            peer.wait_until_acked()
+            assert manager.ask("activate") == [True, "active"]
+            peer.publish("/in", payloads[2])
+            for payload in payloads:
+                assert peer.take() == ("/out", payload)
+            assert manager.ask("deactivate") == [True, "inactive"]
+        assert manager.ask("inactive_shutdown") == [True, ""]
+        assert node.wait() == 0
+        counts = (
+            r"^in +6 +0 +6 +0 +0$" if kind != "cpp" else "^latched_node: 6 received, .* 6 published, .* 0 lost by ROS"
+        )
+        assert re.search(counts, node.said(), re.MULTILINE), node.said()
+
+
+@pytest.mark.parametrize("kind", ["live", "cpp"])
 def test_services_are_there_only_while_the_node_is_active(place: Place, kind: str) -> None:
     camera = Camera(place.ros, place.folder)
     service = "/set_camera_info"

@@ -36,3 +36,17 @@ def managed_node(name: str, change: Callable[[bool], None], end: Callable[[], No
             return TransitionCallbackReturn.SUCCESS
 
     return ManagedNode(name)
+
+
+def waiting_group(is_active: Callable[[], bool]) -> Any:
+    """Return a callback group for `transient_local` subscriptions, whose messages wait in ROS until the node is active.
+
+    Their publishers do not send them again.
+    """
+    from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+
+    class WaitingGroup(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]
+        def can_execute(self, entity: Any) -> bool:
+            return is_active() and bool(super().can_execute(entity))
+
+    return WaitingGroup()

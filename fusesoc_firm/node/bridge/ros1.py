@@ -48,14 +48,20 @@ class Ros1(Ros):
         }
         self._callers = {number: Caller(self, rospy, item) for number, item in self._clients.items()}
         self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"] if topic["is_numbered"]}
-        self._subscribers = {
-            topic["number"]: rospy.Subscriber(
+        # The topics that must be connected before messages of another one are handed over.
+        self._others = {first: others for first, *others in config["groups"]}
+        self._subscribers: dict[int, Any] = {}
+        for topic in config["subscribers"]:
+            self._subscribers[topic["number"]] = rospy.Subscriber(
                 topic["name"], _raw_class(rospy, topic), self._taken, topic["number"], tcp_nodelay=True
             )
-            for topic in config["subscribers"]
-        }
+
+    def _has_publisher(self, topic: int) -> bool:
+        return topic in self._subscribers and self._subscribers[topic].get_num_connections() > 0
 
     def _taken(self, message: Any, topic: int) -> None:
+        if not all(map(self._has_publisher, self._others.get(topic, ()))):
+            return
         payload = message._buff  # noqa: SLF001 - rospy has no public name for it
         missing = 0
         if topic in self._gaps:

@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from .channel import DIAGNOSTICS, DONE, STOP, Channel
-from .managed import managed_node
+from .managed import managed_node, waiting_group
 from .ros import FLUSH_SECONDS, KINDS, LOOK_SECONDS, BridgeError, Ends, Gaps, Ros, type_report
 from .ros2_types import SERVICE_DEPTH, message_class, service_class
 
@@ -64,6 +64,9 @@ class Ros2(Ros):
             return
         if is_active:
             self._serve()
+            # What ROS has replaced in its queues meanwhile is not lost.
+            for gaps in self._gaps.values():
+                gaps.forget()
         else:
             self._cease()
         self._is_active = is_active
@@ -177,7 +180,13 @@ class Ros2(Ros):
                 self.lose(number, event.total_count_change)
 
         create = functools.partial(
-            self._node.create_subscription, message, topic["name"], taken, _quality(topic), raw=True
+            self._node.create_subscription,
+            message,
+            topic["name"],
+            taken,
+            _quality(topic),
+            raw=True,
+            callback_group=waiting_group(lambda: self._is_active) if topic["is_transient_local"] else None,
         )
         try:
             return create(event_callbacks=SubscriptionEventCallbacks(message_lost=lost))

@@ -1,4 +1,4 @@
-"""Actions: a server becomes four converters, one each for its goals, cancellations, feedback and results.
+"""Actions: a server or client becomes four converters, one each for goals, cancellations, feedback and results.
 
 The messages are those of ROS with their ids and states, so that bags contain them, too.
 """
@@ -14,7 +14,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
 from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived.model import Action
+from fusesoc_firm.system.derived.model import Action, ServiceEnd
 from fusesoc_firm.system.derived.partition import Parts
 from fusesoc_firm.system.derived.services import (
     converter,
@@ -24,21 +24,32 @@ from fusesoc_firm.system.derived.services import (
     ros_name_of,
     with_entries,
 )
-from fusesoc_firm.system.written.specification import PUBLISHER, SERVER, SERVICE_MODES, SUBSCRIBER, Block, Specification
+from fusesoc_firm.system.written.specification import (
+    CLIENT,
+    PUBLISHER,
+    SERVER,
+    SERVICE_MODES,
+    SUBSCRIBER,
+    Block,
+    Specification,
+)
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 _ACCEPT_LIMIT = Fraction(1)
-_ENDS = {"goal": SUBSCRIBER, "cancel": SUBSCRIBER, "feedback": PUBLISHER, "result": PUBLISHER}
-_NONE = dict.fromkeys(_ENDS)
+# The modes of the converters of a server and of a client.
+_ENDS = {
+    SERVER: {"goal": SUBSCRIBER, "cancel": SUBSCRIBER, "feedback": PUBLISHER, "result": PUBLISHER},
+    CLIENT: {"goal": PUBLISHER, "cancel": PUBLISHER, "feedback": SUBSCRIBER, "result": SUBSCRIBER},
+}
 
 
 def with_actions(
     specification: Specification, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Specification:
-    """Return the specification with four converters, such as `<name>_goal`, for each server of an action.
+    """Return the specification with four converters, such as `<name>_goal`, for each server or client of an action.
 
-    Connections from the server lead from the goals and the cancellations; those to it lead to the feedback and the
-    results. Note the faults in keys of actions.
+    Connections from a server lead from the goals and the cancellations; those to it lead to the feedback and the
+    results. For a client, the directions are reversed. Note the faults in keys of actions.
     """
     blocks: list[Block] = []
     entries: dict[str, tuple[str, ...]] = {}
@@ -47,10 +58,10 @@ def with_actions(
             messages = _messages_of(block, libraries, faults)
             made = {
                 end: converter(block, f"{block.name}_{end}", mode, messages[end], _topic(block, end))
-                for end, mode in _ENDS.items()
+                for end, mode in _ENDS[block.mode].items()
             }
             # Cancellations are short.
-            made["cancel"] = replace(made["cancel"], max_length=None)
+            made["cancel"] = replace(made["cancel"], max_length=None, buffer=None)
             entries[block.name] = tuple(item.name for item in made.values() if item.mode == PUBLISHER)
             blocks += made.values()
         else:
@@ -90,20 +101,20 @@ def _messages_of(
     """Return the names of the messages by their ends; note the faults of the block."""
     if block.service is not None:
         message = f"'{block.name}' has a service and an action"
-        faults.error(message, block.service.source, "a server has either 'service' or 'action'")
-    if block.mode and block.mode != SERVER:
-        message = f"'{block.name}' cannot be a {block.mode} of an action"
-        faults.error(message, block.mode.source, f"legal here: {SERVER}; hardware cannot send goals to other nodes")
-        return _NONE
+        faults.error(message, block.service.source, f"a {block.mode} has either 'service' or 'action'")
+    if block.mode == CLIENT and block.accept_limit is not None:
+        message = f"'acceptLimit' is legal only for servers, but '{block.name}' is a client"
+        faults.error(message, block.accept_limit.source, "'timeLimit' limits the silence of the client's server")
     found = interface_of(block, InterfaceKind.ACTION, libraries, faults)
-    return action_messages(found.name, found.ros) if found else _NONE
+    return action_messages(found.name, found.ros) if found else dict.fromkeys(_ENDS[SERVER])
 
 
 def _action(block: Block) -> Action:
-    assert block.middleware and block.action
-    goal, cancel, feedback, result = (f"{block.name}_{end}" for end in _ENDS)
+    assert block.middleware and block.mode and block.action
+    goal, cancel, feedback, result = (f"{block.name}_{end}" for end in _ENDS[SERVER])
     return Action(
         str(block.name),
+        ServiceEnd(str(block.mode)),
         parse_name(block.action),
         MIDDLEWARES[block.middleware],
         ros_name_of(block),

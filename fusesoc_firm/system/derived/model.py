@@ -110,7 +110,7 @@ class Converter(Topic):
 
 
 class ServiceEnd(Enum):
-    """The end of a service that a system is: a server answers calls, a client calls."""
+    """The end of a service or an action that a system is: a server answers calls or pursues goals, a client asks."""
 
     SERVER = "server"
     CLIENT = "client"
@@ -135,13 +135,15 @@ class Service:
 
 @dataclass(frozen=True)
 class Action:
-    """An action that a system serves: `block` is its block in the specification, `type` is the action's name.
+    """An action that a system serves, or to which it sends goals: `block` is its block in the specification.
 
-    `goal`, `cancel`, `feedback` and `result` are the blocks of the converters. `time_limit` seconds after the hardware
-    last sent something about a goal, the goal fails. After `accept_limit` seconds, a goal is accepted in any case.
+    `type` is the action's name; `goal`, `cancel`, `feedback` and `result` are the blocks of the converters.
+    `time_limit` seconds after the side with a goal last sent something about it, the goal fails. After `accept_limit`
+    seconds, a goal in the hardware is accepted in any case.
     """
 
     block: str
+    end: ServiceEnd
     type: MessageName
     ros: Middleware
     ros_name: str

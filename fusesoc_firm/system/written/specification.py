@@ -320,7 +320,7 @@ class Block(Section):
     )
     mode: Text | None = key(
         "direction of a converter; server answers calls of a service or pursues goals of an action, client calls a"
-        " service",
+        " service or sends goals to an action",
         choices=MODES,
         only_of=CONVERTER,
     )
@@ -329,17 +329,17 @@ class Block(Section):
         "the type of the service of a server or client, such as std_srvs/SetBool", only_of=CONVERTER
     )
     action: Text | None = key(
-        "the type of the action of a server, such as test_msgs/Fibonacci", only_of=CONVERTER, is_asked=False
+        "the type of the action of a server or client, such as test_msgs/Fibonacci", only_of=CONVERTER, is_asked=False
     )
     time_limit: Text | None = key(
-        "the longest time in which a call of a service is answered, or in which the hardware sends nothing about a goal"
-        " of an action, such as 500 ms (default: 5 s)",
+        "the longest time in which a call of a service is answered, or in which nothing is sent about a goal of an"
+        " action by the hardware, or by a client's server, such as 500 ms (default: 5 s)",
         name="timeLimit",
         only_of=CONVERTER,
         is_asked=False,
     )
     accept_limit: Text | None = key(
-        "the time after which a goal of an action is accepted if the hardware has not sent anything (default: 1 s)",
+        "the time after which a server accepts a goal of an action if the hardware has sent nothing (default: 1 s)",
         name="acceptLimit",
         only_of=CONVERTER,
         is_asked=False,

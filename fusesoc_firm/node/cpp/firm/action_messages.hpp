@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -19,8 +20,9 @@
 
 namespace firm {
 
-// The state of a goal: waiting for the hardware, or after its end.
-enum class GoalState { kWaiting, kExecuting, kCanceling, kSucceeded, kCanceled, kAborted, kRejected };
+// The state of a goal: waiting for the hardware, or after its end. kLost: the server of a goal that the hardware has sent
+// does not tell its end.
+enum class GoalState { kWaiting, kExecuting, kCanceling, kSucceeded, kCanceled, kAborted, kRejected, kLost };
 
 inline bool has_ended(GoalState state) {
   return state != GoalState::kWaiting && state != GoalState::kExecuting && state != GoalState::kCanceling;
@@ -49,6 +51,12 @@ struct GoalReference {
   Stamp stamp{};
 
   bool has_id() const { return id.find_first_not_of('\0') != std::string::npos; }
+
+  // Return whether this cancellation concerns a goal: one by its id, all until a time, or all.
+  bool means(const GoalReference& goal) const {
+    if (!has_id() && stamp.is_zero()) return true;
+    return goal.id == id || (!stamp.is_zero() && goal.stamp <= stamp);
+  }
 };
 
 // The state of a goal for all clients; `was_taken` tells whether the hardware has ever had the goal.
@@ -119,8 +127,10 @@ class ActionMessages {
  public:
   virtual ~ActionMessages() = default;
 
-  // Return the id and the stamp of a goal.
+  // Return the id and the stamp of a goal, or of the goal that feedback or a result of ROS 1 concerns.
   virtual GoalReference goal(const Bytes& payload) const = 0;
+  // Return a goal, feedback or a result of ROS 1 with another id.
+  virtual Bytes renamed(const Bytes& payload, const GoalReference& goal) const = 0;
   // Return the goals that a cancellation concerns.
   virtual GoalReference cancellation(const Bytes& payload) const = 0;
   // Return the cancellation of one goal, for the hardware.
@@ -133,6 +143,8 @@ class ActionMessages {
   virtual Bytes result(const GoalStatus& status, const Bytes& payload) = 0;
   // Return the states of all goals.
   virtual Bytes states(const std::vector<GoalStatus>& goals) = 0;
+  // Return the ids of the goals whose states a message contains.
+  virtual std::set<std::string> listed(const Bytes& payload) const = 0;
 };
 
 // The messages of actionlib (ROS 1).
@@ -144,6 +156,16 @@ class Ros1ActionMessages : public ActionMessages {
     return goal_id(reader);
   }
 
+  Bytes renamed(const Bytes& payload, const GoalReference& goal) const override {
+    MessageReader reader(payload);
+    skip_header(reader);
+    Bytes bytes(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(reader.place()));
+    put_goal_id(bytes, goal);
+    goal_id(reader);
+    bytes.insert(bytes.end(), payload.begin() + static_cast<std::ptrdiff_t>(reader.place()), payload.end());
+    return bytes;
+  }
+
   GoalReference cancellation(const Bytes& payload) const override {
     MessageReader reader(payload);
     return goal_id(reader);
@@ -151,8 +173,7 @@ class Ros1ActionMessages : public ActionMessages {
 
   Bytes cancel(const GoalReference& goal) const override {
     Bytes bytes;
-    put_stamp(bytes, goal.stamp);
-    put_text(bytes, goal.id);
+    put_goal_id(bytes, goal);
     return bytes;
   }
 
@@ -182,6 +203,18 @@ class Ros1ActionMessages : public ActionMessages {
     put_number(bytes, static_cast<std::uint32_t>(goals.size()));
     for (const auto& status : goals) put_status(bytes, status);
     return bytes;
+  }
+
+  std::set<std::string> listed(const Bytes& payload) const override {
+    MessageReader reader(payload);
+    skip_header(reader);
+    std::set<std::string> found;
+    for (std::uint32_t left = reader.number(); left > 0; --left) {
+      found.insert(goal_id(reader).id);
+      reader.byte();
+      reader.text(reader.number());
+    }
+    return found;
   }
 
  private:
@@ -218,6 +251,11 @@ class Ros1ActionMessages : public ActionMessages {
     bytes.insert(bytes.end(), text.begin(), text.end());
   }
 
+  static void put_goal_id(Bytes& bytes, const GoalReference& goal) {
+    put_stamp(bytes, goal.stamp);
+    put_text(bytes, goal.id);
+  }
+
   static std::uint8_t number_of(const GoalStatus& status) {
     switch (status.state) {
       case GoalState::kWaiting: return 0;
@@ -227,13 +265,13 @@ class Ros1ActionMessages : public ActionMessages {
       case GoalState::kCanceled: return status.was_taken ? kPreempted : kRecalled;
       case GoalState::kAborted: return 4;
       case GoalState::kRejected: return 5;
+      case GoalState::kLost: return 9;
     }
     return 0;
   }
 
   static void put_status(Bytes& bytes, const GoalStatus& status) {
-    put_stamp(bytes, status.goal.stamp);
-    put_text(bytes, status.goal.id);
+    put_goal_id(bytes, status.goal);
     bytes.push_back(number_of(status));
     put_text(bytes, status.text);
   }
@@ -261,6 +299,13 @@ class Ros2ActionMessages : public ActionMessages {
  public:
   GoalReference goal(const Bytes& payload) const override { return {id_of(payload)}; }
 
+  Bytes renamed(const Bytes& payload, const GoalReference& goal) const override {
+    id_of(payload);
+    Bytes bytes = payload;
+    std::copy(goal.id.begin(), goal.id.end(), bytes.begin() + kIdPlace);
+    return bytes;
+  }
+
   GoalReference cancellation(const Bytes& payload) const override {
     MessageReader reader(payload, kIdPlace);
     std::string id = reader.text(kIdBytes);
@@ -273,12 +318,7 @@ class Ros2ActionMessages : public ActionMessages {
     return bytes;
   }
 
-  Bytes feedback(const GoalStatus& status, const Bytes& payload) override {
-    id_of(payload);
-    Bytes bytes = payload;
-    std::copy(status.goal.id.begin(), status.goal.id.end(), bytes.begin() + kIdPlace);
-    return bytes;
-  }
+  Bytes feedback(const GoalStatus& status, const Bytes& payload) override { return renamed(payload, status.goal); }
 
   GoalState state(const Bytes& payload) const override {
     switch (MessageReader(payload, kStatePlace).byte()) {
@@ -307,6 +347,32 @@ class Ros2ActionMessages : public ActionMessages {
     }
     return bytes;
   }
+
+  std::set<std::string> listed(const Bytes& payload) const override {
+    MessageReader reader(payload, kIdPlace);
+    std::set<std::string> found;
+    for (std::uint32_t left = reader.number(); left > 0; --left) {
+      found.insert(reader.text(kIdBytes));
+      // Padding before the stamp; then the state.
+      reader.text((4 - reader.place() % 4) % 4);
+      reader.stamp();
+      reader.byte();
+    }
+    return found;
+  }
+
+  // Return whether a response to a goal accepts it.
+  static bool is_accepted(const Bytes& payload) { return MessageReader(payload, kStatePlace).byte() != 0; }
+
+  // Return the request for the result of a goal.
+  static Bytes request(const GoalReference& goal) {
+    Bytes bytes = encoding();
+    bytes.insert(bytes.end(), goal.id.begin(), goal.id.end());
+    return bytes;
+  }
+
+  // Return whether a result is that of an unknown goal.
+  static bool is_unknown(const Bytes& payload) { return MessageReader(payload, kStatePlace).byte() == 0; }
 
   // Return the response to a goal, which is accepted or rejected.
   static Bytes accepted(bool is_accepted, const Stamp& stamp) {
@@ -354,7 +420,8 @@ class Ros2ActionMessages : public ActionMessages {
       case GoalState::kSucceeded: return 4;
       case GoalState::kCanceled: return 5;
       case GoalState::kAborted: return 6;
-      case GoalState::kRejected: return 0;
+      case GoalState::kRejected:
+      case GoalState::kLost: return 0;
     }
     return 0;
   }

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <firm/actions.hpp>
+#include <firm/action.hpp>
 #include <firm/node.hpp>
 #include <firm/services.hpp>
 #include <firm/topic.hpp>
@@ -108,8 +108,9 @@ inline void add_counts(Report& report, const std::string& block, const GoalStati
                                              {block + " canceled", counted.canceled},
                                              {block + " aborted", counted.aborted},
                                              {block + " rejected", counted.rejected},
-                                             {block + " unasked", counted.unasked}});
-  report.troubles += counted.aborted + counted.rejected + counted.unasked;
+                                             {block + " unasked", counted.unasked},
+                                             {block + " lost", counted.lost}});
+  report.troubles += counted.aborted + counted.rejected + counted.unasked + counted.lost;
 }
 
 // Publishes reports each second, with a warning if a count of trouble has grown.

@@ -44,6 +44,8 @@ struct NodeConfiguration {
   std::size_t longest_payload = 1 << 26;    // bytes, in either direction
   std::size_t queue_depth = 100;            // frames, for each subscriber
   std::map<unsigned, std::size_t> queue_depths{};  // frames, for subscribers whose queues differ
+  // The subscribers whose frames wait in the queue of another one, so that they are sent in the order of both.
+  std::map<unsigned, unsigned> shared_queues{};
   Overflow overflow = Overflow::kDropOldest;
   std::function<std::unique_ptr<Policy>()> policy = nullptr;  // default: least recently used
   unsigned restarts = 0;                    // the number of times that a failed transport is reopened
@@ -111,7 +113,7 @@ class Node {
     trace_.write("received", subscriber, number, size);
     try {
       const bool is_kept =
-          queues_.put(subscriber, {number, pack_frame(static_cast<std::uint8_t>(subscriber), payload, size)});
+          queues_.put(queue_of(subscriber), {number, pack_frame(static_cast<std::uint8_t>(subscriber), payload, size)});
       if (is_kept) trace_.write("queued", subscriber, number, size);
       return is_kept;
     } catch (const ClosedError&) {
@@ -202,6 +204,11 @@ class Node {
     }
     BurstJoiner(configuration.publishers, configuration.width);
     return configuration;
+  }
+
+  unsigned queue_of(unsigned subscriber) const {
+    const auto found = configuration_.shared_queues.find(subscriber);
+    return found == configuration_.shared_queues.end() ? subscriber : found->second;
   }
 
   // Return the capacities of all queues.

@@ -16,6 +16,7 @@
 #include <ros/callback_queue.h>
 #include <ros/subscription_callback_helper.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <functional>
@@ -142,6 +143,14 @@ class Ros1 {
     options.transport_hints.tcpNoDelay();
     types_[node_->resolveName(topic.name)] = topic.type;
     subscribers_.push_back(node_->subscribe(options));
+  }
+
+  // Return whether a topic to which the node subscribes is connected to a publisher.
+  bool has_publisher(const Topic& topic) const {
+    const std::string name = node_->resolveName(topic.name);
+    return std::any_of(subscribers_.begin(), subscribers_.end(), [&name](const ros::Subscriber& subscriber) {
+      return subscriber.getTopic() == name && subscriber.getNumPublishers() > 0;
+    });
   }
 
   // Return a function that publishes messages of a topic.

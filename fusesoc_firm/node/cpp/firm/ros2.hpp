@@ -125,7 +125,7 @@ class Ros2 {
 
   // Pass every message of a topic to `handler`, in the thread that calls spin(). Throws MiddlewareError.
   void subscribe(const Topic& topic, const Quality& quality, MessageHandler handler) {
-    auto made = std::make_unique<Subscription>(quality.depth, topic.type, std::move(handler));
+    auto made = std::make_unique<Subscription>(quality, topic.type, std::move(handler));
     rcl_subscription_options_t options = rcl_subscription_get_default_options();
     options.qos = profile(quality);
     check_rcl(rcl_subscription_init(&made->rcl, &node_, type_support(topic), topic.name.c_str(), &options),
@@ -191,12 +191,13 @@ class Ros2 {
   bool spin(std::chrono::milliseconds duration) {
     look_at_peers();
     const auto servers = waiting_servers();
-    if (subscriptions_.empty() && servers.empty() && clients_.empty()) {
+    const auto subscriptions = waiting_subscriptions();
+    if (subscriptions.empty() && servers.empty() && clients_.empty()) {
       // rcl does not wait on an empty set.
       std::this_thread::sleep_for(duration);
       return rcl_context_is_valid(&context_);
     }
-    check_rcl(rcl_wait_set_resize(&waiting_, subscriptions_.size(), 0, 0, clients_.size(), servers.size(), 0),
+    check_rcl(rcl_wait_set_resize(&waiting_, subscriptions.size(), 0, 0, clients_.size(), servers.size(), 0),
               "wait for messages");
     check_rcl(rcl_wait_set_clear(&waiting_), "wait for messages");
     for (const auto& server : servers) {
@@ -205,7 +206,7 @@ class Ros2 {
     for (const auto& client : clients_) {
       check_rcl(rcl_wait_set_add_client(&waiting_, client->rcl(), nullptr), "wait for responses");
     }
-    for (const auto& subscription : subscriptions_) {
+    for (const auto* subscription : subscriptions) {
       check_rcl(rcl_wait_set_add_subscription(&waiting_, &subscription->rcl, nullptr), "wait for messages");
     }
     const rcl_ret_t result = rcl_wait(&waiting_, std::chrono::nanoseconds(duration).count());
@@ -214,8 +215,8 @@ class Ros2 {
       return rcl_context_is_valid(&context_);
     }
     check_rcl(result, "wait for messages");
-    for (std::size_t index = 0; index < subscriptions_.size(); ++index) {
-      if (waiting_.subscriptions[index] != nullptr) subscriptions_[index]->take_all(is_active_);
+    for (std::size_t index = 0; index < subscriptions.size(); ++index) {
+      if (waiting_.subscriptions[index] != nullptr) subscriptions[index]->take_all(is_active_);
     }
     for (std::size_t index = 0; index < clients_.size(); ++index) {
       if (waiting_.clients[index] != nullptr) clients_[index]->take();
@@ -260,6 +261,8 @@ class Ros2 {
       for (const auto& server : servers_) server->close();
       throw;
     }
+    // What ROS has replaced in its queues meanwhile is not lost.
+    for (const auto& subscription : subscriptions_) subscription->gaps = Gaps();
     is_active_ = true;
   }
 
@@ -315,8 +318,11 @@ class Ros2 {
 
   // A subscription with a buffer that grows to the largest message.
   struct Subscription {
-    Subscription(std::size_t most, std::string message_type, MessageHandler handle_message)
-        : depth(most), type(std::move(message_type)), handler(std::move(handle_message)) {
+    Subscription(const Quality& quality, std::string message_type, MessageHandler handle_message)
+        : depth(quality.depth),
+          is_transient_local(quality.is_transient_local),
+          type(std::move(message_type)),
+          handler(std::move(handle_message)) {
       const rcl_allocator_t allocator = rcl_get_default_allocator();
       check_rcl(rmw_serialized_message_init(&message, 0, &allocator), "allocate a message");
     }
@@ -347,6 +353,7 @@ class Ros2 {
     }
 
     const std::size_t depth;
+    const bool is_transient_local;
     const std::string type;
     const MessageHandler handler;
     Gaps gaps;
@@ -354,6 +361,16 @@ class Ros2 {
     rcl_subscription_t rcl = rcl_get_zero_initialized_subscription();
     rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
   };
+
+  // Return the subscriptions whose messages are taken. Those of `transient_local` topics wait in ROS until the node is
+  // active, since their publishers do not send them again.
+  std::vector<Subscription*> waiting_subscriptions() const {
+    std::vector<Subscription*> found;
+    for (const auto& subscription : subscriptions_) {
+      if (is_active_ || !subscription->is_transient_local) found.push_back(subscription.get());
+    }
+    return found;
+  }
 
   static rmw_qos_profile_t profile(const Quality& quality) {
     rmw_qos_profile_t made = rmw_qos_profile_default;

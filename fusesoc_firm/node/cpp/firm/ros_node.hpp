@@ -221,7 +221,10 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
     out << (service.is_server ? "service of" : "service called by") << " the hardware:\n  " << service.name << "  "
         << service.type << "\n";
   }
-  for (const auto& action : system.actions) out << "action of the hardware:\n  " << action.name << "\n";
+  for (const auto& action : system.actions) {
+    out << (action.is_server ? "action of the hardware:\n  " : "action to which the hardware sends goals:\n  ")
+        << action.name << "\n";
+  }
   out << "\nSIGINT and SIGTERM end the node after all pending messages; a second signal ends the node at once.\n"
       << "exit status: 0, 1 if the hardware or ROS failed, 2 for an invalid command line\n";
 }
@@ -288,6 +291,12 @@ class Engines {
     for (const auto& topic : system.subscribers) {
       if (topic.id) configuration.queue_depths[*topic.id] = arguments.quality_of(topic).depth;
     }
+    for (const auto& action : system.actions) {
+      // A result must not overtake feedback, nor a cancellation its goal.
+      const auto [first, second] = action.is_server ? std::pair(action.goal, action.cancel)
+                                                    : std::pair(action.feedback, action.result);
+      configuration.shared_queues[second] = first;
+    }
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
     configuration.has_status = system.has_status_frames();
@@ -309,7 +318,8 @@ class Engines {
       };
     }
     for (const auto& action : system.actions) {
-      for (const unsigned publisher : {action.feedback, action.result}) {
+      const bool is_server = action.is_server;
+      for (const unsigned publisher : {is_server ? action.feedback : action.goal, is_server ? action.result : action.cancel}) {
         from_hardware_.at(publisher) = [this, publisher](const std::uint8_t* payload, std::size_t size) {
           actions_.take(publisher, payload, size);
         };
@@ -326,6 +336,7 @@ class Engines {
     configuration.on_rejected = configuration.on_aborted = nullptr;
     configuration.on_restart = configuration.on_rest = nullptr;
     configuration.queue_depths.clear();
+    configuration.shared_queues.clear();
     software_ = std::make_unique<Node>(configuration, "software:" + arguments.software, by_id(from_software_));
     for (unsigned id = 0; id < inputs.size(); ++id) {
       if (inputs[id].converter) from_hardware_.at(*inputs[id].converter) = into(*software_, id);
@@ -351,7 +362,7 @@ class Engines {
     };
   }
 
-  // Serve and call all services, and serve all actions, with a middleware.
+  // Serve and call all services, and exchange the goals of all actions, with a middleware.
   template <typename Ros>
   void connect(Ros& ros) {
     calls_.connect(ros);
@@ -483,7 +494,7 @@ inline void print_calls(const std::string& block, const CallStatistics& counted)
 inline void print_goals(const std::string& block, const GoalStatistics& counted) {
   std::cerr << block << ": " << counted.goals << " goals, " << counted.succeeded << " succeeded, " << counted.canceled
             << " canceled, " << counted.aborted << " aborted, " << counted.rejected << " rejected, " << counted.unasked
-            << " unasked" << std::endl;
+            << " unasked, " << counted.lost << " lost" << std::endl;
 }
 
 // The services and actions while they are connected to a middleware, which outlives them.
