@@ -147,7 +147,7 @@ async def _cost(session: aiohttp.ClientSession, address: str, process: int) -> f
 
 async def _cycle(session: aiohttp.ClientSession, address: str) -> int:
     """The last cycle of the latest burst, or 0 before the first."""
-    async with session.get(f"{address}api/grants") as answer:
+    async with session.get(f"{address}api/timeline") as answer:
         grants: list[Any] = json.loads(await answer.text())["grants"]
     return int(grants[-1][2]) if grants else 0
 

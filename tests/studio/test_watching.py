@@ -26,7 +26,7 @@ VIEW_BUTTONS = ".text > [role=group]"
 VIEWS = {
     "bytes": "document.querySelectorAll('.bytes td').length > 5",
     "VHDL": "document.querySelector('.code .cm-content').textContent.includes('entity robot_system is')",
-    "grants": "document.querySelectorAll('.grant').length > 0",
+    "timeline": "document.querySelector('.grant') && document.querySelector('.lanes .wait')",
     "plots": "document.querySelector('.plot canvas') && document.querySelector('.plot').innerText.includes('cycles')",
     "status": "document.querySelector('.view').innerText.includes('no status block')",
     "evaluate": """document.querySelector('.view').innerText.includes("needs a 'period'")""",
