@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.studio.browser import PROGRAM, Page, opened
-from tests.studio.played import HOSTILE, modelled, write_system
+from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_system
 from tests.studio.served import served
 from tests.studio.test_page import AXE, ROOM
 
@@ -209,6 +209,40 @@ def test_a_full_queue_is_seen_at_its_wire(tmp_path: Path) -> None:
         await page.until("document.querySelector('.wire.crowded') !== null")
 
     watching(tmp_path, steps, "--fault=hang", "--at=20")
+
+
+def words_at(source: str, sink: str) -> str:
+    """The script that finds the words at a wire."""
+    return f"""document.querySelector('[data-wire="{source}>{sink}"]')?.textContent"""
+
+
+def test_wires_show_where_messages_wait_and_where_that_begins(tmp_path: Path) -> None:
+    async def steps(page: Page) -> None:
+        await press(page, "run")
+        names = [*TYPES]
+        ways = [("from the host", name) for name in names] + [(name, f"{name}_out") for name in names]
+        ways += [(f"{name}_out", "to the host") for name in names]
+        for way, percent in zip(ways, WAITS[2:], strict=True):
+            share = f"Number({words_at(*way)}?.match(/waits (\\d+) %/)?.[1] ?? 0)"
+            # The model rounds down.
+            await page.until(f"{share} <= {percent} && {share} > {percent} - 5")
+        for way in (("point_out", "to the host"), ("text", "text_out")):
+            assert await page.evaluate(f"{words_at(*way)}.includes('begins here')")
+        assert "begins" not in await page.evaluate(words_at("point", "point_out"))
+        assert await page.evaluate("document.querySelectorAll('path.waits.first').length") == 2
+        await page.picture(tmp_path / "waits.png")
+        # An opened response shows the counts of its cycles.
+        await open_message(page, "point_out")
+        await page.until("document.querySelector('.message').innerText.includes('where messages waited in the cycles')")
+        await page.until(f"{words_at('point_out', 'to the host')}.includes('waits')")
+        await page.picture(tmp_path / "past.png")
+        await press(page, "newest", ".messages")
+        await page.until("!document.querySelector('.message').innerText.includes('where messages waited')")
+        await press(page, "timeline", VIEW_BUTTONS)
+        await page.until("document.querySelector('.view').innerText.includes('point_out → to the host')")
+        await page.picture(tmp_path / "timeline.png")
+
+    watching(tmp_path, steps)
 
 
 @pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")
