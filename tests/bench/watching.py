@@ -132,7 +132,7 @@ async def _show(page: Page, address: str) -> None:
     await page.call("Page.navigate", url=address)
     while not await page.evaluate(_SETTLED):
         await asyncio.sleep(0.2)
-    await page.until("document.querySelectorAll('.messages tbody tr').length > 100")
+    await page.until("document.querySelectorAll('.messages tbody tr').length >= 100")
     await page.evaluate(_COUNT)
 
 
