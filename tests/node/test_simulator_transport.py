@@ -239,7 +239,7 @@ def test_waits_are_requested_only_while_they_are_wanted(model: list[str]) -> Non
         for _ in range(rounds):
             transport.send(b"\0" * 80)
             assert transport.receive(60) is not None
-            time.sleep(0.006)
+            time.sleep(0.012)
         found = [event for event in seen if isinstance(event, Waits)]
         seen.clear()
         return found

@@ -53,7 +53,7 @@ _STEP_SECONDS = 0.001
 _STEP_SHARE = 1 / 8
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
 # The least time between two requests of waits.
-_WAITS_SECONDS = 0.005
+_WAITS_SECONDS = 0.01
 _PIECE_BYTES = 2**16
 # The most that Linux grants every user. In a small pipe, a large frame needs a change of processes for each 64 KiB.
 _PIPE_BYTES = 2**20
