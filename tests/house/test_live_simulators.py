@@ -245,9 +245,9 @@ def levels_of(waves: Path, unit: str) -> Iterator[dict[str, str]]:
                 before |= now
             elif words and not line.startswith("$"):
                 value, code = (words[0][1:], words[1]) if line.startswith("b") else (line[0], line[1:].strip())
-                for name, high, low in names.get(code, ()):
-                    bits = value.rjust(high - low + 1, "0")[::-1]
-                    now |= {f"{name}[{low + place}]" if high > low else name: bit for place, bit in enumerate(bits)}
+                for name, first, last in names.get(code, ()):
+                    bits = value.rjust(first - last + 1, "0")[::-1]
+                    now |= {f"{name}[{last + place}]" if first > last else name: bit for place, bit in enumerate(bits)}
 
 
 @pytest.mark.check
@@ -256,7 +256,8 @@ def test_waits_are_those_of_the_waves(system: str, tmp_path: Path, build_root: P
     """They are counted here in GHDL's waves of a run; all simulators count the same."""
     spec, counted = SPECS / system / f"{system}.yaml", []
     loaded = load_beside(spec)
-    frames = [pack_frame(item.subscriber.id, item.payload) for item in stimuli_of(spec, loaded)[:12]]
+    ids = {item.block: item.id for item in loaded.system.subscribers}
+    frames = [pack_frame(ids[item.subscriber.block], item.payload) for item in stimuli_of(spec, loaded)[:12]]
     for tool in fitting(is_live=True):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not installed")

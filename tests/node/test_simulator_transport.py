@@ -237,14 +237,14 @@ def test_waits_are_requested_only_while_they_are_wanted(model: list[str]) -> Non
 
     def waits(rounds: int) -> list[Waits]:
         for _ in range(rounds):
-            transport.send(b"\0" * 80)
-            assert transport.receive(60) is not None
+            opened.send(b"\0" * 80)
+            assert opened.receive(60) is not None
             time.sleep(0.012)
         found = [event for event in seen if isinstance(event, Waits)]
         seen.clear()
         return found
 
-    with SimulatorTransport(lambda: Simulator(model), None, seen.append, lambda: is_wanted) as transport:
+    with SimulatorTransport(lambda: Simulator(model), None, seen.append, lambda: is_wanted) as opened:
         assert waits(5) == []
         is_wanted = True
         found = waits(5)
