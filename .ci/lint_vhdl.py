@@ -59,6 +59,7 @@ UNREADABLE = re.compile(r"^Error while processing (.+?): *\nError: (.*) @ Line (
 # they use every template (`unused_templates`).
 CALLS: Sequence[tuple[str, str, Mapping[str, object]]] = (
     ("quat2euler/quat2euler", "system", {"board": "ulx3s"}),
+    ("quat2euler/quat2euler", "simulation", {"product": "live"}),
     ("quat2euler/quat2euler_hls", "system", {}),
     ("quat2euler/quat2euler_hls", "simulation", {}),
     ("mobile_robot/mobile_robot", "simulation", {"simulator": "icarus"}),

@@ -185,6 +185,14 @@ class Frame:
     nodes: tuple[Node, ...]
     trailing_bytes: int
 
+    def __hash__(self) -> int:
+        """Return the hash of all parts, computed once, since tables have frames as keys and these may be large."""
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.message, self.ros, self.prefix, self.checked_prefix, self.nodes, self.trailing_bytes))
+
     @property
     def is_fixed_size(self) -> bool:
         """Whether the whole payload is one `Fixed`, so that offsets in the `Fixed` are offsets in the payload."""

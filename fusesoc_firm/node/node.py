@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
@@ -67,6 +67,12 @@ class HardwareListener(Protocol):
 
     def refused(self, converter: int | None) -> None:
         """Handle a fault from the hardware: of a converter, numbered as in `frame_error`, or in a frame's id (None)."""
+
+    def wants_waits(self) -> bool:
+        """Return whether simulated hardware should count the cycles in which its wires wait."""
+
+    def waited(self, cycle: int, counts: Sequence[int]) -> None:
+        """Handle these counts, which end before a cycle; see `Waits` of `node/transport/simulator.py`."""
 
 
 OpenTransport = Callable[[HardwareListener], Transport]
@@ -566,6 +572,15 @@ class Node:
             self._report(
                 "the hardware rejected a frame " + ("with an unknown id" if converter is None else "of a publisher")
             )
+
+    def wants_waits(self) -> bool:
+        """Return whether somebody watches the run; any thread may call this method."""
+        return self._watch is not None and self._watch.is_watched()
+
+    def waited(self, cycle: int, counts: Sequence[int]) -> None:
+        """Record the cycles in which wires waited; any thread may call this method."""
+        if self._watch:
+            self._watch.waited(cycle, counts)
 
     def _begin_anew(self, hardware: _Hardware, error: TransportError) -> bool:
         """Reopen the transport if the settings allow it; return False if they do not, or if reopening fails."""

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.node import HardwareListener, OpenTransport
 from fusesoc_firm.node.status import check_digest
 from fusesoc_firm.node.transport.open_transport import open_transport
-from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
+from fusesoc_firm.node.transport.simulator import (
+    ErrorPulse,
+    Event,
+    Pace,
+    Simulator,
+    SimulatorTransport,
+    Taken,
+    Waits,
+)
 from fusesoc_firm.node.transport.status_registers import StatusRegisters, open_registers_at
 from fusesoc_firm.node.transport.transport import Transport, TransportError
 from fusesoc_firm.simulation.simulator import BuiltSimulator
@@ -24,13 +33,13 @@ def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -
     command = built.command(seed=seed, stall_percent=stall_percent)
 
     return lambda listener: SimulatorTransport(
-        lambda: Simulator(command, built.folder), _PACE, partial(_tell, listener)
+        lambda: Simulator(command, built.folder), _PACE, partial(_tell, listener), listener.wants_waits
     )
 
 
 def at_address(address: str) -> OpenTransport:
     """Return a function that opens a transport; docs/reference/transports.md describes addresses."""
-    return lambda listener: open_transport(address, _PACE, partial(_tell, listener))
+    return lambda listener: open_transport(address, _PACE, partial(_tell, listener), listener.wants_waits)
 
 
 def status_registers(description: NodeDescription, address: str, transport: str) -> StatusRegisters | None:
@@ -100,9 +109,17 @@ class _LateListener:
         if self.listens:
             self._listener.refused(converter)
 
+    def wants_waits(self) -> bool:
+        return self.listens and self._listener.wants_waits()
+
+    def waited(self, cycle: int, counts: Sequence[int]) -> None:
+        self._listener.waited(cycle, counts)
+
 
 def _tell(listener: HardwareListener, event: Event) -> None:
     if isinstance(event, Taken):
         listener.taken(event.first_cycle, event.last_cycle)
     elif isinstance(event, ErrorPulse):
         listener.refused(event.converter)
+    elif isinstance(event, Waits):
+        listener.waited(event.cycle, event.counts)

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 _MOST_BYTES, _MOST_MESSAGES = 64 * 2**20, 20_000
-# The number of the latest bursts.
-_MOST_GRANTS = 5000
+# The number of the latest bursts, and of the latest counts of waits.
+_MOST_GRANTS, _MOST_WAITS = 5000, 5000
 # The number of latencies of a block from which percentiles are computed.
 _MOST_LATENCIES = 1000
 
@@ -59,6 +59,27 @@ class Grant:
     block: str
     first: int
     last: int
+
+
+@dataclass(frozen=True)
+class Waits:
+    """The cycles in which each wire of simulated hardware waited, from the cycle `first` to the one before `end`.
+
+    On a wire that waits, a message or a beat is offered and not taken. `cycles` are those that were counted.
+    """
+
+    first: int
+    end: int
+    cycles: int
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, parts: Sequence[Waits]) -> Waits | None:
+        """Return the sum of parts in their order, or None without parts."""
+        if not parts:
+            return None
+        counts = tuple(map(sum, zip(*(part.counts for part in parts), strict=True)))
+        return cls(parts[0].first, parts[-1].end, sum(part.cycles for part in parts), counts)
 
 
 @dataclass(frozen=True)
@@ -127,6 +148,11 @@ class Watch:
         self._counts: dict[str, _Counting] = {}
         self._loads: Callable[[], Mapping[str, Load]] = dict
         self._grants: deque[Grant] = deque(maxlen=_MOST_GRANTS)
+        self._waits: deque[Waits] = deque(maxlen=_MOST_WAITS)
+        self._waits_of_all: Waits | None = None
+        self._counted_to: int | None = None
+        self.is_watched: Callable[[], bool] = lambda: False
+        """Returns whether somebody watches; what costs the run time is counted only then."""
         self.status: Mapping[str, int] = {}
         """The counts of the hardware's status that were read last, by texts for the user."""
         self.restart()
@@ -178,6 +204,36 @@ class Watch:
         """Return the latest bursts, at most `most`, the oldest first."""
         with self._lock:
             return [*islice(self._grants, max(0, len(self._grants) - most), None)]
+
+    def waited(self, cycle: int, counts: Sequence[int]) -> None:
+        """Record the cycles in which each wire has waited since the last call, up to the one before `cycle`.
+
+        The first call begins the count, and so does one of a simulator that has begun again.
+        """
+        with self._lock:
+            first, self._counted_to = self._counted_to, cycle
+            if first is None or cycle <= first or (self._waits and len(counts) != len(self._waits[-1].counts)):
+                return
+            found = Waits(first, cycle, cycle - first, tuple(counts))
+            self._waits.append(found)
+            self._waits_of_all = Waits.of([self._waits_of_all, found] if self._waits_of_all else [found])
+
+    @property
+    def waits_of_all(self) -> Waits | None:
+        """The waits in all cycles that were counted, or None before the first ones."""
+        return self._waits_of_all
+
+    def waits(self, most: int, first: int = 0, last: int | None = None) -> list[Waits]:
+        """Return the latest counts of waits, at most `most`, the oldest first.
+
+        Those that end before the cycle `first` or begin after the cycle `last` are left out.
+        """
+        with self._lock:
+            latest = reversed(self._waits)
+            found = [
+                *islice((item for item in latest if item.end > first and (last is None or item.first <= last)), most)
+            ]
+        return found[::-1]
 
     def since(self, number: int, most: int) -> News:
         """Return the newest messages after the one with this number, at most `most`; -1 is before the first."""

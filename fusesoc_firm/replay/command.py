@@ -25,7 +25,7 @@ from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, Stream, open_ba
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.transport.simulator import Simulator, Waits
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Latency, Watch
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
@@ -163,6 +163,7 @@ class _Replay:
         total = expected if source.limit is None else min(expected, source.limit)
         topics = {stream.topic for stream in self.routes}
         with tqdm(total=total, unit="msg", disable=None, file=sys.stderr) as bar:
+            self._count_waits()
             try:
                 for recorded in source.messages(self.bag, topics):
                     if self.settings.control and not self.settings.control.passes():
@@ -191,6 +192,7 @@ class _Replay:
         except (StuckError, TransportError) as error:
             faults.append(f"the rest of the bag was not replayed: {error}")
             self.is_over = True
+        self._count_waits()
         if recorded.stream in self._calls:
             self._compare()
             if answer := self._answer(route):
@@ -275,6 +277,18 @@ class _Replay:
     def _seen_at(self, subscriber: Topic, payload: bytes, stamp: int) -> int | None:
         watch = self.settings.watch
         return watch.saw(subscriber.block, payload, stamp - self.bag.start) if watch else None
+
+    def _count_waits(self) -> None:
+        """Record where messages have waited since the last call, if somebody watches."""
+        watch, simulator = self.settings.watch, self.run.simulator
+        if not watch or not watch.is_watched():
+            return
+        # The end of a simulator is reported where a message needs it.
+        with suppress(TransportError):
+            simulator.request_waits()
+            for event in simulator.run(0):
+                if isinstance(event, Waits):
+                    watch.waited(event.cycle, event.counts)
 
     def _end(self) -> None:
         """End the simulation, and report its errors."""

@@ -22,7 +22,9 @@ from fusesoc_firm.system import system_core
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.configuration import (
     NODE_BENCH_TEMPLATE,
+    SYSTEM_TEMPLATE,
     TEST_BENCH_TEMPLATE,
+    system_configuration,
     test_bench_configuration,
 )
 from fusesoc_firm.system.hardware.verilog_bench import (
@@ -32,6 +34,7 @@ from fusesoc_firm.system.hardware.verilog_bench import (
     translated_unit,
     verilog_bench_configuration,
 )
+from fusesoc_firm.system.hardware.waits import watched_entity
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.written.specification import CHIPS
 from fusesoc_firm.text.diagnostics import SourceRef, fail
@@ -90,7 +93,8 @@ def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a live simulation, whose start sets the seed and the stall rate. May raise `InputError`."""
     _check_simulator(loaded.system, str(request.parameters["simulator"]), "live")
     _refuse_node(loaded)
-    files = _with_open_end(request, loaded, TEST_BENCH_TEMPLATE, VERILOG_BENCH_TEMPLATE)
+    files = _watched_system(request, loaded)
+    files |= _with_open_end(request, loaded, TEST_BENCH_TEMPLATE, VERILOG_BENCH_TEMPLATE)
     return GeneratedCore(f"Live simulation of system {loaded.system.name}", files)
 
 
@@ -101,6 +105,14 @@ def network_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
         fail(f"the product 'network' needs one of the interconnects {', '.join(CHIPS)}")
     files = _with_open_end(request, loaded, NODE_BENCH_TEMPLATE, VERILOG_NODE_BENCH_TEMPLATE)
     return GeneratedCore(f"Simulated board of system {loaded.system.name}", files)
+
+
+def _watched_system(request: Request, loaded: LoadedSystem) -> dict[str, GeneratedFile]:
+    """Return the top level that shows where messages wait; in Verilog, the test bench looks into the netlist."""
+    if not SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
+        return {}
+    text = render(SYSTEM_TEMPLATE, system_configuration(loaded.system, is_watched=True))
+    return {f"{watched_entity(loaded.system)}.vhd": GeneratedFile(text, VHDL, tags=_BENCH_TAGS)}
 
 
 def _with_open_end(request: Request, loaded: LoadedSystem, vhdl: str, verilog: str) -> dict[str, GeneratedFile]:

@@ -16,7 +16,7 @@ from aiohttp import WSMsgType, web
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.node.watch import Seen
+from fusesoc_firm.node.watch import Seen, Waits, Watch
 from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, has_pose, numbers_of, picture_of, pose_of
@@ -31,8 +31,8 @@ from fusesoc_firm.tools.simulators import fitting
 _SECONDS, _MOST_AHEAD = 0.05, 20
 # The number of messages in an answer about the record.
 _MOST_ROWS = 200
-# The number of bursts and of points in an answer.
-_MOST_GRANTS, _MOST_POINTS = 500, 500
+# The number of bursts, of counts of waits, and of points in an answer.
+_MOST_GRANTS, _MOST_WAITS, _MOST_POINTS = 500, 500, 500
 # The number of beats in a wave.
 _MOST_BEATS = 24
 # What can be plotted of each message beside its own numbers.
@@ -54,6 +54,7 @@ class Live:
         self._workspace = workspace
         self._count = 0
         self._sockets: set[web.WebSocketResponse] = set()
+        self._pages = 0
         self._file = ""
         self.run: Run | None = None
 
@@ -62,6 +63,7 @@ class Live:
         if self.run:
             self.run.stop()
         self.run = run
+        run.watch.is_watched = lambda: self._pages > 0
         self._file = self._workspace.name(run.spec)
         self._count += 1
 
@@ -74,7 +76,7 @@ class Live:
             "GET picture": self._picture,
             "GET poses": self._poses,
             "GET wave": self._wave,
-            "GET grants": self._grants,
+            "GET timeline": self._timeline,
             "GET status": self._status,
             "GET series": self._series,
             "POST run": self._run,
@@ -98,6 +100,7 @@ class Live:
         socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024, compress=False)
         await socket.prepare(request)
         self._sockets.add(socket)
+        self._pages += 1
         ahead = asyncio.Semaphore(_MOST_AHEAD)
         sender = asyncio.create_task(self._send(socket, ahead))
         try:
@@ -107,6 +110,7 @@ class Live:
                         ahead.release()
         finally:
             self._sockets.discard(socket)
+            self._pages -= 1
             sender.cancel()
             with suppress(asyncio.CancelledError, ConnectionError):
                 await sender
@@ -140,12 +144,13 @@ class Live:
         return in_json({"messages": [*map(row, rows)]})
 
     async def _message(self, request: web.Request) -> web.Response:
-        """Return the fields of a message."""
+        """Return the fields of a message, and the waits while the hardware worked on it."""
         run, seen = self._seen(request)
         frame = run.topics[seen.block].frame
         found = await asyncio.to_thread(fields_of, frame, seen.payload)
         kinds = {"hasPicture": has_picture(frame), "hasPose": has_pose(frame)}
-        return in_json({"row": row(seen), "type": str(frame.message), **kinds, **found})
+        waits = waits_during(run.watch, seen)
+        return in_json({"row": row(seen), "type": str(frame.message), **kinds, **found, "waits": waits and vars(waits)})
 
     async def _picture(self, request: web.Request) -> web.Response:
         """Return the picture in a message."""
@@ -168,10 +173,17 @@ class Live:
         run, seen = self._seen(request)
         return in_json(wave(run.system, run.topics[seen.block], seen))
 
-    async def _grants(self, _: web.Request) -> web.Response:
-        """Return the latest bursts of the hardware."""
-        grants = self._current().watch.grants(_MOST_GRANTS)
-        return in_json({"grants": [(item.block, item.first, item.last) for item in grants]})
+    async def _timeline(self, _: web.Request) -> web.Response:
+        """Return the latest bursts of the hardware, and the waits of its wires from the first of them on."""
+        watch = self._current().watch
+        grants = watch.grants(_MOST_GRANTS)
+        waits = watch.waits(_MOST_WAITS, grants[0].first if grants else 0)
+        return in_json(
+            {
+                "grants": [(item.block, item.first, item.last) for item in grants],
+                "waits": [vars(item) for item in waits],
+            }
+        )
 
     async def _status(self, _: web.Request) -> web.Response:
         """Return what the hardware's status has counted."""
@@ -223,6 +235,16 @@ class Live:
         if not seen:
             raise web.HTTPNotFound(reason="this message is not in the record any more")
         return run, seen
+
+
+def waits_during(watch: Watch, seen: Seen) -> Waits | None:
+    """Return the waits in the cycles from a response's cause to the response, as far as they are known."""
+    if seen.cycles is None:
+        return None
+    first, last = seen.cycles
+    if seen.latency.cycles is not None:
+        first = last - seen.latency.cycles
+    return Waits.of(watch.waits(_MOST_WAITS, first, last))
 
 
 def wave(system: DerivedSystem, topic: Topic, seen: Seen) -> dict[str, Any]:

@@ -78,6 +78,7 @@ def state_of(run: Run, number: int, file: str) -> dict[str, Any]:
         "isPaused": is_paused(run),
         "isControlled": run.control is not None,
         "clock": None if clock is None else float(clock),
+        "wires": run.wires,
     }
 
 
@@ -87,12 +88,13 @@ def is_paused(run: Run) -> bool:
 
 
 def figures(run: Run) -> dict[str, Any]:
-    """Return counts and loads of all blocks of a run, and the time for which they hold."""
+    """Return counts and loads of all blocks of a run, the waits of its wires, and the time for which they hold."""
     watch = run.watch
     return {
         "seconds": time.monotonic() - watch.start_ns / 1e9,
         "counts": {block: _counted(count) for block, count in watch.counts().items()},
         "loads": {block: vars(load) for block, load in watch.loads().items()},
+        "waits": watch.waits_of_all and vars(watch.waits_of_all),
     }
 
 

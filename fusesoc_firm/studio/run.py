@@ -22,6 +22,7 @@ from fusesoc_firm.simulation.simulator import BuiltSimulator
 from fusesoc_firm.simulation.software_run import stimulated, system_stimuli, taken_elsewhere
 from fusesoc_firm.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import Topic
+from fusesoc_firm.system.hardware.waits import wires
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError, fail
@@ -47,6 +48,7 @@ class Run:
         self.spec, self.title, self.control = spec.resolve(), title, control
         self.system, self.libraries = loaded.system, loaded.libraries
         self.watch = Watch()
+        self.wires = wires(loaded.system)
         self.state, self.text = RUNNING, ""
 
     @property

@@ -18,7 +18,7 @@ from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError
 from fusesoc_firm.text.yaml_edit import path_at
 from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
-from fusesoc_firm.text.yaml_text import parse_yaml, yaml_data
+from fusesoc_firm.text.yaml_text import YamlText, data_of, parse_yaml
 
 Load = Callable[[str], LoadedSystem]
 """Derives the system of a text in the specification's place. May raise `InputError`."""
@@ -39,8 +39,10 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
         derived = derived_description(loaded.system)
     except InputError as error:
         diagnostics = error.diagnostics
-    root = _root(text)
-    return outline(text) | {"faults": [_fault(root, file, item) for item in diagnostics], "derived": derived}
+    read = _read(text)
+    root = read.root if read else None
+    faults = [_fault(root, file, item) for item in diagnostics]
+    return {"specification": _content(read), "faults": faults, "derived": derived}
 
 
 def outline(text: str) -> dict[str, Any]:
@@ -57,18 +59,26 @@ def grammar() -> dict[str, Any]:
 
 def content_of(text: str) -> dict[str, Any] | None:
     """Return the mapping in a text, or None if the text is anything else."""
+    return _content(_read(text))
+
+
+def _content(read: YamlText | None) -> dict[str, Any] | None:
+    if read is None or read.is_cut:
+        return None
     try:
-        content = yaml_data(text)
+        content = data_of(read.root)
     except yaml.YAMLError:
         return None
     return content if isinstance(content, dict) else None
 
 
-def _root(text: str) -> yaml.Node | None:
-    """Return the root of a text, or of the part above the place from which it is invalid YAML."""
-    # A text that exceeds the limits has no nodes.
+def _read(text: str) -> YamlText | None:
+    """Return the nodes of a text, or of the part above the place from which it is invalid YAML.
+
+    A text that exceeds the limits has no nodes.
+    """
     with suppress(InputError):
-        return parse_yaml(text, "", Diagnostics()).root
+        return parse_yaml(text, "", Diagnostics())
     return None
 
 

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Simulator, Taken
+from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Simulator, Taken, Waits
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from tests.cores.pipes import TOOLS, PipeBench, pipe_bench
 from tests.hdl.frames import random_frames
 
 SEED = 20240611
 EVERY_BYTE = bytes(range(256))
-VERSION = b"V\2"
+VERSION = b"V\3"
 FRAME = b"\x07\x04\x00\x00\x00\x00\x0a\xff\x0d"
 
 
@@ -35,6 +35,11 @@ def run_to_rest(simulator: Simulator, rest: int = 300) -> list[Event]:
     while simulator.quiet < rest:
         events += simulator.run(rest)
     return events
+
+
+def run_to_burst(simulator: Simulator) -> None:
+    while not any(isinstance(event, Burst) for event in simulator.run(1000)):
+        pass
 
 
 def send_all(simulator: Simulator, frames: list[bytes], seed: int) -> list[Event]:
@@ -96,6 +101,43 @@ def test_the_same_requests_have_the_same_reports(bench: PipeBench) -> None:
             time.sleep(pause)
             runs.append((events + run_to_rest(simulator), simulator.cycle))
     assert runs[0] == runs[1]
+
+
+def test_waits_are_counted_from_the_first_request_on(bench: PipeBench) -> None:
+    """The system is a wire: a beat waits in the same cycles in both streams of the host, and at its ends."""
+    print(f"seed {SEED}")
+    with bench.start(8, SEED=SEED, STALL_PERCENT=40) as simulator:
+        found = []
+        for _ in range(2):
+            simulator.request(EVERY_BYTE)
+            run_to_burst(simulator)
+            simulator.request_waits()
+            found += simulator.run(0)
+        before, waits = found
+        assert isinstance(before, Waits)
+        assert isinstance(waits, Waits)
+        assert before.counts == (0, 0, 0, 0)
+        assert waits.cycle == simulator.cycle
+        # A stalled host takes 256 beats in some 427 cycles.
+        assert waits.counts == waits.counts[:1] * 4
+        assert 100 < waits.counts[0] < 250
+        simulator.request_waits()
+        assert simulator.run(0) == [Waits(simulator.cycle, (0, 0, 0, 0))]
+
+
+def test_all_simulators_count_the_same_waits(tmp_path: Path) -> None:
+    found = []
+    for tool in TOOLS:
+        (tmp_path / tool).mkdir()
+        with pipe_bench(tool, tmp_path / tool).start(8, SEED=SEED, STALL_PERCENT=47) as simulator:
+            for _ in range(4):
+                simulator.request_waits()
+                found += simulator.run(0)
+                simulator.request(EVERY_BYTE * 2)
+                run_to_burst(simulator)
+    print(f"seed {SEED}: {found[:4]}")
+    assert found == found[:4] * len(TOOLS)
+    assert [event.counts[0] > 100 for event in found[:4] if isinstance(event, Waits)] == [False, True, True, True]
 
 
 def test_a_run_ends_with_the_cycle_in_which_something_happens(bench: PipeBench) -> None:
@@ -212,8 +254,8 @@ def test_what_happened_in_the_cycle_of_a_fault_is_reported(bench: PipeBench) -> 
 @pytest.mark.parametrize(
     ("requests", "message"),
     [
-        (b"X", "unknown request 88; legal: F, A, H, R, Q"),
-        (b"\x00", "unknown request 0; legal: F, A, H, R, Q"),
+        (b"X", "unknown request 88; legal: F, A, H, R, W, Q"),
+        (b"\x00", "unknown request 0; legal: F, A, H, R, W, Q"),
         (b"R\x01\x00", "the requests end within a request"),
         (b"F\x04\x00\x00\x00abc", "the requests end within a request"),
         (b"F\x00\x00\x00\x00", "the requested frame has no bytes"),

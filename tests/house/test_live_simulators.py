@@ -6,18 +6,21 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
 
 from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
+from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import BurstJoiner
-from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.transport.simulator import Simulator, Waits
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.simulation.simulator import BuiltSimulator, CoreSources, build_simulator
-from fusesoc_firm.system.message_sources import core_of
+from fusesoc_firm.studio.run import stimuli_of
+from fusesoc_firm.system.hardware.waits import waits_configuration
+from fusesoc_firm.system.message_sources import core_of, load_beside
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.simulators import fitting
 from tests.house.test_main_job import ROOT, run
@@ -217,3 +220,67 @@ def test_the_command_prints_a_program(tmp_path: Path, capsys: pytest.CaptureFixt
     with pytest.raises(SystemExit):
         main(["simulator", str(spec), "--seed", "0"])
     assert "0 is not a whole number from 1 to 2147483562" in capsys.readouterr().err
+
+
+def levels_of(waves: Path, unit: str) -> Iterator[dict[str, str]]:
+    """The levels of the signals in a unit before each rising edge of its clk, by name or `name[bit]`."""
+    names: dict[str, list[tuple[str, int, int]]] = {}
+    scopes: list[str] = []
+    before: dict[str, str] = {}
+    now: dict[str, str] = {}
+    with waves.open(encoding="utf-8") as lines:
+        for line in lines:
+            words = line.split()
+            if line.startswith("$scope"):
+                scopes.append(words[2])
+            elif line.startswith("$upscope"):
+                scopes.pop()
+            elif line.startswith("$var") and scopes[-1] == unit:
+                name, _, bounds = "".join(words[4:-1]).partition("[")
+                high, _, low = bounds.rstrip("]").partition(":")
+                names.setdefault(words[3], []).append((name.lower(), int(high or 0), int(low or high or 0)))
+            elif line.startswith("#"):
+                if now.get("clk") == "1" and before.get("clk") == "0":
+                    yield dict(before)
+                before |= now
+            elif words and not line.startswith("$"):
+                value, code = (words[0][1:], words[1]) if line.startswith("b") else (line[0], line[1:].strip())
+                for name, first, last in names.get(code, ()):
+                    bits = value.rjust(first - last + 1, "0")[::-1]
+                    now |= {f"{name}[{last + place}]" if first > last else name: bit for place, bit in enumerate(bits)}
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("system", ["quat2euler", "multi_type"])
+def test_waits_are_those_of_the_waves(system: str, tmp_path: Path, build_root: Path) -> None:
+    """They are counted here in GHDL's waves of a run; all simulators count the same."""
+    spec, counted = SPECS / system / f"{system}.yaml", []
+    loaded = load_beside(spec)
+    ids = {item.block: item.id for item in loaded.system.subscribers}
+    frames = [pack_frame(ids[item.subscriber.block], item.payload) for item in stimuli_of(spec, loaded)[:12]]
+    for tool in fitting(is_live=True):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+        built = build_simulator(spec, tool, build_root=build_root.parent / "simulators")
+        command = built.command(seed=3, stall_percent=STALL_PERCENT)
+        command += [f"--vcd={tmp_path / 'waves.vcd'}"] * (tool == "ghdl")
+        with Simulator(command, built.folder) as simulator:
+            simulator.request_waits()
+            for frame in frames:
+                simulator.request(frame)
+            simulator.run(1)
+            while simulator.quiet < 1000:
+                simulator.run(1000)
+            simulator.request_waits()
+            counted += simulator.run(0)
+            simulator.quit()
+    assert counted == counted[:1] * len(counted)
+    (waits,) = counted[:1]
+    assert isinstance(waits, Waits)
+    edges = [*levels_of(tmp_path / "waves.vcd", "u_system")][-waits.cycle :]
+    expected = []
+    for row in waits_configuration(loaded.system)["wires"]:
+        pairs = [(item["verilog_valid"], item["verilog_ready"]) for item in row["handshakes"]]
+        expected.append(sum(any(now[valid] == "1" and now[ready] == "0" for valid, ready in pairs) for now in edges))
+    assert [*waits.counts[2:]] == expected
+    assert max(expected) > 100

@@ -34,7 +34,9 @@ class Simulator:
     fault: str
     at: int
     words: dict[int, int] = field(default_factory=dict)
+    percents: list[int] = field(default_factory=list)
     cycle: int = 0
+    counted: int = 0
     moved: int = 0
     taken: int = 0
     begun: int = 0
@@ -109,6 +111,12 @@ class Simulator:
             "error": b"E\1\0" + self.cycle.to_bytes(8, "little") + b"I" + self.cycle.to_bytes(8, "little"),
         }.get(self.fault, b"")
 
+    def waits(self) -> bytes:
+        """The report of the cycles in which each wire waited: a percentage of all."""
+        cycles, self.counted = self.cycle - self.counted, self.cycle
+        counts = b"".join((cycles * percent // 100).to_bytes(4, "little") for percent in self.percents)
+        return b"W" + self.cycle.to_bytes(8, "little") + len(self.percents).to_bytes(2, "little") + counts
+
     def standing(self) -> bytes:
         leaves = any(last - self.beats(burst) <= self.cycle for last, _, burst in self.events)
         quiet = 0 if self.waiting or leaves else min(self.cycle - self.moved, 2**32 - 1)
@@ -149,13 +157,18 @@ def main() -> None:
     parser.add_argument("--fault", choices=FAULTS, default="")
     parser.add_argument("--at", type=int, default=0)
     parser.add_argument("--word", action="append", default=[], metavar="ADDRESS=WORD")
+    parser.add_argument("--waits", type=int, nargs="*", default=[], help="percent of the cycles on each wire")
     # The options of a real simulator are for its test bench.
     arguments, _ = parser.parse_known_args()
     words = {int(address, 16): int(word, 16) for address, _, word in (item.partition("=") for item in arguments.word)}
-    simulator = Simulator(arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at, words)
+    options = arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at
+    simulator = Simulator(*options, words, arguments.waits)
     with open(3, "rb") as requests, open(4, "wb") as reports:
-        reports.write(b"V\2")
+        reports.write(b"V\3")
         while (letter := requests.read(1)) not in (b"", b"Q"):
+            if letter == b"W":
+                reports.write(simulator.waits())
+                continue
             number = int.from_bytes(requests.read(4), "little")
             if letter == b"F":
                 simulator.put(requests.read(number))

@@ -8,21 +8,22 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from fusesoc_firm.node.transport.open_transport import open_transport
-from fusesoc_firm.node.transport.simulator import Event, Pace, Simulator, SimulatorTransport, Taken
+from fusesoc_firm.node.transport.simulator import Event, Pace, Simulator, SimulatorTransport, Taken, Waits
 from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
 
 # An echo: a frame is taken and comes back a cycle after it; of the bytes of a frame's payload, some are orders.
 _MODEL = """
 import os, struct, sys, time
 requests, reports = open(3, "rb"), open(4, "wb")
-cycle = quiet = 0
+cycle = quiet = counted = 0
 frames = []
-reports.write(b"V\\2")
+reports.write(b"V\\3")
 def say(*parts):
     reports.write(b"".join(parts))
 while kind := requests.read(1):
@@ -51,6 +52,9 @@ while kind := requests.read(1):
         else:
             cycle, quiet = cycle + left, quiet + left
         say(b"S", struct.pack("<QI", cycle, min(quiet, 2**31 - 1)))
+    elif kind == b"W":
+        say(b"W", struct.pack("<QHIII", cycle, 3, cycle - counted, 0, (cycle - counted) // 4))
+        counted = cycle
     elif kind == b"Q":
         say(b"S", struct.pack("<QI", cycle, quiet))
         reports.flush()
@@ -225,6 +229,33 @@ def test_a_frame_begins_the_run_that_brings_its_answer(model: list[str]) -> None
         # The second run may have ended without a burst, which doubles the next one.
         assert begun[1] in [(64, 1), (128, 1)]
         assert all(runs == 1 for _, runs in begun[1:])
+
+
+def test_waits_are_requested_only_while_they_are_wanted(model: list[str]) -> None:
+    seen: list[Event] = []
+    is_wanted = False
+
+    def waits(rounds: int) -> list[Waits]:
+        for _ in range(rounds):
+            opened.send(b"\0" * 80)
+            assert opened.receive(60) is not None
+            time.sleep(0.012)
+        found = [event for event in seen if isinstance(event, Waits)]
+        seen.clear()
+        return found
+
+    with SimulatorTransport(lambda: Simulator(model), None, seen.append, lambda: is_wanted) as opened:
+        assert waits(5) == []
+        is_wanted = True
+        found = waits(5)
+        assert len(found) >= 3
+        assert all(before.cycle < after.cycle for before, after in pairwise(found))
+        for before, after in pairwise(found):
+            cycles = after.cycle - before.cycle
+            assert after.counts == (cycles, 0, cycles // 4)
+        is_wanted = False
+        waits(1)
+        assert waits(5) == []
 
 
 def test_frames_that_are_not_taken_hold_the_sender(transport: Transport) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -109,6 +110,12 @@ class Listener:
         raise AssertionError
 
     def refused(self, converter: int | None) -> None:
+        raise AssertionError
+
+    def wants_waits(self) -> bool:
+        return False
+
+    def waited(self, cycle: int, counts: Sequence[int]) -> None:
         raise AssertionError
 
 

@@ -83,6 +83,11 @@ class Listener:
 
     def refused(self, converter: int | None) -> None: ...
 
+    def wants_waits(self) -> bool:
+        return False
+
+    def waited(self, cycle: int, counts: Sequence[int]) -> None: ...
+
 
 def test_a_simulator_has_no_registers() -> None:
     assert status_registers(DESCRIPTION, "", "pipe:exec simulator") is None

@@ -12,7 +12,7 @@ import pytest
 
 from fusesoc_firm.node.carrier import Taken
 from fusesoc_firm.node.player import Player
-from fusesoc_firm.node.watch import Control, Latency, Percentiles, Watch
+from fusesoc_firm.node.watch import Control, Latency, Percentiles, Waits, Watch
 
 
 def test_the_record_is_bounded_and_tells_what_is_missing() -> None:
@@ -38,6 +38,31 @@ def test_the_record_is_bounded_and_tells_what_is_missing() -> None:
     assert watch.first == 100
     assert watch.counts()["a"].messages == 100
     assert watch.counts()["b"].bytes == 5000
+
+
+def test_waits_are_kept_and_summed_over_the_counted_cycles() -> None:
+    watch = Watch()
+    assert (watch.waits_of_all, watch.waits(10)) == (None, [])
+    # The first call begins the count.
+    watch.waited(1000, [7, 7])
+    assert watch.waits_of_all is None
+    watch.waited(1100, [10, 90])
+    watch.waited(1100, [0, 0])
+    watch.waited(1400, [0, 150])
+    parts = [Waits(1000, 1100, 100, (10, 90)), Waits(1100, 1400, 300, (0, 150))]
+    assert watch.waits(10) == parts
+    assert watch.waits_of_all == Waits.of(parts) == Waits(1000, 1400, 400, (10, 240))
+    assert watch.waits(10, 1099, 1099) == parts[:1]
+    assert watch.waits(10, 1100) == watch.waits(1) == parts[1:]
+    # A simulator that took the place of another one begins at cycle 0.
+    watch.waited(50, [5, 5])
+    watch.waited(60, [1, 2])
+    assert watch.waits(1) == [Waits(50, 60, 10, (1, 2))]
+    assert watch.waits_of_all == Waits(1000, 60, 410, (11, 242))
+    for cycle in range(100, 10_000):
+        watch.waited(cycle, [0, 1])
+    assert len(watch.waits(10_000)) == 5000
+    assert watch.waits_of_all == Waits(1000, 9999, 410 + 9939, (11, 242 + 9900))
 
 
 def test_a_long_run_needs_no_more_memory() -> None:

@@ -541,6 +541,8 @@ def test_software_elsewhere_takes_and_gives_topics(tmp_path: Path) -> None:
 def test_a_watch_records_the_replay_and_pauses_it(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point")))
     items, watch, control = points("ros1", 20), Watch(), Control()
+    # A page is open only while the replay is paused after two messages.
+    watch.is_watched = lambda: not control.is_open
     control.step()
     control.step()
     source = bag(tmp_path, "ros1", items)
@@ -553,6 +555,10 @@ def test_a_watch_records_the_replay_and_pauses_it(tmp_path: Path) -> None:
     replaying.join(0.1)
     assert replaying.is_alive()
     assert watch.since(-1, 0).last == 3
+    # One count for each message; the model says that a wire waits in all cycles.
+    first, second = watch.waits(10)
+    assert (first.first, first.end) == (0, second.first)
+    assert second.counts == (second.end,)
     control.resume()
     replaying.join(60)
     assert not replaying.is_alive()
@@ -565,6 +571,7 @@ def test_a_watch_records_the_replay_and_pauses_it(tmp_path: Path) -> None:
             assert item.latency.cause == number - 1
             # 29 bytes come in 4 beats and go out in as many, the first of them 20 cycles after the last.
             assert item.latency.cycles == 3 + 20 + 3
+    assert watch.waits(10) == [first, second]
     assert read(tmp_path / "out.bag") == renamed(items, "/p_out")
 
 

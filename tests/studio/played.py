@@ -27,6 +27,9 @@ STIMULI = [
     {"text": {"data": HOSTILE}},
     {"image": IMAGE},
 ]
+# The percentage of the cycles in which each wire waits: from and to the host, from the Manager, to the publishers, and
+# from them. The point waits for the Manager, and the text for its publisher.
+WAITS = (0, 0, 40, 25, 0, 50, 30, 0, 60, 0, 0)
 TYPES = {"point": "geometry_msgs/Point", "text": "std_msgs/String", "image": "sensor_msgs/Image"}
 
 
@@ -56,6 +59,9 @@ def modelled(*options: str) -> Callable[[Path, str], BuiltSimulator]:
     def build(spec: Path, tool: str) -> BuiltSimulator:
         if tool == "verilator":
             fail(f"cannot build the simulator for {spec}", hint=HOSTILE)
-        return BuiltSimulator(tool, spec.parent, (sys.executable, model_simulator.__file__, "--width=64", *options))
+        waits = ("--waits", *map(str, WAITS))
+        return BuiltSimulator(
+            tool, spec.parent, (sys.executable, model_simulator.__file__, "--width=64", *waits, *options)
+        )
 
     return build

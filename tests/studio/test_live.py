@@ -6,8 +6,10 @@ import asyncio
 import io
 import json
 import math
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
-from itertools import count
+from dataclasses import replace
+from itertools import count, pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -17,12 +19,13 @@ import pytest
 from matplotlib import image as pictures
 
 from fusesoc_firm.frame.codec import encode
-from fusesoc_firm.node.watch import Control, Load
+from fusesoc_firm.node.watch import Control, Latency, Load, Seen, Waits, Watch
+from fusesoc_firm.studio.live import waits_during
 from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
 from fusesoc_firm.studio.reports import Reports
 from fusesoc_firm.studio.run import Run
 from fusesoc_firm.studio.server import Studio
-from tests.studio.played import HOSTILE, modelled, write_system
+from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_system
 from tests.studio.served import load, served
 from tests.studio.test_server import ask
 
@@ -228,6 +231,49 @@ def test_a_load_that_changes_without_a_message_is_reported(spec: Path, monkeypat
     assert report
     assert report["figures"]["loads"]["point"]["refused"] == 1
     assert reports.next(run, 1, "robot.yaml") is None
+
+
+def test_waits_are_counted_only_while_a_page_watches(studio: Studio) -> None:
+    begin(studio, isEndless=True)
+    # Messages pass, but nobody watches.
+    while len((timeline := ask(studio, "GET", "api/timeline")[2])["grants"]) < 300:
+        time.sleep(0.01)
+    assert timeline["waits"] == []
+    news = until(studio, lambda now: bool(now.get("waits") and now["waits"]["cycles"] > 5000))
+    names = [*TYPES]
+    own = [(name, f"{name}_out") for name in names]
+    assert [tuple(wire) for wire in news["run"]["wires"]] == [
+        ("the host", "from the host"),
+        ("to the host", "the host"),
+        *(("from the host", name) for name in names),
+        *own,
+        *((f"{name}_out", "to the host") for name in names),
+    ]
+    shares = [100 * count / news["waits"]["cycles"] for count in news["waits"]["counts"]]
+    # The model rounds the cycles of each count down.
+    assert all(expected - 5 < share <= expected for share, expected in zip(shares, WAITS, strict=True))
+    control(studio, "stop")
+    until(studio, lambda now: now["run"]["state"] == "ended")
+    waits = ask(studio, "GET", "api/timeline")[2]["waits"]
+    assert all(before["end"] <= after["first"] for before, after in pairwise(waits))
+    assert all(item["end"] - item["first"] == item["cycles"] for item in waits)
+    # A response has the counts that its cycles touch.
+    row = ask(studio, "GET", "api/record?before=999999999")[2]["messages"][-1]
+    found = ask(studio, "GET", f"api/message?number={row[0]}")[2]
+    assert (found["waits"] is None) == (row[5] is None)
+
+
+def test_waits_of_a_message_are_those_of_its_cycles() -> None:
+    watch = Watch()
+    for cycle in (100, 200, 300, 400):
+        watch.waited(cycle, [cycle, 1])
+    response = Seen(5, "b", 0, b"", Latency(cycles=60), (240, 250))
+    # Its cause began to come in at cycle 190.
+    assert waits_during(watch, response) == Waits(100, 300, 200, (500, 2))
+    alone = replace(response, latency=Latency())
+    assert waits_during(watch, replace(alone, cycles=(300, 310))) == Waits(300, 400, 100, (400, 1))
+    assert waits_during(watch, replace(alone, cycles=(900, 990))) is None
+    assert waits_during(watch, replace(alone, cycles=None)) is None
 
 
 def test_the_record_goes_back(studio: Studio) -> None:

@@ -145,11 +145,11 @@ def test_a_system_without_times_is_told_what_is_missing(studio: Studio, timed: P
 def test_a_run_shows_its_bursts_and_numbers(tmp_path: Path) -> None:
     spec = write_system(tmp_path)
     with served(spec, modelled()) as studio:
-        for name in "grants", "status", "series?block=point", "wave?number=0":
+        for name in "timeline", "status", "series?block=point", "wave?number=0":
             assert ask(studio, "GET", f"api/{name}")[0] == 404
         begin(studio)
         news = until(studio, lambda now: now["run"] and now["run"]["state"] == "ended")
-        grants = ask(studio, "GET", "api/grants")[2]["grants"]
+        grants = ask(studio, "GET", "api/timeline")[2]["grants"]
         sizes = {row[1]: row[3] for row in news["messages"]}
         # A beat has 8 bytes; the frame begins with an id and a length.
         assert [last - first + 1 for _, first, last in grants] == [-(-(sizes[name] + 5) // 8) for name, _, _ in grants]

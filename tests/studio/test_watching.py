@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.studio.browser import PROGRAM, Page, opened
-from tests.studio.played import HOSTILE, modelled, write_system
+from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_system
 from tests.studio.served import served
 from tests.studio.test_page import AXE, ROOM
 
@@ -26,7 +26,7 @@ VIEW_BUTTONS = ".text > [role=group]"
 VIEWS = {
     "bytes": "document.querySelectorAll('.bytes td').length > 5",
     "VHDL": "document.querySelector('.code .cm-content').textContent.includes('entity robot_system is')",
-    "grants": "document.querySelectorAll('.grant').length > 0",
+    "timeline": "document.querySelector('.grant') && document.querySelector('.lanes .wait')",
     "plots": "document.querySelector('.plot canvas') && document.querySelector('.plot').innerText.includes('cycles')",
     "status": "document.querySelector('.view').innerText.includes('no status block')",
     "evaluate": """document.querySelector('.view').innerText.includes("needs a 'period'")""",
@@ -92,7 +92,8 @@ def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
         await page.until(f"{count} === 4")
         await press(page, "continue")
         wires = "[...document.querySelectorAll('.wire')].map(wire => wire.textContent.trim())"
-        await page.until(f"{wires}.length === 6 && {wires}.every(words => words.includes('/s'))")
+        # Those of the Manager; others show where messages wait.
+        await page.until(f"{wires}.filter(words => words.includes('/s')).length === 6")
         # A frame of 5 beats in and out and a latency of 10 cycles at 100 MHz, as the model says.
         await page.until(f"{wires}.some(words => words.includes('190 ns'))")
         await page.until(f"{ROWS}.length > 10")
@@ -209,6 +210,40 @@ def test_a_full_queue_is_seen_at_its_wire(tmp_path: Path) -> None:
         await page.until("document.querySelector('.wire.crowded') !== null")
 
     watching(tmp_path, steps, "--fault=hang", "--at=20")
+
+
+def words_at(source: str, sink: str) -> str:
+    """The script that finds the words at a wire."""
+    return f"""document.querySelector('[data-wire="{source}>{sink}"]')?.textContent"""
+
+
+def test_wires_show_where_messages_wait_and_where_that_begins(tmp_path: Path) -> None:
+    async def steps(page: Page) -> None:
+        await press(page, "run")
+        names = [*TYPES]
+        ways = [("from the host", name) for name in names] + [(name, f"{name}_out") for name in names]
+        ways += [(f"{name}_out", "to the host") for name in names]
+        for way, percent in zip(ways, WAITS[2:], strict=True):
+            share = f"Number({words_at(*way)}?.match(/waits (\\d+) %/)?.[1] ?? 0)"
+            # The model rounds down.
+            await page.until(f"{share} <= {percent} && {share} > {percent} - 5")
+        for way in (("point_out", "to the host"), ("text", "text_out")):
+            assert await page.evaluate(f"{words_at(*way)}.includes('begins here')")
+        assert "begins" not in await page.evaluate(words_at("point", "point_out"))
+        assert await page.evaluate("document.querySelectorAll('path.waits.first').length") == 2
+        await page.picture(tmp_path / "waits.png")
+        # An opened response shows the counts of its cycles.
+        await open_message(page, "point_out")
+        await page.until("document.querySelector('.message').innerText.includes('where messages waited in the cycles')")
+        await page.until(f"{words_at('point_out', 'to the host')}.includes('waits')")
+        await page.picture(tmp_path / "past.png")
+        await press(page, "newest", ".messages")
+        await page.until("!document.querySelector('.message').innerText.includes('where messages waited')")
+        await press(page, "timeline", VIEW_BUTTONS)
+        await page.until("document.querySelector('.view').innerText.includes('point_out → to the host')")
+        await page.picture(tmp_path / "timeline.png")
+
+    watching(tmp_path, steps)
 
 
 @pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")

@@ -12,6 +12,8 @@ module firm_sim_pipe #(
   parameter WIDTH = 8,
   // Bits of `frame_error`, one per converter.
   parameter ERRORS = 1,
+  // Bits of `waits`, one per wire within the system.
+  parameter WIRES = 1,
   // Determines all random choices.
   parameter SEED = 1,
   // The chance per cycle and direction that the host stalls.
@@ -38,7 +40,9 @@ module firm_sim_pipe #(
   output reg                s_axis_tready,
 
   input  wire               id_error,
-  input  wire [ERRORS-1:0]  frame_error
+  input  wire [ERRORS-1:0]  frame_error,
+  // High in each cycle in which a wire has a message or a beat that is not taken.
+  input  wire [WIRES-1:0]   waits
 );
 
   localparam LANES        = WIDTH / 8;
@@ -46,7 +50,9 @@ module firm_sim_pipe #(
   localparam RESET_CYCLES = 8;
   localparam HIGHEST_SEED = 2147483562;  // of math_real.uniform
   localparam MOST_ERRORS  = 65534;
-  localparam VERSION      = 2;           // of requests and reports
+  localparam MOST_WIRES   = 65533;
+  localparam MOST_WAITED  = 2147483647;
+  localparam VERSION      = 3;           // of requests and reports
   localparam MOST_QUIET   = 2147483647;
   // Bytes that are read at once, and written at once: a call for each byte takes more time than the simulation.
   localparam PIECE_BYTES  = 4096;
@@ -80,6 +86,10 @@ module firm_sim_pipe #(
   reg [63:0] first_out;
   reg        is_accepting;
 
+  // Cycles in which a beat waited: into the system, out of it, and on the wires within it.
+  integer    waited [0:WIRES+1];
+  reg        is_counting;                // the host has asked for them
+
   // The inputs as sampled before the rising edge.
   reg               tready, tvalid, tlast;
   reg [WIDTH-1:0]   tdata;
@@ -88,6 +98,7 @@ module firm_sim_pipe #(
   reg [7:0]         tid;
   reg               id_pulse;
   reg [ERRORS-1:0]  frame_pulses;
+  reg [WIRES-1:0]   wait_levels;         // only while waits are counted
 
   // A beat that waited for `tready`, and that the stream from the system must still show.
   reg               is_held, held_tlast, held_tuser;
@@ -252,6 +263,20 @@ module firm_sim_pipe #(
       $fwrite(reports, "E");
       write_number({32'b0, converter}, 2);
       write_number(cycle, 8);
+    end
+  endtask
+
+  task report_waits;
+    integer place;
+    begin
+      $fwrite(reports, "W");
+      write_number(cycle, 8);
+      write_number(WIRES + 2, 2);
+      for (place = 0; place < WIRES + 2; place = place + 1) begin
+        write_number({32'b0, waited[place]}, 4);
+        waited[place] = 0;
+      end
+      is_counting = 1;
     end
   endtask
 
@@ -456,6 +481,27 @@ module firm_sim_pipe #(
     end
   endtask
 
+  // ------------------------------------------------------------------ waits
+
+  task count_wait(input integer place);
+    if (waited[place] < MOST_WAITED)
+      waited[place] = waited[place] + 1;
+  endtask
+
+  task count_waits;
+    integer place;
+    begin
+      if (is_offered && tready === 1'b0)
+        count_wait(0);
+      if (tvalid === 1'b1 && !is_accepting)
+        count_wait(1);
+      if (wait_levels !== {WIRES{1'b0}})
+        for (place = 0; place < WIRES; place = place + 1)
+          if (wait_levels[place] === 1'b1)
+            count_wait(place + 2);
+    end
+  endtask
+
   // ------------------------------------------------------------------ cycles
 
   task sample;
@@ -469,6 +515,8 @@ module firm_sim_pipe #(
       tlast        = s_axis_tlast;
       id_pulse     = id_error;
       frame_pulses = frame_error;
+      if (is_counting)
+        wait_levels = waits;
     end
   endtask
 
@@ -483,6 +531,8 @@ module firm_sim_pipe #(
         rst_n = 1;
         if (quiet < MOST_QUIET)
           quiet = quiet + 1;
+        if (is_counting)
+          count_waits;
         send;
         receive;
         watch_errors;
@@ -503,6 +553,8 @@ module firm_sim_pipe #(
         stall_percent = STALL_PERCENT;
       if (WIDTH != 8 && WIDTH != 16 && WIDTH != 32 && WIDTH != 64 && WIDTH != 128 && WIDTH != 256 && WIDTH != 512)
         $fatal(1, "firm_sim_pipe: WIDTH is %0d; legal: 8, 16, 32, 64, 128, 256, 512", WIDTH);
+      if (WIRES < 1 || WIRES > MOST_WIRES)
+        $fatal(1, "firm_sim_pipe: WIRES is %0d; legal: 1 to 65533", WIRES);
       if (ERRORS < 1 || ERRORS > MOST_ERRORS)
         $fatal(1, "firm_sim_pipe: ERRORS is %0d; legal: 1 to 65534", ERRORS);
       if (seed < 1 || seed > HIGHEST_SEED)
@@ -524,6 +576,7 @@ module firm_sim_pipe #(
   endtask
 
   task reset_state;
+    integer place;
     begin
       cycle        = 0;
       quiet        = 0;
@@ -534,6 +587,9 @@ module firm_sim_pipe #(
       is_offered   = 0;
       is_accepting = 0;
       is_held      = 0;
+      is_counting  = 0;
+      for (place = 0; place < WIRES + 2; place = place + 1)
+        waited[place] = 0;
     end
   endtask
 
@@ -557,10 +613,12 @@ module firm_sim_pipe #(
         read_frame(request == "A", request == "H");
       else if (request == "R")
         run;
+      else if (request == "W")
+        report_waits;
       else if (request == "Q")
         report_stand;
       else begin
-        $display("firm_sim_pipe: unknown request %0d; legal: F, A, H, R, Q", request);
+        $display("firm_sim_pipe: unknown request %0d; legal: F, A, H, R, W, Q", request);
         fail;
       end
       request = request == "Q" ? -1 : $fgetc(requests);

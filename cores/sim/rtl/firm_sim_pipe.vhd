@@ -21,6 +21,8 @@ entity firm_sim_pipe is
     ID_BYTES : integer := 1;
     -- Bits of `frame_error`, one per converter.
     ERRORS : integer := 1;
+    -- Bits of `waits`, one per wire within the system.
+    WIRES : integer := 1;
     -- Determines all random choices.
     SEED : integer := 1;
     -- The chance per cycle and direction that the host stalls.
@@ -48,7 +50,9 @@ entity firm_sim_pipe is
     s_axis_tready : out std_logic;
 
     id_error    : in std_logic                           := '0';
-    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0')
+    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0');
+    -- High in each cycle in which a wire has a message or a beat that is not taken.
+    waits       : in std_logic_vector(WIRES-1 downto 0)  := (others => '0')
   );
 end entity firm_sim_pipe;
 
@@ -61,8 +65,10 @@ architecture simulation of firm_sim_pipe is
   constant HIGHEST_SEED : positive := 2147483562;  -- of math_real.uniform
   constant NO_ERRORS    : std_logic_vector(ERRORS-1 downto 0) := (others => '0');
   constant MOST_ERRORS  : natural  := 2**16 - 2;
+  constant NO_WAITS     : std_logic_vector(WIRES-1 downto 0) := (others => '0');
+  constant MOST_WIRES   : natural  := 2**16 - 3;
   -- Of requests and reports.
-  constant VERSION      : natural  := 2;
+  constant VERSION      : natural  := 3;
 
   type level_t is array (boolean) of std_logic;
   constant LEVEL_OF : level_t := (false => '0', true => '1');
@@ -94,6 +100,9 @@ architecture simulation of firm_sim_pipe is
     return (cycle.high, cycle.low + 1);
   end function next_cycle;
 
+  -- Cycles in which a beat waited: into the system, out of it, and on the wires within it.
+  type counts_t is array (natural range <>) of natural;
+
   -- A frame that waits to be sent; byte k is character k+1.
   type frame_t;
   type frame_ptr_t is access frame_t;
@@ -114,6 +123,9 @@ begin
     severity failure;
   assert ERRORS >= 1 and ERRORS <= MOST_ERRORS
     report "firm_sim_pipe: ERRORS is " & integer'image(ERRORS) & "; legal: 1 to 65534"
+    severity failure;
+  assert WIRES >= 1 and WIRES <= MOST_WIRES
+    report "firm_sim_pipe: WIRES is " & integer'image(WIRES) & "; legal: 1 to 65533"
     severity failure;
   assert SEED >= 1 and SEED <= HIGHEST_SEED
     report "firm_sim_pipe: SEED is " & integer'image(SEED) & "; legal: 1 to 2147483562"
@@ -154,6 +166,9 @@ begin
     variable held_tuser : std_logic_vector(s_axis_tuser'range);
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
+
+    variable is_counting : boolean := false;    -- the host has asked for waits
+    variable waited      : counts_t(0 to WIRES+1) := (others => 0);
 
     -- Reports must be read before the simulation ends.
     procedure fail(what : in string) is
@@ -307,6 +322,18 @@ begin
       write_number(converter, 2);
       write_cycle(cycle);
     end procedure report_error;
+
+    procedure report_waits is
+    begin
+      write(reports, 'W');
+      write_cycle(cycle);
+      write_number(WIRES + 2, 2);
+      for count in waited'range loop
+        write_number(waited(count), 4);
+      end loop;
+      waited      := (others => 0);
+      is_counting := true;
+    end procedure report_waits;
 
     procedure report_stand is
     begin
@@ -513,6 +540,32 @@ begin
       end if;
     end procedure watch_errors;
 
+    -- ------------------------------------------------------------------ waits
+
+    procedure count_wait(place : in natural) is
+    begin
+      if waited(place) < natural'high then
+        waited(place) := waited(place) + 1;
+      end if;
+    end procedure count_wait;
+
+    procedure count_waits is
+    begin
+      if is_offered and m_axis_tready = '0' then
+        count_wait(0);
+      end if;
+      if s_axis_tvalid = '1' and not is_accepting then
+        count_wait(1);
+      end if;
+      if waits /= NO_WAITS then
+        for wire in 0 to WIRES-1 loop
+          if waits(wire) = '1' then
+            count_wait(wire + 2);
+          end if;
+        end loop;
+      end if;
+    end procedure count_waits;
+
     -- ------------------------------------------------------------------ cycles
 
     procedure clock_cycle is
@@ -531,6 +584,9 @@ begin
         clk <= '1';
         if quiet < integer'high then
           quiet := quiet + 1;
+        end if;
+        if is_counting then
+          count_waits;
         end if;
         send;
         receive;
@@ -565,8 +621,9 @@ begin
         when 'A'    => read_frame(true, false);
         when 'H'    => read_frame(false, true);
         when 'R'    => run;
+        when 'W'    => report_waits;
         when 'Q'    => report_stand;
-        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, A, H, R, Q");
+        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, A, H, R, W, Q");
       end case;
     end loop;
     wait;

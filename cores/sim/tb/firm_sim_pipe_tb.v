@@ -19,7 +19,10 @@ module firm_sim_pipe_tb;
   wire             in_tvalid, in_tlast, in_tready;
   wire             id_error, frame_error;
 
-  firm_sim_pipe #(.WIDTH(WIDTH)) u_host (
+  // The system itself is the wire, seen from both ends.
+  wire [1:0] waits = {in_tvalid & ~in_tready, out_tvalid & ~out_tready};
+
+  firm_sim_pipe #(.WIDTH(WIDTH), .WIRES(2)) u_host (
     .clk(clk),
     .rst_n(rst_n),
     .m_axis_tdata(out_tdata),
@@ -36,7 +39,8 @@ module firm_sim_pipe_tb;
     .s_axis_tlast(in_tlast),
     .s_axis_tready(in_tready),
     .id_error(id_error),
-    .frame_error(frame_error)
+    .frame_error(frame_error),
+    .waits(waits)
   );
 
   firm_sim_wire #(.WIDTH(WIDTH)) u_system (

@@ -36,12 +36,18 @@ architecture simulation of firm_sim_pipe_tb is
   signal id_error    : std_logic;
   signal frame_error : std_logic_vector(0 downto 0);
 
+  -- The system itself is the wire, seen from both ends.
+  signal waits : std_logic_vector(1 downto 0);
+
 begin
+
+  waits <= (in_tvalid and not in_tready) & (out_tvalid and not out_tready);
 
   u_host : entity firm.firm_sim_pipe
     generic map (
       WIDTH         => WIDTH,
       ERRORS        => 1,
+      WIRES         => 2,
       SEED          => SEED,
       STALL_PERCENT => STALL_PERCENT
     )
@@ -62,7 +68,8 @@ begin
       s_axis_tlast  => in_tlast,
       s_axis_tready => in_tready,
       id_error      => id_error,
-      frame_error   => frame_error
+      frame_error   => frame_error,
+      waits         => waits
     );
 
   u_system : entity firm.firm_sim_wire

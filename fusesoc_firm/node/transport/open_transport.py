@@ -19,15 +19,20 @@ from fusesoc_firm.node.transport.uart import UartTransport
 LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts], dma:UIO:BUFFER[:poll]"
 
 
-def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Event], None] | None = None) -> Transport:
-    """Open the transport at an address; `pace` and `observe` are for a simulator. May raise `TransportError`.
+def open_transport(
+    address: str,
+    pace: Pace | None = None,
+    observe: Callable[[Event], None] | None = None,
+    wants_waits: Callable[[], bool] = lambda: False,
+) -> Transport:
+    """Open the transport at an address; the other arguments are for a simulator. May raise `TransportError`.
 
     The shell runs a simulator's command.
     """
     kind, _, rest = address.partition(":")
     if kind == "pipe" and rest.strip():
         command = ["/bin/sh", "-c", rest]
-        return SimulatorTransport(lambda: Simulator(command), pace, observe)
+        return SimulatorTransport(lambda: Simulator(command), pace, observe, wants_waits)
     if kind == "uart":
         device, second, has_flow_control = _device(rest, ":rtscts")
         if device and second:

@@ -18,6 +18,7 @@ import fcntl
 import os
 import select
 import signal
+import struct
 import subprocess
 import tempfile
 import threading
@@ -39,7 +40,7 @@ MOST_CYCLES = 2**31 - 1
 # Connect the pipes to the descriptors that a simulator expects. A shell cannot copy two-digit descriptors, but it can
 # open them by name.
 _SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
-PIPE_VERSION = 2
+PIPE_VERSION = 3
 """The version of requests and reports."""
 
 _SHOWN_LINES = 20
@@ -51,6 +52,8 @@ _END_SECONDS = 10.0
 _STEP_SECONDS = 0.001
 _STEP_SHARE = 1 / 8
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
+# The least time between two requests of waits.
+_WAITS_SECONDS = 0.01
 _PIECE_BYTES = 2**16
 # The most that Linux grants every user. In a small pipe, a large frame needs a change of processes for each 64 KiB.
 _PIPE_BYTES = 2**20
@@ -74,7 +77,18 @@ class ErrorPulse:
     cycle: int
 
 
-Event = Taken | Burst | ErrorPulse
+@dataclass(frozen=True)
+class Waits:
+    """The cycles in which beats have waited since the last such event: before `cycle`, on each wire.
+
+    The first two wires are those from and to the host, the others are within the system (`system/hardware/waits.py`).
+    """
+
+    cycle: int
+    counts: tuple[int, ...]
+
+
+Event = Taken | Burst | ErrorPulse | Waits
 
 
 class _Reports:
@@ -164,6 +178,13 @@ class Simulator:
         kind = b"A" if is_aborted else b"F" if hole is None else b"H" + hole.to_bytes(4, "little")
         self._write(kind + len(frame).to_bytes(4, "little"))
         self._write(frame)
+
+    def request_waits(self) -> None:
+        """Request `Waits`, which the next run returns; the simulator counts from the first request on.
+
+        May raise `TransportError`.
+        """
+        self._write(b"W")
 
     def run(self, cycles: int) -> list[Event]:
         """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""
@@ -283,6 +304,9 @@ class Simulator:
             return ErrorPulse(self._number(2), self._number(8))
         if kind == b"I":
             return ErrorPulse(None, self._number(8))
+        if kind == b"W":
+            cycle, wires = self._number(8), self._number(2)
+            return Waits(cycle, struct.unpack(f"<{wires}I", self._read(4 * wires)))
         return self._fail(f"the simulator sent 0x{kind.hex()} instead of the start of a report")
 
     def _wait(self) -> int | None:
@@ -335,15 +359,17 @@ class SimulatorTransport:
         start: Callable[[], Simulator],
         pace: Pace | None = None,
         observe: Callable[[Event], None] | None = None,
+        wants_waits: Callable[[], bool] = lambda: False,
     ) -> None:
         """Start the simulator with `start`; `observe` is called with every event, and must not raise or call this.
 
-        Raise `TransportError` if the simulator cannot be started.
+        `Waits` are requested while `wants_waits` returns True. Raise `TransportError` if the simulator cannot be
+        started.
         """
         self._start = start
         self._pace = pace or Pace()
         self._restarts = self._pace.restarts
-        self._observe = observe
+        self._observe, self._wants_waits = observe, wants_waits
         self._changed = threading.Condition()
         self._sent: deque[bytes] = deque()
         self._frames = 0  # not yet taken by the system, including those in `_sent`
@@ -355,7 +381,7 @@ class SimulatorTransport:
         self._is_used = False  # the simulator, by a thread that does not hold the lock
         # The cycles of the next run, of one that takes about _STEP_SECONDS, and of one after a burst.
         self._step = self._short_step = self._quiet_step = _FEWEST_CYCLES
-        self._began = self._changed_at = self._wakes_at = 0.0
+        self._began = self._changed_at = self._wakes_at = self._counted_at = 0.0
         self._passes_frames = False  # the run
         self._simulator = start()
 
@@ -471,6 +497,9 @@ class SimulatorTransport:
             self._simulator.request(self._sent.popleft())
             frames += 1
         self._began = time.monotonic()
+        if self._began >= self._counted_at + _WAITS_SECONDS and self._wants_waits():
+            self._simulator.request_waits()
+            self._counted_at = self._began
         self._passes_frames = frames > 0
         if frames:
             self._changed_at = self._began
@@ -488,7 +517,7 @@ class SimulatorTransport:
         events = self._simulator.finish()
         now = time.monotonic()
         self._adapt(self._simulator.cycle - first, now)
-        if events:
+        if any(not isinstance(event, Waits) for event in events):
             self._changed_at = now
             self._step = self._short_step
         # After a burst, those to whom it goes need the processor more than hardware that may do nothing.

@@ -229,8 +229,10 @@ def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
 
 def _fields(outgoing: Outgoing, given: MessageSide, taken: MessageSide) -> frozenset[Names]:
     """Return the fields carried from one side to another; raise `InputError` for an unknown path."""
-    chosen = select(given.frame, *(places(paths) for paths in (outgoing.include, outgoing.exclude)))
-    return _names(given.frame) & _names(taken.frame) & _names(chosen)
+    carried = _names(given.frame) & _names(taken.frame)
+    if outgoing.include or outgoing.exclude:
+        carried &= _names(select(given.frame, places(outgoing.include), places(outgoing.exclude)))
+    return carried
 
 
 def places(paths: Iterable[Text]) -> Paths:

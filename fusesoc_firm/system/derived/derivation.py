@@ -247,11 +247,11 @@ class _Analysis:
             key = library.ros, name
             if key not in self.frames:
                 self.frames[key] = frame_of(name, library.closure(name))
-            frame = select(self.frames[key], places(include), places(exclude))
+            frame = self.frames[key]
+            return select(frame, places(include), places(exclude)) if include or exclude else frame
         except InputError as error:
             self.faults.take(error, message.source)
             return None
-        return frame
 
     # --- blocks ------------------------------------------------------------------------------------------------
 

@@ -31,6 +31,7 @@ from fusesoc_firm.system.hardware.names import (
 )
 from fusesoc_firm.system.hardware.scheduler import scheduler_configuration
 from fusesoc_firm.system.hardware.status import status_configuration
+from fusesoc_firm.system.hardware.waits import waits_configuration, watched_entity
 from fusesoc_firm.system.hardware.wires import connections
 from fusesoc_firm.text.render import Context
 
@@ -42,11 +43,12 @@ TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
 NODE_BENCH_TEMPLATE = "vhdl/node_bench.vhd"
 
 
-def system_configuration(system: DerivedSystem) -> Context:
-    """Return the configuration of the top level."""
+def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> Context:
+    """Return the configuration of the top level; if it is watched, an output shows the wires that wait."""
     names = Names(system)
     return {
         **dimensions(system),
+        "entity": watched_entity(system) if is_watched else system.entity,
         "name": system.name,
         **interconnect_configuration(system),
         **status_configuration(system),
@@ -67,6 +69,7 @@ def system_configuration(system: DerivedSystem) -> Context:
         "pins": pin_groups(names, system),
         "synchronisers": [pin_synchroniser(names, *pin, system) for pin in synchronised_pins(system)],
         "connections": connections(names, system),
+        "watched": waits_configuration(system) if is_watched else None,
     }
 
 
@@ -100,6 +103,8 @@ def test_bench_configuration(
     has_join = system.scheduling.is_preemptive and not is_live
     return {
         "bench": test_bench_entity(system, is_live=is_live),
+        "unit": watched_entity(system) if is_live else system.entity,
+        "watched": waits_configuration(system) if is_live else None,
         "is_live": is_live,
         "pins": pins,
         "clocks": [

@@ -31,7 +31,7 @@ from fusesoc_firm.text.naming import distinct_identifiers
 # Names that the top level and its test bench use, which signals of blocks and pins must not have.
 _TAKEN = """
     system_rst_n u_system_rst
-    clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
+    clk rst_n id_error frame_error frame_error_code waits rtl u_manager u_scheduler firm work ieee std_logic_1164
     s_axis_tdata s_axis_tkeep s_axis_tuser s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tuser m_axis_tid m_axis_tvalid m_axis_tlast m_axis_tready
     to_tdata to_tkeep to_tuser to_tvalid to_tlast to_tready

@@ -1,6 +1,7 @@
 // Requests to the server, whose address is that of the page.
 
 import type { Row } from "./live.svelte";
+import type { Waits } from "./waits";
 
 export type Path = (string | number)[];
 
@@ -85,6 +86,7 @@ export interface Message {
   fields: [string, string][];
   isShortened: boolean;
   fault: string;
+  waits: Waits | null;
 }
 
 export interface Wishes {

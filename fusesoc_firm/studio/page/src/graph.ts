@@ -3,10 +3,12 @@
 import type { Edge, Node } from "@xyflow/svelte";
 import { layout } from "./engine";
 import type { Fault, Path, Scene, Section } from "./api";
+import { FROM_HOST, HOST, TO_HOST, wireKey } from "./waits";
 
 export type Kind = "subscriber" | "publisher" | "service" | "accelerator" | "software" | "manager";
 
-export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path };
+/** What a block shows; the sides of the Manager have a `wire` to the host, which is that of a `file`'s run. */
+export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path; wire?: string; file?: string };
 export type BlockData = BlockWords & { errors: number; warnings: number };
 
 export type BlockNode = Node<BlockData, "block">;
@@ -101,17 +103,17 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
     const data = { kind: kindOf(specification, block ?? {}), name: String(block?.name ?? `block ${index + 1}`) };
     return nodeOf(`block:${index}`, { ...data, lines: linesOf(block ?? {}, specification, derived), path }, faultsAt(scene.faults, path));
   });
-  const manager = (id: string, name: string, lines: string[], faults: Fault[]) =>
-    nodeOf(id, { kind: "manager", name, lines, path: ["project"] }, faults);
+  const manager = (id: string, name: string, wire: string, lines: string[], faults: Fault[]) =>
+    nodeOf(id, { kind: "manager", name, lines, path: ["project"], wire, file: scene.file }, faults);
   const faults = faultsAt(scene.faults, ["project"]);
   const link = `${project.interconnect ?? "axi_stream"}, ${project.width ?? 8} bits`;
-  nodes.unshift(manager("manager:in", "from the host", [link], []));
-  nodes.push(manager("manager:out", "to the host", [`scheduler ${project.scheduler ?? "fixed_priority"}`], faults));
+  nodes.unshift(manager("manager:in", FROM_HOST, wireKey(HOST, FROM_HOST), [link], []));
+  nodes.push(manager("manager:out", TO_HOST, wireKey(TO_HOST, HOST), [`scheduler ${project.scheduler ?? "fixed_priority"}`], faults));
   const edges: Edge[] = [];
   blocks.forEach((block, index) => {
     const [taken, given] = streamsOf(block ?? {});
-    if (taken) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, scene.file, taken));
-    if (given) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", scene.file, given));
+    if (taken) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, { file: scene.file, block: taken, wire: wireKey(FROM_HOST, taken) }));
+    if (given) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", { file: scene.file, block: given, wire: wireKey(given, TO_HOST) }));
     list(block?.outgoing).forEach((way, number) => {
       const sink = blocks.findIndex((other) => other?.name === way?.name);
       if (sink < 0) return;
@@ -123,7 +125,7 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
         target: `block:${sink}`,
         label: fields.join(", "),
         ariaLabel: `connection from ${block.name} to ${way.name}`,
-        data: { path: ["blocks", index, "outgoing", number] },
+        data: { path: ["blocks", index, "outgoing", number], file: scene.file, wire: wireKey(taken ?? block.name, streamsOf(blocks[sink])[1] ?? way.name) },
       });
     });
   });
@@ -139,10 +141,10 @@ function streamsOf(block: Section): [string | null, string | null] {
 }
 
 /** The stream between the Manager and a converter, whose wire shows the live words of its block. */
-function fixed(id: string, source: string, target: string, file: string, block: string): Edge {
+function fixed(id: string, source: string, target: string, data: { file: string; block: string; wire: string }): Edge {
   const type = "wire";
   const still = { selectable: false, deletable: false, focusable: false };
-  return { id, source, target, type, ...still, class: "stream", data: { file, block } };
+  return { id, source, target, type, ...still, class: "stream", data };
 }
 
 /**

@@ -1,6 +1,7 @@
 // What the page knows of the current run: counts and rates of each block, and the latest messages.
 
 import { address } from "./api";
+import { since, waitsOf, type Wait, type Waits, type Way } from "./waits";
 
 /** A message without its content: number, block, seconds, bytes, and of a response: cause, cycles, ns of the wall clock. */
 export type Row = [number, string, number, number, number | null, number | null, number | null];
@@ -14,6 +15,7 @@ export interface Run {
   isPaused: boolean;
   isControlled: boolean;
   clock: number | null;
+  wires: Way[];
 }
 
 interface Percentiles {
@@ -41,6 +43,7 @@ interface Figures {
   seconds: number;
   counts: Record<string, Count>;
   loads: Record<string, Load>;
+  waits: Waits | null;
 }
 
 /** What is new of a run; what is not new is left out. See fusesoc_firm/studio/reports.py. */
@@ -53,7 +56,8 @@ interface Report {
   figures?: Figures;
 }
 
-const MOST_ROWS = 200;
+// Each further row costs time in each picture; older ones are in the record.
+const MOST_ROWS = 100;
 // The server sends up to 20 reports that are not confirmed.
 const CONFIRMED = 10;
 // The seconds over which rates are averaged.
@@ -87,7 +91,16 @@ export class Live {
   /** The longest of the latest latencies of each block, in cycles. */
   longest = $state.raw<Record<string, number>>({});
   isFollowing = $state(true);
+  /** The waits of an opened message, which the wires show instead of the present ones. */
+  past = $state.raw<Waits | null>(null);
+  #present = $state.raw<Waits | null>(null);
+  #waits = $derived(waitsOf(this.run?.wires ?? [], this.past ?? this.#present));
   #history: Figures[] = [];
+
+  /** What is known of the waits on a wire. */
+  waits(key: string): Wait | undefined {
+    return this.#waits.get(key);
+  }
 
   /** Follow the run until the returned function is called; connects again if the server was restarted. */
   follow(): () => void {
@@ -128,6 +141,7 @@ export class Live {
     if (isNew) {
       this.#history = [];
       [this.rows, this.skipped, this.isFollowing, this.first, this.last] = [[], 0, true, 0, -1];
+      [this.past, this.#present] = [null, null];
     }
     if (run !== undefined) this.run = run;
     if (messages) {
@@ -143,6 +157,7 @@ export class Live {
     const begin = this.#history.findIndex((item) => item.seconds >= figures.seconds - WINDOW);
     this.#history = [...this.#history.slice(Math.max(0, begin - 1)), figures];
     this.words = this.#wordsOf(figures, run);
+    this.#present = since(figures.waits, this.#history[0].waits) ?? this.#present;
     const timed = Object.entries(figures.counts).filter(([, count]) => count.cycles);
     this.longest = Object.fromEntries(timed.map(([name, count]) => [name, count.cycles!.maximum]));
     const { loads } = figures;

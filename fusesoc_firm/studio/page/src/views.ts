@@ -1,6 +1,7 @@
 // What the page asks of the server for the views below the picture.
 
 import { get } from "./api";
+import type { Waits } from "./waits";
 
 /** Bytes with one meaning; see fusesoc_firm/studio/byte_map.py. */
 export interface Part {
@@ -66,7 +67,7 @@ export const bytes = (file: string) => get<{ width: number; blocks: Record<strin
 export const generated = (file: string, name: string) =>
   get<{ names: string[]; name: string; lines: Line[] }>("generated", { file, name });
 export const schedulers = (file: string) => get<Schedulers | { missing: string }>("schedulers", { file });
-export const grants = () => get<{ grants: Grant[] }>("grants");
+export const timeline = () => get<{ grants: Grant[]; waits: Waits[] }>("timeline");
 export const status = () => get<{ access: string | null; counts: Record<string, number> }>("status");
 export const series = (block: string, field: string) => get<Series>("series", { block, field });
 
