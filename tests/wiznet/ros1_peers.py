@@ -8,14 +8,20 @@ import time
 import xmlrpc.client
 from collections.abc import Iterator
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.fabric.ros1 import Node
+from fusesoc_firm.fabric.ros1 import Node, Server
+from fusesoc_firm.system.derived.model import Host
 from tests.wiznet.peers import free_port
 from tests.wiznet.ros1 import Board, Manager, Stalls, clocked, endpoint, interpreted, node
 
 _SEED = 20261126  # of the stalls
+# Services of the running node: one that has time, and one of which the hardware must answer soon.
+ASK = Server("/ask", "std_srvs/Ask", 32 * "a", 2, 2, 100)
+SOON = Server("/ask/soon", "std_srvs/Ask", 32 * "a", 3, 3, 1)
+_HOSTS = (Host("robot-2.lab", IPv4Address("127.0.0.1")), Host("robot-2", IPv4Address("127.0.0.2")))
 LONGEST_SECONDS = 60  # a busy machine is slow
 
 
@@ -48,11 +54,20 @@ class Running:
 
 
 def running_node(chip: int, program: Path | None = None) -> Iterator[Running]:
-    """Run a node without a master, with two topics each way: interpreted, or by a program of the hardware."""
+    """Run a node without a master: interpreted, or by a program of the hardware.
+
+    It has topics each way, of which two have the ids 0 and 1, and two services.
+    """
     made = node(
         ("127.0.0.1", free_port()),
         (endpoint("/turn", "geometry_msgs", "Quaternion"), endpoint("/turn/2", "geometry_msgs", "Point")),
-        (endpoint("/place", "geometry_msgs", "Point"), endpoint("/turn", "geometry_msgs", "Quaternion")),
+        (
+            endpoint("/place", "geometry_msgs", "Point"),
+            endpoint("/turn", "geometry_msgs", "Quaternion"),
+            endpoint("/push", "geometry_msgs", "Vector3"),  # with the MD5 sum of a Point
+        ),
+        (ASK, SOON),
+        _HOSTS,
     )
     manager = Manager(lambda _number, _payload: iter(()))
     board = clocked(made, chip, manager, program, Stalls(_SEED), []) if program else interpreted(made, chip, manager)

@@ -17,6 +17,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from enum import IntEnum, IntFlag
+from functools import partial
 
 SOCKETS = 8
 MEMORY = 16384  # bytes of all transmit buffers together, and of all receive buffers
@@ -145,6 +146,7 @@ class Chip:
         `common` is its number of common registers, `address` that of SIPR, `retry` that of RTR, which RCR follows.
         """
         self.misuses: list[str] = []
+        self.has_link = True
         self._common_bytes = common
         self._address = address
         self._retry = retry
@@ -238,7 +240,7 @@ class Chip:
             Command.DISCON: self._disconnect,
             Command.CLOSE: self._cut,
             Command.SEND: self._send,
-            Command.SEND_KEEP: lambda _: None,  # the kernel's keep-alive follows KPALVTR
+            Command.SEND_KEEP: self._send_keep,
             Command.RECV: self._receive,
         }
         if item.command:
@@ -302,6 +304,14 @@ class Chip:
             item.tx_commanded = item.tx_write
             self._guarded(item, self._transfer)
 
+    def _send_keep(self, item: ChipSocket) -> None:
+        """Ask whether the peer is still there. The kernel asks again each second, and gives up as the chip does."""
+        if item.status not in _SENDING_STATES or item.registers[KEEP_ALIVE]:
+            self._misuse(item, "SEND_KEEP without a connection, or beside KPALVTR")
+            return
+        assert item.connection
+        self._guarded(item, partial(_keep_alive, seconds=1))
+
     def _receive(self, item: ChipSocket) -> None:
         if (item.rx_read - item.rx_freed) % _COUNT > (item.rx_write - item.rx_freed) % _COUNT:
             self._misuse(item, "RECV of more bytes than were received")
@@ -361,9 +371,7 @@ class Chip:
             self._end(item, Interrupt.TIMEOUT)
 
     def _established(self, item: ChipSocket) -> None:
-        assert item.connection
-        if error := item.connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
-            raise OSError(error, errno.errorcode[error])
+        _raise_error(item)
         self._set_up(item)
         item.status = Status.ESTABLISHED
         item.interrupt |= Interrupt.CON
@@ -372,13 +380,14 @@ class Chip:
         assert item.connection
         item.connection.setblocking(False)
         options = [(socket.TCP_NODELAY, 1), (socket.TCP_USER_TIMEOUT, int(self._tcp_seconds() * 1000))]
-        if seconds := 5 * item.registers[KEEP_ALIVE]:
-            item.connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-            options += [(socket.TCP_KEEPIDLE, seconds), (socket.TCP_KEEPINTVL, seconds)]
         for option, value in options:
             item.connection.setsockopt(socket.IPPROTO_TCP, option, value)
+        if seconds := 5 * item.registers[KEEP_ALIVE]:
+            _keep_alive(item, seconds)
 
     def _transfer(self, item: ChipSocket) -> None:
+        if item.has_ended:
+            _raise_error(item)  # nothing is received any more that would tell of a reset
         self._transmit(item)
         for data in _received(item):
             for byte in data:
@@ -450,6 +459,21 @@ def _kernel_socket() -> socket.socket:
     made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     made.setblocking(False)
     return made
+
+
+def _raise_error(item: ChipSocket) -> None:
+    """Raise the `OSError` that a connection has, if any."""
+    assert item.connection
+    if error := item.connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+        raise OSError(error, errno.errorcode[error])
+
+
+def _keep_alive(item: ChipSocket, seconds: int) -> None:
+    """Ask the peer whenever nothing has come from it for so long."""
+    assert item.connection
+    item.connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL):
+        item.connection.setsockopt(socket.IPPROTO_TCP, option, seconds)
 
 
 def _unacknowledged(item: ChipSocket) -> int:
