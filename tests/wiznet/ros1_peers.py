@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import struct
+import subprocess
 import time
 import xmlrpc.client
 from collections.abc import Iterator
@@ -14,10 +15,12 @@ from typing import Any
 
 from fusesoc_firm.fabric.ros1 import Node, Server
 from fusesoc_firm.system.derived.model import Host
+from tests.ros.cpp_nodes import DEBIAN_PYTHON
 from tests.wiznet.peers import free_port
 from tests.wiznet.ros1 import Board, Manager, Stalls, clocked, endpoint, interpreted, node
 
 _SEED = 20261126  # of the stalls
+_ROS = Path(__file__).parent.parent / "ros"
 # Services of the running node: one that has time, and one of which the hardware must answer soon.
 ASK = Server("/ask", "std_srvs/Ask", 32 * "a", 2, 2, 100)
 SOON = Server("/ask/soon", "std_srvs/Ask", 32 * "a", 3, 3, 1)
@@ -104,3 +107,20 @@ def header_of(peer: socket.socket) -> dict[str, str]:
 def pause() -> None:
     """Let the other side see what was sent as a part of its own."""
     time.sleep(0.002)
+
+
+def service_client(folder: Path) -> Path:
+    """Compile the client of roscpp for a service of cameras."""
+    words = ["pkg-config", "--cflags", "--libs", "roscpp"]
+    libraries = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    program = folder / "client"
+    options = ["-std=c++17", "-O1", "-pthread", str(_ROS / "service_client.cpp"), "-o", str(program)]
+    subprocess.run(["g++", *options, *libraries], check=True)
+    return program
+
+
+def service_sum() -> str:
+    """The MD5 sum by which ROS itself knows the service of cameras."""
+    code = "from sensor_msgs.srv import SetCameraInfo as s; print(s._md5sum)"
+    done = subprocess.run([DEBIAN_PYTHON, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()

@@ -6,7 +6,6 @@ import json
 import random
 import socket
 import struct
-import subprocess
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
@@ -22,7 +21,18 @@ from tests.ros.camera.model import respond
 from tests.ros.cpp_nodes import Client, Ros, missing_ros1, ros1
 from tests.ros.service_simulator import frames
 from tests.wiznet.ros1 import Manager, Stalls, clocked, framed, hardware, interpreted, node
-from tests.wiznet.ros1_peers import ASK, SOON, Running, header, header_of, pause, read, running_node
+from tests.wiznet.ros1_peers import (
+    ASK,
+    SOON,
+    Running,
+    header,
+    header_of,
+    pause,
+    read,
+    running_node,
+    service_client,
+    service_sum,
+)
 
 SEED = 20261127
 HARDWARE = 5500
@@ -255,23 +265,13 @@ def _camera(_number: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
 
 def _clients(ros: Ros, folder: Path, calls: int) -> list[Client]:
     """Two of rospy, two of roscpp."""
-    program = folder / "client"
-    options = ["-std=c++17", "-O1", "-pthread", str(ROS / "service_client.cpp"), "-o", str(program)]
-    subprocess.run(["g++", *options, *ros.libraries], check=True)
     rospy = [ros.python, str(ROS / "service_peer.py"), "1", CAMERA, str(calls)]
-    roscpp = [str(program), CAMERA, str(calls)]
+    roscpp = [str(service_client(folder)), CAMERA, str(calls)]
     seeds = [str(SEED + number) for number in range(4)]
     return [
         *(Client(ros, [*rospy, seed]) for seed in seeds[:2]),
-        *(Client(ros, [*roscpp, seed, _camera_sum(ros)]) for seed in seeds[2:]),
+        *(Client(ros, [*roscpp, seed, service_sum()]) for seed in seeds[2:]),
     ]
-
-
-def _camera_sum(ros: Ros) -> str:
-    """The MD5 sum by which ROS itself knows the service."""
-    code = "from sensor_msgs.srv import SetCameraInfo as s; print(s._md5sum)"
-    done = subprocess.run([ros.python, "-c", code], capture_output=True, text=True, check=True)
-    return done.stdout.strip()
 
 
 @pytest.mark.check
@@ -281,7 +281,7 @@ def test_clients_of_rospy_and_roscpp_at_once(tmp_path: Path, kind: str, request:
     print(f"seed {SEED}")
     with ros1(tmp_path) as ros:
         master = urlsplit(ros.environment["ROS_MASTER_URI"])
-        service = Server(CAMERA, "sensor_msgs/SetCameraInfo", _camera_sum(ros), 0, 0, 100)
+        service = Server(CAMERA, "sensor_msgs/SetCameraInfo", service_sum(), 0, 0, 100)
         made = node((str(master.hostname), int(master.port or 0)), (), (), (service,))
         manager = Manager(_camera)
         if kind == "interpreted":
