@@ -157,7 +157,7 @@ class Board:
         self.stop()
         misuses = self.chip.misuses
         self.chip.close()
-        assert not misuses
+        assert not misuses, misuses
 
     def _run(self, run: Callable[[Board], None]) -> None:
         try:

@@ -92,6 +92,7 @@ class ChipSocket:
     def forget(self) -> None:
         """Return to CLOSED without a connection. Registers that the host wrote remain."""
         self.status = Status.CLOSED
+        self.shown = Status.CLOSED  # when the host last read it
         self.interrupt = Interrupt(0)
         self.command = 0  # what a read of Sn_CR still returns
         self.connection: socket.socket | None = None
@@ -178,6 +179,7 @@ class Chip:
         if address == INTERRUPT:
             return item.interrupt
         if address == STATUS:
+            item.shown = item.status
             return item.status
         if address & 1:
             self.poll()  # the chip does not hold a count while its bytes are read
@@ -297,7 +299,7 @@ class Chip:
 
     def _send(self, item: ChipSocket) -> None:
         if item.status not in _SENDING_STATES:
-            self._misuse(item, "SEND without a connection")
+            self._misuse_without_connection(item, "SEND")
         elif (item.tx_write - item.tx_acknowledged) % _COUNT > item.tx_bytes:
             self._misuse(item, "SEND of more bytes than are free")
         else:
@@ -306,11 +308,12 @@ class Chip:
 
     def _send_keep(self, item: ChipSocket) -> None:
         """Ask whether the peer is still there. The kernel asks again each second, and gives up as the chip does."""
-        if item.status not in _SENDING_STATES or item.registers[KEEP_ALIVE]:
-            self._misuse(item, "SEND_KEEP without a connection, or beside KPALVTR")
-            return
-        assert item.connection
-        self._guarded(item, partial(_keep_alive, seconds=1))
+        if item.status not in _SENDING_STATES:
+            self._misuse_without_connection(item, "SEND_KEEP")
+        elif item.registers[KEEP_ALIVE]:
+            self._misuse(item, "SEND_KEEP beside KPALVTR")
+        else:
+            self._guarded(item, partial(_keep_alive, seconds=1))
 
     def _receive(self, item: ChipSocket) -> None:
         if (item.rx_read - item.rx_freed) % _COUNT > (item.rx_write - item.rx_freed) % _COUNT:
@@ -320,6 +323,11 @@ class Chip:
         # The interrupt comes again while bytes remain.
         if item.rx_freed != item.rx_write:
             item.interrupt |= Interrupt.RECV
+
+    def _misuse_without_connection(self, item: ChipSocket, what: str) -> None:
+        """Note a command, unless the connection has ended after the host last read the status."""
+        if item.shown not in _SENDING_STATES:
+            self._misuse(item, f"{what} without a connection")
 
     def _misuse(self, item: ChipSocket, what: str) -> None:
         self.misuses.append(f"socket {item.number} in {item.status.name}: {what}")

@@ -42,9 +42,8 @@ _NAMESPACE = re.compile(rf"/|(/{_WORD})+")
 # Networks of one address or of two have no room for hosts beside their own addresses.
 _LONGEST_PREFIX = 30
 _UNUSED_ADDRESS = IPv4Address(0)
-_LABEL = r"[A-Za-z0-9](?:-*[A-Za-z0-9])*"
 # The letter tells a name from an address.
-_HOST_NAME = re.compile(rf"(?:{_LABEL}\.)*(?=[0-9-]*[A-Za-z]){_LABEL}")
+_HOST_NAME = re.compile(r"(?:[\w-]+\.)*[\w-]*[A-Za-z][\w-]*", re.ASCII)
 # The node's program counts names in a byte, with its topics.
 _MOST_HOSTS = 64
 
@@ -141,7 +140,7 @@ def _hosts(section: NodeNetwork, faults: Diagnostics) -> tuple[Host, ...]:
         before = len(faults.found)
         address = _address(item.address, faults) if item.address else None
         if item.name and not _HOST_NAME.fullmatch(item.name):
-            hint = "legal here: letters, digits, '-' and '.', with a letter after the last '.'"
+            hint = "legal here: letters, digits, '-', '_' and '.', with a letter after the last '.'"
             faults.error(f"'{item.name}' is not the name of a host", item.name.source, hint)
         elif item.name in hosts:
             faults.error(f"host '{item.name}' is given twice", item.name.source, "use each name once")
