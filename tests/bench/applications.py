@@ -28,8 +28,8 @@ MANAGER_TITLE = "The Manager within, LUT/FF"
 # Table 5.4, the generated part and the accelerators: LUT, FF, BRAM, DSP.
 _USE_CASES = {"sobel": "1551/1294, 3 BRAM", "mobile_robot": "30127/21665, 578 DSP"}
 _TARGET = "synth_xilinx"
-# But for its message, it is the system robotic_arm.
-_TWIN = "robotic_arm_franka"
+# But for a message or the node in fabric, they are other systems.
+_TWINS = ("obstacle_node", "robotic_arm_franka")
 _MANAGER = re.compile(r"^module (firm_manager_(\d+)_(\d+)_(\d+)_\w+)", re.MULTILINE)
 _COLUMNS = ("system", "family", "LUT", "FF", "LUT as RAM", "block RAM", "DSP", "dissertation", "result")
 _MANAGER_COLUMNS = (
@@ -47,7 +47,7 @@ _NOTE = """
     in table 5.4, for the image on an UltraScale+ and for the robot on a Zynq-7000. The messages are the same, but the
     accelerators differ: the dissertation's Sobel filter processes three channels, and the dissertation's robot consists
     of many arithmetic cores in VHDL and HLS. quat2euler_hls has no netlist, since an HLS tool generates its kernel.
-    robotic_arm_franka is robotic_arm with another message.
+    robotic_arm_franka is robotic_arm with another message, obstacle_node is obstacle with a node in fabric.
     """
 _MANAGER_NOTE = """
     The scheduler is not included; the Manager's connections are ports. The dissertation's value is the sum in table 3.3
@@ -73,7 +73,7 @@ class NotBuiltError(Exception):
 
 def applications() -> dict[str, Path]:
     """The cores of specs/ that have a netlist, by name."""
-    cores = (path for path in sorted(REPOSITORY.glob("specs/*/*.core")) if path.stem != _TWIN)
+    cores = (path for path in sorted(REPOSITORY.glob("specs/*/*.core")) if path.stem not in _TWINS)
     return {path.stem: path for path in cores if _TARGET in _content(path)["targets"]}
 
 

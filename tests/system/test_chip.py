@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import pytest
 import yaml
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.fabric.ros1 import node_of
+from fusesoc_firm.message.library import libraries
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
+from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.text.diagnostics import InputError
 
 SPECIFICATION = """\
@@ -76,6 +80,63 @@ def test_messages_above_the_buffer_of_the_chip_are_refused(
 
 def test_a_message_as_long_as_the_buffer_is_possible(tmp_path: Path) -> None:
     assert main(["system", "check", str(_specification(tmp_path, "Text", ", maxLength: 2044"))]) == 0
+
+
+SERVICES = """\
+paths: [messages]
+project:
+  name: turtle
+  clock: 12 MHz
+  interconnect: w5500
+  network:
+    mac: "02:0A:00:00:00:02"
+    address: 192.0.2.9
+    master: robot-pc:11000
+    hosts: [{name: robot-pc, address: 192.0.2.1}]
+accelerators:
+  - name: answering
+    type: VHDL
+    sources: answering.vhd
+    interface:
+      input: [{middleware: ROS, message: long_msgs/AskRequest}]
+      output: [{middleware: ROS, message: long_msgs/AskResponse}]
+blocks:
+  - {name: ask, middleware: ROS, mode: server, service: long_msgs/Ask, outgoing: [{name: answer}]}
+  - {name: answer, type: answering, outgoing: [{name: ask}]}
+"""
+
+
+def _with_service(folder: Path, answer: str = "uint8[8] answer") -> Path:
+    path = _specification(folder, "Text")
+    (folder / "messages" / "long_msgs" / "srv").mkdir()
+    text = f"uint8[8] question\n---\n{answer}\n"
+    (folder / "messages" / "long_msgs" / "srv" / "Ask.srv").write_text(text, encoding="utf-8")
+    path.write_text(SERVICES, encoding="utf-8")
+    (folder / "answering.vhd").touch()
+    return path
+
+
+def test_a_service_is_part_of_the_node(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = _with_service(tmp_path)
+    loaded = load_system(path, libraries([tmp_path / "messages"], None, None))
+    node = node_of(loaded.system, loaded.libraries)
+    assert (node.subscribers, node.publishers) == ((), ())
+    (service,) = node.services
+    assert (service.name, service.type, service.request, service.response) == ("/ask", "long_msgs/Ask", 0, 0)
+    assert service.md5 == _md5("uint8[8] questionuint8[8] answer")
+    assert main(["system", "show", str(path)]) == 0
+    shown = yaml.safe_load(capsys.readouterr().out)["System"]["network"]
+    assert (shown["master"], shown["hosts"]) == ("192.0.2.1:11000", {"robot-pc": "192.0.2.1"})
+
+
+def _md5(text: str) -> str:
+    """The sum of a service, by the rule of genmsg: both parts, one after another."""
+    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+
+
+def test_a_response_has_one_byte_less(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "check", str(_with_service(tmp_path, "uint8[2044] answer"))]) == 1
+    assert "payloads of 2044 bytes, but a buffer of the chip holds 2043" in capsys.readouterr().err
 
 
 def _request(folder: Path, **parameters: str) -> Request:

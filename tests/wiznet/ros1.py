@@ -12,7 +12,7 @@ from ipaddress import IPv4Address
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
-from fusesoc_firm.fabric.ros1 import Endpoint, Node, image
+from fusesoc_firm.fabric.ros1 import Endpoint, Node, Server, image
 from fusesoc_firm.fabric.wiznet.chip import Status
 from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.fabric.wiznet.w5200 import W5200
@@ -22,7 +22,7 @@ from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.system.derived.model import Network
+from fusesoc_firm.system.derived.model import Host, Network
 from tests.bench.model import compiled
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
@@ -35,6 +35,8 @@ _IDLE_BYTES = 5  # of a turn without news
 _LONGEST_SECONDS = 60
 # More at once is not the board's time, but the machine's. The bench plays them during the header of an SPI frame.
 _MOST_MS = 5
+# The bench counts the Manager's bytes in two bytes.
+_MOST_OFFERED = 0xFFFF
 
 
 def endpoint(topic: str, package: str, name: str) -> Endpoint:
@@ -44,12 +46,19 @@ def endpoint(topic: str, package: str, name: str) -> Endpoint:
     return Endpoint(topic, str(message), signature(message, definitions), closure_text(message, definitions))
 
 
-def node(master: tuple[str, int], subscribers: tuple[Endpoint, ...], publishers: tuple[Endpoint, ...]) -> Node:
+def node(
+    master: tuple[str, int],
+    subscribers: tuple[Endpoint, ...],
+    publishers: tuple[Endpoint, ...],
+    services: tuple[Server, ...] = (),
+    hosts: tuple[Host, ...] = (),
+) -> Node:
     """A node `/fabric` at an address on loopback that only this process uses."""
     number = os.getpid() % 0x3FFFFF
     address = IPv4Address((127 << 24) + (0x400000 | number) + 1)
-    network = Network(bytes.fromhex("020000000001"), address, IPv4Address("255.0.0.0"), None, "fabric", "/", 0)
-    return Node("/fabric", network, (IPv4Address(master[0]), master[1]), subscribers, publishers)
+    mac, netmask = bytes.fromhex("020000000001"), IPv4Address("255.0.0.0")
+    network = Network(mac, address, netmask, None, "fabric", "/", 0, hosts=hosts)
+    return Node("/fabric", network, (IPv4Address(master[0]), master[1]), subscribers, publishers, services)
 
 
 Accelerator = Callable[[int, bytes], Iterator[tuple[int, bytes]]]
@@ -86,12 +95,16 @@ def offer(frame: bytes) -> list[int]:
 
 
 class Board:
-    """A running board in a thread. `turns` has the SPI bytes of each turn of an interpreter."""
+    """A running board in a thread. `turns` has the SPI bytes of each turn of an interpreter.
+
+    The board's time is `clock.milliseconds`; `clock.rate` may be changed.
+    """
 
     def __init__(self, run: Callable[[Board], None], chip: W5200 | W5500, manager: Manager) -> None:
         self.chip = chip
         self.manager = manager
         self.turns: list[int] = []
+        self.clock = Clock()
         self.is_running = True
         self.to_offer: SimpleQueue[list[int]] = SimpleQueue()
         self._error: list[Exception] = []
@@ -144,7 +157,7 @@ class Board:
         self.stop()
         misuses = self.chip.misuses
         self.chip.close()
-        assert not misuses
+        assert not misuses, misuses
 
     def _run(self, run: Callable[[Board], None]) -> None:
         try:
@@ -153,19 +166,18 @@ class Board:
             self._error.append(error)
 
 
-def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
-    """A board whose program the interpreter runs."""
+def interpreted(board: Node, chip_number: int, manager: Manager, model: W5200 | W5500 | None = None) -> Board:
+    """A board whose program the interpreter runs, on another model of the chip if one is given."""
 
-    chip = MODELS[chip_number]()
+    chip = model or MODELS[chip_number]()
 
     def run(running: Board) -> None:
-        access, clock = ACCESSES[chip_number](chip), Clock()
-        sequencer = Sequencer(image(board, chip_number), access, lambda: clock.milliseconds // _MS_PER_UNIT)
+        access, clock = ACCESSES[chip_number](chip), running.clock
+        sequencer = Sequencer(image(board, chip_number), access, clock.units)
         while running.is_running:
             before = access.bytes
             sequencer.turn()
             running.turns.append(access.bytes - before)
-            clock.pass_time()
             if running.turns[-1] <= _IDLE_BYTES:
                 chip.poll(0.002)
             while sequencer.given:
@@ -177,17 +189,24 @@ def interpreted(board: Node, chip_number: int, manager: Manager) -> Board:
 
 @dataclass
 class Clock:
-    """The board's time. It stands still while a busy machine lets the board wait."""
+    """The board's time. It stands still while a busy machine lets the board wait, and with a `rate` of 0."""
 
     milliseconds: int = 0
+    rate: int = 1
     _latest: int = field(default_factory=time.monotonic_ns)
+
+    def units(self) -> int:
+        """The present time in units of the sequencer."""
+        self.pass_time()
+        return self.milliseconds // _MS_PER_UNIT
 
     def pass_time(self) -> int:
         """Go on by the time since the last call, which is returned in ms."""
         passed = (time.monotonic_ns() - self._latest) // 1_000_000
         self._latest += passed * 1_000_000
-        self.milliseconds += min(passed, _MOST_MS)
-        return min(passed, _MOST_MS)
+        counted = self.rate * min(passed, _MOST_MS)
+        self.milliseconds += counted
+        return counted
 
 
 @dataclass(frozen=True)
@@ -235,7 +254,7 @@ def clocked(
     chip = MODELS[chip_number]()
 
     def run(running: Board) -> None:
-        clock, answers = Clock(), list[int]()
+        clock, answers = running.clock, list[int]()
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
             assert process.stdin
             assert process.stdout
@@ -243,7 +262,8 @@ def clocked(
                 match process.stdout.read(1):
                     case b"s":
                         chip.select()
-                        offered, answers = answers + running.offered(), []
+                        waiting = answers + running.offered()
+                        offered, answers = waiting[:_MOST_OFFERED], waiting[_MOST_OFFERED:]
                         log.append(Frame(clock.pass_time(), offered))
                         words = [byte.to_bytes(2, "big") for byte in offered]
                         size = len(offered).to_bytes(2, "big")

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import socket
 import struct
+import subprocess
 import time
 import xmlrpc.client
 from collections.abc import Iterator
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.fabric.ros1 import Node
+from fusesoc_firm.fabric.ros1 import Node, Server
+from fusesoc_firm.system.derived.model import Host
+from tests.ros.cpp_nodes import DEBIAN_PYTHON
 from tests.wiznet.peers import free_port
 from tests.wiznet.ros1 import Board, Manager, Stalls, clocked, endpoint, interpreted, node
 
 _SEED = 20261126  # of the stalls
+_ROS = Path(__file__).parent.parent / "ros"
+# Services of the running node: one that has time, and one of which the hardware must answer soon.
+ASK = Server("/ask", "std_srvs/Ask", 32 * "a", 2, 2, 100)
+SOON = Server("/ask/soon", "std_srvs/Ask", 32 * "a", 3, 3, 1)
+_HOSTS = (Host("robot-2.lab", IPv4Address("127.0.0.1")), Host("robot-2", IPv4Address("127.0.0.2")))
 LONGEST_SECONDS = 60  # a busy machine is slow
 
 
@@ -48,11 +57,20 @@ class Running:
 
 
 def running_node(chip: int, program: Path | None = None) -> Iterator[Running]:
-    """Run a node without a master, with two topics each way: interpreted, or by a program of the hardware."""
+    """Run a node without a master: interpreted, or by a program of the hardware.
+
+    It has topics each way, of which two have the ids 0 and 1, and two services.
+    """
     made = node(
         ("127.0.0.1", free_port()),
         (endpoint("/turn", "geometry_msgs", "Quaternion"), endpoint("/turn/2", "geometry_msgs", "Point")),
-        (endpoint("/place", "geometry_msgs", "Point"), endpoint("/turn", "geometry_msgs", "Quaternion")),
+        (
+            endpoint("/place", "geometry_msgs", "Point"),
+            endpoint("/turn", "geometry_msgs", "Quaternion"),
+            endpoint("/push", "geometry_msgs", "Vector3"),  # with the MD5 sum of a Point
+        ),
+        (ASK, SOON),
+        _HOSTS,
     )
     manager = Manager(lambda _number, _payload: iter(()))
     board = clocked(made, chip, manager, program, Stalls(_SEED), []) if program else interpreted(made, chip, manager)
@@ -89,3 +107,20 @@ def header_of(peer: socket.socket) -> dict[str, str]:
 def pause() -> None:
     """Let the other side see what was sent as a part of its own."""
     time.sleep(0.002)
+
+
+def service_client(folder: Path) -> Path:
+    """Compile the client of roscpp for a service of cameras."""
+    words = ["pkg-config", "--cflags", "--libs", "roscpp"]
+    libraries = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    program = folder / "client"
+    options = ["-std=c++17", "-O1", "-pthread", str(_ROS / "service_client.cpp"), "-o", str(program)]
+    subprocess.run(["g++", *options, *libraries], check=True)
+    return program
+
+
+def service_sum() -> str:
+    """The MD5 sum by which ROS itself knows the service of cameras."""
+    code = "from sensor_msgs.srv import SetCameraInfo as s; print(s._md5sum)"
+    done = subprocess.run([DEBIAN_PYTHON, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()

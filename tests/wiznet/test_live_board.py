@@ -19,7 +19,10 @@ import pytest
 from tests.fabric.hosts import Host, missing, switched
 from tests.ros.cpp_nodes import DEBIAN_PYTHON, missing_ros1
 from tests.ros.live_nodes import PACED_PEER
+from tests.wiznet.ros1_peers import service_client, service_sum
 
+ROS = Path(__file__).parent.parent / "ros"
+CAMERA, SERVICE_PEER = ROS / "camera", ROS / "service_peer.py"
 MASTER, BOARD = "192.0.2.1", "192.0.2.2"
 SPECIFICATION = """\
 project:
@@ -43,6 +46,15 @@ blocks:
      outgoing: [{{name: other}}]}}
   - {{name: other, type: first_three, outgoing: [{{name: site}}]}}
   - {{name: site, middleware: ROS, mode: publisher, message: geometry_msgs/Point, topic: /site}}
+"""
+# Instead of the project of tests/ros/camera.
+PROJECT = f"""\
+project:
+  name: camera
+  width: 32
+  clock: 12 MHz
+  interconnect: {{chip}}
+  network: {{{{mac: "02:00:00:00:00:01", address: {BOARD}, master: {MASTER}, namespace: /lab}}}}
 """
 WAYS = [("/lab/turn", "/lab/place"), ("/roll", "/site")]
 
@@ -127,31 +139,67 @@ def _until_the_end(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[
         process.communicate()
 
 
-@pytest.mark.skipif(bool(_why_not()), reason=_why_not())
-@pytest.mark.parametrize(("chip", "width"), [("w5500", 64), pytest.param("w5200", 8, marks=pytest.mark.thorough)])
-def test_a_simulated_board_serves_rospy(tmp_path: Path, chip: str, width: int) -> None:
-    specification = _specification(tmp_path, chip, width)
+@contextmanager
+def _live(specification: Path, name: str, tool: str) -> Iterator[tuple[Peers, subprocess.Popen[str]]]:
+    """A host with a master, and the simulated board of a system."""
+    folder = specification.parent
     with switched(2) as (_, host, board_host):
         assert (host.address, board_host.address) == (MASTER, BOARD)
-        peers = Peers(host, tmp_path)
-        live = [*_firm(), "live", str(specification), "--tool", "verilator", "--build-root", str(tmp_path / "build")]
+        peers = Peers(host, folder)
+        live = [*_firm(), "live", str(specification), "--tool", tool, "--build-root", str(folder / "build")]
         with (
             _until_the_end(peers.start("rosmaster", "--core", "-p", "11311", output=subprocess.DEVNULL)),
             _until_the_end(subprocess.Popen(board_host.command(*live), stdout=subprocess.PIPE, text=True)) as board,
         ):
             assert board.stdout
-            assert board.stdout.readline() == f"/lab/turn is at {BOARD}; its master is {MASTER}:11311; Ctrl-C ends it\n"
-            peers = replace(peers, board=board)
-            words = [DEBIAN_PYTHON, PACED_PEER, "1", "10", "2", json.dumps(WAYS)]
-            for result in json.loads(peers.run(*words)):
-                assert result["sent"] == 20
-                assert result["z"] == [math.sin((number / 1000 - 3) / 2) for number in range(20)]
-            # It gives up when an answer takes more than 5 s, which is possible on a busy machine.
+            assert board.stdout.readline() == f"{name} is at {BOARD}; its master is {MASTER}:11311; Ctrl-C ends it\n"
+            yield replace(peers, board=board), board
+
+
+@pytest.mark.skipif(bool(_why_not()), reason=_why_not())
+@pytest.mark.parametrize(
+    ("chip", "width", "tool"),
+    [
+        ("w5500", 64, "verilator"),
+        pytest.param("w5200", 8, "verilator", marks=pytest.mark.thorough),
+        pytest.param("w5500", 8, "ghdl", marks=pytest.mark.thorough),
+    ],
+)
+def test_a_simulated_board_serves_rospy(tmp_path: Path, chip: str, width: int, tool: str) -> None:
+    with _live(_specification(tmp_path, chip, width), "/lab/turn", tool) as (peers, board):
+        words = [DEBIAN_PYTHON, PACED_PEER, "1", "10", "2", json.dumps(WAYS)]
+        for result in json.loads(peers.run(*words)):
+            assert result["sent"] == 20
+            assert result["z"] == [math.sin((number / 1000 - 3) / 2) for number in range(20)]
+        if tool != "ghdl":
+            # It gives up when an answer takes more than 5 s, which GHDL always takes, and others on a busy machine.
             peers.wait_until(lambda: "Pid: 1" in peers.tried("rosnode", "info", "/lab/turn")[1])
-            peers.run("rosnode", "kill", "/lab/turn")
-            peers.wait_until(lambda: "/lab/turn" not in peers.run("rosnode", "list").split())
-            board.send_signal(signal.SIGINT)
-            assert board.wait(MOST_SECONDS) == 0
+        peers.run("rosnode", "kill", "/lab/turn")
+        peers.wait_until(lambda: "/lab/turn" not in peers.run("rosnode", "list").split())
+        board.send_signal(signal.SIGINT)
+        assert board.wait(MOST_SECONDS) == 0
+
+
+@pytest.mark.skipif(bool(_why_not()), reason=_why_not())
+@pytest.mark.parametrize("chip", [pytest.param("w5500", marks=pytest.mark.thorough), "w5200"])
+def test_a_simulated_board_serves_calls_of_rospy_and_roscpp(tmp_path: Path, chip: str) -> None:
+    """The service of tests/ros/camera, whose requests have any size."""
+    shutil.copytree(CAMERA, tmp_path / "camera")
+    specification = tmp_path / "camera" / "camera.yaml"
+    text = specification.read_text(encoding="utf-8")
+    for old, new in (("project: {name: camera, width: 32}", PROJECT.format(chip=chip)), ("4096", "2000")):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    specification.write_text(text, encoding="utf-8")
+    client = service_client(tmp_path)
+    name, calls = "/lab/set_camera_info", "10"
+    # Each begins with the end of a line at its input.
+    rospy = f"echo | {DEBIAN_PYTHON} {SERVICE_PEER} 1 {name} {calls} 1"
+    roscpp = f"echo | {client} {name} {calls} 2 {service_sum()}"
+    with _live(specification, "/lab/camera", "verilator") as (peers, _):
+        for command in (rospy, roscpp):
+            ready, result = peers.run("sh", "-c", command).splitlines()
+            assert (ready, json.loads(result)) == ("ready", {"wrong": [], "failed": []})
 
 
 def test_an_address_of_another_machine_is_explained(tmp_path: Path) -> None:

@@ -9,26 +9,27 @@ import threading
 import time
 import xmlrpc.client
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from typing import Any
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
 from fusesoc_firm.fabric.ros1 import Endpoint
+from fusesoc_firm.fabric.wiznet.chips import MODELS
 from tests.wiznet.ros1 import framed
 from tests.wiznet.ros1_peers import LONGEST_SECONDS, Running, header, header_of, read, running_node
 
 SEED = 20261126
 POINT_BYTES, QUATERNION_BYTES = 24, 32
-# The bars of a Point to one of its subscribers, and of a turn without news: a W5200's frames are one byte longer.
-MOST_BYTES = {5500: 68, 5200: 77}
+# The bar of a Point to one of its subscribers; a turn without news, which is one frame of the SPI.
+MOST_BYTES = 68
 IDLE_BYTES = {5500: 4, 5200: 5}
 BUFFER = 2048
 MOST_CONNECTIONS = 5
 
 
-@pytest.fixture(params=MOST_BYTES, ids="w{}".format)
+@pytest.fixture(params=MODELS, ids="w{}".format)
 def running(request: pytest.FixtureRequest) -> Iterator[Running]:
     yield from running_node(request.param)
 
@@ -47,20 +48,23 @@ def _turns(running: Running) -> list[int]:
 
 
 def test_the_spi_carries_few_bytes(running: Running) -> None:
-    idle, most = IDLE_BYTES[running.chip], MOST_BYTES[running.chip]
+    idle = IDLE_BYTES[running.chip]
+    running.board.clock.rate = 0  # no peer is asked whether it is still there
     peers: list[socket.socket] = []
     with ExitStack() as stack:
-        for count in range(1, MOST_CONNECTIONS + 1):
-            peers.append(_subscribe(running, stack))
-            running.wait_until_idle(idle)
-            _turns(running)
-            running.board.send(0, bytes(POINT_BYTES))
-            for peer in peers:
-                assert read(peer, 4 + POINT_BYTES) == framed(0, bytes(POINT_BYTES))[1:]
-            running.wait_until_idle(idle)
-            # The next turns handle the interrupts of what has arrived.
-            first, *_ = (size for size in _turns(running) if size > idle)
-            assert first - idle <= most * count
+        for count in (1, MOST_CONNECTIONS):
+            peers += [_subscribe(running, stack) for _ in range(count - len(peers))]
+            # More than a buffer of the chip holds, so that messages cross its end.
+            for _ in range(BUFFER // (4 + POINT_BYTES) + 1):
+                running.wait_until_idle(idle)
+                _turns(running)
+                running.board.send(0, bytes(POINT_BYTES))
+                for peer in peers:
+                    assert read(peer, 4 + POINT_BYTES) == framed(0, bytes(POINT_BYTES))[1:]
+                running.wait_until_idle(idle)
+                # The next turns handle the interrupts of what has arrived.
+                first, *_ = (size for size in _turns(running) if size > idle)
+                assert first - idle <= MOST_BYTES * count
 
 
 def test_a_subscriber_that_reads_nothing_delays_nobody(running: Running) -> None:
@@ -86,6 +90,7 @@ def test_further_subscribers_are_taken_when_there_is_room(running: Running) -> N
             peer.sendall(header("callerid=/me", "md5sum=*", "topic=/place"))
             assert peer.recv(1) == b""
         assert running.call("getPid", "/me") == [1, "", 1]
+        assert running.call("getBusStats", "/me")[1] == "refused peers: 0001, unknown host: n"
         peers[2].close()
         running.board.wait_until(lambda: running.board.listening() == 7 - MOST_CONNECTIONS + 1)
         _subscribe(running, stack)
@@ -240,6 +245,20 @@ def test_a_message_longer_than_the_buffer_ends_its_connection(running: Running) 
         assert publisher.connection
         publisher.connection.sendall((BUFFER - 3).to_bytes(4, "little"))
         assert publisher.connection.recv(1) == b""
+
+
+def test_a_publisher_whose_uri_has_a_name_is_found_in_the_table(running: Running) -> None:
+    (turn, *_) = running.node.subscribers
+    with closing(Publisher(turn)) as publisher:
+        named = publisher.uri.replace("127.0.0.1", "robot-2.lab")
+        unknown = publisher.uri.replace("127.0.0.1", "robot-22")
+        assert running.call("publisherUpdate", "/master", turn.topic, [named]) == [1, "", 0]
+        publisher.accept()
+        assert running.call("getBusStats", "/me")[1] == "refused peers: 0000, unknown host: n"
+        assert running.call("publisherUpdate", "/master", turn.topic, [unknown, named]) == [1, "", 0]
+        assert running.call("getBusStats", "/me")[1] == "refused peers: 0000, unknown host: y"
+        publisher.send(bytes(QUATERNION_BYTES))
+        running.wait_until_taken(0, bytes(QUATERNION_BYTES))
 
 
 def test_a_fault_of_a_publisher_is_tried_again_at_the_next_list(running: Running) -> None:

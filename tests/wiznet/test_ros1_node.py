@@ -196,6 +196,9 @@ def test_the_tools_of_ros_know_the_hardware(running: Clocked, tmp_path: Path) ->
         assert echoed[0] == "%time,field.x,field.y,field.z"
         assert len(echoed) == 4
         _tool(ros, "rosbag", "record", "-l", "3", "-O", "places.bag", "/place", folder=tmp_path)
+    script = "import rosbag; print([m._type for _, m, _ in rosbag.Bag('places.bag').read_messages()])"
+    read_back = _tool(ros, ros.python, "-c", script, folder=tmp_path).stdout
+    assert read_back.strip() == str(3 * ["geometry_msgs/Point"])
     with AnyReader([tmp_path / "places.bag"]) as bag:
         assert [connection.msgtype for connection in bag.connections] == ["geometry_msgs/msg/Point"]
         ((_, _, data), *others) = bag.messages()
@@ -253,6 +256,27 @@ def test_five_subscribers_are_served_at_once(running: Clocked) -> None:
         while any(peer.poll() is None for peer in peers) and time.monotonic() < latest:
             running.board.send(0, struct.pack("<3d", rng.random(), 0, 0))
             time.sleep(0.05)
+        for peer in peers:
+            assert peer.poll() == 0
+            assert len(peer.communicate()[0].splitlines()) == 11
+
+
+@pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"one of {', '.join(TOOLS)} is not installed")
+def test_eight_subscribers_take_turns_at_four_sockets(running: Clocked) -> None:
+    """Those that are refused come when others have left."""
+    ros, rng, own = running.ros, random.Random(SEED), running.node
+    words = ["rostopic", "echo", "-p", "-n", "10", "/place"]
+    sockets = running.board.chip.sockets
+    with ExitStack() as stack:
+        fifth = stack.enter_context(socket.create_connection((str(own.network.address), own.port), LONGEST_SECONDS))
+        fifth.sendall(header("callerid=/me", "md5sum=*", "topic=/place"))
+        assert "error" not in header_of(fifth)
+        peers = [stack.enter_context(_started(ros, *words)) for _ in range(8)]
+        running.board.wait_until(lambda: sum(item.status == Status.ESTABLISHED for item in sockets) >= 5)
+        latest = time.monotonic() + 5 * LONGEST_SECONDS
+        while any(peer.poll() is None for peer in peers) and time.monotonic() < latest:
+            running.board.send(0, struct.pack("<3d", rng.random(), 0, 0))
+            time.sleep(0.1)
         for peer in peers:
             assert peer.poll() == 0
             assert len(peer.communicate()[0].splitlines()) == 11

@@ -154,6 +154,7 @@ def test_a_thousand_calls_are_answered(running: Running) -> None:
         ((f"md5sum={POINT}", "topic=/plac"), False),
         (("topic=/place",), False),
         ((), False),
+        ((f"md5sum={POINT}", "topic=/push", "type=geometry_msgs/Point"), False),
     ],
 )
 def test_a_header_is_accepted_or_refused(running: Running, fields: tuple[str, ...], accepted: bool) -> None:
@@ -169,6 +170,13 @@ def test_a_header_is_accepted_or_refused(running: Running, fields: tuple[str, ..
         payload = bytes(range(24))
         running.board.send(0, payload)
         assert read(peer, 28) == framed(0, payload)[1:]
+
+
+def test_types_with_the_same_sum_are_told_apart(running: Running) -> None:
+    for topic, name in (("/place", "geometry_msgs/Point"), ("/push", "geometry_msgs/Vector3")):
+        with running.connect() as peer:
+            peer.sendall(header("callerid=/me", f"md5sum={POINT}", f"topic={topic}", f"type={name}"))
+            assert header_of(peer)["type"] == name
 
 
 def test_sockets_listen_again_after_garbage(running: Running) -> None:

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A FIFO of 65 bytes, which tells its reader that it holds the next 64 bytes of a frame or the frame's end, and its
+-- A FIFO of 64 bytes, which tells its reader that it holds the next 64 bytes of a frame or the frame's end, and its
 -- writer that it is empty. So neither has to wait in the middle of a transfer.
 library ieee;
 use ieee.std_logic_1164.all;
@@ -29,12 +29,13 @@ end entity firm_wiznet_fifo;
 
 architecture rtl of firm_wiznet_fifo is
 
+  -- The output holds one byte; of the memory's places, one is never used.
   type memory_t is array (0 to 63) of std_logic_vector(9 downto 0);
   signal memory_r : memory_t;
 
   signal write_r : unsigned(5 downto 0);
   signal read_r  : unsigned(5 downto 0);
-  signal level_r : unsigned(6 downto 0);                 -- bytes in the memory
+  signal level_r : unsigned(5 downto 0);                 -- bytes in the memory
   signal ends_r  : unsigned(6 downto 0);                 -- ends of frames, that at the output included
   signal valid_r : std_logic;
   signal shown_r : std_logic_vector(9 downto 0);
@@ -47,7 +48,7 @@ architecture rtl of firm_wiznet_fifo is
 
 begin
 
-  ready <= rst_n and not level_r(6);                      -- in reset, the source waits
+  ready <= '0' when level_r = 63 else rst_n;              -- in reset, the source waits
   write <= s_axis_tvalid and ready;
   read  <= '1' when level_r /= 0 and (valid_r = '0' or m_axis_tready = '1') else '0';
   entry <= write and s_axis_tlast;
@@ -59,7 +60,7 @@ begin
   m_axis_tuser(0) <= shown_r(9);
   m_axis_tvalid   <= valid_r;
   is_empty        <= '1' when valid_r = '0' and level_r = 0 else '0';
-  has_part        <= '1' when valid_r = '1' and (level_r >= 63 or ends_r /= 0) else '0';
+  has_part        <= '1' when valid_r = '1' and (level_r = 63 or ends_r /= 0) else '0';
 
   access_memory : process (clk)
   begin

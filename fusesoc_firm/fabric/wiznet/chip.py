@@ -17,6 +17,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from enum import IntEnum, IntFlag
+from functools import partial
 
 SOCKETS = 8
 MEMORY = 16384  # bytes of all transmit buffers together, and of all receive buffers
@@ -91,6 +92,7 @@ class ChipSocket:
     def forget(self) -> None:
         """Return to CLOSED without a connection. Registers that the host wrote remain."""
         self.status = Status.CLOSED
+        self.shown = Status.CLOSED  # when the host last read it
         self.interrupt = Interrupt(0)
         self.command = 0  # what a read of Sn_CR still returns
         self.connection: socket.socket | None = None
@@ -145,6 +147,7 @@ class Chip:
         `common` is its number of common registers, `address` that of SIPR, `retry` that of RTR, which RCR follows.
         """
         self.misuses: list[str] = []
+        self.has_link = True
         self._common_bytes = common
         self._address = address
         self._retry = retry
@@ -176,6 +179,7 @@ class Chip:
         if address == INTERRUPT:
             return item.interrupt
         if address == STATUS:
+            item.shown = item.status
             return item.status
         if address & 1:
             self.poll()  # the chip does not hold a count while its bytes are read
@@ -238,7 +242,7 @@ class Chip:
             Command.DISCON: self._disconnect,
             Command.CLOSE: self._cut,
             Command.SEND: self._send,
-            Command.SEND_KEEP: lambda _: None,  # the kernel's keep-alive follows KPALVTR
+            Command.SEND_KEEP: self._send_keep,
             Command.RECV: self._receive,
         }
         if item.command:
@@ -295,12 +299,21 @@ class Chip:
 
     def _send(self, item: ChipSocket) -> None:
         if item.status not in _SENDING_STATES:
-            self._misuse(item, "SEND without a connection")
+            self._misuse_without_connection(item, "SEND")
         elif (item.tx_write - item.tx_acknowledged) % _COUNT > item.tx_bytes:
             self._misuse(item, "SEND of more bytes than are free")
         else:
             item.tx_commanded = item.tx_write
             self._guarded(item, self._transfer)
+
+    def _send_keep(self, item: ChipSocket) -> None:
+        """Ask whether the peer is still there. The kernel asks again each second, and gives up as the chip does."""
+        if item.status not in _SENDING_STATES:
+            self._misuse_without_connection(item, "SEND_KEEP")
+        elif item.registers[KEEP_ALIVE]:
+            self._misuse(item, "SEND_KEEP beside KPALVTR")
+        else:
+            self._guarded(item, partial(_keep_alive, seconds=1))
 
     def _receive(self, item: ChipSocket) -> None:
         if (item.rx_read - item.rx_freed) % _COUNT > (item.rx_write - item.rx_freed) % _COUNT:
@@ -310,6 +323,11 @@ class Chip:
         # The interrupt comes again while bytes remain.
         if item.rx_freed != item.rx_write:
             item.interrupt |= Interrupt.RECV
+
+    def _misuse_without_connection(self, item: ChipSocket, what: str) -> None:
+        """Note a command, unless the connection has ended after the host last read the status."""
+        if item.shown not in _SENDING_STATES:
+            self._misuse(item, f"{what} without a connection")
 
     def _misuse(self, item: ChipSocket, what: str) -> None:
         self.misuses.append(f"socket {item.number} in {item.status.name}: {what}")
@@ -361,9 +379,7 @@ class Chip:
             self._end(item, Interrupt.TIMEOUT)
 
     def _established(self, item: ChipSocket) -> None:
-        assert item.connection
-        if error := item.connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
-            raise OSError(error, errno.errorcode[error])
+        _raise_error(item)
         self._set_up(item)
         item.status = Status.ESTABLISHED
         item.interrupt |= Interrupt.CON
@@ -372,13 +388,14 @@ class Chip:
         assert item.connection
         item.connection.setblocking(False)
         options = [(socket.TCP_NODELAY, 1), (socket.TCP_USER_TIMEOUT, int(self._tcp_seconds() * 1000))]
-        if seconds := 5 * item.registers[KEEP_ALIVE]:
-            item.connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-            options += [(socket.TCP_KEEPIDLE, seconds), (socket.TCP_KEEPINTVL, seconds)]
         for option, value in options:
             item.connection.setsockopt(socket.IPPROTO_TCP, option, value)
+        if seconds := 5 * item.registers[KEEP_ALIVE]:
+            _keep_alive(item, seconds)
 
     def _transfer(self, item: ChipSocket) -> None:
+        if item.has_ended:
+            _raise_error(item)  # nothing is received any more that would tell of a reset
         self._transmit(item)
         for data in _received(item):
             for byte in data:
@@ -450,6 +467,21 @@ def _kernel_socket() -> socket.socket:
     made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     made.setblocking(False)
     return made
+
+
+def _raise_error(item: ChipSocket) -> None:
+    """Raise the `OSError` that a connection has, if any."""
+    assert item.connection
+    if error := item.connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+        raise OSError(error, errno.errorcode[error])
+
+
+def _keep_alive(item: ChipSocket, seconds: int) -> None:
+    """Ask the peer whenever nothing has come from it for so long."""
+    assert item.connection
+    item.connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL):
+        item.connection.setsockopt(socket.IPPROTO_TCP, option, seconds)
 
 
 def _unacknowledged(item: ChipSocket) -> int:

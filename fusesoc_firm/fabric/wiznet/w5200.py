@@ -10,7 +10,7 @@ from fusesoc_firm.fabric.wiznet.chip import Chip, ChipSocket
 
 _ADDRESS, _RETRY = 0x0F, 0x17
 _VERSION, _INTERRUPTS, _PHY = 0x1F, 0x34, 0x35
-_LINK_UP = 0x20
+_LINK_DOWN, _LINK_UP = 0x00, 0x20
 _COMMON = 0x37
 _SOCKETS, _TX, _RX = 0x4000, 0x8000, 0xC000
 _HEADER = 4
@@ -55,7 +55,7 @@ class W5200(Chip):
 
     def _read(self, address: int) -> int:
         if address < _SOCKETS:
-            own = {_VERSION: 3, _INTERRUPTS: self.interrupts(), _PHY: _LINK_UP}
+            own = {_VERSION: 3, _INTERRUPTS: self.interrupts(), _PHY: _LINK_UP if self.has_link else _LINK_DOWN}
             return own[address] if address in own else self.common[address] if address < _COMMON else 0
         if address < _TX:
             return self.read_socket(address >> 8 & 7, address & 0xFF)

@@ -9,7 +9,7 @@ from fusesoc_firm.fabric.wiznet.chip import Chip
 
 _ADDRESS, _RETRY = 0x0F, 0x19
 _INTERRUPTS, _PHY, _VERSION = 0x17, 0x2E, 0x39
-_LINK_UP = 0xBF
+_LINK_DOWN, _LINK_UP = 0xB8, 0xBF
 _COMMON = 0x40
 _FIXED_LENGTHS = {1: 1, 2: 2, 3: 4}
 _HEADER = 3
@@ -58,7 +58,8 @@ class W5500(Chip):
 
     def _read(self, block: int, address: int) -> int:
         if block == 0:
-            own = {_INTERRUPTS: self.interrupts(), _PHY: _LINK_UP, _VERSION: 4}
+            phy = _LINK_UP if self.has_link else _LINK_DOWN
+            own = {_INTERRUPTS: self.interrupts(), _PHY: phy, _VERSION: 4}
             return own[address] if address in own else self.common[address] if address < _COMMON else 0
         item = self.sockets[block >> 2]
         match block & 3:

@@ -6,7 +6,9 @@ from collections.abc import Iterable, Sequence
 
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.system.derived.model import Converter
-from fusesoc_firm.system.written.specification import AXI_STREAM, NO_STATUS, Block, Specification
+from fusesoc_firm.system.derived.services import ros_name_of
+from fusesoc_firm.system.derived.timing import seconds_of
+from fusesoc_firm.system.written.specification import AXI_STREAM, NO_STATUS, SERVER, Block, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 # Sockets of the chip for connections: of eight, one calls the master, and two remain for calls of others.
@@ -15,6 +17,8 @@ CONNECTIONS = 5
 LONGEST = 2044
 # The numbers of registrations, and of types, which the node's program counts in a byte and in 6 bits.
 MOST_TOPICS, MOST_TYPES = 127, 62
+# Seconds in which a call is answered: 255 alarms of 8 s.
+LONGEST_LIMIT = 2000
 
 
 def check_chip(
@@ -30,17 +34,36 @@ def check_chip(
     if project.status != NO_STATUS:
         hint = f"remove the key, or use '{AXI_STREAM}'"
         faults.error(f"{message}has no host that reads a status", project.status.source, hint)
-    services = dict.fromkeys(block.service_block for block in written.blocks if block.service_block)
+    services = [*dict.fromkeys(block.service_block for block in written.blocks if block.service_block)]
+    _check_services(services, message, faults)
+    topics = [[item for item in side if not item.service] for side in (subscribers, publishers)]
+    for side in topics:
+        _check_topics(side, blocks, faults)
+    for item in subscribers:
+        _check_size(item, blocks[item.block], LONGEST, faults)
+    for item in publishers:
+        # A byte before a response tells whether the call has succeeded.
+        _check_size(item, blocks[item.block], LONGEST - 1 if item.service else LONGEST, faults)
+        _check_durability(item, blocks[item.block], message, faults)
+    _check_counts(topics, services, blocks, message, faults)
+
+
+def _check_services(services: Sequence[Block], message: str, faults: Diagnostics) -> None:
+    """Note actions and clients, services with the same name, and time limits that the node cannot measure."""
+    owners: dict[str, str] = {}
     for block in services:
         place = block.mode.source if block.mode else block.name.source
-        faults.error(f"{message}has no services and actions, such as '{block.name}'", place, "legal here: topics")
-    for side in (subscribers, publishers):
-        _check_topics(side, blocks, faults)
-        for item in side:
-            _check_size(item, blocks[item.block], faults)
-    for item in publishers:
-        _check_durability(item, blocks[item.block], message, faults)
-    _check_counts(subscribers, publishers, blocks, message, faults)
+        if block.action is not None or block.mode != SERVER:
+            kind = "actions" if block.action is not None else "clients of services"
+            hint = f"legal here: topics, and services with 'mode: {SERVER}'"
+            faults.error(f"{message}has no {kind}, such as '{block.name}'", place, hint)
+            continue
+        name = ros_name_of(block)
+        if (owner := owners.setdefault(name, str(block.name))) != block.name:
+            faults.error(f"'{block.name}' and '{owner}' have the same name {name}", block.name.source, "use others")
+        if block.time_limit and (seconds_of(block.time_limit) or 0) > LONGEST_LIMIT:
+            hint = f"legal here: up to {LONGEST_LIMIT} s"
+            faults.error(f"'timeLimit' cannot be '{block.time_limit}'", block.time_limit.source, hint)
 
 
 def _check_topics(items: Iterable[Converter], blocks: dict[str, Block], faults: Diagnostics) -> None:
@@ -54,25 +77,25 @@ def _check_topics(items: Iterable[Converter], blocks: dict[str, Block], faults: 
             faults.error(message, block.topic.source if block.topic else block.name.source, hint)
 
 
-def _check_size(item: Converter, block: Block, faults: Diagnostics) -> None:
+def _check_size(item: Converter, block: Block, most: int, faults: Diagnostics) -> None:
     """Note a converter whose payloads, or the payloads that its block asks for, do not fit in the chip's buffer."""
-    key = next((name for name in ("max_length", "buffer") if (getattr(block, name) or 0) > LONGEST), None)
+    key = next((name for name in ("max_length", "buffer") if (getattr(block, name) or 0) > most), None)
+    least = item.frame.payload_bytes if item.frame.is_fixed_size else length_of(item.frame).minimum
     if key:
         faults.error(
             f"payloads of '{item.block}' cannot have {getattr(block, key)} bytes",
             block.place(key),
-            f"a buffer of the chip holds {LONGEST}",
+            f"a buffer of the chip holds {most}",
         )
-    elif item.frame.is_fixed_size and item.frame.payload_bytes > LONGEST:
-        _note_long(item, block, item.frame.payload_bytes, "use a smaller message", faults)
-    elif not item.frame.is_fixed_size and (least := length_of(item.frame).minimum) > LONGEST:
-        _note_long(item, block, least, "use a smaller message", faults)
-    elif (item.max_length or 0) > LONGEST:
-        _note_long(item, block, item.max_length or 0, f"add 'maxLength: {LONGEST}' to the block", faults)
+    elif least > most:
+        _note_long(item, block, (least, most), "use a smaller message", faults)
+    elif not item.frame.is_fixed_size and (item.max_length or 0) > most:
+        _note_long(item, block, (item.max_length or 0, most), f"add 'maxLength: {most}' to the block", faults)
 
 
-def _note_long(item: Converter, block: Block, size: int, hint: str, faults: Diagnostics) -> None:
-    message = f"'{item.block}' has payloads of {size} bytes, but a buffer of the chip holds {LONGEST}"
+def _note_long(item: Converter, block: Block, sizes: tuple[int, int], hint: str, faults: Diagnostics) -> None:
+    size, most = sizes
+    message = f"'{item.block}' has payloads of {size} bytes, but a buffer of the chip holds {most}"
     faults.error(message, block.name.source, hint)
 
 
@@ -83,24 +106,28 @@ def _check_durability(item: Converter, block: Block, message: str, faults: Diagn
 
 
 def _check_counts(
-    subscribers: Sequence[Converter],
-    publishers: Sequence[Converter],
+    topics: Sequence[Sequence[Converter]],
+    services: Sequence[Block],
     blocks: dict[str, Block],
     message: str,
     faults: Diagnostics,
 ) -> None:
-    """Note more topics than connections or numbers, and warn where each topic once is more than all connections."""
+    """Note more topics than connections or numbers, and warn where each topic once is more than all connections.
+
+    `topics` are the subscribers and the publishers.
+    """
+    subscribers, publishers = topics
     items = (*subscribers, *publishers)
+    places = [block.name.source for block in (*(blocks[item.block] for item in items), *services)]
+    uses = f"{len(items)} topics" + (f" and {len(services)} services" if services else "")
     if len(subscribers) > CONNECTIONS:
-        first = blocks[subscribers[CONNECTIONS].block]
         hint = "of eight sockets, one calls the master and two are kept for calls of others"
-        faults.error(f"{message}allows {CONNECTIONS} subscribers, not {len(subscribers)}", first.name.source, hint)
-    elif len(items) > CONNECTIONS:
-        place = blocks[items[CONNECTIONS].block].name.source
+        faults.error(f"{message}allows {CONNECTIONS} subscribers, not {len(subscribers)}", places[CONNECTIONS], hint)
+    elif len(places) > CONNECTIONS:
         hint = "other nodes wait until a connection ends"
-        faults.warn(f"{message}has {CONNECTIONS} connections for {len(items)} topics", place, hint)
-    types = dict.fromkeys(item.frame.message for item in items)
-    if len(items) > MOST_TOPICS or len(types) > MOST_TYPES:
-        place = blocks[items[min(len(items) - 1, MOST_TOPICS)].block].name.source
-        hint = f"legal here: up to {MOST_TOPICS} topics of up to {MOST_TYPES} types"
-        faults.error(f"{message}cannot have {len(items)} topics of {len(types)} types", place, hint)
+        faults.warn(f"{message}has {CONNECTIONS} connections for {uses}", places[CONNECTIONS], hint)
+    types = len(dict.fromkeys(item.frame.message for item in items)) + len(services)
+    if len(places) > MOST_TOPICS or types > MOST_TYPES:
+        place = places[min(len(places) - 1, MOST_TOPICS)]
+        hint = f"legal here: up to {MOST_TOPICS} topics of up to {MOST_TYPES} types; each service counts as one of both"
+        faults.error(f"{message}cannot have {uses} of {types} types", place, hint)

@@ -330,10 +330,19 @@ class NetworkKind(Enum):
 
 
 @dataclass(frozen=True)
+class Host:
+    """Another host in the network."""
+
+    name: str
+    address: IPv4Address
+
+
+@dataclass(frozen=True)
 class Network:
     """The place of a system that is a node itself: its MAC address (six bytes), IPv4 addresses and names.
 
-    `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port.
+    `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port, and knows the
+    names of `hosts`.
     """
 
     mac: bytes
@@ -345,6 +354,7 @@ class Network:
     domain: int
     kind: NetworkKind = NetworkKind.ETHERNET
     master: tuple[IPv4Address, int] | None = None
+    hosts: tuple[Host, ...] = ()
 
 
 class StatusAccess(Enum):

@@ -9,7 +9,7 @@ from ipaddress import AddressValueError, IPv4Address, IPv4Network
 from fusesoc_firm.message.middleware import MIDDLEWARES
 from fusesoc_firm.system.derived.chip import check_chip
 from fusesoc_firm.system.derived.ids import ONE_BYTE
-from fusesoc_firm.system.derived.model import Converter, Network, NetworkKind, Scheduling, Software
+from fusesoc_firm.system.derived.model import Converter, Host, Network, NetworkKind, Scheduling, Software
 from fusesoc_firm.system.written.specification import (
     AXI_STREAM,
     CHIPS,
@@ -42,6 +42,10 @@ _NAMESPACE = re.compile(rf"/|(/{_WORD})+")
 # Networks of one address or of two have no room for hosts beside their own addresses.
 _LONGEST_PREFIX = 30
 _UNUSED_ADDRESS = IPv4Address(0)
+# The letter tells a name from an address.
+_HOST_NAME = re.compile(r"(?:[\w-]+\.)*[\w-]*[A-Za-z][\w-]*", re.ASCII)
+# The node's program counts names in a byte, with its topics.
+_MOST_HOSTS = 64
 
 
 def network_of(
@@ -111,7 +115,8 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     """Return the network of a section, or None if it has a fault."""
     mac = _mac(section.mac, faults)
     network = _addresses(section, faults)
-    master = None if section.master is None else _master(section.master, faults)
+    hosts = _hosts(section, faults)
+    master = None if section.master is None else _master(section.master, hosts, faults)
     name = _name(section, project, faults)
     if not _NAMESPACE.fullmatch(section.namespace) or len(section.namespace) > _LONGEST_NAME:
         hint = "legal here: / or an absolute name, such as /arm/left, of up to 255 letters, digits and single '_'"
@@ -125,19 +130,39 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     if master:
         _check_reachable(section, address, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
     kind = NetworkKind(project.interconnect) if project.interconnect in NETWORKS else NetworkKind.ETHERNET
-    return Network(mac, address, netmask, gateway, name, str(section.namespace), section.domain, kind, master)
+    return Network(mac, address, netmask, gateway, name, str(section.namespace), section.domain, kind, master, hosts)
 
 
-def _master(text: Text, faults: Diagnostics) -> tuple[IPv4Address, int] | None:
-    """Return address and port of a master; the form of ROS_MASTER_URI is legal, too."""
-    address, colon, port = text.removeprefix("http://").removesuffix("/").partition(":")
+def _hosts(section: NodeNetwork, faults: Diagnostics) -> tuple[Host, ...]:
+    """Return the hosts with legal names and addresses; note the others."""
+    hosts: dict[str, Host] = {}
+    for item in section.hosts:
+        before = len(faults.found)
+        address = _address(item.address, faults) if item.address else None
+        if item.name and not _HOST_NAME.fullmatch(item.name):
+            hint = "legal here: letters, digits, '-', '_' and '.', with a letter after the last '.'"
+            faults.error(f"'{item.name}' is not the name of a host", item.name.source, hint)
+        elif item.name in hosts:
+            faults.error(f"host '{item.name}' is given twice", item.name.source, "use each name once")
+        if address and item.name and len(faults.found) == before:
+            hosts[item.name] = Host(str(item.name), address)
+    if len(section.hosts) > _MOST_HOSTS:
+        hint = f"legal here: up to {_MOST_HOSTS}"
+        faults.error(f"{len(section.hosts)} hosts are not possible", section.hosts[_MOST_HOSTS].source, hint)
+    return (*hosts.values(),)
+
+
+def _master(text: Text, hosts: Sequence[Host], faults: Diagnostics) -> tuple[IPv4Address, int] | None:
+    """Return address and port of a master; the form of ROS_MASTER_URI is legal, too, also with the name of a host."""
+    name, colon, port = text.removeprefix("http://").removesuffix("/").partition(":")
     port = port if colon else str(_MASTER_PORT)
+    address = next((str(host.address) for host in hosts if host.name == name), name)
     try:
         found = IPv4Address(address), int(port) if port.isascii() and port.isdecimal() else 0
     except AddressValueError:
         found = _UNUSED_ADDRESS, 0
     if not 0 < found[1] <= _HIGHEST_PORT or found[0] == _UNUSED_ADDRESS or found[0].is_multicast:
-        hint = "legal here: four numbers and a port, such as 192.168.1.10:11311; the chip does not look up names"
+        hint = "legal here: an address and a port, such as 192.168.1.10:11311; or the name of one of 'hosts'"
         faults.error(f"'{text}' is not the address of a master", text.source, hint)
         return None
     return found

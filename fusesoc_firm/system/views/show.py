@@ -87,6 +87,7 @@ def _network(network: Network | None) -> dict[str, Any]:
             "name": network.name,
             "namespace": network.namespace,
             **({"master": "{}:{}".format(*network.master)} if network.master else {"domain": network.domain}),
+            **({"hosts": {host.name: str(host.address) for host in network.hosts}} if network.hosts else {}),
         }
     }
 

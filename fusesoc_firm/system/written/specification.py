@@ -111,6 +111,14 @@ class PublisherGroup(Section):
 
 
 @dataclass(frozen=True)
+class NetworkHost(Section):
+    """The address of a host that URIs of ROS 1 call by its name."""
+
+    name: Text = key("the host's name in URIs, such as robot-pc", is_required=True)
+    address: Text = key("its IPv4 address, such as 192.168.1.10", is_required=True)
+
+
+@dataclass(frozen=True)
 class NodeNetwork(Section):
     """The place of a system that is a node itself in its network, and its name in ROS."""
 
@@ -123,6 +131,12 @@ class NodeNetwork(Section):
     domain: int = key("the domain of ROS 2 (ROS_DOMAIN_ID); only used with ethernet", form="integer", default=0)
     master: Text | None = key(
         "address and port of the master of ROS 1, such as 192.168.1.10:11311; required with w5500 and w5200"
+    )
+    hosts: tuple[NetworkHost, ...] = key(
+        "hosts whose nodes have URIs with names instead of addresses; only used with w5500 and w5200",
+        form="sections",
+        section=NetworkHost,
+        is_asked=False,
     )
 
 
