@@ -327,6 +327,14 @@ class NetworkKind(Enum):
     W5200 = "w5200"
 
 
+class Phy(Enum):
+    """The interface of the PHY that connects a node to Ethernet."""
+
+    GMII = "gmii"
+    MII = "mii"
+    RMII = "rmii"
+
+
 @dataclass(frozen=True)
 class Network:
     """The place of a system that is a node itself: its MAC address (six bytes), IPv4 addresses and names.
@@ -343,6 +351,7 @@ class Network:
     domain: int
     kind: NetworkKind = NetworkKind.ETHERNET
     master: tuple[IPv4Address, int] | None = None
+    phy: Phy = Phy.GMII
 
 
 class StatusAccess(Enum):

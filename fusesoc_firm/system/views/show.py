@@ -86,9 +86,15 @@ def _network(network: Network | None) -> dict[str, Any]:
             **{name: str(value) for name, value in addresses.items() if value},
             "name": network.name,
             "namespace": network.namespace,
-            **({"master": "{}:{}".format(*network.master)} if network.master else {"domain": network.domain}),
+            **_way(network),
         }
     }
+
+
+def _way(network: Network) -> dict[str, Any]:
+    if network.master:
+        return {"master": "{}:{}".format(*network.master)}
+    return {"domain": network.domain, "phy": network.phy.value}
 
 
 def default_lengths(system: DerivedSystem) -> list[str]:

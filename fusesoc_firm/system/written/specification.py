@@ -50,6 +50,8 @@ LINKS = ("uart", "spi")
 ETHERNET = "ethernet"
 CHIPS = W5500, W5200 = ("w5500", "w5200")
 NETWORKS = (ETHERNET, *CHIPS)
+# The interface of the PHY of a node by Ethernet.
+PHYS = ("gmii", "mii", "rmii")
 # The accesses to the registers of a system's status, if it has one.
 NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
@@ -124,6 +126,7 @@ class NodeNetwork(Section):
     master: Text | None = key(
         "address and port of the master of ROS 1, such as 192.168.1.10:11311; required with w5500 and w5200"
     )
+    phy: Text = key("the interface of the PHY; only used with ethernet", choices=PHYS, default=Text(PHYS[0]))
 
 
 @dataclass(frozen=True)
