@@ -45,6 +45,7 @@ architecture rtl of firm_net_presence is
   constant MAC_BYTES      : natural := 6;
   constant ADDRESS_BYTES  : natural := 4;
   constant QUERY_BYTES    : natural := 8;
+  constant SHORTEST_HEADER : natural := 5;  -- of IPv4, in words
   constant LAST_PLACE     : natural := 127;
 
   subtype byte_t is std_logic_vector(7 downto 0);
@@ -119,7 +120,7 @@ begin
           query_r <= '0';
         elsif place_r = IPV4_PLACE then
           igmp_r <= to_unsigned(IPV4_PLACE, 7) + (unsigned(s_axis_tdata(3 downto 0)) & "00");
-          if s_axis_tdata(7 downto 4) /= VERSION then
+          if s_axis_tdata(7 downto 4) /= VERSION or unsigned(s_axis_tdata(3 downto 0)) < SHORTEST_HEADER then
             query_r <= '0';
           end if;
         elsif place_r = PROTOCOL_PLACE and s_axis_tdata /= IGMP then

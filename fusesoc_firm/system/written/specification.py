@@ -358,7 +358,8 @@ class Block(Section):
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     max_length: int | None = key(
-        "bytes of the longest payload, if the message has no bounds (default: 65536, with a link or a network 2000)",
+        "bytes of the longest payload, if the message has no bounds (default: 65536; with a link, w5500 or w5200"
+        " 2000; with ethernet the most that is possible)",
         name="maxLength",
         form="integer",
         only_of=CONVERTER,
