@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.fabric.names import memory_of_names
+from fusesoc_firm.fabric.names import LONGEST_NAME, memory_of_names
 from fusesoc_firm.fabric.node import Node, node_of
 from fusesoc_firm.fabric.packets import memory_of, programs_of
 from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
@@ -14,6 +14,7 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.system.derived.ethernet import longest_sent
 from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entity
+from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Context, Rendering, render
 
 _NODE_TEMPLATE = "vhdl/net_node.vhd"
@@ -25,9 +26,9 @@ def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibr
 
     Raise `InputError` if a name is too long.
     """
-    if system.network is None or system.network.kind is not NetworkKind.ETHERNET:
+    node, entity = ethernet_node(system, libraries), node_entity(system)
+    if node is None:
         return {}
-    node, entity = node_of(system, libraries), node_entity(system)
     packets, names = f"{system.entity}_packets", f"{system.entity}_names"
     made = [
         memory_of(node, packets, frames_of(node.network)),
@@ -35,6 +36,24 @@ def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibr
         Rendering(_NODE_TEMPLATE, _configuration(system, node, {"entity": entity, "packets": packets, "names": names})),
     ]
     return {f"{item.context['entity']}.vhd": render(item.template, item.context) for item in made}
+
+
+def ethernet_node(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> Node | None:
+    """Return the node of a system by Ethernet, or None for other systems.
+
+    Raise `InputError` if a name is longer than those that the hardware compares.
+    """
+    if system.network is None or system.network.kind is not NetworkKind.ETHERNET:
+        return None
+    node = node_of(system, libraries)
+    for item in node.readers:
+        for name in (item.topic, item.type):
+            if len(name) > LONGEST_NAME:
+                fail(
+                    f"the name {name} of '{system.name}' has {len(name)} characters in ROS 2's network",
+                    hint=f"a node by Ethernet compares up to {LONGEST_NAME}",
+                )
+    return node
 
 
 def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:

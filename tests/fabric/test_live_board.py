@@ -29,8 +29,10 @@ LOT, LOTS = 10, 5
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
 
-def _specification(folder: Path) -> Path:
-    """The demo with the names and the address of the other tests here."""
+@pytest.fixture(scope="module")
+def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The demo with the names and the address of the other tests here; its simulator is built beside it, once."""
+    folder = tmp_path_factory.mktemp("board")
     shutil.copytree(SYSTEM / "rtl", folder / "rtl")
     text = (SYSTEM / "quat2euler_ethernet.yaml").read_text(encoding="utf-8")
     for old, new in {
@@ -62,23 +64,29 @@ def _live(*options: str) -> list[str]:
 class Lab:
     """A switch with the board's TAP device, and a host for each peer."""
 
-    def __init__(self, folder: Path, stack: ExitStack) -> None:
-        self._folder, self._stack, self._ros = folder, stack, ros2(folder)
+    def __init__(self, specification: Path, folder: Path, stack: ExitStack) -> None:
+        self._specification, self._stack, self._ros = specification, stack, ros2(folder)
         self.switch, *self._hosts = stack.enter_context(switched(2))
         self.switch.run("ip", "tuntap", "add", "dev", "tap0", "mode", "tap")
         self.switch.run("ip", "link", "set", "tap0", "master", "switch", "up")
 
     def board(self) -> subprocess.Popen[str]:
         """The board, when it runs."""
-        words = _live(str(_specification(self._folder)), "--tool", "verilator", "--network", "tap0")
+        words = _live(str(self._specification), "--tool", "verilator", "--network", "tap0")
         for core in ("firm_cordic", "firm_float64"):
             words += ["--depend", f"robot:acc:{core}:0.2.0"]
-        words += ["--build-root", str(self._folder / "build")]
+        words += ["--build-root", str(self._specification.parent / "build")]
         board = subprocess.Popen(self.switch.command(*words), stdout=subprocess.PIPE, text=True)
         self._stack.callback(_end, board)
         assert board.stdout
         assert board.stdout.readline() == "/board is at 192.0.2.9, at tap0, in domain 0; Ctrl-C ends it\n"
         return board
+
+    def members(self) -> list[tuple[str, str]]:
+        """Port and group of each membership that the switch knows."""
+        command = self.switch.command("bridge", "-json", "mdb", "show", "dev", "switch")
+        shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        return [(item["port"], item["grp"]) for part in json.loads(shown) for item in part.get("mdb", [])]
 
     def peers(self) -> dict[str, Peer]:
         """A peer of each kind."""
@@ -102,7 +110,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 @pytest.fixture
-def lab(tmp_path: Path) -> Iterator[Lab]:
+def lab(specification: Path, tmp_path: Path) -> Iterator[Lab]:
     if reason := _why_not():
         pytest.skip(reason)
     if not shutil.which("verilator"):
@@ -110,21 +118,27 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
     if not Path("/dev/net/tun").exists():
         pytest.skip("there is no /dev/net/tun")
     with ExitStack() as stack:
-        yield Lab(tmp_path, stack)
+        yield Lab(specification, tmp_path, stack)
+
+
+def _exchange(peers: dict[str, Peer], chance: random.Random) -> None:
+    """Quaternions of both peers, by turns; each peer gets the angles of all."""
+    model = _model()
+    sent = [[chance.uniform(-1, 1) for _ in range(4)] for _ in range(2 * LOT)]
+    for number, values in enumerate(sent):
+        [*peers.values()][number % 2].send([("quaternion", values)])
+    wanted = sorted(list(model.quaternion_to_euler(*values)) for values in sent)
+    for peer in peers.values():
+        assert sorted(values for _, values in peer.take(2 * LOT)) == wanted
 
 
 def test_quaternions_of_both_peers_come_back_as_euler_angles(lab: Lab) -> None:
     print(f"seed {SEED}")
-    chance, model = random.Random(SEED), _model()
+    chance = random.Random(SEED)
     board, peers = lab.board(), lab.peers()
     print({name: peer.wait_until_matched() for name, peer in peers.items()})
     for _ in range(LOTS):
-        sent = [[chance.uniform(-1, 1) for _ in range(4)] for _ in range(2 * LOT)]
-        for number, values in enumerate(sent):
-            [*peers.values()][number % 2].send([("quaternion", values)])
-        wanted = sorted(list(model.quaternion_to_euler(*values)) for values in sent)
-        for peer in peers.values():
-            assert sorted(values for _, values in peer.take(2 * LOT)) == wanted
+        _exchange(peers, chance)
     peers["rclpy"].tell('"graph"\n')
     graph = next(line for line in iter(peers["rclpy"].line, None) if isinstance(line, dict))
     assert ["board", "/"] in graph["nodes"]
@@ -132,3 +146,16 @@ def test_quaternions_of_both_peers_come_back_as_euler_angles(lab: Lab) -> None:
     assert ["/euler_out", ["geometry_msgs/msg/Point"]] in graph["topics"]
     board.send_signal(signal.SIGINT)
     assert board.wait() == 0
+
+
+def test_a_switch_with_snooping_knows_the_board_as_a_member(lab: Lab) -> None:
+    """The kernel's bridge asks for members, and forwards announcements to them only."""
+    print(f"seed {SEED}")
+    querier = "mcast_snooping 1 mcast_querier 1 mcast_startup_query_interval 100 mcast_query_interval 500"
+    lab.switch.run("ip", "link", "set", "switch", "type", "bridge", *querier.split())
+    board = lab.board()
+    while ("tap0", "239.255.0.1") not in lab.members():
+        assert board.poll() is None
+    peers = lab.peers()
+    print({name: peer.wait_until_matched() for name, peer in peers.items()})
+    _exchange(peers, random.Random(SEED))

@@ -17,7 +17,10 @@ from tests.system.systems import accelerator, converter, derived, instance, spec
 SPECS = Path(__file__).resolve().parents[2] / "specs"
 CORES = sorted(SPECS.glob("*/*.core"))
 # Boards with a chip are for systems that are nodes.
-SYNTHESIS = {*(f"synth_{family}" for family in ("xilinx", "ecp5", "ice40", "gowin")), *boards()} - {"icebreaker_w5500", "ulx3s_lan8720"}
+SYNTHESIS = {*(f"synth_{family}" for family in ("xilinx", "ecp5", "ice40", "gowin")), *boards()} - {
+    "icebreaker_w5500",
+    "ulx3s_lan8720",
+}
 SIMULATION = {"sim", "sim_icarus", "sim_verilator", "live", "live_verilator", "emulate"}
 
 

@@ -116,6 +116,15 @@ def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:
     assert 'LOCATE COMP "rmii_rxd[1]" SITE "B9";' in files["ulx3s_lan8720.lpf"]
 
 
+def test_a_topic_may_be_too_long_for_the_hardware(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The topic is rt, the namespace, / and the block's name."""
+    text = path.read_text(encoding="utf-8").replace("/lab", f"/{'n' * 149}")
+    for length, code in ((98, 0), (99, 1)):
+        path.write_text(text.replace("name: turn,", f"name: {'t' * length},"), encoding="utf-8")
+        assert main(["system", "check", str(path)]) == code
+    assert "of 'turtle' has 252 characters in ROS 2's network" in capsys.readouterr().err
+
+
 def test_it_is_not_simulated_with_a_host(path: Path) -> None:
     with pytest.raises(InputError, match="has no host to simulate"):
         _files(path.parent, product="live", simulator="ghdl")

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Keeps a board's place in its network: it has reports sent that it is a member of its group (IGMP version 2, RFC 2236),
--- and probes for its own address (ARP, RFC 5227). Both are sent four times, one second apart, and the same again every
--- 64 seconds, since a PHY or a switch may not be ready at first. A query of a router or switch is answered. A host that
--- uses the board's address is reported.
+-- Keeps a board's place in its network: it has reports sent that it is a member of its group (IGMP version 2, RFC
+-- 2236), and probes for its own address (ARP, RFC 5227). Both are sent four times, one second apart, and the same again
+-- every 64 seconds, since a PHY or a switch may not be ready at first. A query of a router or switch is answered. A host
+-- that uses the board's address is reported.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -39,14 +39,14 @@ architecture rtl of firm_net_presence is
   constant REPEATS : positive := 4;     -- seconds in which both are sent
 
   -- Places in a frame, of the first byte of a field.
-  constant IPV4_PLACE     : natural := 14;
-  constant PROTOCOL_PLACE : natural := 23;
-  constant SENDER_PLACE   : natural := 22;  -- of ARP: a MAC address and an IPv4 address
-  constant MAC_BYTES      : natural := 6;
-  constant ADDRESS_BYTES  : natural := 4;
-  constant QUERY_BYTES    : natural := 8;
+  constant IPV4_PLACE      : natural := 14;
+  constant PROTOCOL_PLACE  : natural := 23;
+  constant SENDER_PLACE    : natural := 22;  -- of ARP: a MAC address and an IPv4 address
+  constant MAC_BYTES       : natural := 6;
+  constant ADDRESS_BYTES   : natural := 4;
+  constant QUERY_BYTES     : natural := 8;
   constant SHORTEST_HEADER : natural := 5;  -- of IPv4, in words
-  constant LAST_PLACE     : natural := 127;
+  constant LAST_PLACE      : natural := 127;
 
   subtype byte_t is std_logic_vector(7 downto 0);
   type bytes_t is array (natural range <>) of byte_t;

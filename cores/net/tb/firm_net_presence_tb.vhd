@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Sends frames to the board 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether it
--- is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a millisecond, and what is asked for
--- or reported then: `report`, `probe` or `taken`. A packet is sent up to three cycles after it is asked for.
+-- Sends frames to the board 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether
+-- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a millisecond, and what is asked
+-- for or reported then: `report`, `probe` or `taken`. A packet is sent up to four cycles after it is asked for.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The clock, the reset and the PHY of a simulated board, whose frames another program exchanges. BITS of a byte cross in
--- each cycle, the lowest ones first: 8 for a GMII, 4 for an MII, 2 for an RMII. Frames have preamble and checksum. It
+-- The clock, the reset and the PHY of a simulated board, whose frames another program exchanges. BITS of a byte cross
+-- in each cycle, the lowest ones first: 8 for a GMII, 4 for an MII, 2 for an RMII. Frames have preamble and checksum. It
 -- reports at file descriptor 4:
 --
 --     w CYCLES   a frame to the system may begin, after a number of cycles (4 bytes, the lowest first)
