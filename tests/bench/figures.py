@@ -199,7 +199,8 @@ def write(sections: Mapping[str, str]) -> None:
 
 def written() -> str:
     """The text of all pages."""
-    return "\n".join((FOLDER / f"{page.name}.md").read_text(encoding="utf-8") for page in PAGES)
+    files = (FOLDER / f"{page.name}.md" for page in PAGES)
+    return "\n".join(file.read_text(encoding="utf-8") for file in files if file.is_file())
 
 
 def _section_of(text: str, heading: str) -> str:
