@@ -28,8 +28,8 @@ MANAGER_TITLE = "The Manager within, LUT/FF"
 # Table 5.4, the generated part and the accelerators: LUT, FF, BRAM, DSP.
 _USE_CASES = {"sobel": "1551/1294, 3 BRAM", "mobile_robot": "30127/21665, 578 DSP"}
 _TARGET = "synth_xilinx"
-# But for its message, it is the system robotic_arm.
-_TWIN = "robotic_arm_franka"
+# But for their messages or their network, they are the systems robotic_arm and quat2euler.
+_TWINS = ("quat2euler_ethernet", "robotic_arm_franka")
 _MANAGER = re.compile(r"^module (firm_manager_(\d+)_(\d+)_(\d+)_\w+)", re.MULTILINE)
 _COLUMNS = ("system", "family", "LUT", "FF", "LUT as RAM", "block RAM", "DSP", "dissertation", "result")
 _MANAGER_COLUMNS = (
@@ -73,7 +73,7 @@ class NotBuiltError(Exception):
 
 def applications() -> dict[str, Path]:
     """The cores of specs/ that have a netlist, by name."""
-    cores = (path for path in sorted(REPOSITORY.glob("specs/*/*.core")) if path.stem != _TWIN)
+    cores = (path for path in sorted(REPOSITORY.glob("specs/*/*.core")) if path.stem not in _TWINS)
     return {path.stem: path for path in cores if _TARGET in _content(path)["targets"]}
 
 

@@ -119,6 +119,7 @@ def test_frames_that_come_while_a_packet_leaves_wait(library: Library, tmp_path:
     assert sorted(frame[34:] for frame in made) == sorted(data)
 
 
+@pytest.mark.check
 def test_the_longest_packet_of_ipv4(library: Library, tmp_path: Path) -> None:
     data = random.Random(SEED).randbytes(65515)
     sent = fragments(HOSTS[0], 1, data)
