@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Keeps a board's place in its network: it has reports sent that it is a member of its group (IGMP version 2, RFC
--- 2236), and probes for its own address (ARP, RFC 5227). Both are sent four times, one second apart, and the same again
--- every 64 seconds, since a PHY or a switch may not be ready at first. A query of a router or switch is answered. A host
--- that uses the board's address is reported.
+-- 2236), and probes for its own address (ARP, RFC 5227). Both are sent four times, one second apart, and the same
+-- again every 64 seconds, since a PHY or a switch may not be ready at first. A query of a router or switch is
+-- answered. A host that uses the board's address is reported.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

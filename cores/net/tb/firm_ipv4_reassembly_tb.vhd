@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Sends frames to the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether it
--- is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a frame that leaves, in the same form
--- without the cycles; or `dropped`, or `lost`.
+-- Sends frames to the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether
+-- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a frame that leaves, in the
+-- same form without the cycles; or `dropped`, or `lost`.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends two streams of frames through firm_net_samples each, and the payloads through firm_net_merge. A row of a file
--- is a frame of the Manager: whether it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is
--- a frame that leaves: the number of bytes, and the bytes; or `long` with the number of the stream.
+-- is a frame of the Manager: whether it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results
+-- is a frame that leaves: the number of bytes, and the bytes; or `long` with the number of the stream.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,14 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The clock, the reset and the PHY of a simulated board, whose frames another program exchanges. BITS of a byte cross
--- in each cycle, the lowest ones first: 8 for a GMII, 4 for an MII, 2 for an RMII. Frames have preamble and checksum. It
--- reports at file descriptor 4:
+-- in each cycle, the lowest ones first: 8 for a GMII, 4 for an MII, 2 for an RMII. Frames have preamble and checksum.
+-- It reports at file descriptor 4:
 --
 --     w CYCLES   a frame to the system may begin, after a number of cycles (4 bytes, the lowest first)
 --     b BYTE     a byte of the system's frame
 --     e          the end of this frame
 --
--- After each 'w', it reads at file descriptor 3: the number of bytes of the frame (2 bytes, the lowest first; 0 without
--- a frame), and these bytes. The simulation ends with the file. `firm live` starts it (docs/reference/network.md).
+-- After each 'w', it reads at file descriptor 3: the number of bytes of the frame (2 bytes, the lowest first; 0
+-- without a frame), and these bytes. The simulation ends with the file. `firm live` starts it
+-- (docs/reference/network.md).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
