@@ -26,18 +26,12 @@ import yaml
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.converter.pipeline import PIPELINES
-from fusesoc_firm.fabric.names import memory_of_names
-from fusesoc_firm.fabric.node import node_of
-from fusesoc_firm.fabric.packets import memory_of
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
-from fusesoc_firm.message.library import MessageLibrary, libraries
+from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.hardware.registers import registers_configuration
 from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, status_map
-from fusesoc_firm.system.written.specification import read_specification
-from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.loop import loop_text
 
@@ -62,6 +56,8 @@ CALLS: Sequence[tuple[str, str, Mapping[str, object]]] = (
     ("quat2euler/quat2euler", "simulation", {"product": "live"}),
     ("quat2euler/quat2euler_hls", "system", {}),
     ("quat2euler/quat2euler_hls", "simulation", {}),
+    ("quat2euler/quat2euler_ethernet", "system", {"board": "ulx3s_lan8720"}),
+    ("quat2euler/quat2euler_ethernet", "simulation", {"product": "network"}),
     ("mobile_robot/mobile_robot", "simulation", {"simulator": "icarus"}),
     ("image_pipeline/image_pipeline", "system", {"board": "zynq7000"}),
     ("multi_type/multi_type_verilog", "system", {}),
@@ -149,29 +145,6 @@ def write_registers() -> None:
         (SAMPLES / f"{name}.vhd").write_text(render(REGISTERS_TEMPLATE, configuration), encoding="ascii")
 
 
-# A node on Ethernet; no system contains its hardware yet.
-NODE = """\
-project: {name: robot, width: 8, interconnect: ethernet, network: {mac: "02:00:00:00:00:01", address: 10.0.0.2}}
-blocks:
-  - {name: pose, middleware: ROS2, mode: subscriber, message: geometry_msgs/Pose, outgoing: [{name: copy}]}
-  - {name: copy, middleware: ROS2, mode: publisher, message: geometry_msgs/Pose}
-"""
-
-
-def write_node() -> None:
-    """Write the memories of a node in fabric: the programs of its packets, and the names of its topics."""
-    path = SAMPLES / "node.yaml"
-    path.write_text(NODE, encoding="utf-8")
-    faults, known = Diagnostics(), libraries((), None, None)
-    system = derive(read_specification(path, path.name, faults), SAMPLES, known, faults)
-    faults.raise_if_any()
-    node = node_of(system, known)
-    for memory in (memory_of(node, "node_packets"), memory_of_names(node.readers, "node_names")):
-        (SAMPLES / f"{memory.context['entity']}.vhd").write_text(
-            render(memory.template, memory.context), encoding="ascii"
-        )
-
-
 # A node of ROS 1 in the sockets of a chip.
 CHIP = """\
 project:
@@ -213,7 +186,6 @@ def samples() -> list[Path]:
     write_loop()
     write_registers()
     write_chip()
-    write_node()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]
     return sorted([*made, *GOLDEN.glob("*.vhd")])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from fusesoc_firm.cli.common import add_sources, command, load
 from fusesoc_firm.cli.simulator import add_simulator_options, built_board, built_simulator
@@ -13,6 +13,7 @@ from fusesoc_firm.cli.studio import add_watch, watched
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
+    from fusesoc_firm.fabric.simulated_board import SimulatedBoard
     from fusesoc_firm.system.system_core import LoadedSystem
 
 
@@ -37,6 +38,9 @@ def add_live(commands: Any) -> None:
     )
     live.add_argument(
         "--transport", metavar="ADDRESS", help="the transport to the hardware (default: build and start a simulator)"
+    )
+    live.add_argument(
+        "--network", metavar="TAP", help="the TAP device at which a simulated board with interconnect ethernet is"
     )
     add_watch(live)
     add_node_options(live)
@@ -67,32 +71,22 @@ def _live(arguments: argparse.Namespace) -> None:
     loaded = load(arguments)
     if loaded.system.network and not arguments.transport:
         _run_board(arguments, loaded)
+    elif arguments.network:
+        _fail_for_network(arguments, loaded)
     else:
         _run_node(arguments, loaded)
 
 
 def _run_board(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
-    """Run the simulated board of a system that is a node in the sockets of a chip."""
-    from fusesoc_firm.fabric.ros1 import PORT, node_of
-    from fusesoc_firm.fabric.wiznet.board import Board, check_address
-    from fusesoc_firm.fabric.wiznet.chips import MODELS
-    from fusesoc_firm.system.hardware.interconnect import CHIP_NUMBERS
-    from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
-    from fusesoc_firm.system.system_core import refuse_network
+    """Run the simulated board of a system that is a node itself."""
+    from fusesoc_firm.system.written.specification import ETHERNET
 
-    refuse_network(loaded)
     _refuse_options(arguments, loaded)
-    network = loaded.system.network
-    assert network is not None
-    node = node_of(loaded.system, loaded.libraries)
-    check_address(network.address, PORT)
-    built = built_board(arguments)
-    # The build may have taken minutes.
-    check_address(network.address, PORT)
-    chip = MODELS[CHIP_NUMBERS[network.kind]]()
-    board = Board(built.words, built.folder, chip, NETWORK_HERTZ)
-    master = "{}:{}".format(*node.master)
-    print(f"{node.name} is at {network.address}; its master is {master}; Ctrl-C ends it", flush=True)
+    is_ethernet = loaded.specification.project.interconnect == ETHERNET
+    if bool(arguments.network) != is_ethernet:
+        _fail_for_network(arguments, loaded)
+    board, line = _at_device(arguments, loaded) if is_ethernet else _in_sockets(arguments, loaded)
+    print(f"{line}; Ctrl-C ends it", flush=True)
     try:
         board.run()
     except KeyboardInterrupt:
@@ -101,10 +95,57 @@ def _run_board(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
         board.close()
 
 
+def _in_sockets(arguments: argparse.Namespace, loaded: LoadedSystem) -> tuple[SimulatedBoard, str]:
+    """Return the board of a node in the sockets of a chip, and a line about it."""
+    from fusesoc_firm.fabric.ros1 import PORT, node_of
+    from fusesoc_firm.fabric.wiznet.board import Board, check_address
+    from fusesoc_firm.fabric.wiznet.chips import MODELS
+    from fusesoc_firm.system.hardware.interconnect import CHIP_NUMBERS
+    from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
+
+    network = loaded.system.network
+    assert network is not None
+    node = node_of(loaded.system, loaded.libraries)
+    check_address(network.address, PORT)
+    built = built_board(arguments)
+    # The build may have taken minutes.
+    check_address(network.address, PORT)
+    chip = MODELS[CHIP_NUMBERS[network.kind]]()
+    board = Board(built.words, built.folder, chip, NETWORK_HERTZ[network.kind.value])
+    master = "{}:{}".format(*node.master)
+    return board, f"{node.name} is at {network.address}; its master is {master}"
+
+
+def _at_device(arguments: argparse.Namespace, loaded: LoadedSystem) -> tuple[SimulatedBoard, str]:
+    """Return the board of a node by Ethernet at a TAP device, and a line about it."""
+    from fusesoc_firm.fabric.ethernet_board import Board, Tap
+    from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
+
+    network = loaded.system.network
+    assert network is not None
+    Tap(arguments.network).close()
+    built = built_board(arguments)
+    board = Board(built.words, built.folder, Tap(arguments.network), NETWORK_HERTZ[network.kind.value])
+    name = f"{network.namespace.rstrip('/')}/{network.name}"
+    return board, f"{name} is at {network.address}, at {arguments.network}, in domain {network.domain}"
+
+
+def _fail_for_network(arguments: argparse.Namespace, loaded: LoadedSystem) -> NoReturn:
+    """Raise `InputError` for a missing or useless device."""
+    from fusesoc_firm.system.written.specification import ETHERNET
+
+    interconnect = loaded.specification.project.interconnect
+    if arguments.network:
+        fail(f"'--network' is not possible with interconnect '{interconnect}'", hint=f"it is for '{ETHERNET}'")
+    hint = "add '--network' with a TAP device, such as '--network tap0'"
+    fail(f"a simulated board with interconnect '{interconnect}' needs a network", interconnect.source, hint)
+
+
 def _refuse_options(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
     """Raise `InputError` for an option about a node on the host: the simulated board is the node."""
+    version = next(iter(loaded.system.frames)).ros.number
     given = [f"--{name.replace('_', '-')}" for name in _OF_NODES if getattr(arguments, name)]
-    given += [*arguments.remappings, *([f"--ros {arguments.ros}"] if arguments.ros == 2 else [])]
+    given += [*arguments.remappings, *([f"--ros {arguments.ros}"] if arguments.ros not in (None, version) else [])]
     if given:
         fail(
             f"'{given[0]}' is not possible with interconnect '{loaded.specification.project.interconnect}'",

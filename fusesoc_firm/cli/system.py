@@ -166,6 +166,7 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _check_as_json(arguments: argparse.Namespace) -> None:
     """Print whether a specification is valid, and all faults and warnings; exit with 1 if it is not valid."""
+    from fusesoc_firm.fabric.ethernet import ethernet_node
     from fusesoc_firm.fabric.ros1 import memory_of
 
     faults: Sequence[Diagnostic] = ()
@@ -176,6 +177,7 @@ def _check_as_json(arguments: argparse.Namespace) -> None:
         warnings += check_sources(loaded, arguments.spec)
         _check_stimuli(loaded, arguments.stimuli)
         memory_of(loaded.system, loaded.libraries)
+        ethernet_node(loaded.system, loaded.libraries)
     except InputError as error:
         faults = error.diagnostics
     _print_json({"valid": not faults, "diagnostics": [item.data() for item in (*faults, *warnings)]})
@@ -188,6 +190,7 @@ def _print_json(data: object) -> None:
 
 
 def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
+    from fusesoc_firm.fabric.ethernet import ethernet_node
     from fusesoc_firm.fabric.ros1 import memory_of
     from fusesoc_firm.system.views.show import counts, default_lengths
 
@@ -196,6 +199,7 @@ def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -
     system = loaded.system
     _check_stimuli(loaded, stimuli)
     memory = memory_of(system, loaded.libraries)
+    ethernet_node(system, loaded.libraries)
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
     for line in default_lengths(system):
         print(line)

@@ -13,6 +13,8 @@ from fusesoc_firm.fabric.node import Endpoint
 from fusesoc_firm.text.render import Rendering
 
 _PLACES = 256
+LONGEST_NAME = _PLACES - len(rtps.string(""))
+"""The characters of the longest name of a topic or type."""
 _WORDS_IN_ROW = 8
 _PARTS: tuple[Callable[[Endpoint], bytes], ...] = (
     lambda item: rtps.string(item.topic),

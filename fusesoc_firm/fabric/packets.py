@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from ipaddress import IPv4Address
 from itertools import chain
+from types import MappingProxyType
 
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
@@ -25,6 +26,7 @@ _LAST = 1 << 10
 _FROM_FIELD, _FROM_PAYLOAD, _FROM_RESULT = 1 << 8, 2 << 8, 3 << 8
 _LITTLE, _INLINE, _DATA, _KEY = 1, 2, 4, 8
 _IP_BYTES, _UDP_BYTES = 20, 8
+_PRELUDE_WORDS = 9
 # A header of IPv4 without options; its protocol.
 _IPV4, _TIME_TO_LIVE, _UDP, _DO_NOT_FRAGMENT = 0x45, 64, 17, 0x4000
 _TYPE_IPV4, _NO_CHECKSUM = b"\x08\x00", bytes(2)
@@ -108,14 +110,20 @@ class Programs:
         return max(4, (len(self.words) - 1).bit_length())
 
 
-def programs_of(node: Node) -> Programs:
-    """Return the programs of a node, in the order of `packets_of`."""
+def programs_of(node: Node, frames: Mapping[str, bytes] = MappingProxyType({})) -> Programs:
+    """Return the programs of a node, in the order of `packets_of`, and those of constant `frames`."""
     words: Words = []
     entries = {}
-    for name, packet in packets_of(node).items():
+    made = {name: program(node, packet) for name, packet in packets_of(node).items()}
+    for name, items in {**made, **{name: _constant(frame) for name, frame in frames.items()}}.items():
         entries[name] = len(words)
-        words += program(node, packet)
+        words += items
     return Programs(tuple(words), entries)
+
+
+def _constant(frame: bytes) -> Words:
+    """Return the program of a frame without results, whose prelude has no effect."""
+    return [*bytes(_PRELUDE_WORDS), *frame[:-1], frame[-1] | _LAST]
 
 
 def packets_of(node: Node) -> dict[str, Packet]:
@@ -296,9 +304,9 @@ def _gap() -> Submessage:
 _WORDS_IN_ROW = 8
 
 
-def memory_of(node: Node, entity: str) -> Rendering:
-    """Return the memory of a node's programs, as an entity for `firm_packet_builder`."""
-    programs = programs_of(node)
+def memory_of(node: Node, entity: str, frames: Mapping[str, bytes] = MappingProxyType({})) -> Rendering:
+    """Return the memory of the programs of a node and of constant frames, as an entity for `firm_packet_builder`."""
+    programs = programs_of(node, frames)
     words = [f'"{word:011b}"' for word in programs.words]
     return Rendering(
         "vhdl/packets.vhd",

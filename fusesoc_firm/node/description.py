@@ -14,7 +14,7 @@ from fusesoc_firm.node.services import NodeService, node_service
 from fusesoc_firm.node.topics import NodeTopic, node_topic
 from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere, way_to
 from fusesoc_firm.system.derived.model import Converter, StatusAccess, Topic
-from fusesoc_firm.system.system_core import LoadedSystem, identity, refuse_network
+from fusesoc_firm.system.system_core import LoadedSystem, identity
 from fusesoc_firm.text.diagnostics import fail
 
 
@@ -95,7 +95,6 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
 
     Raise `InputError` for a middleware other than ROS, for ids of two bytes, and for a system that is a node itself.
     """
-    refuse_network(loaded)
     if loaded.system.network:
         fail(
             f"'{loaded.system.name}' is a node itself, and needs none on a host",

@@ -46,6 +46,7 @@ def _load_converters(request: Request) -> LoadedRequest:
 
 def _load_system(request: Request) -> LoadedRequest:
     from fusesoc_firm.converter.converter_core import VHDL
+    from fusesoc_firm.fabric.ethernet import node_files
     from fusesoc_firm.fabric.ros1 import rom_files
     from fusesoc_firm.node import cpp_package
     from fusesoc_firm.simulation import simulation_core
@@ -55,9 +56,10 @@ def _load_system(request: Request) -> LoadedRequest:
         for warning in loaded.warnings:
             print(warning, file=sys.stderr)
         core = system_core.system_core(loaded)
-        roms = {name: GeneratedFile(text, VHDL) for name, text in rom_files(loaded.system, loaded.libraries).items()}
+        made = rom_files(loaded.system, loaded.libraries) | node_files(loaded.system, loaded.libraries)
+        parts = {name: GeneratedFile(text, VHDL) for name, text in made.items()}
         node = {} if loaded.system.network else cpp_package.generated_files(loaded)
-        return replace(core, files={**roms, **core.files, **node})
+        return replace(core, files={**parts, **core.files, **node})
 
     loaded = system_core.load_requested(request)
     make: Callable[[Request, system_core.LoadedSystem], GeneratedCore]

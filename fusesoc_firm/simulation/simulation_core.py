@@ -19,9 +19,10 @@ from fusesoc_firm.simulation.reference import Response, responses
 from fusesoc_firm.simulation.software_run import answered, system_stimuli, traffic
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system import system_core
-from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.configuration import (
     NODE_BENCH_TEMPLATE,
+    PHY_BENCH_TEMPLATE,
     SYSTEM_TEMPLATE,
     TEST_BENCH_TEMPLATE,
     system_configuration,
@@ -31,12 +32,13 @@ from fusesoc_firm.system.hardware.verilog_bench import (
     ENVIRONMENT_TEMPLATE,
     VERILOG_BENCH_TEMPLATE,
     VERILOG_NODE_BENCH_TEMPLATE,
+    VERILOG_PHY_BENCH_TEMPLATE,
     translated_unit,
     verilog_bench_configuration,
 )
 from fusesoc_firm.system.hardware.waits import watched_entity
 from fusesoc_firm.system.system_core import LoadedSystem
-from fusesoc_firm.system.written.specification import CHIPS
+from fusesoc_firm.system.written.specification import NETWORKS
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
@@ -99,11 +101,17 @@ def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
 
 
 def network_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
-    """Return the core of a simulated board whose chip is at the other end of a pipe. May raise `InputError`."""
+    """Return the core of a simulated board whose chip or network is at the other end of a pipe.
+
+    May raise `InputError`.
+    """
     _check_simulator(loaded.system, str(request.parameters["simulator"]), "network")
     if loaded.system.network is None:
-        fail(f"the product 'network' needs one of the interconnects {', '.join(CHIPS)}")
-    files = _with_open_end(request, loaded, NODE_BENCH_TEMPLATE, VERILOG_NODE_BENCH_TEMPLATE)
+        fail(f"the product 'network' needs one of the interconnects {', '.join(NETWORKS)}")
+    benches = NODE_BENCH_TEMPLATE, VERILOG_NODE_BENCH_TEMPLATE
+    if loaded.system.network.kind is NetworkKind.ETHERNET:
+        benches = PHY_BENCH_TEMPLATE, VERILOG_PHY_BENCH_TEMPLATE
+    files = _with_open_end(request, loaded, *benches)
     return GeneratedCore(f"Simulated board of system {loaded.system.name}", files)
 
 

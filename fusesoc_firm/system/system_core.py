@@ -47,7 +47,8 @@ from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
 from fusesoc_firm.system.derived.actions import with_actions
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
-from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, NetworkKind
+from fusesoc_firm.system.derived.ethernet import check_ethernet
+from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.derived.services import with_services
 from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
@@ -62,15 +63,13 @@ from fusesoc_firm.system.hardware.status import (
     status_entity,
 )
 from fusesoc_firm.system.written.specification import (
-    AXI_STREAM,
-    ETHERNET,
     Accelerator,
     Draft,
     Specification,
     is_core,
     read_specification,
 )
-from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef, fail
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.text.yaml_text import Text
@@ -155,6 +154,8 @@ def load_system(
     specification = with_services(specification, libraries, faults)
     specification = with_actions(specification, libraries, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
+    check_ethernet(specification, system, faults)
+    faults.raise_if_any()
     return LoadedSystem(specification, path.parent, libraries, system, None, faults.warnings)
 
 
@@ -197,18 +198,7 @@ def load_requested(request: Request) -> LoadedSystem:
         changed=lambda written: with_keys(on_board(written, board) if board else written, given),
         core_folders=request.message_folders.of,
     )
-    refuse_network(loaded)
     return replace(loaded, board=board)
-
-
-def refuse_network(loaded: LoadedSystem) -> None:
-    """Raise `InputError` for a system with Ethernet, whose hardware is not complete."""
-    if loaded.system.network and loaded.system.network.kind is NetworkKind.ETHERNET:
-        fail(
-            f"interconnect '{ETHERNET}' can be checked, but is not built yet",
-            loaded.specification.project.interconnect.source,
-            f"simulate with '{AXI_STREAM}': here, or as the parameter 'interconnect' of the core's generator",
-        )
 
 
 def with_keys(specification: Specification, values: Mapping[str, str]) -> Specification:

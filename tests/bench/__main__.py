@@ -27,6 +27,7 @@ from tests.bench import (
     live,
     loops,
     manager,
+    network,
     replay,
     resize,
     simulators,
@@ -57,11 +58,16 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing, fuzz, loops, builds and actions: only rows whose names match, such as 'Image.* 64 bits'; for"
-        " live and studio: only tables",
+        help="for timing, network, fuzz, loops, builds and actions: only rows whose names match, such as"
+        " 'Image.* 64 bits'; for live and studio: only tables",
     )
     parser.add_argument(
-        "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"
+        "--seeds",
+        type=int,
+        nargs="+",
+        default=SEEDS,
+        metavar="N",
+        help="for timing and network: of placements (default: 1 2 3)",
     )
     arguments = parser.parse_args()
     if unknown := set(arguments.parts) - set(figures.parts()):
@@ -89,6 +95,9 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "area": lambda: area.measure(Yosys(), _tell),
         "manager": lambda: manager.measure(Yosys(), _tell),
         "timing": lambda: timing.measure(Nextpnr(Yosys()), _tell, figures.written(), arguments.row, arguments.seeds),
+        "network": lambda: network.measure(
+            Nextpnr(Yosys(), device=network.DEVICE), _tell, figures.written(), arguments.row, arguments.seeds
+        ),
         "loops": lambda: loops.measure(seed, _tell, figures.written(), arguments.row),
         "use": lambda: use.measure(seed, _tell),
         "cycles": lambda: cycles.measure(seed, _tell),

@@ -28,8 +28,8 @@ MANAGER_TITLE = "The Manager within, LUT/FF"
 # Table 5.4, the generated part and the accelerators: LUT, FF, BRAM, DSP.
 _USE_CASES = {"sobel": "1551/1294, 3 BRAM", "mobile_robot": "30127/21665, 578 DSP"}
 _TARGET = "synth_xilinx"
-# But for a message or the node in fabric, they are other systems.
-_TWINS = ("obstacle_node", "robotic_arm_franka")
+# But for their messages or their node in fabric, they are other systems.
+_TWINS = ("obstacle_node", "quat2euler_ethernet", "robotic_arm_franka")
 _MANAGER = re.compile(r"^module (firm_manager_(\d+)_(\d+)_(\d+)_\w+)", re.MULTILINE)
 _COLUMNS = ("system", "family", "LUT", "FF", "LUT as RAM", "block RAM", "DSP", "dissertation", "result")
 _MANAGER_COLUMNS = (

@@ -23,6 +23,7 @@ from tests.bench import (
     live,
     loops,
     manager,
+    network,
     nextpnr,
     replay,
     resize,
@@ -69,6 +70,7 @@ PAGES = (
         "build and simulation times",
         ("systems", "builds", "actions", "simulators", "store"),
     ),
+    Page("network", "Figures of a node in fabric", "area and clock", ("network",)),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live", "resize")),
     Page("studio", "Figures of firm studio", "how fast the page is", ("studio",)),
 )
@@ -83,6 +85,7 @@ _HEADINGS = {
     "images": "Images",
     "links": "Links and crossings",
     "applications": "Applications",
+    "network": "ROS 2 by Ethernet",
     "systems": "Systems",
     "builds": "Builds",
     "actions": "Cached steps",
@@ -120,6 +123,8 @@ _METHODS = {
         streams as ports, as in [Area](converters.md#area). Yosys runs `{yosys.ECP5.synthesis}` for ECP5 and
         `{yosys.ICE40.synthesis}` for iCE40 UltraPlus. The targets `synth_*` run the same commands with the installed
         Yosys.""",
+    "network": f"""LUT4, FF and MHz are measured as in [Timing](manager.md#timing), with nextpnr's
+        `{network.DEVICE}`.""",
     "systems": "The table lists the time to check and generate a large system.",
     "builds": "The table lists the time to generate many cores.",
     "actions": """The table lists the time of commands whose [steps are cached](../reference/actions.md).""",
@@ -161,6 +166,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         images,
         links,
         applications,
+        network,
         systems,
         builds,
         actions,
@@ -193,7 +199,8 @@ def write(sections: Mapping[str, str]) -> None:
 
 def written() -> str:
     """The text of all pages."""
-    return "\n".join((FOLDER / f"{page.name}.md").read_text(encoding="utf-8") for page in PAGES)
+    files = (FOLDER / f"{page.name}.md" for page in PAGES)
+    return "\n".join(file.read_text(encoding="utf-8") for file in files if file.is_file())
 
 
 def _section_of(text: str, heading: str) -> str:
@@ -221,9 +228,9 @@ def _versions(part: str) -> str:
         tools += [_first_line("verilator"), *live.versions()]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]
-    elif part in ("area", "manager", "timing", "links", "applications"):
+    elif part in ("area", "manager", "timing", "network", "links", "applications"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
-        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
+        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part in ("timing", "network") else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
     return ", ".join(tools)

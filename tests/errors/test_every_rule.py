@@ -43,7 +43,6 @@ OTHER_FAULTS = {
     ("system/scaffold/project.py", "_check_topics"): "options of the command line",
     ("system/scaffold/example.py", "example_named"): "options of the command line",
     ("system/register_files.py", "write_register_files"): "a right specification without a status",
-    ("system/system_core.py", "refuse_network"): "a right specification whose hardware is not complete",
     ("system/derived/status.py", "_check_id"): "a system of 256 converters, in test_status",
     ("system/derived/status.py", "_check_channels"): "a system of 4,097 converters, in test_status",
     ("system/derived/timing.py", "tasks_of"): "a question that a right specification does not answer",

@@ -17,6 +17,13 @@ from peer import DEPTH, FIELDS, run
 
 # Annotations are values here, which the library looks up in this module.
 @dataclass
+class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
+    x: float64
+    y: float64
+    z: float64
+
+
+@dataclass
 class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
     x: float64
     y: float64
@@ -34,7 +41,7 @@ class UInt32(IdlStruct, typename="std_msgs::msg::dds_::UInt32_"):
     data: uint32
 
 
-CLASSES: dict[str, type[IdlStruct]] = {"Quaternion": Quaternion, "String": String, "UInt32": UInt32}
+CLASSES: dict[str, type[IdlStruct]] = {"Point": Point, "Quaternion": Quaternion, "String": String, "UInt32": UInt32}
 
 
 class CyclonePeer:

@@ -2,10 +2,11 @@
 
     python ros_peer.py|cyclone_peer.py RELIABILITY TYPES [listen]
 
-TYPES is `{topic: type}`; the peer publishes on `<topic>_in` and subscribes to `<topic>_out`. Types are `Quaternion`,
-`String` and `UInt32`. With `listen`, it publishes nothing. The first line on its output, `{"matched": seconds}`, says
-after which time all topics had a match. A line `[topic, values]` on its input is published, `"graph"` asks for what the
-peer's graph knows, and `"farewell"` ends it. What comes is `[topic, values]`. It needs nothing but its own middleware.
+TYPES is `{topic: type}`; the peer publishes on `<topic>_in` and subscribes to `<topic>_out`. Types are `Point`,
+`Quaternion`, `String` and `UInt32`. With `listen`, it publishes nothing. The first line on its output,
+`{"matched": seconds}`, says after which time all topics had a match. A line `[topic, values]` on its input is
+published, `"graph"` asks for what the peer's graph knows, and `"farewell"` ends it. What comes is `[topic, values]`. It
+needs nothing but its own middleware.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-FIELDS = {"Quaternion": ["x", "y", "z", "w"], "String": ["data"], "UInt32": ["data"]}
+FIELDS = {"Point": ["x", "y", "z"], "Quaternion": ["x", "y", "z", "w"], "String": ["data"], "UInt32": ["data"]}
 DEPTH = 1000
 
 

@@ -10,7 +10,7 @@ import rclpy
 from peer import DEPTH, FIELDS, run
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-PACKAGES = {"Quaternion": "geometry_msgs", "String": "std_msgs", "UInt32": "std_msgs"}
+PACKAGES = {"Point": "geometry_msgs", "Quaternion": "geometry_msgs", "String": "std_msgs", "UInt32": "std_msgs"}
 BOARD = "board"
 
 

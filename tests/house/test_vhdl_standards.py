@@ -91,6 +91,9 @@ def test_systems(firm: Library, core: Path, tmp_path: Path) -> None:
     """The accelerators and benches of the demo systems, and their generated systems with test benches."""
     sections = yaml.safe_load(core.read_text(encoding="utf-8").partition("\n")[2])
     given = sections["generate"]["simulation"]["parameters"]
+    # A node in fabric is simulated with streams.
+    for instance in sections["targets"]["sim"]["generate"]:
+        given |= instance.get("simulation", {}) if isinstance(instance, dict) else {}
     spec, stimuli, model = (core.parent / given.pop(name) for name in ("spec", "stimuli", "model"))
     # The simulators of accelerators in Verilog have their bench in Verilog, too.
     is_vhdl = sections["targets"]["sim"]["flow_options"]["tool"] == "ghdl"

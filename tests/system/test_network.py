@@ -1,4 +1,4 @@
-"""A system that is a node of ROS 2 itself: checked and shown, but not generated yet."""
+"""A system that is a node of ROS 2 itself: checked, shown, and generated."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from fusesoc_firm.text.diagnostics import InputError
 SPECIFICATION = """\
 project:
   name: turtle
+  clock: 125 MHz
   interconnect: ethernet
   network: {mac: 02:0A:00:00:00:02, address: 192.0.2.9, gateway: 192.0.2.254, namespace: /lab}
 blocks:
-  - {name: turn, middleware: ROS2, mode: subscriber, message: geometry_msgs/Quaternion, outgoing: [{name: turned}]}
-  - {name: turned, middleware: ROS2, mode: publisher, message: geometry_msgs/Quaternion}
+  - {name: turn, middleware: ROS2, mode: subscriber, message: geometry_msgs/Quaternion, qos: {profile: sensor_data},
+     outgoing: [{name: turned}]}
+  - {name: turned, middleware: ROS2, mode: publisher, message: geometry_msgs/Quaternion, qos: {profile: sensor_data}}
 """
-REFUSAL = "3:17: error: interconnect 'ethernet' can be checked, but is not built yet"
 
 
 @pytest.fixture
@@ -45,13 +46,14 @@ def test_it_is_checked_and_shown(path: Path, capsys: pytest.CaptureFixture[str])
         "name": "turtle",
         "namespace": "/lab",
         "domain": 0,
+        "phy": "gmii",
     }
 
 
 def test_no_node_on_a_host_serves_it(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for command in (["live", str(path), "--transport", "uart:/dev/null"], ["system", "node", str(path)]):
         assert main(command) == 1
-        assert f"{path}:{REFUSAL}" in capsys.readouterr().err
+        assert "'turtle' is a node itself, and needs none on a host" in capsys.readouterr().err
 
 
 def _request(folder: Path, **parameters: str) -> Request:
@@ -59,8 +61,94 @@ def _request(folder: Path, **parameters: str) -> Request:
     return Request("far", "test:sys:turtle-system:0", folder, {**known, **parameters})
 
 
-def test_it_is_not_generated_but_with_streams(path: Path) -> None:
-    with pytest.raises(InputError, match="is not built yet"):
-        GENERATORS["far"].load(_request(path.parent))
-    loaded = GENERATORS["far"].load(_request(path.parent, interconnect="axi_stream"))
-    assert "turtle_system.vhd" in loaded.generate().files
+def _files(folder: Path, **parameters: str) -> dict[str, str]:
+    files = GENERATORS["far"].load(_request(folder, **parameters)).generate().files
+    return {name: str(file.content) for name, file in files.items()}
+
+
+def test_its_node_comes_before_its_top_level(path: Path) -> None:
+    names = [*_files(path.parent)]
+    parts = ("packets", "names", "node")
+    assert [name for name in names if name.startswith("turtle_system_")] == [
+        f"turtle_system_{name}.vhd" for name in parts
+    ]
+    assert names.index("turtle_system_node.vhd") < names.index("turtle_system.vhd")
+
+
+def test_it_has_streams_instead(path: Path) -> None:
+    files = _files(path.parent, interconnect="axi_stream")
+    assert "s_axis_tdata     : in" in files["turtle_system.vhd"]
+    assert not [name for name in files if name.startswith("turtle_system_")]
+
+
+@pytest.mark.parametrize(
+    ("phy", "clock"), [("gmii", "125 MHz"), ("mii", "25 MHz"), ("mii", "100 MHz"), ("rmii", "50 MHz")]
+)
+def test_each_phy_has_its_pins(path: Path, phy: str, clock: str) -> None:
+    text = path.read_text(encoding="utf-8").replace("125 MHz", clock).replace("namespace", f"phy: {phy}, namespace")
+    path.write_text(text, encoding="utf-8")
+    top = _files(path.parent)["turtle_system.vhd"]
+    assert f"u_phy : entity firm.firm_{phy}" in top
+    assert f"    {phy}_rxd " in top
+
+
+def test_its_node_has_the_numbers_of_the_specification(path: Path) -> None:
+    text = path.read_text(encoding="utf-8").replace("namespace", "domain: 3, namespace")
+    path.write_text(text, encoding="utf-8")
+    node = _files(path.parent)["turtle_system_node.vhd"]
+    # The ports 8150, 8160 and 8161, the first one in the lowest bits.
+    for line in (
+        'x"020a00000002"',
+        'x"c0000209"',
+        'x"1fe11fe01fd6"',
+        "CLOCK_HZ      => 125000000",
+        "SAMPLE        => 64",
+    ):
+        assert line in node
+    assert "--   0  rt/lab/turn\n" in node
+
+
+def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:
+    files = _files(path.parent, board="ulx3s_lan8720")
+    assert {"turtle_ulx3s_lan8720.vhd", "ulx3s_lan8720.lpf"} < set(files)
+    assert "u_phy : entity firm.firm_rmii" in files["turtle_system.vhd"]
+    assert "CLOCK_HZ      => 50000000" in files["turtle_system_node.vhd"]
+    assert 'LOCATE COMP "rmii_rxd[1]" SITE "B9";' in files["ulx3s_lan8720.lpf"]
+
+
+def test_a_topic_may_be_too_long_for_the_hardware(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The topic is rt, the namespace, / and the block's name."""
+    text = path.read_text(encoding="utf-8").replace("/lab", f"/{'n' * 149}")
+    for length, code in ((98, 0), (99, 1)):
+        path.write_text(text.replace("name: turn,", f"name: {'t' * length},"), encoding="utf-8")
+        assert main(["system", "check", str(path)]) == code
+    assert "of 'turtle' has 252 characters in ROS 2's network" in capsys.readouterr().err
+
+
+def test_it_is_not_simulated_with_a_host(path: Path) -> None:
+    with pytest.raises(InputError, match="has no host to simulate"):
+        _files(path.parent, product="live", simulator="ghdl")
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        ([], "a simulated board with interconnect 'ethernet' needs a network"),
+        (["--network", "missing0"], "there is no network device 'missing0'"),
+        (["--network", "lo"], "cannot open the network device 'lo'"),
+        (["--network", "lo", "--ros", "1"], "'--ros 1' is not possible with interconnect 'ethernet'"),
+        (["--network", "lo", "--trace", "ways.csv"], "'--trace' is not possible with interconnect 'ethernet'"),
+    ],
+)
+def test_its_simulated_board_needs_a_device(
+    path: Path, capsys: pytest.CaptureFixture[str], options: list[str], fault: str
+) -> None:
+    assert main(["live", str(path), *options]) == 1
+    assert fault in capsys.readouterr().err
+
+
+def test_other_systems_have_no_network(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = path.read_text(encoding="utf-8").replace("interconnect: ethernet", "interconnect: axi_stream")
+    path.write_text(text, encoding="utf-8")
+    assert main(["live", str(path), "--network", "tap0"]) == 1
+    assert "'--network' is not possible with interconnect 'axi_stream'" in capsys.readouterr().err

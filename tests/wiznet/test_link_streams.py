@@ -36,7 +36,7 @@ ended:
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     library = Library("firm", tmp_path_factory.mktemp("link"))
-    library.analyse(core_files("axis/package", "axis/axis", "cdc/sync", "net/wiznet", "net/wiznet_node"))
+    library.analyse(core_files("axis/package", "axis/axis", "cdc/sync", "net/streams", "net/wiznet", "net/wiznet_node"))
     library.analyse([Path(__file__).with_name("link_bench.vhd")])
     return library
 

@@ -4,7 +4,6 @@
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
-use firm.firm_axis_pkg.all;
 
 entity firm_wiznet_link is
   generic (
@@ -96,9 +95,6 @@ architecture rtl of firm_wiznet_link is
 
 begin
 
-  assert is_stream_width(WIDTH)
-    report "firm_wiznet_link: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
-    severity failure;
   assert CLOCK_HZ >= 1
     report "firm_wiznet_link: CLOCK_HZ is " & integer'image(CLOCK_HZ) & "; legal: 1 and more"
     severity failure;
@@ -159,96 +155,34 @@ begin
       spi_miso      => spi_miso
     );
 
-  bytes : if WIDTH = 8 generate
-    in_data       <= s_axis_tdata;
-    in_abort      <= s_axis_tuser;
-    in_valid      <= s_axis_tvalid;
-    in_last       <= s_axis_tlast;
-    s_axis_tready <= in_ready;
-    m_axis_tdata  <= out_data;
-    m_axis_tkeep  <= "1";
-    m_axis_tuser  <= "0";
-    m_axis_tvalid <= out_valid;
-    m_axis_tlast  <= out_last;
-    out_ready     <= m_axis_tready;
-  end generate bytes;
-
-  words : if WIDTH > 8 generate
-
-    constant COUNT_BITS : positive := clog2(WIDTH/8+1);
-    -- The counts of one byte and of zero bytes.
-    constant ONE        : std_logic_vector(COUNT_BITS-1 downto 0) := (0 => '1', others => '0');
-    constant NONE       : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
-
-    signal lanes     : std_logic_vector(WIDTH-1 downto 0);
-    signal window    : std_logic_vector(WIDTH-1 downto 0);
-    signal available : std_logic_vector(COUNT_BITS-1 downto 0);
-    signal is_last   : std_logic;  -- the frame ends with the available bytes
-    signal take      : std_logic;
-
-    signal ends_aborted : std_logic;
-    signal ends_broken  : std_logic;
-
-  begin
-
-    fill_lane : process (out_data)
-    begin
-      lanes             <= (others => '0');
-      lanes(7 downto 0) <= out_data;
-    end process fill_lane;
-
-    u_pack : entity firm.firm_axis_pack
-      generic map (
-        WIDTH => WIDTH
-      )
-      port map (
-        clk           => clk,
-        rst_n         => rst_n,
-        data          => lanes,
-        count         => ONE,
-        last          => out_last,
-        valid         => out_valid,
-        ready         => out_ready,
-        m_axis_tdata  => m_axis_tdata,
-        m_axis_tkeep  => m_axis_tkeep,
-        m_axis_tuser  => m_axis_tuser,
-        m_axis_tvalid => m_axis_tvalid,
-        m_axis_tlast  => m_axis_tlast,
-        m_axis_tready => m_axis_tready
-      );
-
-    u_window : entity firm.firm_axis_window
-      generic map (
-        WIDTH => WIDTH
-      )
-      port map (
-        clk           => clk,
-        rst_n         => rst_n,
-        s_axis_tdata  => s_axis_tdata,
-        s_axis_tkeep  => s_axis_tkeep,
-        s_axis_tuser  => s_axis_tuser,
-        s_axis_tvalid => s_axis_tvalid,
-        s_axis_tlast  => s_axis_tlast,
-        s_axis_tready => s_axis_tready,
-        window        => window,
-        available     => available,
-        is_last       => is_last,
-        is_aborted    => ends_aborted,
-        is_broken     => ends_broken,
-        shown         => open,
-        ends          => open,
-        take_valid    => take,
-        take          => ONE,
-        skip          => '0'
-      );
-
-    in_data     <= window(7 downto 0);
-    -- A frame ends without a byte only if it is aborted or broken; a void byte carries the mark.
-    in_abort(0) <= ends_aborted or ends_broken;
-    in_valid <= is_last when available = NONE else '1';
-    in_last  <= is_last when available = NONE or available = ONE else '0';
-    take     <= in_valid and in_ready;
-
-  end generate words;
+  u_streams : entity firm.firm_net_streams
+    generic map (
+      WIDTH => WIDTH
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      to_tdata      => out_data,
+      to_tvalid     => out_valid,
+      to_tlast      => out_last,
+      to_tready     => out_ready,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tuser  => m_axis_tuser,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tuser  => s_axis_tuser,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      from_tdata    => in_data,
+      from_tuser    => in_abort,
+      from_tvalid   => in_valid,
+      from_tlast    => in_last,
+      from_tready   => in_ready
+    );
 
 end architecture rtl;

@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A board with the pins of an MII or a GMII that sends back each good frame. A row of the file is a burst on the line
--- to the board, in units of nibbles or bytes: the idle ones before it, the one at which the PHY reports an error or -1,
--- the number, and the values. What the board sends goes to a file in the same form. The clocks are unrelated.
+-- A board with the pins of an MII, a GMII or an RMII that sends back each good frame. A row of the file is a burst on
+-- the line to the board, in units of nibbles, bytes or two bits: the idle ones before it, the one at which the PHY
+-- reports an error or -1, the number, and the values; one of 256 and more comes without rx_dv. What the board sends
+-- goes to a file in the same form. The clocks are unrelated; an RMII has that of the system.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -12,6 +13,7 @@ use firm.firm_sim_pkg.all;
 entity firm_mii_tb is
   generic (
     IS_GMII       : boolean := false;
+    IS_RMII       : boolean := false;
     LINE_FILE     : string  := "nibbles.txt";
     RESULT_FILE   : string  := "sent.txt";
     EXPECTED_FILE : string  := "";
@@ -33,7 +35,7 @@ architecture simulation of firm_mii_tb is
   signal rst_n    : std_logic := '0';
   signal over     : boolean   := false;
 
-  -- The pins; an MII has the lower four of data.
+  -- The pins; an MII has the lower four of data, an RMII the lower two.
   signal pin_rx_dv : std_logic                    := '0';
   signal pin_rx_er : std_logic                    := '0';
   signal pin_rxd   : std_logic_vector(7 downto 0) := x"00";
@@ -64,17 +66,48 @@ begin
 
   clk <= not clk after PERIOD_PS * 500 fs when not over else '0';
 
-  u_rx_clock : entity firm.firm_sim_clock
-    generic map (
-      PERIOD_PS => PHY_PERIOD_PS,
-      SEED      => SEED
-    )
-    port map (
-      reference => clk,
-      clk       => rx_clk
-    );
+  if_phy_clock : if not IS_RMII generate
 
-  if_mii : if not IS_GMII generate
+    u_rx_clock : entity firm.firm_sim_clock
+      generic map (
+        PERIOD_PS => PHY_PERIOD_PS,
+        SEED      => SEED
+      )
+      port map (
+        reference => clk,
+        clk       => rx_clk
+      );
+
+  end generate if_phy_clock;
+
+  if_rmii : if IS_RMII generate
+
+    rx_clk <= clk;
+    tx_clk <= clk;
+
+    u_rmii : entity firm.firm_rmii
+      port map (
+        clk         => clk,
+        rst_n       => rst_n,
+        rmii_crs_dv => pin_rx_dv,
+        rmii_rxd    => pin_rxd(1 downto 0),
+        rmii_tx_en  => pin_tx_en,
+        rmii_txd    => pin_txd(1 downto 0),
+        rx_step     => rx_step,
+        rx_dv       => rx_dv,
+        rx_er       => rx_er,
+        rxd         => rxd,
+        tx_step     => tx_step,
+        tx_en       => tx_en,
+        txd         => txd
+      );
+
+    pin_txd(7 downto 2) <= (others => '0');
+    pin_tx_er           <= '0';
+
+  end generate if_rmii;
+
+  if_mii : if not (IS_GMII or IS_RMII) generate
 
     u_tx_clock : entity firm.firm_sim_clock
       generic map (
@@ -230,7 +263,9 @@ begin
       end loop;
       for place in 0 to size-1 loop
         read(row, value);
-        if place = fault then
+        if value >= 256 then
+          show('0', '0', value - 256);
+        elsif place = fault then
           show('1', '1', value);
         else
           show('1', '0', value);

@@ -15,10 +15,17 @@ from typing import Any
 
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.boards.processor import MOST_CLOCKS, PROCESSORS
-from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
+from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind, Phy
 from fusesoc_firm.system.hardware.configuration import top_level_pins
-from fusesoc_firm.system.hardware.interconnect import CHIP_PINS, LINK_PINS
-from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, Specification
+from fusesoc_firm.system.hardware.interconnect import (
+    ADDRESS_FAULT,
+    CHIP_PINS,
+    LINK_PINS,
+    NETWORK_FAULTS,
+    PHY_PINS,
+    phy_pins,
+)
+from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, PHYS, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.text.naming import identifier, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
@@ -37,6 +44,7 @@ _CLOCK = "clk"
 _PORTS = (
     _CLOCK,
     *dict.fromkeys(name for pins in (*LINK_PINS.values(), CHIP_PINS) for name, _, _ in pins),
+    *(name for pins in PHY_PINS.values() for name, _, _ in pins),
     *("led", "led_n", "reset", "reset_n"),
 )
 # Contacts bounce for up to some 10 ms; the cycles are at least those that firm_debounce takes.
@@ -44,7 +52,7 @@ _DEBOUNCE_SECONDS = 0.01
 _SHORTEST_DEBOUNCE = 4
 # The optional keys of a board.
 _OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq", "spi_rst_n"}
-# The pins of each interconnect.
+# The pins of each interconnect but ethernet, whose pins depend on the PHY.
 _PINS = {**{kind.value: pins for kind, pins in LINK_PINS.items()}, **dict.fromkeys(CHIPS, CHIP_PINS)}
 
 
@@ -78,7 +86,10 @@ class Board(Section):
     description: Text = key("maker, board and FPGA", is_required=True)
     flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=(*FLOWS, *_NEEDED))
     clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
-    interconnect: Text = key("the connection to the host", is_required=True, choices=(AXI_STREAM, *_PINS))
+    interconnect: Text = key(
+        "the connection to the host or to a network", is_required=True, choices=(AXI_STREAM, *_PINS, ETHERNET)
+    )
+    phy: Text | None = key("the interface of the PHY, with interconnect ethernet", choices=PHYS)
     part: Text | None = key("the FPGA's name in Vivado", rule=word_fault)
     board_part: Text | None = key(
         "the board's name in Vivado, if Vivado sets up the processor", name="boardPart", rule=word_fault
@@ -99,6 +110,11 @@ class Board(Section):
         """Whether pins connect the host or the network to the system."""
         return self.flow in FLOWS
 
+    @property
+    def host_pins(self) -> Sequence[tuple[str, str, str]]:
+        """The pins of the interconnect: name, direction and type."""
+        return phy_pins(Phy(str(self.phy))) if self.phy else _PINS[self.interconnect]
+
 
 @dataclass(frozen=True)
 class _Port:
@@ -112,7 +128,11 @@ class _Port:
 
     def bits(self) -> list[str]:
         """Return the names of all bits; the board assigns an FPGA pin to each bit."""
-        return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
+        return _bits(self.name, self.width)
+
+
+def _bits(name: str, width: int | None) -> list[str]:
+    return [name] if width is None else [f"{name}[{bit}]" for bit in range(width)]
 
 
 def boards() -> tuple[str, ...]:
@@ -145,12 +165,16 @@ def read_board(name: str, folder: Path = Path()) -> Board:
 
 
 def _check_pins(board: Board, faults: Diagnostics) -> None:
-    if board.interconnect not in _PINS:
+    if board.interconnect == AXI_STREAM:
         faults.error(
             f"boards with flow '{board.flow}' have no processor for streams",
             board.interconnect.source,
-            nearest("", _PINS),
+            nearest("", (*_PINS, ETHERNET)),
         )
+        return
+    if (board.interconnect == ETHERNET) != (board.phy is not None):
+        place = board.phy.source if board.phy else board.interconnect.source
+        faults.error(f"the key 'phy' and interconnect '{ETHERNET}' need each other", place)
         return
     seen: dict[str, Text] = {}
     for pin in board.pins:
@@ -158,7 +182,10 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
         if twin is not pin.port:
             faults.error(f"port '{pin.port}' already has a pin, at {twin.source}", pin.port.source)
     source = board.pins[-1].source if board.pins else board.source
-    needed = {_CLOCK, *(name for name, _, _ in _PINS[board.interconnect])} - _OPTIONAL
+    names = [name for name, _, _ in board.host_pins]
+    if board.phy:
+        names = [bit for name, _, bits in PHY_PINS[Phy(str(board.phy))] for bit in _bits(name, bits)]
+    needed = {_CLOCK, *names} - _OPTIONAL
     for port in sorted(needed - seen.keys()):
         faults.error(
             f"the board has no pin for '{port}'", source, f"interconnect '{board.interconnect}' needs this pin"
@@ -191,7 +218,10 @@ def on_board(specification: Specification, board: Board) -> Specification:
     frequency that the specification requests.
     """
     clock = board.clock if board.is_linked else specification.project.clock or board.clock
-    return replace(specification, project=replace(specification.project, interconnect=board.interconnect, clock=clock))
+    project = replace(specification.project, interconnect=board.interconnect, clock=clock)
+    if board.phy and project.network:
+        project = replace(project, network=replace(project.network, phy=board.phy))
+    return replace(specification, project=project)
 
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
@@ -219,7 +249,8 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
         elif missing := next((bit for bit in pin.bits() if bit not in places), None):
             hint = f"add '{{port: {missing}, site: ...}}' to your own board file"
             faults.error(f"{pin.what} has no site on board '{board.name}'", pin.source, hint)
-    known = (*_PORTS, *(bit for pin in pins for bit in pin.bits()))
+    lines = [bit for phy in PHY_PINS.values() for name, _, bits in phy for bit in _bits(name, bits)]
+    known = (*_PORTS, *lines, *(bit for pin in pins for bit in pin.bits()))
     for place in board.pins:
         if place.port.lower() not in known:
             message = f"the system has no port '{place.port}'"
@@ -235,13 +266,14 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
     """Return the configuration of the top level and of its constraints."""
     assert system.clock is not None
     clock_hz = int(system.clock)
-    ports = {pin.port.lower() for pin in board.pins}
+    ports = {pin.port.lower().partition("[")[0] for pin in board.pins}
     pins = _accelerator_pins(system)
-    link = [(name, direction) for name, direction, _ in _PINS[board.interconnect] if name in ports]
+    link = [(name, direction) for name, direction, _ in board.host_pins if name in ports]
+    types = {name: type_.partition(" :=")[0] for name, _, type_ in board.host_pins}
     is_spi = board.interconnect == LinkKind.SPI.value
     own = [(name, "out" if name.startswith("led") else "in") for name in ("led", "led_n", "reset", "reset_n")]
     declared = [(_CLOCK, "in"), *link, *((name, direction) for name, direction in own if name in ports)]
-    typed = [(name, direction, vhdl_type(None)) for name, direction in declared]
+    typed = [(name, direction, types.get(name, vhdl_type(None))) for name, direction in declared]
     typed += [(pin.name, pin.direction, vhdl_type(pin.width)) for pin in pins]
     return {
         "entity": board_entity(system, board),
@@ -258,6 +290,7 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
         "is_uart": board.interconnect == LinkKind.UART.value,
         "is_spi": is_spi,
         "has_link": system.link is not None,
+        "network": {"fault_count": len(NETWORK_FAULTS), "address_fault": ADDRESS_FAULT} if board.phy else None,
         "clock_mhz": f"{clock_hz / 10**6:g}",
         "pins": [
             {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.system.derived.services import ros_name_of
 from fusesoc_firm.system.derived.timing import seconds_of
-from fusesoc_firm.system.written.specification import AXI_STREAM, NO_STATUS, SERVER, Block, Specification
+from fusesoc_firm.system.written.specification import SERVER, Block, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 # Sockets of the chip for connections: of eight, one calls the master, and two remain for calls of others.
@@ -31,14 +31,9 @@ def check_chip(
         faults.error(
             f"{message}needs the clock's frequency", source, "add 'clock' to 'project', such as 'clock: 12 MHz'"
         )
-    if project.status != NO_STATUS:
-        hint = f"remove the key, or use '{AXI_STREAM}'"
-        faults.error(f"{message}has no host that reads a status", project.status.source, hint)
     services = [*dict.fromkeys(block.service_block for block in written.blocks if block.service_block)]
     _check_services(services, message, faults)
     topics = [[item for item in side if not item.service] for side in (subscribers, publishers)]
-    for side in topics:
-        _check_topics(side, blocks, faults)
     for item in subscribers:
         _check_size(item, blocks[item.block], LONGEST, faults)
     for item in publishers:
@@ -64,17 +59,6 @@ def _check_services(services: Sequence[Block], message: str, faults: Diagnostics
         if block.time_limit and (seconds_of(block.time_limit) or 0) > LONGEST_LIMIT:
             hint = f"legal here: up to {LONGEST_LIMIT} s"
             faults.error(f"'timeLimit' cannot be '{block.time_limit}'", block.time_limit.source, hint)
-
-
-def _check_topics(items: Iterable[Converter], blocks: dict[str, Block], faults: Diagnostics) -> None:
-    """Note blocks of one direction with the same topic, since the node has a connection for each topic."""
-    owners: dict[str, str] = {}
-    for item in items:
-        if (owner := owners.setdefault(item.name, item.block)) != item.block:
-            block = blocks[item.block]
-            message = f"'{item.block}' and '{owner}' have the same topic {item.name}"
-            hint = "a node in fabric has a topic only once in each direction; connect one block to several others"
-            faults.error(message, block.topic.source if block.topic else block.name.source, hint)
 
 
 def _check_size(item: Converter, block: Block, most: int, faults: Diagnostics) -> None:

@@ -25,6 +25,9 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
         f"{system.entity}_in_environment": "the system's test bench",
         f"{system.entity}_rom": "the memory of the system's node",
         f"{system.entity}_network": "the test bench of the system's node",
+        f"{system.entity}_node": "the system's node",
+        f"{system.entity}_packets": "the packets of the system's node",
+        f"{system.entity}_names": "the names of the system's node",
     }
     frames: dict[str, Frame] = {}
     packages: dict[str, MessageName] = {}

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from fusesoc_firm.frame.length import DEFAULT_LONGEST, MOST_BYTES, bounded_payload, length_of
+from fusesoc_firm.system.derived.ethernet import LONGEST_SENT, LONGEST_TAKEN
 from fusesoc_firm.system.derived.model import Converter
-from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, Block, Project
+from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 # The default with a link, which stores whole frames. With the header and the bytes that an adapter sends late, such a
@@ -20,11 +21,8 @@ def with_longest_payloads(
 ) -> tuple[Converter, ...]:
     """Return the subscribers, those of variable size with their longest payloads; note faults in `maxLength`."""
     _check_keys(blocks, subscribers, faults)
-    has_link = project.interconnect != AXI_STREAM
     return tuple(
-        item
-        if item.frame.is_fixed_size
-        else _limited(item, blocks[item.block], _default(item, has_link=has_link), faults)
+        item if item.frame.is_fixed_size else _limited(item, blocks[item.block], _default(item, project), faults)
         for item in subscribers
     )
 
@@ -39,11 +37,14 @@ def with_longest_sent(
     """Return the publishers, those whose frames may pause with their longest payloads; note faults in `maxLength`.
 
     By default, a publisher sends at most as much as the system's subscribers accept from the host, since a response
-    often has the size of its cause. A node in the sockets of a chip sends no more than a link does.
+    often has the size of its cause. A node in the sockets of a chip sends no more than a link does, and one by Ethernet
+    no more than its memory holds.
     """
     _check_keys(blocks, publishers, faults)
     least = _LINK_DEFAULT if project.interconnect in CHIPS else DEFAULT_LONGEST
     default = max([least, *(item.max_length or 0 for item in subscribers if item.software is None)])
+    if project.interconnect == ETHERNET:
+        default = LONGEST_SENT
     return tuple(
         _limited(item, blocks[item.block], default if item.software is None else MOST_BYTES, faults)
         if item.may_pause
@@ -78,8 +79,10 @@ def _limited(converter: Converter, block: Block, default: int, faults: Diagnosti
     return replace(converter, max_length=given)
 
 
-def _default(subscriber: Converter, *, has_link: bool) -> int:
+def _default(subscriber: Converter, project: Project) -> int:
     """Return the longest payload of a message without bounds; software of the system itself keeps its lengths."""
-    if has_link:
+    if project.interconnect == ETHERNET:
+        return LONGEST_TAKEN
+    if project.interconnect != AXI_STREAM:
         return _LINK_DEFAULT
     return DEFAULT_LONGEST if subscriber.software is None else MOST_BYTES

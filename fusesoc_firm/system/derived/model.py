@@ -329,6 +329,14 @@ class NetworkKind(Enum):
     W5200 = "w5200"
 
 
+class Phy(Enum):
+    """The interface of the PHY that connects a node to Ethernet."""
+
+    GMII = "gmii"
+    MII = "mii"
+    RMII = "rmii"
+
+
 @dataclass(frozen=True)
 class Host:
     """Another host in the network."""
@@ -355,6 +363,7 @@ class Network:
     kind: NetworkKind = NetworkKind.ETHERNET
     master: tuple[IPv4Address, int] | None = None
     hosts: tuple[Host, ...] = ()
+    phy: Phy = Phy.GMII
 
 
 class StatusAccess(Enum):

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from ipaddress import AddressValueError, IPv4Address, IPv4Network
 
 from fusesoc_firm.message.middleware import MIDDLEWARES
 from fusesoc_firm.system.derived.chip import check_chip
 from fusesoc_firm.system.derived.ids import ONE_BYTE
-from fusesoc_firm.system.derived.model import Converter, Host, Network, NetworkKind, Scheduling, Software
+from fusesoc_firm.system.derived.model import Converter, Host, Network, NetworkKind, Phy, Scheduling, Software
 from fusesoc_firm.system.written.specification import (
     AXI_STREAM,
     CHIPS,
     ETHERNET,
     NETWORKS,
-    STATUS_AXI_LITE,
-    STATUS_FRAMES,
+    NO_STATUS,
+    Block,
     NodeNetwork,
     Project,
     Specification,
@@ -80,9 +80,23 @@ def network_of(
             "add the address of the master of ROS 1, such as 'master: 192.168.1.10:11311'",
         )
     _check_system(specification, scheduling, software, faults)
+    blocks = {str(block.name): block for block in specification.blocks}
+    for side in converters:
+        _check_topics([item for item in side if not item.service], blocks, faults)
     if is_chip:
         check_chip(specification, *converters, faults)
     return network
+
+
+def _check_topics(items: Iterable[Converter], blocks: dict[str, Block], faults: Diagnostics) -> None:
+    """Note blocks of one direction with the same topic, since a node in fabric has an end for each topic."""
+    owners: dict[str, str] = {}
+    for item in items:
+        if (owner := owners.setdefault(item.name, item.block)) != item.block:
+            block = blocks[item.block]
+            message = f"'{item.block}' and '{owner}' have the same topic {item.name}"
+            hint = "a node in fabric has a topic only once in each direction; connect one block to several others"
+            faults.error(message, block.topic.source if block.topic else block.name.source, hint)
 
 
 def _check_system(written: Specification, scheduling: Scheduling, software: Software, faults: Diagnostics) -> None:
@@ -95,8 +109,13 @@ def _check_system(written: Specification, scheduling: Scheduling, software: Soft
         faults.error(f"{message}cannot carry the bursts of scheduler '{scheduling.policy}'", source, hint)
     if project.id_bytes != ONE_BYTE:
         faults.error(f"{message}is not possible with 'idBytes: {project.id_bytes}'", source, f"use '{AXI_STREAM}'")
-    if project.status == STATUS_AXI_LITE and project.interconnect == ETHERNET:
-        faults.error(f"{message}has no port for AXI4-Lite", project.status.source, f"use 'status: {STATUS_FRAMES}'")
+    if project.status != NO_STATUS:
+        hint = f"remove the key, or use '{AXI_STREAM}'"
+        faults.error(f"{message}has no host that reads a status", project.status.source, hint)
+    services = dict.fromkeys(block.service_block for block in written.blocks if block.service_block)
+    for block in services if project.interconnect == ETHERNET else ():
+        place = block.mode.source if block.mode else block.name.source
+        faults.error(f"{message}has no services and actions, such as '{block.name}'", place, "legal here: topics")
     for item in software.blocks:
         if item.type.accelerator.sources:
             hint = "without 'sources', the software is another node, on a host"
@@ -130,7 +149,8 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     if master:
         _check_reachable(section, address, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
     kind = NetworkKind(project.interconnect) if project.interconnect in NETWORKS else NetworkKind.ETHERNET
-    return Network(mac, address, netmask, gateway, name, str(section.namespace), section.domain, kind, master, hosts)
+    namespace, domain, phy = str(section.namespace), section.domain, Phy(section.phy)
+    return Network(mac, address, netmask, gateway, name, namespace, domain, kind, master, hosts, phy)
 
 
 def _hosts(section: NodeNetwork, faults: Diagnostics) -> tuple[Host, ...]:

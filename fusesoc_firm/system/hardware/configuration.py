@@ -40,7 +40,7 @@ _HOST_PERIOD = 10_000
 
 SYSTEM_TEMPLATE = "vhdl/system.vhd"
 TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
-NODE_BENCH_TEMPLATE = "vhdl/node_bench.vhd"
+NODE_BENCH_TEMPLATE, PHY_BENCH_TEMPLATE = "vhdl/node_bench.vhd", "vhdl/phy_bench.vhd"
 
 
 def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> Context:
@@ -76,7 +76,7 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
 def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
     """Return the name of the test bench that compares frames with files, or of the live test bench with a pipe.
 
-    The live test bench of a node in fabric is a board: the pipe carries the bytes of its chip.
+    The live test bench of a node in fabric is a board: the pipe carries the bytes of its chip, or its frames.
     """
     if system.network:
         return f"{system.entity}_network"

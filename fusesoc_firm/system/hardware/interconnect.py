@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from fusesoc_firm.system.derived.model import DerivedSystem, Link, LinkKind, NetworkKind
+from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.system.derived.model import DerivedSystem, Link, LinkKind, NetworkKind, Phy
 
 # A link's pins at the top level, with their names in the link's core; a board may omit pins that have a default.
 LINK_PINS = {
@@ -32,6 +33,57 @@ CHIP_PINS = (
     ("spi_miso", "in", "std_logic"),
     ("spi_rst_n", "out", "std_logic"),
 )
+# The PHY's pins of a node by Ethernet, at the top level and at the core firm_<phy>, with their bits.
+PHY_PINS: Mapping[Phy, tuple[tuple[str, str, int | None], ...]] = {
+    Phy.GMII: (
+        ("gmii_rx_clk", "in", None),
+        ("gmii_rx_dv", "in", None),
+        ("gmii_rx_er", "in", None),
+        ("gmii_rxd", "in", 8),
+        ("gmii_tx_en", "out", None),
+        ("gmii_tx_er", "out", None),
+        ("gmii_txd", "out", 8),
+    ),
+    Phy.MII: (
+        ("mii_rx_clk", "in", None),
+        ("mii_rx_dv", "in", None),
+        ("mii_rx_er", "in", None),
+        ("mii_rxd", "in", 4),
+        ("mii_tx_clk", "in", None),
+        ("mii_tx_en", "out", None),
+        ("mii_tx_er", "out", None),
+        ("mii_txd", "out", 4),
+    ),
+    Phy.RMII: (
+        ("rmii_crs_dv", "in", None),
+        ("rmii_rxd", "in", 2),
+        ("rmii_tx_en", "out", None),
+        ("rmii_txd", "out", 2),
+    ),
+}
+# The bits of a byte that each PHY moves in a cycle of the line.
+_LINE_BITS = {Phy.GMII: 8, Phy.MII: 4, Phy.RMII: 2}
+# The signal at firm_sim_phy of each pin, by the pin's name without the PHY's; None for pins of errors.
+_SIMULATED = {
+    **dict.fromkeys(("rx_clk", "tx_clk"), "clk"),
+    **dict.fromkeys(("rx_dv", "crs_dv"), "rx_dv"),
+    **dict.fromkeys(("rx_er", "tx_er")),
+    **{name: name for name in ("rxd", "tx_en", "txd")},
+}
+# The bits of network_error of firm_net_link.
+NETWORK_FAULTS = (
+    "a frame on the line is broken or too long",
+    "a datagram for the board is broken",
+    "a fragment is dropped",
+    "a reply to ARP or ping, or a packet of discovery, has no room",
+    "another node has no room",
+    "a publisher of another node, of a topic that is received, has no room",
+    "a message of another node has no room",
+    "a message to send is too long",
+    "another host has the address of the board",
+)
+ADDRESS_FAULT = 8
+"""The bit of an address that is taken."""
 CHIP_NUMBERS = {NetworkKind.W5500: 5500, NetworkKind.W5200: 5200}
 
 # The default baud rate of firm_uart_link, which a netlist keeps.
@@ -40,13 +92,15 @@ _BAUD = 1_000_000
 
 def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
     """Return the streams as ports of the top level, or the link or node that they connect to."""
+    nothing = {"has_streams": False, "link": None, "node": None, "ethernet": None}
+    if system.network and system.network.kind is NetworkKind.ETHERNET:
+        return {**nothing, "ethernet": _ethernet(system, system.network.phy)}
     if system.network:
-        return {"has_streams": False, "link": None, "node": _node(system)}
+        return {**nothing, "node": _node(system)}
     if system.link is None:
-        return {"has_streams": True, "link": None, "node": None}
+        return {**nothing, "has_streams": True}
     return {
-        "has_streams": False,
-        "node": None,
+        **nothing,
         "link": {
             "entity": f"firm_{system.link.kind.value}_link",
             "longest": system.link.longest,
@@ -60,6 +114,37 @@ def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
 def rom_entity(system: DerivedSystem) -> str:
     """Return the name of the ROM of a node in a chip's sockets."""
     return f"{system.entity}_rom"
+
+
+def node_entity(system: DerivedSystem) -> str:
+    """Return the name of the entity that is the node of a system by Ethernet."""
+    return f"{system.entity}_node"
+
+
+def phy_pins(phy: Phy) -> list[tuple[str, str, str]]:
+    """Return the pins of a PHY as ports of the top level."""
+    return [(name, direction, vhdl_type(bits)) for name, direction, bits in PHY_PINS[phy]]
+
+
+def _ethernet(system: DerivedSystem, phy: Phy) -> dict[str, Any]:
+    """Return a node by Ethernet, and the core of its PHY's pins."""
+    return {
+        "entity": node_entity(system),
+        "name": phy.value.upper(),
+        "phy": f"firm_{phy.value}",
+        # An RMII does not report errors to the PHY.
+        "sends_errors": phy is not Phy.RMII,
+        "pins": [{**pin, **_in_simulation(pin["name"])} for pin in _pins(phy_pins(phy))],
+        "line_bits": _LINE_BITS[phy],
+        "faults": [{"bit": bit, "meaning": meaning} for bit, meaning in enumerate(NETWORK_FAULTS)],
+        "fault_count": len(NETWORK_FAULTS),
+    }
+
+
+def _in_simulation(pin: str) -> dict[str, Any]:
+    """Return what the PHY of a simulated board, whose line has the system's clock, connects to a pin."""
+    signal = _SIMULATED[pin.partition("_")[2]]
+    return {"signal": signal or "", "is_low": pin.endswith("rx_er"), "is_open": pin.endswith("tx_er")}
 
 
 def _node(system: DerivedSystem) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from fusesoc_firm.system.hardware.configuration import top_level_pins
 from fusesoc_firm.text.render import Context
 
 VERILOG_BENCH_TEMPLATE = "verilog/test_bench.v"
-VERILOG_NODE_BENCH_TEMPLATE = "verilog/node_bench.v"
+VERILOG_NODE_BENCH_TEMPLATE, VERILOG_PHY_BENCH_TEMPLATE = "verilog/node_bench.v", "verilog/phy_bench.v"
 ENVIRONMENT_TEMPLATE = "vhdl/in_environment.vhd"
 
 # Cycles without a beat until a simulation with a link ends: the time of 300 bytes, which a link sends without a beat at

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.request.core_reader import read_core
-from fusesoc_firm.system.boards.board import QUARTUS, VIVADO, board_entity, boards, read_board
+from fusesoc_firm.system.boards.board import QUARTUS, VIVADO, Board, board_entity, boards, read_board
 from fusesoc_firm.system.derived.link import may_be_linked
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.verilog_bench import translated_unit
 from fusesoc_firm.system.system_core import LoadedSystem
-from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS
+from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, LINKS
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
@@ -43,8 +43,9 @@ _SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
 # line takes ten cycles of this clock, and the emulated processor does not know how fast the line is.
 EMULATING = "verilator"
 EMULATED = {"interconnect": "uart", "clock": "10 MHz"}
-# The target of a simulated board with a chip, and its clock: the time of the node is about that of its peers.
-NETWORK, NETWORK_HERTZ = "network", 1_000_000
+# The target of a simulated board with a chip or a PHY, and its clock: the time of the node is about that of its peers.
+NETWORK = "network"
+NETWORK_HERTZ = {**dict.fromkeys(CHIPS, 1_000_000), ETHERNET: 250_000}
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
 # A target with the comment above it; blank lines separate targets.
 _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
@@ -178,7 +179,10 @@ def _kinds(system: DerivedSystem) -> list[_Kind]:
         _Kind("live", "verilog_pipe", "live", "live", streams),
     ]
     if system.network:
-        kinds.append(_Kind(NETWORK, "verilog_chip", "network", "network", {"clock": f"{NETWORK_HERTZ // 10**6} MHz"}))
+        way = system.network.kind.value
+        flag = "verilog_chip" if way in CHIPS else "verilog_phy"
+        clock = {"clock": f"{NETWORK_HERTZ[way] / 10**6:g} MHz"}
+        kinds.append(_Kind(NETWORK, flag, "network", "network", clock))
     return kinds
 
 
@@ -231,7 +235,7 @@ def _emulation(system: DerivedSystem, unit: str) -> dict[str, object] | None:
 
 def _description(simulator: Simulator, kind: _Kind, *, is_first: bool) -> str:
     if kind.name == NETWORK and is_first:
-        return f"Build the simulated board of firm live in {simulator.title}, behind the pins of its chip"
+        return f"Build the simulated board of firm live in {simulator.title}, behind the pins of its network"
     if kind.is_live and is_first:
         return f"Build a simulator in {simulator.title} that another program starts and sends frames to"
     if kind.is_live:
@@ -249,8 +253,7 @@ def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
 def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
     """Return a board's target, or None if it lacks support for the HLS kernels of the system, or needs a node."""
     board = read_board(name)
-    is_node = system.network is not None and system.network.kind.value in CHIPS
-    if (has_kernels and board.flow != VIVADO) or (board.interconnect in CHIPS and not is_node):
+    if (has_kernels and board.flow != VIVADO) or not _has_network_of(system, board):
         return None
     options: dict[str, str | Sequence[str] | None] = {
         "frontends": ["ghdlsynth"] if board.is_linked else None,
@@ -274,6 +277,12 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
         "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],
         "toplevel": f"{top}_wrapper" if board.flow == VIVADO else top,
     }
+
+
+def _has_network_of(system: DerivedSystem, board: Board) -> bool:
+    """Return whether a system is a node of the kind that a board's network needs."""
+    kind = system.network.kind.value if system.network else ""
+    return kind in CHIPS if board.interconnect in CHIPS else board.interconnect in (kind, *LINKS, AXI_STREAM)
 
 
 def _value(value: str | Sequence[str]) -> str:

@@ -86,10 +86,16 @@ def _network(network: Network | None) -> dict[str, Any]:
             **{name: str(value) for name, value in addresses.items() if value},
             "name": network.name,
             "namespace": network.namespace,
-            **({"master": "{}:{}".format(*network.master)} if network.master else {"domain": network.domain}),
-            **({"hosts": {host.name: str(host.address) for host in network.hosts}} if network.hosts else {}),
+            **_way(network),
         }
     }
+
+
+def _way(network: Network) -> dict[str, Any]:
+    if network.master:
+        hosts = {host.name: str(host.address) for host in network.hosts}
+        return {"master": "{}:{}".format(*network.master), **({"hosts": hosts} if hosts else {})}
+    return {"domain": network.domain, "phy": network.phy.value}
 
 
 def default_lengths(system: DerivedSystem) -> list[str]:

@@ -50,6 +50,8 @@ LINKS = ("uart", "spi")
 ETHERNET = "ethernet"
 CHIPS = W5500, W5200 = ("w5500", "w5200")
 NETWORKS = (ETHERNET, *CHIPS)
+# The interface of the PHY of a node by Ethernet.
+PHYS = ("gmii", "mii", "rmii")
 # The accesses to the registers of a system's status, if it has one.
 NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
@@ -138,6 +140,7 @@ class NodeNetwork(Section):
         section=NetworkHost,
         is_asked=False,
     )
+    phy: Text = key("the interface of the PHY; only used with ethernet", choices=PHYS, default=Text(PHYS[0]))
 
 
 @dataclass(frozen=True)
@@ -369,7 +372,8 @@ class Block(Section):
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     max_length: int | None = key(
-        "bytes of the longest payload, if the message has no bounds (default: 65536, with a link or a network 2000)",
+        "bytes of the longest payload, if the message has no bounds (default: 65536; with a link, w5500 or w5200"
+        " 2000; with ethernet the most that is possible)",
         name="maxLength",
         form="integer",
         only_of=CONVERTER,

@@ -1,0 +1,514 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Reassembles the fragments of UDP datagrams (RFC 791). Frames pass through as they come, the fragments among them
+-- included, which firm_udp_receiver drops; when a packet is complete, it is sent as one frame without fragments. Frames
+-- that come meanwhile wait in a store, except fragments, and leave by turns with further packets.
+--
+-- Fragments of several packets may be interleaved, but those of each packet come in order, as hosts send them and an
+-- Ethernet keeps them. So the state of a packet is its size so far, whatever the number of fragments. A packet that
+-- lacks a fragment is given up; fragments with options are dropped.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_ipv4_reassembly is
+  generic (
+    PACKETS : integer := 2;     -- that are reassembled at the same time, 1 to 8
+    BYTES   : integer := 16384; -- of the longest one, without its header; a power of two, 2048 to 65536
+    DEPTH   : integer := 4096;  -- bytes of frames that wait for the end of a packet, a power of two, 4 and more
+    TICKS   : integer := 1000   -- without a fragment, after which a packet is given up, 1 to 65535
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+    tick  : in std_logic;  -- a pulse each millisecond
+
+    -- This host, the first byte on the line highest.
+    mac     : in std_logic_vector(47 downto 0);
+    address : in std_logic_vector(31 downto 0);
+
+    -- All frames of firm_mac_receiver; after a last beat, six cycles are without a beat.
+    s_axis_tdata  : in std_logic_vector(7 downto 0);
+    s_axis_tuser  : in std_logic_vector(0 downto 0);
+    s_axis_tvalid : in std_logic;
+    s_axis_tlast  : in std_logic;
+
+    -- The same, and reassembled packets.
+    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+
+    -- Pulses.
+    is_dropped : out std_logic;  -- a packet that is given up, or a fragment that belongs to none
+    is_lost    : out std_logic   -- a frame that waited without room
+  );
+end entity firm_ipv4_reassembly;
+
+architecture rtl of firm_ipv4_reassembly is
+
+  constant SLOT_BITS  : positive := max(1, clog2(PACKETS));
+  constant PLACE_BITS : positive := max(1, clog2(BYTES));
+  constant HEAD_BITS  : positive := 6;
+
+  -- Places in a frame, of the first byte of a field.
+  constant TYPE_PLACE     : natural := 12;
+  constant VERSION_PLACE  : natural := 14;
+  constant LENGTH_PLACE   : natural := 16;
+  constant NUMBER_PLACE   : natural := 18;
+  constant FRAGMENT_PLACE : natural := 20;
+  constant PROTOCOL_PLACE : natural := 23;
+  constant CHECKSUM_PLACE : natural := 24;
+  constant SOURCE_PLACE   : natural := 26;
+  constant TARGET_PLACE   : natural := 30;
+  constant DATA_PLACE     : natural := 34;
+  constant LAST_PLACE     : natural := 127;
+  constant IPV4_BYTES     : natural := 20;
+  constant MAC_BYTES      : natural := 6;
+  constant GAP            : natural := 6;      -- cycles between frames
+  constant LONGEST        : natural := 65535;  -- a packet with its header
+
+  subtype byte_t is std_logic_vector(7 downto 0);
+  constant UDP     : byte_t := x"11";
+  constant VERSION : byte_t := x"45";  -- without options
+  constant IPV4    : unsigned(15 downto 0) := x"0800";
+
+  subtype slot_t is unsigned(SLOT_BITS-1 downto 0);
+  subtype size_t is unsigned(16 downto 0);
+  subtype sum_t is unsigned(18 downto 0);
+  subtype key_t is std_logic_vector(47 downto 0);  -- the sender's address, and the packet's identification
+  subtype slots_t is std_logic_vector(PACKETS-1 downto 0);
+  type memory_t is array (natural range <>) of byte_t;
+  type keys_t is array (natural range 0 to PACKETS-1) of key_t;
+  type sizes_t is array (natural range 0 to PACKETS-1) of size_t;
+  type sums_t is array (natural range 0 to PACKETS-1) of sum_t;
+  type ages_t is array (natural range 0 to PACKETS-1) of natural range 0 to 65535;
+  constant NO_SLOT : slots_t := (others => '0');
+
+  signal data_memory : memory_t(0 to 2**(SLOT_BITS+PLACE_BITS)-1);
+  signal head_memory : memory_t(0 to 2**(SLOT_BITS+HEAD_BITS)-1);
+
+  -- Of each packet.
+  signal used_r  : slots_t;                                 -- it has fragments
+  signal whole_r : slots_t;                                 -- it waits to be sent
+  signal keys_r  : keys_t;
+  signal sizes_r : sizes_t := (others => (others => '0'));  -- bytes so far
+  signal sums_r  : sums_t := (others => (others => '0'));   -- of the words of the header that stay
+  signal ages_r  : ages_t;
+
+  -- ------------------------------------------------------------------ the frame that comes
+  signal place_r    : unsigned(6 downto 0) := (others => '0');
+  signal recent_r   : std_logic_vector(39 downto 0) := (others => '0');
+  signal mine_r     : std_logic;                            -- it is a fragment for this host, so far
+  signal has_more_r : std_logic;
+  signal offset_r   : size_t := (others => '0');            -- of its first byte in the packet
+  signal bytes_r    : size_t := (others => '0');            -- of the packet, in this frame
+  signal end_r      : size_t := (others => '0');            -- the offset after its last byte
+  signal key_r      : key_t := (others => '0');
+  signal sum_r      : sum_t := (others => '0');
+  signal check_r    : sum_t := (others => '0');
+  signal free_r     : slot_t := (others => '0');            -- the place that it gets if it is a first one
+  signal has_free_r : std_logic;
+
+  signal found : slots_t;                                   -- the packet of the fragment
+  signal known : slot_t;
+
+  -- The beat one cycle later, and what is done with it.
+  signal beat_r    : byte_t := (others => '0');
+  signal moves_r   : std_logic;
+  signal ends_r    : std_logic;
+  signal aborted_r : std_logic;
+  signal slot_r    : slot_t := (others => '0');
+  signal taken_r   : std_logic;                             -- these are the packet's next bytes
+  signal refused_r : std_logic;                             -- the fragment belongs to no packet
+  signal broken_r  : std_logic;                             -- a fragment before it is missing
+  signal left_r    : size_t := (others => '0');             -- bytes to come
+  signal write_r   : size_t := (others => '0');
+  signal writes    : std_logic;
+  signal is_whole  : std_logic;                             -- the frame had all bytes
+  signal is_good   : std_logic;                             -- it has ended, and is not aborted
+
+  -- ------------------------------------------------------------------ what leaves
+  type state_t is (PASSING, SENDING, RESTING, DRAINING);
+  signal state_r     : state_t;
+  signal turn_r      : std_logic;                           -- it is the store's turn
+  signal waits_r     : std_logic;                           -- the frame that comes goes to the store
+  signal waits       : std_logic;
+  signal out_slot_r  : slot_t := (others => '0');
+  signal out_place_r : size_t := (others => '0');
+  signal out_last_r  : size_t := (others => '0');
+  signal out_total_r : unsigned(15 downto 0) := (others => '0');
+  signal out_sum_r   : sum_t := (others => '0');
+  signal checksum_r  : unsigned(15 downto 0) := (others => '0');
+  signal gap_r       : natural range 0 to GAP;
+  signal shown_r     : std_logic;                           -- the memories show a byte of the packet
+  signal shown_at_r  : size_t := (others => '0');
+  signal shows_end_r : std_logic;
+  signal data_r      : byte_t := (others => '0');
+  signal head_r      : byte_t := (others => '0');
+  signal sent_byte   : byte_t;
+
+  signal store_valid  : std_logic;
+  signal store_user   : std_logic_vector(0 downto 0);
+  signal stored_data  : byte_t;
+  signal stored_valid : std_logic;
+  signal stored_last  : std_logic;
+  signal stored_ready : std_logic;
+
+  -- The lowest one of several; 0 if there is none.
+  function lowest(slots : slots_t) return slot_t is
+  begin
+    for index in 0 to PACKETS-1 loop
+      if slots(index) = '1' then
+        return to_unsigned(index, SLOT_BITS);
+      end if;
+    end loop;
+    return to_unsigned(0, SLOT_BITS);
+  end function lowest;
+
+  -- Sixteen bits and the carries, as RFC 1071 adds them.
+  function folded(sum : sum_t) return unsigned is
+    variable once : sum_t;
+  begin
+    once := resize(sum(15 downto 0), 19) + sum(18 downto 16);
+    return once(15 downto 0) + once(18 downto 16);
+  end function folded;
+
+begin
+
+  assert PACKETS >= 1 and PACKETS <= 8
+    report "firm_ipv4_reassembly: PACKETS is " & integer'image(PACKETS) & "; legal: 1 to 8"
+    severity failure;
+  assert BYTES >= 2048 and BYTES <= 65536 and 2**clog2(BYTES) = BYTES
+    report "firm_ipv4_reassembly: BYTES is " & integer'image(BYTES) & "; legal: powers of two, 2048 to 65536"
+    severity failure;
+  assert TICKS >= 1 and TICKS <= 65535
+    report "firm_ipv4_reassembly: TICKS is " & integer'image(TICKS) & "; legal: 1 to 65535"
+    severity failure;
+
+  -- ------------------------------------------------------------------ the header
+
+  read_header : process (clk)
+    variable recent : std_logic_vector(47 downto 0);
+    variable word   : unsigned(15 downto 0);
+  begin
+    if rising_edge(clk) then
+      end_r <= offset_r + bytes_r;
+      if s_axis_tvalid = '1' then
+        recent   := recent_r & s_axis_tdata;
+        word     := unsigned(recent(15 downto 0));
+        recent_r <= recent(39 downto 0);
+        if place_r = 0 then
+          mine_r  <= '1';
+          sum_r   <= (others => '0');
+          check_r <= (others => '0');
+        elsif place_r = MAC_BYTES-1 and recent /= mac then
+          mine_r <= '0';
+        elsif place_r = MAC_BYTES and s_axis_tdata(0) = '1' then
+          -- A group of hosts is not a source.
+          mine_r <= '0';
+        elsif place_r = TYPE_PLACE+1 and word /= IPV4 then
+          mine_r <= '0';
+        elsif place_r = VERSION_PLACE and s_axis_tdata /= VERSION then
+          mine_r <= '0';
+        elsif place_r = LENGTH_PLACE+1 then
+          bytes_r <= resize(word, 17) - IPV4_BYTES;
+          if word <= IPV4_BYTES then
+            mine_r <= '0';
+          end if;
+        elsif place_r = NUMBER_PLACE+1 then
+          key_r(15 downto 0) <= recent(15 downto 0);
+        elsif place_r = FRAGMENT_PLACE+1 then
+          has_more_r <= word(13);
+          offset_r   <= '0' & word(12 downto 0) & "000";
+          if word(13 downto 0) = 0 then
+            mine_r <= '0';
+          end if;
+          -- All fragments but the last have multiples of eight bytes.
+          if word(13) = '1' and bytes_r(2 downto 0) /= 0 then
+            mine_r <= '0';
+          end if;
+        elsif place_r = PROTOCOL_PLACE and s_axis_tdata /= UDP then
+          mine_r <= '0';
+        elsif place_r = SOURCE_PLACE+3 then
+          key_r(47 downto 16) <= recent(31 downto 0);
+        elsif place_r = TARGET_PLACE+3 and recent(31 downto 0) /= address then
+          mine_r <= '0';
+        end if;
+        if place_r >= VERSION_PLACE and place_r < DATA_PLACE and place_r(0) = '1' then
+          check_r <= resize(check_r(15 downto 0), 19) + check_r(18 downto 16) + word;
+          if place_r /= LENGTH_PLACE+1 and place_r /= FRAGMENT_PLACE+1 and place_r /= CHECKSUM_PLACE+1 then
+            sum_r <= sum_r + word;
+          end if;
+        end if;
+        if place_r /= LAST_PLACE then
+          place_r <= place_r + 1;
+        end if;
+        if s_axis_tlast = '1' then
+          place_r <= (others => '0');
+        end if;
+      end if;
+      if rst_n = '0' then
+        place_r <= (others => '0');
+      end if;
+    end if;
+  end process read_header;
+
+  compare_keys : process (used_r, whole_r, keys_r, key_r)
+  begin
+    for index in 0 to PACKETS-1 loop
+      found(index) <= '0';
+      if used_r(index) = '1' and whole_r(index) = '0' and keys_r(index) = key_r then
+        found(index) <= '1';
+      end if;
+    end loop;
+  end process compare_keys;
+
+  known <= lowest(found);
+
+  -- ------------------------------------------------------------------ the fragment
+
+  decide : process (clk)
+  begin
+    if rising_edge(clk) then
+      beat_r    <= s_axis_tdata;
+      moves_r   <= s_axis_tvalid;
+      ends_r    <= s_axis_tvalid and s_axis_tlast;
+      aborted_r <= s_axis_tuser(0);
+      if writes = '1' then
+        left_r  <= left_r - 1;
+        write_r <= write_r + 1;
+      end if;
+      if s_axis_tvalid = '1' and place_r = 0 then
+        free_r     <= lowest(not used_r);
+        has_free_r <= '0';
+        if (not used_r) /= NO_SLOT then
+          has_free_r <= '1';
+        end if;
+        taken_r   <= '0';
+        refused_r <= '0';
+        broken_r  <= '0';
+      elsif s_axis_tvalid = '1' and place_r = DATA_PLACE and mine_r = '1' and folded(check_r) = x"ffff" then
+        left_r  <= bytes_r;
+        write_r <= offset_r;
+        slot_r  <= known;
+        if found /= NO_SLOT and end_r <= sizes_r(to_integer(known)) then
+          -- It has come before.
+          null;
+        elsif end_r > BYTES or end_r > LONGEST-IPV4_BYTES then
+          refused_r <= '1';
+          broken_r  <= '1';
+        elsif found /= NO_SLOT and offset_r = sizes_r(to_integer(known)) then
+          taken_r <= '1';
+        elsif found = NO_SLOT and offset_r = 0 and has_free_r = '1' then
+          taken_r <= '1';
+          slot_r  <= free_r;
+        else
+          refused_r <= '1';
+          broken_r  <= '1';
+        end if;
+        if found = NO_SLOT then
+          broken_r <= '0';
+        end if;
+      end if;
+      if rst_n = '0' then
+        moves_r   <= '0';
+        ends_r    <= '0';
+        taken_r   <= '0';
+        refused_r <= '0';
+        broken_r  <= '0';
+      end if;
+    end if;
+  end process decide;
+
+  writes   <= '1' when moves_r = '1' and taken_r = '1' and left_r /= 0 else '0';
+  is_whole <= '1' when left_r = 0 or (left_r = 1 and writes = '1') else '0';
+
+  access_data : process (clk)
+  begin
+    if rising_edge(clk) then
+      if writes = '1' then
+        data_memory(to_integer(slot_r & write_r(PLACE_BITS-1 downto 0))) <= beat_r;
+      end if;
+      data_r <= data_memory(to_integer(out_slot_r & resize(out_place_r - DATA_PLACE, PLACE_BITS)));
+    end if;
+  end process access_data;
+
+  -- The header of the place that the frame gets if it is a first fragment. When its first byte comes, the place is not
+  -- known yet; this byte is that of the board's address.
+  access_head : process (clk)
+  begin
+    if rising_edge(clk) then
+      if s_axis_tvalid = '1' and place_r < DATA_PLACE and place_r /= 0 and has_free_r = '1' then
+        head_memory(to_integer(free_r & place_r(HEAD_BITS-1 downto 0))) <= s_axis_tdata;
+      end if;
+      head_r <= head_memory(to_integer(out_slot_r & out_place_r(HEAD_BITS-1 downto 0)));
+    end if;
+  end process access_head;
+
+  is_good <= ends_r and not aborted_r;
+
+  keep_packets : process (clk)
+  begin
+    if rising_edge(clk) then
+      is_dropped <= is_good and (refused_r or (taken_r and not is_whole));
+      for index in 0 to PACKETS-1 loop
+        if tick = '1' and used_r(index) = '1' and whole_r(index) = '0' then
+          ages_r(index) <= ages_r(index) + 1;
+          if ages_r(index) = TICKS-1 then
+            used_r(index) <= '0';
+            is_dropped    <= '1';
+          end if;
+        end if;
+        if is_good = '1' and slot_r = index then
+          if taken_r = '1' and is_whole = '1' then
+            used_r(index)  <= '1';
+            whole_r(index) <= not has_more_r;
+            sizes_r(index) <= end_r;
+            ages_r(index)  <= 0;
+            if offset_r = 0 then
+              keys_r(index) <= key_r;
+              sums_r(index) <= sum_r;
+            end if;
+          elsif broken_r = '1' then
+            used_r(index) <= '0';
+          end if;
+        end if;
+        if shows_end_r = '1' and out_slot_r = index then
+          used_r(index)  <= '0';
+          whole_r(index) <= '0';
+        end if;
+      end loop;
+      if rst_n = '0' then
+        used_r     <= NO_SLOT;
+        whole_r    <= NO_SLOT;
+        is_dropped <= '0';
+      end if;
+    end if;
+  end process keep_packets;
+
+  -- ------------------------------------------------------------------ what leaves
+
+  waits <= waits_r when place_r /= 0 else
+           '0' when state_r = PASSING else
+           '1';
+
+  store_valid   <= s_axis_tvalid and waits;
+  store_user(0) <= s_axis_tuser(0) or mine_r when place_r >= DATA_PLACE else s_axis_tuser(0);
+
+  u_store : entity firm.firm_mac_store
+    generic map (
+      DEPTH => DEPTH
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tuser  => store_user,
+      s_axis_tvalid => store_valid,
+      s_axis_tlast  => s_axis_tlast,
+      m_axis_tdata  => stored_data,
+      m_axis_tvalid => stored_valid,
+      m_axis_tlast  => stored_last,
+      m_axis_tready => stored_ready,
+      is_lost       => is_lost
+    );
+
+  stored_ready <= '1' when state_r = DRAINING else '0';
+
+  choose : process (clk)
+  begin
+    if rising_edge(clk) then
+      waits_r     <= waits;
+      shown_r     <= '0';
+      shows_end_r <= '0';
+      shown_at_r  <= out_place_r;
+      if state_r = PASSING then
+        out_place_r <= (others => '0');
+        if s_axis_tvalid = '1' or place_r /= 0 then
+          gap_r <= GAP;
+        elsif gap_r /= 0 then
+          gap_r <= gap_r - 1;
+        elsif whole_r /= NO_SLOT then
+          state_r    <= SENDING;
+          out_slot_r <= lowest(whole_r);
+        end if;
+      elsif state_r = SENDING then
+        out_last_r  <= sizes_r(to_integer(out_slot_r)) + (DATA_PLACE-1);
+        out_total_r <= resize(sizes_r(to_integer(out_slot_r)) + IPV4_BYTES, 16);
+        out_sum_r   <= resize(sums_r(to_integer(out_slot_r)), 19) + out_total_r;
+        checksum_r  <= not folded(out_sum_r);
+        shown_r     <= '1';
+        out_place_r <= out_place_r + 1;
+        if out_place_r = out_last_r and out_place_r >= DATA_PLACE then
+          shows_end_r <= '1';
+        end if;
+        if shows_end_r = '1' then
+          shown_r <= '0';
+          state_r <= RESTING;
+          turn_r  <= '1';
+          gap_r   <= GAP;
+        end if;
+      elsif state_r = RESTING then
+        out_place_r <= (others => '0');
+        if gap_r /= 0 then
+          gap_r <= gap_r - 1;
+        elsif stored_valid = '1' and (turn_r = '1' or whole_r = NO_SLOT) then
+          state_r <= DRAINING;
+        elsif whole_r /= NO_SLOT then
+          state_r    <= SENDING;
+          out_slot_r <= lowest(whole_r);
+        elsif (place_r = 0 or waits_r = '0') and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
+          state_r <= PASSING;
+        end if;
+      elsif stored_valid = '1' and stored_last = '1' then
+        state_r <= RESTING;
+        turn_r  <= '0';
+        gap_r   <= GAP;
+      end if;
+      if rst_n = '0' then
+        state_r     <= PASSING;
+        waits_r     <= '0';
+        shown_r     <= '0';
+        shows_end_r <= '0';
+        gap_r       <= 0;
+      end if;
+    end if;
+  end process choose;
+
+  -- Length, fragment and checksum are those of the whole packet.
+  sent_byte <= data_r when shown_at_r >= DATA_PLACE else
+               std_logic_vector(out_total_r(15 downto 8)) when shown_at_r = LENGTH_PLACE else
+               std_logic_vector(out_total_r(7 downto 0)) when shown_at_r = LENGTH_PLACE+1 else
+               x"00" when shown_at_r = FRAGMENT_PLACE or shown_at_r = FRAGMENT_PLACE+1 else
+               std_logic_vector(checksum_r(15 downto 8)) when shown_at_r = CHECKSUM_PLACE else
+               std_logic_vector(checksum_r(7 downto 0)) when shown_at_r = CHECKSUM_PLACE+1 else
+               mac(47 downto 40) when shown_at_r = 0 else
+               head_r;
+
+  show : process (clk)
+  begin
+    if rising_edge(clk) then
+      m_axis_tdata  <= s_axis_tdata;
+      m_axis_tuser  <= s_axis_tuser;
+      m_axis_tvalid <= s_axis_tvalid and not waits;
+      m_axis_tlast  <= s_axis_tlast;
+      if state_r = SENDING then
+        m_axis_tdata  <= sent_byte;
+        m_axis_tuser  <= "0";
+        m_axis_tvalid <= shown_r;
+        m_axis_tlast  <= shows_end_r;
+      elsif state_r = DRAINING then
+        m_axis_tdata  <= stored_data;
+        m_axis_tuser  <= "0";
+        m_axis_tvalid <= stored_valid;
+        m_axis_tlast  <= stored_last;
+      end if;
+      if rst_n = '0' then
+        m_axis_tvalid <= '0';
+      end if;
+    end if;
+  end process show;
+
+end architecture rtl;

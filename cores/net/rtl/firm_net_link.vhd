@@ -1,0 +1,476 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- The host's two streams of a system that is a node of ROS 2 itself: firm_rtps_node between Ethernet frames, which come
+-- from the bytes of a line, and streams of any width. The memories outside, of packets and of names, make it a node. It
+-- answers ARP and ping, too, and keeps its place in the network.
+--
+-- The board does not ask for MAC addresses: it sends to peers only, and sends a peer's packets to the MAC address from
+-- which the peer's announcement came, that of the peer or of the router to it.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+
+entity firm_net_link is
+  generic (
+    WIDTH        : integer := 8;
+    CLOCK_HZ     : integer := 125000000;
+    WRITERS      : integer := 2;   -- of the node, that of ros_discovery_info included
+    READERS      : integer := 1;
+    SAMPLE       : integer := 64;  -- bytes of the longest payload that is sent, a power of two, 2 to 128
+    PROGRAM_BITS : integer := 12;  -- of an address in the memory of packets
+    -- Numbers of packets.
+    REPORT_PACKET : integer := 0;
+    PROBE_PACKET  : integer := 0
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- This host, the first byte on the line highest; the ports of its domain.
+    mac       : in std_logic_vector(47 downto 0);
+    address   : in std_logic_vector(31 downto 0);
+    udp_ports : in std_logic_vector(47 downto 0);
+
+    -- The entity of the writer that sends samples, and what the readers want of a writer: see firm_rtps_node.
+    sample_writer   : in std_logic_vector(31 downto 0);
+    wants_reliable  : in std_logic_vector(READERS-1 downto 0);
+    wants_transient : in std_logic_vector(READERS-1 downto 0);
+
+    -- The memories that fusesoc_firm.fabric.packets and fusesoc_firm.fabric.names make.
+    packet          : out std_logic_vector(7 downto 0);
+    entry           : in  std_logic_vector(PROGRAM_BITS-1 downto 0);
+    program_enable  : out std_logic;
+    program_address : out std_logic_vector(PROGRAM_BITS-1 downto 0);
+    program_word    : in  std_logic_vector(10 downto 0);
+    names_address   : out std_logic_vector(9 downto 0);
+    names_data      : in  std_logic_vector(8*READERS-1 downto 0);
+
+    -- The line: of firm_gmii, firm_mii or firm_rmii.
+    rx_step : in  std_logic;
+    rx_dv   : in  std_logic;
+    rx_er   : in  std_logic;
+    rxd     : in  std_logic_vector(7 downto 0);
+    tx_step : in  std_logic;
+    tx_en   : out std_logic;
+    tx_er   : out std_logic;
+    txd     : out std_logic_vector(7 downto 0);
+
+    -- Frames to the system, never aborted.
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(0 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic;
+
+    -- Frames from the system; an aborted one is dropped.
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- Pulses:
+    --   0  a frame on the line is broken or too long
+    --   1  a datagram for the board is broken
+    --   2  a fragment is dropped
+    --   3  a reply to ARP or ping, or a packet of discovery, has no room
+    --   4  a peer has no room
+    --   5  a matching writer of a peer has no room
+    --   6  a sample has no room
+    --   7  a sample to send is too long
+    --   8  another host has the board's address
+    network_error : out std_logic_vector(8 downto 0)
+  );
+end entity firm_net_link;
+
+architecture rtl of firm_net_link is
+
+  constant PORTS    : positive := 3;
+  constant GROUP_IP : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
+  constant SOURCES  : positive := 8;     -- matched writers of peers
+  constant DEPTH    : positive := 4096;  -- bytes of waiting discovery, and of waiting payloads
+  constant HELD     : positive := 256;   -- bytes of a payload to send
+
+  function cycles_of(hertz : integer) return positive is
+  begin
+    if hertz < 1000 then
+      return 1;
+    end if;
+    return hertz / 1000;
+  end function cycles_of;
+
+  function number_of(number : integer) return std_logic_vector is
+    variable bits : std_logic_vector(7 downto 0) := (others => '0');
+  begin
+    for place in bits'range loop
+      if (number / 2**place) mod 2 = 1 then
+        bits(place) := '1';
+      end if;
+    end loop;
+    return bits;
+  end function number_of;
+
+  constant CYCLES      : positive := cycles_of(CLOCK_HZ);
+  -- A constant prefix does not change at a restart: vendor, MAC address, zeros.
+  constant PREFIX_HEAD : std_logic_vector(15 downto 0) := x"0000";
+  constant PREFIX_TAIL : std_logic_vector(31 downto 0) := x"00000000";
+
+  signal cycle_r : natural range 0 to CYCLES-1;
+  signal tick_r  : std_logic;
+
+  signal received_tdata  : std_logic_vector(7 downto 0);
+  signal received_tuser  : std_logic_vector(0 downto 0);
+  signal received_tvalid : std_logic;
+  signal received_tlast  : std_logic;
+
+  signal datagram_tdata  : std_logic_vector(7 downto 0);
+  signal datagram_tuser  : std_logic_vector(0 downto 0);
+  signal datagram_tvalid : std_logic;
+  signal datagram_tlast  : std_logic;
+  signal source_mac      : std_logic_vector(47 downto 0);
+  signal prefix          : std_logic_vector(95 downto 0);
+
+  signal in_tdata      : std_logic_vector(7 downto 0);
+  signal in_tvalid     : std_logic;
+  signal in_tlast      : std_logic;
+  signal in_tready     : std_logic;
+  signal out_tdata     : std_logic_vector(7 downto 0);
+  signal out_tuser     : std_logic_vector(0 downto 0);
+  signal out_tvalid    : std_logic;
+  signal out_tlast     : std_logic;
+  signal out_tready    : std_logic;
+  signal sample_tdata  : std_logic_vector(7 downto 0);
+  signal sample_tvalid : std_logic;
+  signal sample_tlast  : std_logic;
+  signal sample_tready : std_logic;
+
+  -- Packets of the node, which waits for the builder, and of its presence.
+  signal node_start    : std_logic;
+  signal node_packet   : std_logic_vector(7 downto 0);
+  signal node_bytes    : std_logic_vector(15 downto 0);
+  signal node_busy     : std_logic;
+  signal held_r        : std_logic;  -- a packet of the node waits for the end of another one
+  signal wants_report  : std_logic;
+  signal wants_probe   : std_logic;
+  signal is_sent       : std_logic;
+  signal start         : std_logic;
+  signal is_node       : std_logic;
+  signal payload_bytes : std_logic_vector(15 downto 0);
+  signal is_busy       : std_logic;
+
+  signal field_valid    : std_logic;
+  signal field_address  : std_logic_vector(6 downto 0);
+  signal field_data     : std_logic_vector(7 downto 0);
+  signal payload_tdata  : std_logic_vector(7 downto 0);
+  signal payload_tvalid : std_logic;
+  signal payload_tready : std_logic;
+
+  -- Replies to ARP and ping, then packets.
+  signal sources_tdata  : std_logic_vector(15 downto 0);
+  signal sources_tvalid : std_logic_vector(1 downto 0);
+  signal sources_tlast  : std_logic_vector(1 downto 0);
+  signal sources_tready : std_logic_vector(1 downto 0);
+  signal sent_tdata     : std_logic_vector(7 downto 0);
+  signal sent_tvalid    : std_logic;
+  signal sent_tlast     : std_logic;
+  signal sent_tready    : std_logic;
+
+  signal is_broken     : std_logic;
+  signal is_too_long   : std_logic;
+  signal is_reply_lost : std_logic;
+  signal is_lost       : std_logic;
+  signal is_long       : std_logic;
+  signal is_refused    : std_logic;
+
+begin
+
+  assert CLOCK_HZ >= 1
+    report "firm_net_link: CLOCK_HZ is " & integer'image(CLOCK_HZ) & "; legal: 1 and more"
+    severity failure;
+
+  count_time : process (clk)
+  begin
+    if rising_edge(clk) then
+      tick_r  <= '0';
+      cycle_r <= cycle_r + 1;
+      if cycle_r = CYCLES-1 then
+        cycle_r <= 0;
+        tick_r  <= '1';
+      end if;
+      if rst_n = '0' then
+        cycle_r <= 0;
+        tick_r  <= '0';
+      end if;
+    end if;
+  end process count_time;
+
+  -- ------------------------------------------------------------------ frames of the line
+
+  u_receiver : entity firm.firm_mac_receiver
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      rx_step       => rx_step,
+      rx_dv         => rx_dv,
+      rx_er         => rx_er,
+      rxd           => rxd,
+      m_axis_tdata  => received_tdata,
+      m_axis_tuser  => received_tuser,
+      m_axis_tvalid => received_tvalid,
+      m_axis_tlast  => received_tlast,
+      is_good       => open,
+      is_broken     => is_broken,
+      is_long       => is_too_long
+    );
+
+  u_responder : entity firm.firm_net_responder
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      mac           => mac,
+      address       => address,
+      s_axis_tdata  => received_tdata,
+      s_axis_tuser  => received_tuser,
+      s_axis_tvalid => received_tvalid,
+      s_axis_tlast  => received_tlast,
+      m_axis_tdata  => sources_tdata(7 downto 0),
+      m_axis_tvalid => sources_tvalid(0),
+      m_axis_tlast  => sources_tlast(0),
+      m_axis_tready => sources_tready(0),
+      is_lost       => is_reply_lost
+    );
+
+  u_presence : entity firm.firm_net_presence
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      tick          => tick_r,
+      mac           => mac,
+      address       => address,
+      group_ip      => GROUP_IP,
+      s_axis_tdata  => received_tdata,
+      s_axis_tuser  => received_tuser,
+      s_axis_tvalid => received_tvalid,
+      s_axis_tlast  => received_tlast,
+      wants_report  => wants_report,
+      wants_probe   => wants_probe,
+      is_sent       => is_sent,
+      is_taken      => network_error(8)
+    );
+
+  u_udp : entity firm.firm_udp_receiver
+    generic map (
+      PORTS => PORTS
+    )
+    port map (
+      clk            => clk,
+      rst_n          => rst_n,
+      mac            => mac,
+      address        => address,
+      group_ip       => GROUP_IP,
+      udp_ports      => udp_ports,
+      s_axis_tdata   => received_tdata,
+      s_axis_tuser   => received_tuser,
+      s_axis_tvalid  => received_tvalid,
+      s_axis_tlast   => received_tlast,
+      m_axis_tdata   => datagram_tdata,
+      m_axis_tuser   => datagram_tuser,
+      m_axis_tvalid  => datagram_tvalid,
+      m_axis_tlast   => datagram_tlast,
+      source_mac     => source_mac,
+      source_address => open,
+      source_port    => open,
+      port_match     => open,
+      is_fragment    => network_error(2),
+      is_broken      => network_error(1)
+    );
+
+  -- ------------------------------------------------------------------ the node
+
+  prefix <= PREFIX_HEAD & mac & PREFIX_TAIL;
+
+  u_node : entity firm.firm_rtps_node
+    generic map (
+      WRITERS => WRITERS,
+      READERS => READERS,
+      SOURCES => SOURCES,
+      SAMPLE  => SAMPLE,
+      DEPTH   => DEPTH
+    )
+    port map (
+      clk                 => clk,
+      rst_n               => rst_n,
+      tick                => tick_r,
+      prefix              => prefix,
+      sample_writer       => sample_writer,
+      wants_reliable      => wants_reliable,
+      wants_transient     => wants_transient,
+      packet_tdata        => datagram_tdata,
+      packet_tuser        => datagram_tuser,
+      packet_tvalid       => datagram_tvalid,
+      packet_tlast        => datagram_tlast,
+      source_mac          => source_mac,
+      names_address       => names_address,
+      names_data          => names_data,
+      frame_tdata         => in_tdata,
+      frame_tvalid        => in_tvalid,
+      frame_tlast         => in_tlast,
+      frame_tready        => in_tready,
+      sample_tdata        => sample_tdata,
+      sample_tvalid       => sample_tvalid,
+      sample_tlast        => sample_tlast,
+      sample_tready       => sample_tready,
+      start               => node_start,
+      packet              => node_packet,
+      payload_bytes       => node_bytes,
+      is_busy             => node_busy,
+      build_field_valid   => field_valid,
+      build_field_address => field_address,
+      build_field_data    => field_data,
+      payload_tdata       => payload_tdata,
+      payload_tvalid      => payload_tvalid,
+      payload_tready      => payload_tready,
+      peers_known         => open,
+      sources_known       => open,
+      is_lost             => is_lost,
+      is_full             => network_error(4),
+      is_unmatched        => network_error(5),
+      is_dropped          => network_error(6),
+      is_long             => is_long
+    );
+
+  u_streams : entity firm.firm_net_streams
+    generic map (
+      WIDTH => WIDTH
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      to_tdata      => in_tdata,
+      to_tvalid     => in_tvalid,
+      to_tlast      => in_tlast,
+      to_tready     => in_tready,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tuser  => m_axis_tuser,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tuser  => s_axis_tuser,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      from_tdata    => out_tdata,
+      from_tuser    => out_tuser,
+      from_tvalid   => out_tvalid,
+      from_tlast    => out_tlast,
+      from_tready   => out_tready
+    );
+
+  u_samples : entity firm.firm_net_samples
+    generic map (
+      DEPTH => HELD
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => out_tdata,
+      s_axis_tuser  => out_tuser,
+      s_axis_tvalid => out_tvalid,
+      s_axis_tlast  => out_tlast,
+      s_axis_tready => out_tready,
+      m_axis_tdata  => sample_tdata,
+      m_axis_tvalid => sample_tvalid,
+      m_axis_tlast  => sample_tlast,
+      m_axis_tready => sample_tready,
+      is_long       => is_refused
+    );
+
+  -- ------------------------------------------------------------------ packets
+
+  is_node       <= node_start or held_r;
+  start         <= (is_node or wants_report or wants_probe) and not is_busy;
+  is_sent       <= start and not is_node;
+  packet        <= node_packet when is_node = '1' else
+                   number_of(REPORT_PACKET) when wants_report = '1' else
+                   number_of(PROBE_PACKET);
+  payload_bytes <= node_bytes when is_node = '1' else (others => '0');
+  node_busy     <= is_busy or held_r;
+
+  hold_packet : process (clk)
+  begin
+    if rising_edge(clk) then
+      held_r <= is_node and is_busy;
+      if rst_n = '0' then
+        held_r <= '0';
+      end if;
+    end if;
+  end process hold_packet;
+
+  u_builder : entity firm.firm_packet_builder
+    generic map (
+      ADDRESS_BITS => PROGRAM_BITS
+    )
+    port map (
+      clk             => clk,
+      rst_n           => rst_n,
+      start           => start,
+      entry           => entry,
+      payload_bytes   => payload_bytes,
+      is_busy         => is_busy,
+      field_valid     => field_valid,
+      field_address   => field_address,
+      field_data      => field_data,
+      program_enable  => program_enable,
+      program_address => program_address,
+      program_word    => program_word,
+      s_axis_tdata    => payload_tdata,
+      s_axis_tvalid   => payload_tvalid,
+      s_axis_tready   => payload_tready,
+      m_axis_tdata    => sources_tdata(15 downto 8),
+      m_axis_tvalid   => sources_tvalid(1),
+      m_axis_tlast    => sources_tlast(1),
+      m_axis_tready   => sources_tready(1)
+    );
+
+  u_merge : entity firm.firm_net_merge
+    generic map (
+      SOURCES => 2
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => sources_tdata,
+      s_axis_tvalid => sources_tvalid,
+      s_axis_tlast  => sources_tlast,
+      s_axis_tready => sources_tready,
+      m_axis_tdata  => sent_tdata,
+      m_axis_tvalid => sent_tvalid,
+      m_axis_tlast  => sent_tlast,
+      m_axis_tready => sent_tready
+    );
+
+  u_transmitter : entity firm.firm_mac_transmitter
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => sent_tdata,
+      s_axis_tvalid => sent_tvalid,
+      s_axis_tlast  => sent_tlast,
+      s_axis_tready => sent_tready,
+      tx_step       => tx_step,
+      tx_en         => tx_en,
+      tx_er         => tx_er,
+      txd           => txd,
+      is_sent       => open,
+      is_spoiled    => open
+    );
+
+  network_error(0) <= is_broken or is_too_long;
+  network_error(3) <= is_reply_lost or is_lost;
+  network_error(7) <= is_long or is_refused;
+
+end architecture rtl;

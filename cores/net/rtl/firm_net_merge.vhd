@@ -1,0 +1,95 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Sends the frames of several sources, one frame at a time; of sources that wait, the first one is sent.
+library ieee;
+use ieee.std_logic_1164.all;
+
+entity firm_net_merge is
+  generic (
+    SOURCES : integer := 2  -- 1 or more
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- Source 0 in the lowest bits.
+    s_axis_tdata  : in  std_logic_vector(8*SOURCES-1 downto 0);
+    s_axis_tvalid : in  std_logic_vector(SOURCES-1 downto 0);
+    s_axis_tlast  : in  std_logic_vector(SOURCES-1 downto 0);
+    s_axis_tready : out std_logic_vector(SOURCES-1 downto 0);
+
+    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic
+  );
+end entity firm_net_merge;
+
+architecture rtl of firm_net_merge is
+
+  subtype sources_t is std_logic_vector(SOURCES-1 downto 0);
+  constant NO_SOURCE : sources_t := (others => '0');
+
+  signal first    : sources_t;  -- the source to begin with, if one waits
+  signal chosen_r : sources_t;  -- the source of the frame that is under way
+  signal chosen   : sources_t;
+  signal valid    : std_logic;
+  signal last     : std_logic;
+
+begin
+
+  assert SOURCES >= 1
+    report "firm_net_merge: SOURCES is " & integer'image(SOURCES) & "; legal: 1 or more"
+    severity failure;
+
+  find_first : process (s_axis_tvalid)
+    variable found : std_logic;
+  begin
+    found := '0';
+    for index in 0 to SOURCES-1 loop
+      first(index) <= s_axis_tvalid(index) and not found;
+      found        := found or s_axis_tvalid(index);
+    end loop;
+  end process find_first;
+
+  chosen <= first when chosen_r = NO_SOURCE else chosen_r;
+
+  show : process (chosen, s_axis_tdata, s_axis_tvalid, s_axis_tlast)
+    variable byte : std_logic_vector(7 downto 0);
+  begin
+    byte := x"00";
+    for index in 0 to SOURCES-1 loop
+      if chosen(index) = '1' then
+        byte := byte or s_axis_tdata(8*index+7 downto 8*index);
+      end if;
+    end loop;
+    m_axis_tdata <= byte;
+    valid        <= '0';
+    last         <= '0';
+    if (chosen and s_axis_tvalid) /= NO_SOURCE then
+      valid <= '1';
+    end if;
+    if (chosen and s_axis_tlast) /= NO_SOURCE then
+      last <= '1';
+    end if;
+  end process show;
+
+  m_axis_tvalid <= valid;
+  m_axis_tlast  <= last;
+  s_axis_tready <= chosen when m_axis_tready = '1' else NO_SOURCE;
+
+  follow : process (clk)
+  begin
+    if rising_edge(clk) then
+      if valid = '1' then
+        chosen_r <= chosen;
+        if m_axis_tready = '1' and last = '1' then
+          chosen_r <= NO_SOURCE;
+        end if;
+      end if;
+      if rst_n = '0' then
+        chosen_r <= NO_SOURCE;
+      end if;
+    end if;
+  end process follow;
+
+end architecture rtl;

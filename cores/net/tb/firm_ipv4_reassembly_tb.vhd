@@ -1,0 +1,156 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Sends frames to the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether
+-- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a frame that leaves, in the
+-- same form without the cycles; or `dropped`, or `lost`.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use std.textio.all;
+library firm;
+use firm.firm_sim_pkg.all;
+
+entity firm_ipv4_reassembly_tb is
+  generic (
+    PACKETS       : integer := 2;
+    BYTES         : integer := 2048;
+    DEPTH         : integer := 4096;
+    TICKS         : integer := 1000;
+    FRAME_FILE    : string  := "frames.txt";
+    RESULT_FILE   : string  := "packets.txt";
+    EXPECTED_FILE : string  := "";
+    SEED          : integer := 1;
+    SLOW_PERCENT  : integer := 0;     -- the chance, each cycle, that no byte comes
+    TICK_CYCLES   : integer := 1000;  -- of a millisecond
+    LAST_CYCLES   : integer := 20000  -- after the last frame
+  );
+end entity firm_ipv4_reassembly_tb;
+
+architecture simulation of firm_ipv4_reassembly_tb is
+
+  constant GAP : positive := 6;  -- cycles between frames, at least
+
+  signal clk   : std_logic := '0';
+  signal rst_n : std_logic;
+  signal over  : boolean;
+  signal tick  : std_logic := '0';
+
+  signal s_tdata    : std_logic_vector(7 downto 0);
+  signal s_tuser    : std_logic_vector(0 downto 0);
+  signal s_tvalid   : std_logic;
+  signal s_tlast    : std_logic;
+  signal m_tdata    : std_logic_vector(7 downto 0);
+  signal m_tuser    : std_logic_vector(0 downto 0);
+  signal m_tvalid   : std_logic;
+  signal m_tlast    : std_logic;
+  signal is_dropped : std_logic;
+  signal is_lost    : std_logic;
+
+begin
+
+  clk <= not clk after 4 ns when not over else '0';
+
+  u_reassembly : entity firm.firm_ipv4_reassembly
+    generic map (
+      PACKETS => PACKETS,
+      BYTES   => BYTES,
+      DEPTH   => DEPTH,
+      TICKS   => TICKS
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      tick          => tick,
+      mac           => x"020000000002",
+      address       => x"c0000202",
+      s_axis_tdata  => s_tdata,
+      s_axis_tuser  => s_tuser,
+      s_axis_tvalid => s_tvalid,
+      s_axis_tlast  => s_tlast,
+      m_axis_tdata  => m_tdata,
+      m_axis_tuser  => m_tuser,
+      m_axis_tvalid => m_tvalid,
+      m_axis_tlast  => m_tlast,
+      is_dropped    => is_dropped,
+      is_lost       => is_lost
+    );
+
+  u_rows : entity firm.firm_sim_rows
+    generic map (
+      FRAME_FILE   => FRAME_FILE,
+      SEED         => SEED,
+      SLOW_PERCENT => SLOW_PERCENT,
+      GAP_CYCLES   => 12,
+      LAST_CYCLES  => LAST_CYCLES
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      m_axis_tdata  => s_tdata,
+      m_axis_tuser  => s_tuser,
+      m_axis_tvalid => s_tvalid,
+      m_axis_tlast  => s_tlast,
+      over          => over
+    );
+
+  keep_time : process (clk)
+    variable cycle : natural := 0;
+  begin
+    if rising_edge(clk) then
+      tick  <= '0';
+      cycle := cycle + 1;
+      if cycle = TICK_CYCLES then
+        cycle := 0;
+        tick  <= '1';
+      end if;
+    end if;
+  end process keep_time;
+
+  record_frames : process
+    file results     : text open write_mode is RESULT_FILE;
+    file expected    : text open read_mode is existing(EXPECTED_FILE);
+    variable row     : line;
+    variable content : line;
+    variable size    : natural := 0;
+    variable idle    : natural := GAP;
+
+    procedure note(what : in string) is
+    begin
+      write(row, what);
+      write_result(results, expected, EXPECTED_FILE, row);
+    end procedure note;
+
+  begin
+    while not over loop
+      wait until rising_edge(clk) or over;
+      next when over or rst_n = '0';
+      if is_dropped = '1' then
+        note("dropped");
+      end if;
+      if is_lost = '1' then
+        note("lost");
+      end if;
+      if m_tvalid = '0' then
+        idle := idle + 1;
+        next;
+      end if;
+      assert size /= 0 or idle >= GAP
+        report "two frames without a gap" severity failure;
+      idle := 0;
+      size := size + 1;
+      write(content, ' ' & integer'image(to_integer(unsigned(m_tdata))));
+      if m_tlast = '1' then
+        write(row, integer'image(to_integer(unsigned(m_tuser))) & ' ' & integer'image(size) & content.all);
+        write_result(results, expected, EXPECTED_FILE, row);
+        deallocate(content);
+        size := 0;
+      end if;
+    end loop;
+    assert size = 0
+      report "a frame without an end" severity failure;
+    assert endfile(expected)
+      report EXPECTED_FILE & " has more lines than there are frames" severity failure;
+    print("PASS");
+    wait;
+  end process record_frames;
+
+end architecture simulation;

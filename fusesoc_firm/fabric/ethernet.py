@@ -1,0 +1,98 @@
+"""The hardware of a node of ROS 2 by Ethernet: its memories, and the entity that connects them with `firm_net_link`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.names import LONGEST_NAME, memory_of_names
+from fusesoc_firm.fabric.node import Node, node_of
+from fusesoc_firm.fabric.packets import memory_of, programs_of
+from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.system.derived.ethernet import longest_sent
+from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
+from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entity
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.render import Context, Rendering, render
+
+_NODE_TEMPLATE = "vhdl/net_node.vhd"
+_SHORTEST_SAMPLE = 2
+
+
+def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> dict[str, str]:
+    """Return the VHDL of a node, by its files' names, in compilation order; nothing for other systems.
+
+    Raise `InputError` if a name is too long.
+    """
+    node, entity = ethernet_node(system, libraries), node_entity(system)
+    if node is None:
+        return {}
+    packets, names = f"{system.entity}_packets", f"{system.entity}_names"
+    made = [
+        memory_of(node, packets, frames_of(node.network)),
+        memory_of_names(node.readers, names),
+        Rendering(_NODE_TEMPLATE, _configuration(system, node, {"entity": entity, "packets": packets, "names": names})),
+    ]
+    return {f"{item.context['entity']}.vhd": render(item.template, item.context) for item in made}
+
+
+def ethernet_node(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> Node | None:
+    """Return the node of a system by Ethernet, or None for other systems.
+
+    Raise `InputError` if a name is longer than those that the hardware compares.
+    """
+    if system.network is None or system.network.kind is not NetworkKind.ETHERNET:
+        return None
+    node = node_of(system, libraries)
+    for item in node.readers:
+        for name in (item.topic, item.type):
+            if len(name) > LONGEST_NAME:
+                fail(
+                    f"the name {name} of '{system.name}' has {len(name)} characters in ROS 2's network",
+                    hint=f"a node by Ethernet compares up to {LONGEST_NAME}",
+                )
+    return node
+
+
+def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:
+    """Return the configuration of the node; the hardware has one writer of samples."""
+    assert system.clock is not None
+    network, programs = node.network, programs_of(node, frames_of(node.network))
+    numbers = {name: number for number, name in enumerate(programs.entries)}
+    ports = {
+        "all participants": rtps.multicast_port(network.domain),
+        "discovery": rtps.metatraffic_port(network.domain),
+        "messages": rtps.user_port(network.domain),
+    }
+    return {
+        **entities,
+        "node": network.name,
+        "width": system.width,
+        "lanes": system.width // 8,
+        "readers": [{"id": number, "topic": item.topic} for number, item in enumerate(node.readers)],
+        "writers": [{"id": number, "topic": item.topic} for number, item in enumerate(node.writers[1:])],
+        "fault_count": len(NETWORK_FAULTS),
+        "mac": network.mac.hex(),
+        "address": network.address.packed.hex(),
+        "dotted": str(network.address),
+        "ports": ", ".join(f"{port} ({name})" for name, port in ports.items()),
+        "udp_ports": "".join(f"{port:04x}" for port in reversed(ports.values())),
+        "writer": node.writers[-1].entity.hex(),
+        "reader_count": len(node.readers),
+        "name_bits": 8 * len(node.readers),
+        "writer_count": len(node.writers),
+        "wants_reliable": _bits(item.quality.is_reliable for item in node.readers),
+        "wants_transient": _bits(item.quality.is_transient_local for item in node.readers),
+        "program_bits": programs.address_bits,
+        "clock_hz": round(system.clock),
+        "sample": max(_SHORTEST_SAMPLE, 1 << (longest_sent(system.publishers) - 1).bit_length()),
+        "report_packet": numbers[REPORT],
+        "probe_packet": numbers[PROBE],
+    }
+
+
+def _bits(values: Iterable[bool]) -> str:
+    """Return the digits of a vector whose lowest bit is the first value."""
+    return "".join("01"[value] for value in reversed([*values]))

@@ -1,0 +1,64 @@
+"""Size and clock of a node of ROS 2 by Ethernet, placed and routed on an ECP5-25."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from tests.bench import timing
+from tests.bench.nextpnr import SEEDS, Nextpnr
+from tests.bench.tables import Table, Tell
+from tests.bench.timing import Design, Row
+from tests.hdl.ghdl import Generic, Library, core_files
+
+TITLE = "A node of ROS 2 by Ethernet, MHz"
+DEVICE = "--25k --speed 8 --package CABGA381"
+# The clock of a GMII, in MHz.
+_BAR = 125.0
+_CORES = (
+    "axis/package",
+    "axis/axis",
+    "cdc/sync",
+    "cdc/cdc",
+    "net/mac",
+    "net/streams",
+    "net/responder",
+    "net/presence",
+    "net/udp",
+    "net/rtps",
+    "net/builder",
+    "net/net_node",
+)
+_TOPICS: Mapping[str, Generic] = {"WRITERS": 2, "READERS": 2, "SAMPLE": 64}
+_NOTE = """The node has eight peers, eight writers of peers, two topics in and one topic out, with up to 64 bytes. It is
+    measured without the memories of its packets and names. Block RAMs and distributed memories are not counted."""
+
+
+def rows() -> list[Row]:
+    """All rows: the node with MAC, ARP, ICMP, IGMP and UDP, and its two largest parts."""
+    return [
+        Row("the node", 8, _entity("firm_net_link", {"WIDTH": 8, **_TOPICS}), _BAR),
+        Row("RTPS in it", 8, _entity("firm_rtps_node", _TOPICS)),
+        Row("the packet builder in it", 8, _entity("firm_packet_builder", {})),
+    ]
+
+
+def keys() -> dict[str, list[tuple[str, ...]]]:
+    """The first cells of every row, by table."""
+    return {TITLE: [row.key for row in rows()]}
+
+
+def measure(
+    nextpnr: Nextpnr, tell: Tell, written: str = "", pattern: str = "", seeds: Sequence[int] = SEEDS
+) -> list[Table]:
+    """Place the rows whose names match the regular expression `pattern`; `tell` hears of each."""
+    return timing.measured_tables({TITLE: rows()}, {TITLE: _NOTE}, nextpnr, tell, written, pattern, seeds)
+
+
+def _entity(entity: str, generics: Mapping[str, Generic]) -> Callable[[Path], Design]:
+    def make(folder: Path) -> Design:
+        library = Library("firm", folder)
+        library.analyse(core_files(*_CORES))
+        return Design(library.synthesise(entity, generics, "verilog"), entity)
+
+    return make
