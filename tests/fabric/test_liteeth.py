@@ -86,13 +86,12 @@ class Network:
 
     def _send(self) -> None:
         assert self._process.stdin
+        # LiteEth has no groups: the hardware is addressed like a first peer whose address is known.
+        group, board = Address(rtps.MULTICAST, rtps.multicast_port(0)), Address(BOARD, rtps.metatraffic_port(0))
         for address, packet in self.participant.outbox:
-            # LiteEth has no groups: the hardware is addressed as its first peer would be told to.
-            group = Address(rtps.MULTICAST, rtps.multicast_port(0))
-            if address == group:
-                address = Address(BOARD, rtps.metatraffic_port(0))
-            assert address.host == BOARD
-            self._process.stdin.write(f"send {address.port} {packet.hex()}\n")
+            port = (board if address == group else address).port
+            assert address.host == BOARD or address == group
+            self._process.stdin.write(f"send {port} {packet.hex()}\n")
         self.participant.outbox.clear()
         self._process.stdin.write("run 1\n")
         self._process.stdin.flush()
