@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fusesoc_firm.text.file_lock import locked
+from fusesoc_firm.tools.processes import start_time
 
 BEAT_SECONDS = 2.0
 """The maximum time in seconds between an owner's calls of `beat`."""
@@ -57,7 +58,7 @@ class FolderLock:
     def acquire(self) -> Owner | None:
         """Take the lock and return None or, without waiting, return the current owner. May raise `OSError`."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        mine = Owner(secrets.token_hex(8), _machine(), os.getpid(), _started(os.getpid()), socket.gethostname())
+        mine = Owner(secrets.token_hex(8), _machine(), os.getpid(), start_time(os.getpid()), socket.gethostname())
         new = self.path.with_name(f"{self.path.name}.{mine.token}")
         try:
             new.write_text(json.dumps(vars(mine)), encoding="utf-8")
@@ -92,7 +93,7 @@ class FolderLock:
 
     def _is_gone(self, owner: Owner) -> bool:
         if owner.machine == _machine():
-            return _started(owner.process) != owner.started
+            return start_time(owner.process) != owner.started
         try:
             changed = self.path.stat().st_mtime_ns
         except FileNotFoundError:
@@ -126,12 +127,3 @@ def _machine() -> str:
         return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
     except OSError:
         return socket.gethostname()
-
-
-def _started(process: int) -> str:
-    """Return the start time of a process in the system's units, or an empty string if the process does not exist."""
-    try:
-        # The fields follow the name in parentheses, which may contain blanks.
-        return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]
-    except (FileNotFoundError, ProcessLookupError):
-        return ""

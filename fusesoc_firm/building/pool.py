@@ -8,7 +8,6 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 from fusesoc_firm.building.build import Build, Limits, Outcome, ignore
 from fusesoc_firm.building.folder_lock import BEAT_SECONDS, FolderLock
 from fusesoc_firm.building.process import Run, build_in_this_process, last_lines, run_all
+from fusesoc_firm.tools.processes import process_status
 
 if TYPE_CHECKING:
     from fusesoc_firm.building.plan import Plan
@@ -162,10 +162,5 @@ def _signal(process: BaseProcess, number: signal.Signals) -> bool:
 
 def _has_ended(process: BaseProcess) -> bool:
     """Return whether only zombies are left of a build's processes, as of those in a sandbox, which the system reaps."""
-    states = set()
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        # It may end now; a program's name may contain anything.
-        with suppress(OSError):
-            state, _, group, *_ = status.read_text(errors="replace").rpartition(")")[2].split()
-            states |= {state} if group == str(process.pid) else set()
-    return states == {"Z"}
+    found = (process_status(entry.name) for entry in Path("/proc").glob("[0-9]*"))
+    return {status.state for status in found if status and status.group == str(process.pid)} == {"Z"}

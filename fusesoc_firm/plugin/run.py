@@ -21,6 +21,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 
 from fusesoc_firm.text.files import read_file, write_if_changed
+from fusesoc_firm.tools.processes import start_time
 
 # The folder in which FuseSoC creates a folder for each call; adjacent folders in other places are not one design.
 _GENERATED = "generator_cache"
@@ -38,9 +39,7 @@ Clash = tuple[str, str]
 
 def run_of(fusesoc: int) -> str:
     """Return an id, unique on this machine, for the run of the FuseSoC process with this id."""
-    # The start time follows the name in parentheses, which may contain blanks.
-    status = (read_file(f"/proc/{fusesoc}/stat") or b"").decode(errors="replace")
-    return f"{fusesoc} {''.join(status.rpartition(')')[2].split()[19:20])}"
+    return f"{fusesoc} {start_time(fusesoc)}"
 
 
 def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str) -> Clash | None:

@@ -1,10 +1,13 @@
 """`make proofs`: prove everything, see every broken copy fail, and write the table of docs/figures/proofs.md.
 
+    python -m tests.proofs
+
 The exit code is 1 if a property is not proved or a fault is not found.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 import time
@@ -18,6 +21,7 @@ from tests.proofs.proof import Proof
 
 def main() -> int:
     """Prove one after the other, so that the seconds mean something."""
+    argparse.ArgumentParser("tests.proofs", description="Prove everything, see every fault found.").parse_args()
     yowasp.Yosys().prepare()
     seconds = {proof.name: _seconds(proof) for proof in PROOFS}
     if None in seconds.values():

@@ -1,0 +1,150 @@
+"""The hardware opposite LiteEth, whose MAC, ARP, IPv4 and UDP are between it and the reference node."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.node import Endpoint
+from tests.bench.model import compiled
+from tests.fabric.echo_node import node_in
+from tests.fabric.messages import Address
+from tests.fabric.participant import Participant
+from tests.fabric.test_board import CORES, HARDWARE, memories, sample
+from tests.hdl.verilog import netlist
+
+HERE = Path(__file__).parent
+SEED = 20261127
+BOARD = "192.0.2.9"
+PERIOD = 100  # milliseconds between two samples of the hardware
+SPECIFICATION = """\
+project:
+  name: peer
+  width: 64
+  interconnect: ethernet
+  network: {mac: "02:00:00:00:00:03", address: 192.0.2.3}
+blocks:
+  - {name: counted, middleware: ROS2, mode: subscriber, message: std_msgs/UInt32, topic: /count_out,
+     qos: {reliability: best_effort}, outgoing: [{name: count}]}
+  - {name: said, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /words_out,
+     qos: {reliability: best_effort}, outgoing: [{name: words}]}
+  - {name: count, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /count_in,
+     qos: {reliability: best_effort}}
+  - {name: words, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_in,
+     qos: {reliability: best_effort}}
+"""
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Both ends, translated by Verilator."""
+    if not shutil.which("verilator"):
+        pytest.skip("verilator is not installed")
+    folder = tmp_path_factory.mktemp("liteeth")
+    host = subprocess.check_output([sys.executable, str(HERE / "liteeth_host.py")], text=True, cwd=folder)
+    verilog = netlist("net_node", folder, [*memories(folder), CORES / "net_node.vhd"], HARDWARE)
+    parts = verilog.read_text(encoding="utf-8"), host, (HERE / "liteeth_bench.v").read_text(encoding="ascii")
+    bench = (HERE / "liteeth_bench.cpp").read_text(encoding="ascii")
+    return compiled("\n".join(parts), "liteeth_bench", bench, folder)
+
+
+class Network:
+    """The reference node at LiteEth, and the time of both ends."""
+
+    def __init__(self, process: subprocess.Popen[str], folder: Path) -> None:
+        (folder / "peer.yaml").write_text(SPECIFICATION, encoding="utf-8")
+        self._process = process
+        self.node = node_in(folder / "peer.yaml")
+        self.participant = Participant(self.node, self._take)
+        self.now = 0
+        self.frames: list[bytes] = []
+        self.samples: list[bytes] = []
+        self.participant.start(0)
+
+    def _take(self, _: Endpoint, payload: bytes) -> None:
+        self.samples.append(payload)
+
+    def run(self, milliseconds: int) -> None:
+        """Let both ends run; what they send arrives within the same millisecond or in the next one."""
+        for _ in range(milliseconds):
+            self.now += 1
+            self.participant.tick(self.now)
+            self._send()
+            for kind, data in self._passed():
+                if kind == "frame":
+                    self.frames.append(data)
+                else:
+                    self.participant.receive(data, self.now)
+
+    def _send(self) -> None:
+        assert self._process.stdin
+        # LiteEth has no groups: the hardware is addressed like a first peer whose address is known.
+        group, board = Address(rtps.MULTICAST, rtps.multicast_port(0)), Address(BOARD, rtps.metatraffic_port(0))
+        for address, packet in self.participant.outbox:
+            port = (board if address == group else address).port
+            assert address.host == BOARD or address == group
+            self._process.stdin.write(f"send {port} {packet.hex()}\n")
+        self.participant.outbox.clear()
+        self._process.stdin.write("run 1\n")
+        self._process.stdin.flush()
+
+    def _passed(self) -> Iterator[tuple[str, bytes]]:
+        assert self._process.stdout
+        while (line := self._process.stdout.readline()) != "done\n":
+            assert line, "the simulation has ended"
+            kind, data = line.split()
+            yield kind, bytes.fromhex(data)
+
+    def run_until_matched(self) -> None:
+        """Until the hardware's writer is known, and it knows this node's; at most a second."""
+        for _ in range(100):
+            self.run(10)
+            if self.participant.sources and len(self.participant.sinks) == 2:
+                return
+        raise AssertionError(f"not matched after a second: {self.participant.counts}")
+
+
+@pytest.fixture
+def network(program: Path, tmp_path: Path) -> Iterator[Network]:
+    with subprocess.Popen([str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        yield Network(process, tmp_path)
+        process.kill()
+
+
+@pytest.mark.check
+def test_samples_of_the_hardware_pass_through_liteeth(network: Network) -> None:
+    network.run_until_matched()
+    network.samples.clear()
+    network.run(20 * PERIOD)
+    numbers = [struct.unpack("<I", payload[4:8])[0] for payload in network.samples]
+    assert 19 <= len(numbers) <= 21
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+@pytest.mark.check
+def test_samples_of_all_sizes_through_liteeth_become_frames(network: Network) -> None:
+    print(f"seed {SEED}")
+    network.run_until_matched()
+    chance = random.Random(SEED)
+    writers = {item.topic: item for item in network.node.writers}
+    sent: list[int | str] = []
+    for number in range(300):
+        if chance.random() < 0.3:
+            sent.append(chance.getrandbits(32))
+            topic, payload = "rt/count_in", struct.pack("<I", sent[-1])
+        else:
+            text = "x" * chance.choice((number, chance.randrange(1300)))
+            sent.append(text)
+            topic, payload = "rt/words_in", struct.pack("<I", len(text) + 1) + text.encode() + b"\0"
+        network.participant.publish(writers[topic], rtps.XCDR1 + payload, network.now)
+        network.run(chance.randrange(1, 3))
+    network.run(5)
+    assert [*map(sample, network.frames)] == sent
