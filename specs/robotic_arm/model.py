@@ -31,6 +31,8 @@ ELEMENT_LIMIT = 4
 _GUARD = 6
 _INNER = FRACTION + _GUARD
 _SQUARE_CUT = 8
+# 13/8 rad; the CORDIC unit folds angles from here on.
+_FOLDED_FROM = 13 * 2**FRACTION // 8
 
 Numbers = list[float]
 
@@ -98,7 +100,7 @@ def fold(angle: int) -> int:
 def sincos(angle: int) -> tuple[int, int]:
     """`firm_cordic_sincos`: cosine and sine."""
     left, cosine, sine = angle << _GUARD, _START, 0
-    if abs(left) > 2 * _ANGLES[0]:
+    if not -_FOLDED_FROM <= angle < _FOLDED_FROM:
         left += -4 * _ANGLES[0] if left > 0 else 4 * _ANGLES[0]
         cosine = -cosine
     for index, step in enumerate(_ANGLES):

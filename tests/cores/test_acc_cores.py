@@ -109,6 +109,8 @@ def test_sine_and_cosine(library: Library, tmp_path: Path, fraction: int, iterat
     angles = [0, 1, -1, 4 * unit - 1, -4 * unit]
     for eighths in range(-8, 9):
         angles += [round(PI / 8 * eighths * unit) + beside for beside in (-1, 0, 1)]
+    # The angles that are folded begin here.
+    angles += [sign * 13 * unit // 8 + beside for sign in (-1, 1) for beside in (-1, 0, 1)]
     angles += [generator.randint(-4 * unit, 4 * unit - 1) for _ in range(100)]
     (tmp_path / "vectors.txt").write_text("".join(f"{binary(angle, fraction + 3)}\n" for angle in angles))
     generics = {"FRACTION": fraction, "ITERATIONS": iterations}

@@ -362,7 +362,7 @@ LATENCIES = {
     "resize": (7, 8),
     "from_fixed": (8, 8),
     "to_fixed": (6, 6),
-    "sincos": (105, 76),
+    "sincos": (106, 77),
     "low_pass": (45, 39),
     "pid": (113, 98),
 }
@@ -370,7 +370,7 @@ LATENCIES = {
 INTERVALS = {
     "divide": (57, 28),
     "square_root": (56, 27),
-    "sincos": (106, 77),
+    "sincos": (107, 78),
     "low_pass": (46, 40),
     "pid": (114, 99),
 }

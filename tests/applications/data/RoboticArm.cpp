@@ -28,6 +28,8 @@ static const double HAND_ANGLE = -0.7853981633974483;
 static const std::int64_t PI = 1686629713;
 static const std::int64_t TWO_PI = 3373259426;
 static const std::int64_t FOUR_PI = 6746518852;
+// 13/8 rad: sincos_of folds angles from here on.
+static const std::int64_t FOLDED_FROM = 872415232;
 static const std::int64_t START = 20865051970;
 static const std::int64_t ANGLES[FRACTION] = {
     26986075409, 15930810540, 8417402771, 4272805077, 2144693981, 1073392503,
@@ -81,7 +83,7 @@ static void sincos_of(std::int64_t angle, std::int64_t &cosine, std::int64_t &si
     std::int64_t left = angle * (1 << GUARD);
     std::int64_t x = START;
     std::int64_t y = 0;
-    if (left > 2 * ANGLES[0] || left < -2 * ANGLES[0]) {
+    if (angle >= FOLDED_FROM || angle < -FOLDED_FROM) {
         left += left > 0 ? -4 * ANGLES[0] : 4 * ANGLES[0];
         x = -x;
     }

@@ -2,7 +2,8 @@
 -- Sine and cosine of an angle: CORDIC in rotation mode, one rotation a cycle, no multiplier.
 --
 -- The unit vector is shortened by the factor by which the rotations lengthen it. It is turned by atan(2**-i), i = 0, 1,
--- ..., towards the angle. Angles beyond a quarter turn are first folded by half a turn, which negates the vector.
+-- ..., towards the angle. All rotations together reach 1.74, so angles of 13/8 and more, or below -13/8, are first folded
+-- by half a turn, which negates the vector. A few bits decide about that, since the fold follows in the same cycle.
 -- All numbers have a few bits more than the result, so that truncation in every rotation leaves the result accurate to
 -- about a unit. An angle takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
 
@@ -82,13 +83,14 @@ architecture rtl of firm_cordic_sincos is
     return std_logic_vector(unsigned(number(number'left downto GUARD)) + half);
   end function rounded;
 
-  constant ANGLES : angles_t := all_angles;
-  constant LENGTH : unsigned(INNER-1 downto 0) := inverse_gain(INNER);
+  constant ANGLES      : angles_t := all_angles;
+  constant LENGTH      : unsigned(INNER-1 downto 0) := inverse_gain(INNER);
+  constant FOLDED_FROM : positive := 13;  -- eighths
 
   -- Signals, set bit by bit: ghdl 2.0 translates a constant of more than 32 bits to a Verilog string.
   signal quarter_pi : angle_t;
-  signal half_pi    : angle_t;
   signal pi         : angle_t;
+  signal eighths    : signed(5 downto 0);  -- of the angle that comes, rounded down
   signal start      : number_t;
 
   signal count_r    : unsigned(COUNT_WIDTH-1 downto 0);
@@ -114,8 +116,8 @@ begin
   multiples : for k in quarter_pi'range generate
     quarter_pi(k) <= ANGLES(0)(k);
   end generate multiples;
-  half_pi <= shift_left(quarter_pi, 1);
   pi      <= shift_left(quarter_pi, 2);
+  eighths <= signed(in_angle(FRACTION+2 downto FRACTION-3));
 
   lengths : for k in LENGTH'range generate
     start(k) <= LENGTH(k);
@@ -135,18 +137,25 @@ begin
         busy_r <= '0';
         done_r <= '0';
       elsif ready = '1' then
-        busy_r  <= in_valid;
-        done_r  <= '0';
-        count_r <= (others => '0');
-      elsif busy_r = '1' then
-        count_r <= count_r + 1;
-        if count_r = ITERATIONS-1 then
-          busy_r <= '0';
-          done_r <= '1';
-        end if;
+        busy_r <= in_valid;
+        done_r <= '0';
+      elsif busy_r = '1' and count_r = ITERATIONS-1 then
+        busy_r <= '0';
+        done_r <= '1';
       end if;
     end if;
   end process control;
+
+  -- Without `ready`, which would be on the path to the table of angles: Yosys moves the table's address across it.
+  count : process (clk)
+  begin
+    if rising_edge(clk) then
+      count_r <= (others => '0');
+      if busy_r = '1' then
+        count_r <= count_r + 1;
+      end if;
+    end if;
+  end process count;
 
   rotate : process (clk)
     variable angle : angle_t;
@@ -158,10 +167,10 @@ begin
         cos_r   <= start;
         sin_r   <= (others => '0');
         angle_r <= angle;
-        if angle > half_pi then
+        if eighths >= FOLDED_FROM then
           cos_r   <= -start;
           angle_r <= angle - pi;
-        elsif angle < -half_pi then
+        elsif eighths < -FOLDED_FROM then
           cos_r   <= -start;
           angle_r <= angle + pi;
         end if;

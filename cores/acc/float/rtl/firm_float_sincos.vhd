@@ -60,7 +60,7 @@ architecture rtl of firm_float_sincos is
 
   constant LARGEST : unsigned(INNER+ANGLE_BITS-1 downto 0) := largest_step;
 
-  type state_t is (IDLE, CONVERT, MEASURE, FOLD, ROTATE, FINISH);
+  type state_t is (IDLE, CONVERT, MEASURE, FOLD, ROUND, ROTATE, FINISH);
 
   signal state_r      : state_t;
   -- Folds that are left.
@@ -81,7 +81,7 @@ architecture rtl of firm_float_sincos is
   signal is_undefined : std_logic;
 
   signal half         : signed(1 downto 0);
-  signal folded       : signed(FRACTION+2 downto 0);
+  signal folded_r     : signed(FRACTION+2 downto 0);
   signal turn_valid   : std_logic;
   signal turn_ready   : std_logic;
   signal turned       : std_logic;
@@ -119,9 +119,7 @@ begin
   end generate steps;
   first_step(WIDTH-1) <= '0';
 
-  -- Rounded to nearest.
-  half   <= '0' & angle_r(GUARD-1);
-  folded <= angle_r(INNER+2 downto GUARD) + half;
+  half <= '0' & angle_r(GUARD-1);
 
   u_to_fixed : entity firm.firm_float_to_fixed
     generic map (
@@ -153,7 +151,7 @@ begin
       rst_n     => rst_n,
       in_valid  => turn_valid,
       in_ready  => turn_ready,
-      in_angle  => std_logic_vector(folded),
+      in_angle  => std_logic_vector(folded_r),
       out_valid => turned,
       out_ready => taken,
       out_cos   => cosine_fixed,
@@ -200,6 +198,9 @@ begin
   control : process (clk)
   begin
     if rising_edge(clk) then
+      -- To nearest.
+      folded_r <= angle_r(INNER+2 downto GUARD) + half;
+
       if state_r = IDLE then
         if in_valid = '1' then
           state_r <= CONVERT;
@@ -234,10 +235,13 @@ begin
         step_r  <= '0' & step_r(WIDTH-1 downto 1);
         state_r <= MEASURE;
         if count_r = 0 then
-          state_r <= ROTATE;
+          state_r <= ROUND;
         else
           count_r <= count_r - 1;
         end if;
+
+      elsif state_r = ROUND then
+        state_r <= ROTATE;
 
       elsif state_r = ROTATE then
         if turn_ready = '1' then
