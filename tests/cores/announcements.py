@@ -509,5 +509,5 @@ class Peers:
         self._was_slow = True
 
     def _wait(self, _: _Peer) -> None:
-        self.events.append(Event(Kind.TICKS, count=self._chance.choice([1, 3, 19, 20, 21, 99, 101, 210])))
+        self.events.append(Event(Kind.TICKS, count=self._chance.choice([1, 3, 19, 20, 21, 40])))
         self._was_slow = True
