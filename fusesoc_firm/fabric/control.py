@@ -1,15 +1,15 @@
 """The program of a ROS 2 node in fabric (`ros2_node.seq`), assembled for `firm_rtps_sequencer`.
 
-The sequencer has one memory, in which an instruction works on numbers of 1 to 28 bytes, the lowest byte first. A program
-is text. Each line is `label:`, an instruction with its operands, a comment after `;`, or the name of a place:
+The sequencer has one memory, in which an instruction works on numbers of 1 to 28 bytes, the lowest byte first. A
+program is text. Each line is `label:`, an instruction with its operands, a comment after `;`, or the name of a place:
 
     global NAME ADDRESS       in the memory, of which the record of `firm_rtps_walker` is the begin
     peer NAME OFFSET          in the entry of the peer P: `P.NAME`
     entry NAME OFFSET         in the entry of the source or sink E: `E.NAME`
     table NAME OFFSET         in the table W: `W.NAME`
 
-`field.NAME` is a field of `firm_packet_builder`, `io.NAME` another place outside the memory, and `PLACE+N` a later byte.
-An operation may be followed by the number of its bytes, as in `copy.4 a, b`; without one, it is one byte.
+`field.NAME` is a field of `firm_packet_builder`, `io.NAME` another place outside the memory, and `PLACE+N` a later
+byte. An operation may be followed by the number of its bytes, as in `copy.4 a, b`; without one, it is one byte.
 
 | instruction | effect |
 |---|---|
@@ -44,9 +44,7 @@ MOST_SOURCES = MOST_SINKS = 32
 # Samples of a writer, and of all writers together.
 MOST_DEPTH, MOST_SLOTS = 127, 256
 
-_OPERATIONS = (
-    "copy add sub cmp and test mask load store bit step jump call return take".split()  # noqa: SIM905
-)
+_OPERATIONS = "copy add sub cmp and test mask load store bit step jump call return take".split()
 _SIZES = {size: code for code, size in enumerate((1, 2, 4, 8, 12, 16, 6, 28))}
 _REGISTERS = "PEWX"
 _SPACES = {"global": 0, "peer": 1, "entry": 2, "table": 3}
@@ -276,7 +274,7 @@ class _Assembler:
         operation, _, size = name.partition(".")
         head = _OPERATIONS.index(operation) << 32 | _SIZES[int(size or 1)] << 28
         match operation, operands:
-            case ("return" | "take" | "bit"), ():
+            case (("return" | "take" | "bit"), ()):
                 return head
             case "jump", (*condition, label):
                 return head | _CONDITIONS["".join(condition)] << 14 | self.labels[label]

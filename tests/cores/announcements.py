@@ -166,9 +166,13 @@ class _Peer:
 
 
 class Peers:
-    """Some peers that announce, end, send and leave at random; if they exaggerate, so do their lists of encodings."""
+    """Some peers that announce, end, send and leave at random.
 
-    def __init__(self, count: int, seed: int, *, exaggerate: bool = False) -> None:
+    If they exaggerate, so do their lists of encodings. Unless `is_sure`, no writer matches the reliable reader.
+    """
+
+    def __init__(self, count: int, seed: int, *, exaggerate: bool = False, is_sure: bool = True) -> None:
+        self._is_sure = is_sure
         self._exaggerates = exaggerate
         self._chance, self._node = random.Random(seed), a_node()
         self._peers = [self._peer(number) for number in range(count)]
@@ -290,7 +294,7 @@ class Peers:
         chance = self._chance
         is_known = bool(peer.writers) and chance.random() < 0.1
         entity = chance.choice(peer.writers).entity if is_known else self._new_entity()
-        topic = chance.choice(READ)
+        topic = chance.choice(READ if self._is_sure else READ[:SURE])
         if all(item.entity != entity for item in peer.writers):
             peer.writers.append(_Writer(entity, is_sure=topic == READ[SURE]))
         self._announce_endpoint(peer, PUBLICATIONS_WRITER, entity, topic[:2])
@@ -445,8 +449,11 @@ class Peers:
     def _sure_samples(self, peer: _Peer) -> None:
         """Samples for a reliable reader: some are lost, repeated or sent late, without a payload or in fragments."""
         chance, writer = self._chance, self._sure(peer)
-        for _ in range(chance.randrange(1, 5)):
-            number = writer.number + chance.choice([1, 1, 1, 1, 1, 2, 3, 0, -1])
+        numbers = [writer.number + chance.choice([1, 1, 1, 1, 1, 2, 3, 0, -1])]
+        if chance.random() < 0.5:
+            # As if they had been asked for.
+            numbers = list(range(max(1, writer.number - 8), writer.number + 2))
+        for number in numbers:
             writer.number = max(writer.number, number)
             item: Submessage = self._data(writer, max(0, number))
             assert isinstance(item, Data)

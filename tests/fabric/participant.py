@@ -444,7 +444,9 @@ class Participant:
             peer.acknowledged.discard(item.writer)
         wanted = [number for number in item.missing if 1 <= number <= len(announced)]
         for number in wanted:
-            self._send_to(peer, peer.metatraffic, Data(DISCOVERY[item.writer], item.writer, number, announced[number - 1]))
+            self._send_to(
+                peer, peer.metatraffic, Data(DISCOVERY[item.writer], item.writer, number, announced[number - 1])
+            )
         if item.writer not in peer.acknowledged:
             self._send_to(peer, peer.metatraffic, self._discovery_heartbeat(item.writer))
 

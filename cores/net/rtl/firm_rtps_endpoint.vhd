@@ -12,7 +12,7 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_endpoint is
   generic (
-    READERS : integer := 1; -- of the node, 1 to 8
+    READERS : integer := 1; -- of the node, 0 to 8
     WRITERS : integer := 1  -- of the node, 1 to 9
   );
   port (
@@ -135,8 +135,8 @@ architecture rtl of firm_rtps_endpoint is
 
 begin
 
-  assert READERS >= 1 and READERS <= MOST_READERS
-    report "firm_rtps_endpoint: READERS is " & integer'image(READERS) & "; legal: 1 to " & integer'image(MOST_READERS)
+  assert READERS >= 0 and READERS <= MOST_READERS
+    report "firm_rtps_endpoint: READERS is " & integer'image(READERS) & "; legal: 0 to " & integer'image(MOST_READERS)
     severity failure;
   assert WRITERS >= 1 and WRITERS <= MOST_WRITERS
     report "firm_rtps_endpoint: WRITERS is " & integer'image(WRITERS) & "; legal: 1 to " & integer'image(MOST_WRITERS)

@@ -15,7 +15,7 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_readers is
   generic (
-    READERS : integer := 1;    -- of the node, 1 to 8
+    READERS : integer := 1;    -- of the node, 0 to 8
     FIRST   : integer := 2;    -- the number in the entity id of the first one; those of the others follow
     SOURCES : integer := 8;    -- matched writers, 1 to 32
     BYTES   : integer := 2048; -- of payloads that wait, a power of two, 4 to 65536
@@ -207,8 +207,8 @@ architecture rtl of firm_rtps_readers is
 
 begin
 
-  assert READERS >= 1 and READERS <= MOST_READERS
-    report "firm_rtps_readers: READERS is " & integer'image(READERS) & "; legal: 1 to " & integer'image(MOST_READERS)
+  assert READERS >= 0 and READERS <= MOST_READERS
+    report "firm_rtps_readers: READERS is " & integer'image(READERS) & "; legal: 0 to " & integer'image(MOST_READERS)
     severity failure;
   assert FIRST >= 0 and FIRST + READERS <= 256
     report "firm_rtps_readers: FIRST is " & integer'image(FIRST) & "; legal: 0 to 256-READERS"
