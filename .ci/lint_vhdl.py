@@ -26,6 +26,7 @@ import yaml
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.converter.pipeline import PIPELINES
+from fusesoc_firm.fabric.control import memory_of_control
 from fusesoc_firm.fabric.names import memory_of_names
 from fusesoc_firm.fabric.node import node_of
 from fusesoc_firm.fabric.packets import memory_of
@@ -158,14 +159,18 @@ blocks:
 
 
 def write_node() -> None:
-    """Write the memories of a node in fabric: the programs of its packets, and the names of its topics."""
+    """Write the memories of a node in fabric: its program, those of its packets, and the names of its topics."""
     path = SAMPLES / "node.yaml"
     path.write_text(NODE, encoding="utf-8")
     faults, known = Diagnostics(), libraries((), None, None)
     system = derive(read_specification(path, path.name, faults), SAMPLES, known, faults)
     faults.raise_if_any()
     node = node_of(system, known)
-    for memory in (memory_of(node, "node_packets"), memory_of_names(node.readers, "node_names")):
+    for memory in (
+        memory_of_control(node, "node_control"),
+        memory_of(node, "node_packets"),
+        memory_of_names(node.compared, "node_names"),
+    ):
         (SAMPLES / f"{memory.context['entity']}.vhd").write_text(
             render(memory.template, memory.context), encoding="ascii"
         )

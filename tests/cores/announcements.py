@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from ipaddress import IPv4Address
 
@@ -200,7 +200,7 @@ class Peers:
             self._announce_reader: 8,
             self._ask: 8,
             self._publish: 10,
-            self._end: 2,
+            self._end: 3,
             self._end_reader: 1,
             self._tell: 3,
             self._ask_discovery: 3,
@@ -444,7 +444,8 @@ class Peers:
         return Data(reader, writer.entity, number, payload)
 
     def _sure(self, peer: _Peer) -> _Writer:
-        return self._chance.choice([item for item in peer.writers if item.is_sure] or [_Writer(b"none")])
+        # Later ones seldom found room.
+        return self._chance.choice([item for item in peer.writers if item.is_sure][:2] or [_Writer(b"none")])
 
     def _sure_samples(self, peer: _Peer) -> None:
         """Samples for a reliable reader: some are lost, repeated or sent late, without a payload or in fragments."""
@@ -455,8 +456,9 @@ class Peers:
             numbers = list(range(max(1, writer.number - 8), writer.number + 2))
         for number in numbers:
             writer.number = max(writer.number, number)
-            item: Submessage = self._data(writer, max(0, number))
-            assert isinstance(item, Data)
+            item: Data | DataFrag = self._data(writer, max(0, number))
+            if chance.random() < 0.9:
+                item = replace(item, reader=chance.choice([rtps.NO_ENTITY, self._node.readers[SURE].entity]))
             way = chance.randrange(12)
             if way == 0:
                 item = Data(item.reader, item.writer, item.number, None)
@@ -485,10 +487,10 @@ class Peers:
         chance = self._chance
         if not peer.readers:
             return
-        reader = chance.choice(peer.readers)
+        reader = chance.choice(peer.readers[:3])
         last = 1 if reader.ours == len(WRITTEN) else self._published[reader.ours]
-        base = max(0, last + chance.choice([1, 1, 1, 1, 0, -1, -2, -4, -300]))
-        wanted = [base + place for place in range(chance.choice([0, 0, 1, 5, 40])) if chance.random() < 0.7]
+        base = max(0, last + chance.choice([1, 1, 1, 0, -1, -2, -5, -5, -6, -300]))
+        wanted = [base + place for place in range(chance.choice([0, 0, 1, 5, 8, 40])) if chance.random() < 0.7]
         writer = self._node.writers[0 if reader.ours == len(WRITTEN) else 1 + reader.ours]
         if chance.random() < 0.1:
             writer = chance.choice(self._node.writers)

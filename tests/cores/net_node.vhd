@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node in fabric at a GMII: found by ARP, pings and ROS 2, in the domain 0, at 192.0.2.9 and 02:00:00:00:00:02. Frames of
--- the host are samples to send, and samples of peers leave as frames.
+-- A node in fabric at a GMII: found by ARP, pings and ROS 2, in the domain 0, at 192.0.2.9 and 02:00:00:00:00:02.
+-- Frames of the host are samples to send, and samples of peers leave as frames.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -8,6 +8,8 @@ library firm;
 
 entity net_node is
   generic (
+    WRITERS   : integer := 4;
+    READERS   : integer := 3;
     SAMPLE    : integer := 256; -- see firm_rtps_node
     SLOTS     : integer := 256;
     RELIABLE  : integer := 0;   -- a bit for each endpoint
@@ -45,8 +47,6 @@ architecture rtl of net_node is
 
   constant MAC         : std_logic_vector(47 downto 0) := x"020000000002";
   constant ADDRESS     : std_logic_vector(31 downto 0) := x"c0000209";
-  constant WRITERS     : positive := 3;
-  constant READERS     : positive := 2;
   constant ENDPOINTS   : positive := READERS+WRITERS;
   constant NODE_PREFIX : std_logic_vector(95 downto 0) := x"0000" & MAC & x"00000000";
 

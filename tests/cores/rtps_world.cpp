@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Events from the standard input at a node, and its results on the standard output: see firm_rtps_node_tb. A line `done`
-// follows the results of each event. The arguments are the address of the program's loop, and of 100 cycles those in which
+// Events from the standard input at a node, and its results on the standard output: see firm_rtps_node_tb. The
+// numbers of peers, sources and sinks, `entries`, and a line `done` follow the results of each event. The arguments are the address of the program's loop, and of 100 cycles those in which
 // the host takes nothing.
 #include <cstdlib>
 #include <iostream>
@@ -59,6 +59,10 @@ class World {
     top_.eval();
   }
 
+  void done() const {
+    std::printf("entries %d %d %d\ndone\n", top_.peer_count, top_.source_count, top_.sink_count);
+  }
+
  private:
   void watch() {
     ++since_main_;
@@ -106,7 +110,7 @@ int main(int, char** arguments) {
     } else {
       world.packet(bytes, kind == ABORTED_PACKET);
     }
-    std::puts("done");
+    world.done();
     std::fflush(stdout);
   }
 }

@@ -34,6 +34,7 @@ class World:
             [program, str(main_of(a_node())), str(stall)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         self.pulses: Counter[str] = Counter()
+        self.entries = [0, 0, 0]  # peers, and their writers and readers that match
 
     def __enter__(self) -> World:
         return self
@@ -52,7 +53,9 @@ class World:
             assert row, "the node ended"
             kind, *numbers = row.split()
             content = bytes(map(int, numbers))
-            if kind == "frame":
+            if kind == "entries":
+                self.entries = list(map(int, numbers))
+            elif kind == "frame":
                 found.frames.append(content)
             elif kind == "sent":
                 found.sent.append(sent(content))

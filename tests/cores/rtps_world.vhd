@@ -34,6 +34,10 @@ entity rtps_world is
     program_enable  : out std_logic;
     program_address : out std_logic_vector(9 downto 0);
 
+    peer_count   : out std_logic_vector(7 downto 0);
+    source_count : out std_logic_vector(7 downto 0);
+    sink_count   : out std_logic_vector(7 downto 0);
+
     is_discovery_lost   : out std_logic;
     is_sample_lost      : out std_logic;
     is_peer_refused     : out std_logic;
@@ -144,9 +148,9 @@ begin
       payload_tdata       => payload_tdata,
       payload_tvalid      => payload_tvalid,
       payload_tready      => payload_tready,
-      peer_count          => open,
-      source_count        => open,
-      sink_count          => open,
+      peer_count          => peer_count,
+      source_count        => source_count,
+      sink_count          => sink_count,
       is_discovery_lost   => is_discovery_lost,
       is_sample_lost      => is_sample_lost,
       is_peer_refused     => is_peer_refused,

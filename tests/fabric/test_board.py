@@ -29,7 +29,7 @@ HARDWARE = core_files(*PARTS)
 SAMPLES = 200
 # Samples that a peer sends at once. The TAP device drops frames after 500, and nobody sends them again at best effort.
 LOT = 50
-TYPES = {"count": "UInt32", "words": "String"}
+TYPES = {"count": "UInt32", "words": "String", "sure": "String"}
 SPECIFICATION = """\
 project:
   name: board
@@ -40,10 +40,14 @@ blocks:
   - {name: start, middleware: ROS2, mode: subscriber, message: std_msgs/UInt32, topic: /count_in,
      qos: {reliability: best_effort}, outgoing: [{name: count}]}
   - {name: words, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /words_in,
-     outgoing: [{name: said}]}
+     qos: {reliability: best_effort}, outgoing: [{name: said}]}
+  - {name: sure, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /sure_in,
+     outgoing: [{name: surely}]}
   - {name: count, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /count_out,
      qos: {reliability: best_effort}}
-  - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_out}
+  - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_out,
+     qos: {reliability: best_effort}}
+  - {name: surely, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /sure_out}
 """
 
 
@@ -203,14 +207,14 @@ def test_samples_of_both_peers_become_frames_once_and_in_order(lab: Lab) -> None
 @pytest.mark.parametrize("loss", [0, 20])
 def test_reliable_samples_return_to_both_peers_whatever_is_lost(lab: Lab, loss: int) -> None:
     """The board returns each text of each peer to both."""
-    board, peers = lab.board("echo", str(loss)), lab.peers("words", read="words", reliability="reliable")
+    board, peers = lab.board("echo", str(loss)), lab.peers("sure", read="sure", reliability="reliable")
     print({name: peer.wait_until_matched() for name, peer in peers.items()})
     wait_for(board, 2, 2, 3)
     sent = {name: [f"{name} {number} {'.' * number}" for number in range(SAMPLES)] for name in peers}
     for begin in range(0, SAMPLES, LOT):
         for name, peer in peers.items():
             for text in sent[name][begin : begin + LOT]:
-                peer.tell(["words", [text]])
+                peer.tell(["sure", [text]])
         for peer in peers.values():
             came = [values[0] for _, values in peer.take(2 * LOT)]
             for texts in sent.values():

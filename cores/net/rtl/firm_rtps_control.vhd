@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The control of a node in fabric: firm_rtps_sequencer with its program, and what the program reads and writes outside the
--- memory. fusesoc_firm.fabric.control has the addresses, and fusesoc_firm/fabric/ros2_node.seq the program.
+-- The control of a node in fabric: firm_rtps_sequencer with its program, and what the program reads and writes
+-- outside the memory. fusesoc_firm.fabric.control has the addresses, and fusesoc_firm/fabric/ros2_node.seq the
+-- program.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -88,26 +89,25 @@ architecture rtl of firm_rtps_control is
   constant MOST_ENDPOINTS : positive := 24;
 
   -- Addresses outside the memory. Fields of the builder are at 0 to 127.
-  constant AT_KEY        : natural := 128;  -- 16 bytes
-  constant AT_NUMBER     : natural := 144;  -- 6 bytes
-  constant AT_NOTE       : natural := 150;
-  constant AT_SLOT       : natural := 152;  -- of the payload of the next packet
-  constant AT_WRITER     : natural := 153;
-  constant AT_NEXT_SLOT  : natural := 154;  -- of this writer
-  constant AT_START      : natural := 155;
-  constant AT_LOCK       : natural := 156;
-  constant AT_TAKEN      : natural := 157;  -- bit 0: the tick, 1: the early sample, 2: the sample to send
-  constant AT_REFUSED    : natural := 158;  -- bit 0: a peer, 1: an endpoint
-  constant AT_PEERS      : natural := 160;
-  constant AT_SOURCES    : natural := 161;
-  constant AT_SINKS      : natural := 162;
-  constant AT_MATCHES    : natural := 164;  -- 3 bytes
-  constant AT_FACTS      : natural := 167;
-  constant AT_ENTITY     : natural := 168;  -- 4 bytes
-  constant AT_EARLY      : natural := 172;  -- 4 bytes
-  constant AT_FROM       : natural := 176;  -- the source of the early sample
-  constant AT_FRAME      : natural := 177;  -- the writer of the sample to send
-  constant AT_LARGE      : natural := 178;
+  subtype address_t is std_logic_vector(7 downto 0);
+  constant AT_KEY       : std_logic_vector(7 downto 4) := x"8";
+  constant AT_NUMBER    : std_logic_vector(7 downto 3) := "10010";
+  constant AT_NOTE      : address_t := x"98";
+  constant AT_SLOT      : address_t := x"99";  -- of the payload of the next packet
+  constant AT_WRITER    : address_t := x"9a";
+  constant AT_NEXT_SLOT : address_t := x"9b";  -- of this writer
+  constant AT_START     : address_t := x"9c";
+  constant AT_LOCK      : address_t := x"9d";
+  constant AT_TAKEN     : address_t := x"9e";  -- bit 0: the tick, 1: the early sample, 2: the sample to send
+  constant AT_REFUSED   : address_t := x"9f";  -- bit 0: a peer, 1: an endpoint
+  constant AT_PEERS     : address_t := x"b4";
+  constant AT_SOURCES   : address_t := x"b5";
+  constant AT_SINKS     : address_t := x"b6";
+  -- Words that are read, from x"a0" on; of the last one, the bytes are the early sample's source, the writer of the
+  -- sample to send, and whether numbers are large.
+  constant WORD_OF_FACTS  : std_logic_vector(1 downto 0) := "00";
+  constant WORD_OF_ENTITY : std_logic_vector(1 downto 0) := "01";
+  constant WORD_OF_EARLY  : std_logic_vector(1 downto 0) := "10";
 
   signal conditions    : std_logic_vector(3 downto 0);
   signal index         : std_logic_vector(5 downto 0);
@@ -119,6 +119,8 @@ architecture rtl of firm_rtps_control is
   signal read_data     : std_logic_vector(7 downto 0);
   signal hold          : std_logic;
   signal padded        : std_logic_vector(MOST_ENDPOINTS-1 downto 0);
+  signal facts         : std_logic_vector(7 downto 0);
+  signal word          : std_logic_vector(31 downto 0);
 
   signal tick_r    : std_logic;
   signal locked_r  : std_logic;
@@ -130,9 +132,9 @@ architecture rtl of firm_rtps_control is
   signal sinks_r   : std_logic_vector(7 downto 0);
 
   -- Whether a byte outside is written.
-  function is_at(valid : std_logic; address : std_logic_vector(7 downto 0); place : natural) return std_logic is
+  function is_at(valid : std_logic; address, place : address_t) return std_logic is
   begin
-    if unsigned(address) = place then
+    if address = place then
       return valid;
     end if;
     return '0';
@@ -172,9 +174,8 @@ begin
 
   -- The builder's fields and the payload stay until its packet has left; numbers of samples stay while one is judged.
   hold   <= '0' when write = '0' else
-            is_busy when write_address(7) = '0' or unsigned(write_address) = AT_SLOT
-                         or unsigned(write_address) = AT_START else
-            is_judging when unsigned(write_address) = AT_LOCK and data(0) = '1' else
+            is_busy when write_address(7) = '0' or write_address = AT_SLOT or write_address = AT_START else
+            is_judging when write_address = AT_LOCK and data(0) = '1' else
             '0';
   writes <= write and not hold;
 
@@ -222,8 +223,8 @@ begin
   end process note;
 
   source       <= index(4 downto 0);
-  key_write    <= writes when write_address(7 downto 4) = "1000" else '0';
-  number_write <= writes when write_address(7 downto 3) = "10010" and write_address(2 downto 1) /= "11" else '0';
+  key_write    <= writes when write_address(7 downto 4) = AT_KEY else '0';
+  number_write <= writes when write_address(7 downto 3) = AT_NUMBER else '0';
   note_write   <= is_at(writes, write_address, AT_NOTE);
   write_place  <= write_address(3 downto 0);
   write_data   <= data;
@@ -257,40 +258,27 @@ begin
     padded(ENDPOINTS-1 downto 0) <= matches;
   end process pad;
 
-  choose : process (read_address, number_byte, padded, has_lease, is_large, is_gone, has_default, has_metatraffic,
-                    has_unicast, is_transient, is_reliable, is_known, entity_id, early_number, early_source, writer)
-    variable at : natural range 0 to 255;
+  facts <= has_lease & is_gone & has_default & has_metatraffic & has_unicast & is_transient & is_reliable & is_known;
+
+  -- Entities have their first byte highest.
+  choose_word : process (read_address, facts, padded, entity_id, early_number, is_large, writer, early_source)
   begin
-    at        := to_integer(unsigned(read_address));
-    read_data <= number_byte;
-    if at = AT_FACTS then
-      read_data <= has_lease & is_gone & has_default & has_metatraffic & has_unicast & is_transient & is_reliable
-                   & is_known;
-    elsif at >= AT_MATCHES and at < AT_MATCHES+3 then
-      for place in 0 to 2 loop
-        if at = AT_MATCHES+place then
-          read_data <= padded(8*place+7 downto 8*place);
-        end if;
-      end loop;
-    elsif at >= AT_ENTITY and at < AT_ENTITY+4 then
-      for place in 0 to 3 loop
-        if at = AT_ENTITY+place then
-          read_data <= entity_id(31-8*place downto 24-8*place);
-        end if;
-      end loop;
-    elsif at >= AT_EARLY and at < AT_EARLY+4 then
-      for place in 0 to 3 loop
-        if at = AT_EARLY+place then
-          read_data <= early_number(8*place+7 downto 8*place);
-        end if;
-      end loop;
-    elsif at = AT_FROM then
-      read_data <= "000" & early_source;
-    elsif at = AT_FRAME then
-      read_data <= "00000" & writer;
-    elsif at = AT_LARGE then
-      read_data <= "0000000" & is_large;
+    if read_address(3 downto 2) = WORD_OF_FACTS then
+      word <= facts & padded;
+    elsif read_address(3 downto 2) = WORD_OF_ENTITY then
+      word <= entity_id(7 downto 0) & entity_id(15 downto 8) & entity_id(23 downto 16) & entity_id(31 downto 24);
+    elsif read_address(3 downto 2) = WORD_OF_EARLY then
+      word <= early_number;
+    else
+      word <= x"00" & "0000000" & is_large & "00000" & writer & "000" & early_source;
     end if;
-  end process choose;
+  end process choose_word;
+
+  -- Numbers of sources are at the lower addresses.
+  read_data <= number_byte when read_address(5) = '0' else
+               word(7 downto 0) when read_address(1 downto 0) = "00" else
+               word(15 downto 8) when read_address(1 downto 0) = "01" else
+               word(23 downto 16) when read_address(1 downto 0) = "10" else
+               word(31 downto 24);
 
 end architecture rtl;

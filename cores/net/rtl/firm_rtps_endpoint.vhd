@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Reads how a peer announces a writer or a reader (SEDP), and tells which of the node's endpoints of the other kind match
--- it: those with the same topic, type and hash of the type, if what the writer offers is enough for the reader.
+-- Reads how a peer announces a writer or a reader (SEDP), and tells which of the node's endpoints of the other kind
+-- match it: those with the same topic, type and hash of the type, if what the writer offers is enough for the reader.
 --
 -- Of several parameters with the same id, the first one counts, as in the reference participant
 -- (tests/fabric/participant.py).
@@ -112,17 +112,17 @@ architecture rtl of firm_rtps_endpoint is
   signal mask       : mask_t;
   signal mask_r     : mask_t;
 
-  signal topics_r     : mask_t;
-  signal types_r      : mask_t;
-  signal hashes_r     : mask_t;
-  signal has_hash_r   : std_logic;
-  signal named_r      : std_logic;  -- the part is that of the hash
-  signal given_r      : std_logic;  -- its reliability was told
-  signal reliable_r   : std_logic;
+  signal topics_r    : mask_t;
+  signal types_r     : mask_t;
+  signal hashes_r    : mask_t;
+  signal has_hash_r  : std_logic;
+  signal named_r     : std_logic;  -- the part is that of the hash
+  signal given_r     : std_logic;  -- its reliability was told
+  signal reliable_r  : std_logic;
   signal offers      : std_logic;
-  signal transient_r  : std_logic;
-  signal divided_r    : std_logic;  -- it is in a partition
-  signal encodes_r    : std_logic;
+  signal transient_r : std_logic;
+  signal divided_r   : std_logic;  -- it is in a partition
+  signal encodes_r   : std_logic;
 
   -- ------------------------------------------------------------------ its GUID
   signal source_memory : memory_t;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Holds the last samples of a node's writers: takes frames `id | length | payload`, each into a slot of its writer, and
--- gives the payload of a slot to firm_packet_builder as often as it is asked for. Which slots are whose is in the program
--- of firm_rtps_sequencer, which tells where the next sample of each writer goes. The slot after the last one is not among
--- those that may be asked for, so that a sample can come while another one leaves.
+-- Holds the last samples of a node's writers: takes frames `id | length | payload`, each into a slot of its writer,
+-- and gives the payload of a slot to firm_packet_builder as often as it is asked for. Which slots are whose is in the
+-- program of firm_rtps_sequencer, which tells where the next sample of each writer goes. The slot after the last one
+-- is not among those that may be asked for, so that a sample can come while another one leaves.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

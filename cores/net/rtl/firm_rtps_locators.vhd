@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Writes the fields of a submessage to the record, and what a peer tells in a payload of discovery besides names: where the
--- peer or its endpoint listens (the first locator of each kind for UDP over IPv4), and its lease.
+-- Writes the fields of a submessage to the record, and what a peer tells in a payload of discovery besides names:
+-- where the peer or its endpoint listens (the first locator of each kind for UDP over IPv4), and its lease.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

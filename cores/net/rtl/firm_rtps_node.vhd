@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node of ROS 2 above UDP: packets of RTPS in, frames `id | length | payload` and jobs for firm_packet_builder out, and
--- the other way round. It announces itself, finds its peers, and matches their readers and writers with its own.
+-- A node of ROS 2 above UDP: packets of RTPS in, frames `id | length | payload` and jobs for firm_packet_builder out,
+-- and the other way round. It announces itself, finds its peers, and matches their readers and writers with its own.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -100,24 +100,24 @@ architecture rtl of firm_rtps_node is
   signal is_foreign    : std_logic;
   signal is_aborted    : std_logic;
 
-  signal take       : std_logic;
-  signal takes      : std_logic;
-  signal has_word   : std_logic;
-  signal has_field  : std_logic;
-  signal address    : std_logic_vector(RECORD_BITS-1 downto 0);
-  signal data       : std_logic_vector(7 downto 0);
-  signal is_end     : std_logic;
-  signal is_mine    : std_logic;
-  signal writer     : std_logic_vector(31 downto 0);
-  signal is_large   : std_logic;
-  signal is_gone    : std_logic;
-  signal begins     : std_logic;
-  signal is_value   : std_logic;
-  signal id         : std_logic_vector(15 downto 0);
-  signal size       : std_logic_vector(15 downto 0);
-  signal place      : std_logic_vector(15 downto 0);
-  signal is_little  : std_logic;
-  signal is_last    : std_logic;
+  signal take      : std_logic;
+  signal takes     : std_logic;
+  signal has_word  : std_logic;
+  signal has_field : std_logic;
+  signal address   : std_logic_vector(RECORD_BITS-1 downto 0);
+  signal data      : std_logic_vector(7 downto 0);
+  signal is_end    : std_logic;
+  signal is_mine   : std_logic;
+  signal writer    : std_logic_vector(31 downto 0);
+  signal is_large  : std_logic;
+  signal is_gone   : std_logic;
+  signal begins    : std_logic;
+  signal is_value  : std_logic;
+  signal id        : std_logic_vector(15 downto 0);
+  signal size      : std_logic_vector(15 downto 0);
+  signal place     : std_logic_vector(15 downto 0);
+  signal is_little : std_logic;
+  signal is_last   : std_logic;
 
   signal is_reader       : std_logic;
   signal matches         : std_logic_vector(ENDPOINTS-1 downto 0);

@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The readers of a node in fabric: gives each sample of the writers of peers that match them as a frame
--- `id | length | payload`, once and in order. The id is the number of the reader. Which writers match, and what to do about
--- missing samples, is decided by the program of firm_rtps_sequencer.
+-- `id | length | payload`, once and in order. The id is the number of the reader. Which writers match, and what to do
+-- about missing samples, is decided by the program of firm_rtps_sequencer.
 --
--- The writer of a sample is looked up while the packet arrives. When the packet is known to be good, the sample's number
--- is compared with the next one of its writer: a reliable reader takes that one only, and another one takes any later
--- one as well. A sample that is taken waits for the host.
+-- The writer of a sample is looked up while the packet arrives. When the packet is known to be good, the sample's
+-- number is compared with the next one of its writer: a reliable reader takes that one only, and another one takes
+-- any later one as well. A sample that is taken waits for the host.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -41,8 +41,9 @@ entity firm_rtps_readers is
     -- From firm_rtps_inbox: the submessage is for this node.
     is_mine : in std_logic;
 
-    -- What the program notes about the writer with number `source`: a byte of its GUID; whether there is one (bit 7), its
-    -- reader's reliability (bit 6) and number (bits 2 to 0); a byte of its next sample's number, the lowest first.
+    -- What the program notes about the writer with number `source`: a byte of its GUID; whether there is one (bit 7),
+    -- its reader's reliability (bit 6) and number (bits 2 to 0); a byte of its next sample's number, the lowest
+    -- first.
     source       : in  std_logic_vector(4 downto 0);
     key_write    : in  std_logic;
     note_write   : in  std_logic;
@@ -87,7 +88,12 @@ architecture rtl of firm_rtps_readers is
   constant SOURCE_BITS  : positive := max(1, clog2(SOURCES));
   constant PLACE_BITS   : positive := max(1, clog2(BYTES));
   constant QUEUE_BITS   : positive := max(1, clog2(SAMPLES));
-  constant SAMPLE_BITS  : positive := 1+ID_BITS+SOURCE_BITS+MARK_BITS+NUMBER_BITS+SIZE_BITS;
+  -- A sample that waits: size of its payload, number, mark and number of its source, reader, whether it has a payload.
+  constant AT_NUMBER    : positive := SIZE_BITS;
+  constant AT_MARK      : positive := AT_NUMBER+NUMBER_BITS;
+  constant AT_SOURCE    : positive := AT_MARK+MARK_BITS;
+  constant AT_ID        : positive := AT_SOURCE+SOURCE_BITS;
+  constant SAMPLE_BITS  : positive := AT_ID+ID_BITS+1;
 
   subtype sources_t is std_logic_vector(SOURCES-1 downto 0);
   subtype source_t is unsigned(SOURCE_BITS-1 downto 0);
@@ -109,7 +115,7 @@ architecture rtl of firm_rtps_readers is
   signal kept     : flags_t := (others => "0");                -- samples that the host gets
   signal ids      : ids_t := (others => (others => '0'));      -- the reader of each source
   -- Changes when a source's place gets another writer, whose numbers begin anew: samples of the one before may wait.
-  signal marks    : marks_t := (others => (others => '0'));
+  signal marks      : marks_t := (others => (others => '0'));
   signal sources_r  : sources_t;
   signal reliable_r : sources_t;
 
@@ -153,7 +159,8 @@ architecture rtl of firm_rtps_readers is
   signal judge_place : source_t;
   signal number      : number_t;  -- the next one of that source
   signal from_r      : source_t := (others => '0');
-  signal next_r      : number_t := (others => '0');
+  signal new_r       : number_t := (others => '0');
+  signal next_number : number_t;
   signal same_r      : std_logic;  -- the source is that of the sample
   signal equal_r     : std_logic;
   signal later_r     : std_logic;
@@ -370,9 +377,9 @@ begin
   chosen      <= unsigned(source(SOURCE_BITS-1 downto 0));
   judge_place <= chosen when is_locked = '1' else
                  from_r when judges_r = '1' else
-                 unsigned(candidate(SIZE_BITS+NUMBER_BITS+MARK_BITS+SOURCE_BITS-1
-                                    downto SIZE_BITS+NUMBER_BITS+MARK_BITS));
+                 unsigned(candidate(AT_ID-1 downto AT_SOURCE));
   is_taken    <= judges_r and same_r and (equal_r or (later_r and not strict_r));
+  next_number <= new_r + 1;
   is_judging  <= '0' when judges_r = '0' and judged_r = first_r else '1';
 
   judge : process (clk)
@@ -384,16 +391,15 @@ begin
         judged_r <= judged_r + 1;
       elsif is_locked = '0' and judged_r /= first_r then
         judges_r   <= '1';
-        new_number := unsigned(candidate(SIZE_BITS+NUMBER_BITS-1 downto SIZE_BITS));
+        new_number := unsigned(candidate(AT_MARK-1 downto AT_NUMBER));
         from_r     <= judge_place;
-        next_r     <= new_number + 1;
+        new_r      <= new_number;
         strict_r   <= reliable_r(to_integer(judge_place));
         shows_r    <= candidate(SAMPLE_BITS-1);
         same_r     <= '0';
         equal_r    <= '0';
         later_r    <= '0';
-        if unsigned(candidate(SIZE_BITS+NUMBER_BITS+MARK_BITS-1 downto SIZE_BITS+NUMBER_BITS))
-           = marks(to_integer(judge_place)) then
+        if unsigned(candidate(AT_SOURCE-1 downto AT_MARK)) = marks(to_integer(judge_place)) then
           same_r <= '1';
         end if;
         if new_number = number then
@@ -428,7 +434,7 @@ begin
   begin
 
     takes <= '1' when is_taken = '1' or (number_write = '1' and unsigned(write_place(2 downto 0)) = index) else '0';
-    digit <= std_logic_vector(next_r(8*index+7 downto 8*index)) when is_taken = '1' else write_data;
+    digit <= std_logic_vector(next_number(8*index+7 downto 8*index)) when is_taken = '1' else write_data;
 
     write_number : process (clk)
     begin
@@ -463,13 +469,11 @@ begin
   early_number <= early_entry(31 downto 0);
 
   note_early : process (clk)
-    variable early_now : number_t;
   begin
     if rising_edge(clk) then
-      early_now := next_r - 1;
       if early_write = '1' then
         early(to_integer(early_r(EARLY_BITS-1 downto 0)))
-          <= std_logic_vector(from_r) & std_logic_vector(early_now(31 downto 0));
+          <= std_logic_vector(from_r) & std_logic_vector(new_r(31 downto 0));
         early_r <= early_r + 1;
       end if;
       if takes_early = '1' then
@@ -504,7 +508,7 @@ begin
       if state_r = IDLE then
         size_r  <= unsigned(shown(SIZE_BITS-1 downto 0));
         left_r  <= unsigned(shown(SIZE_BITS-1 downto 0));
-        id_r    <= unsigned(shown(SAMPLE_BITS-2 downto SAMPLE_BITS-1-ID_BITS));
+        id_r    <= unsigned(shown(SAMPLE_BITS-2 downto AT_ID));
         keeps_r <= kept(to_integer(oldest_r(QUEUE_BITS-1 downto 0)))(0);
         place_r <= (others => '0');
         if oldest_r /= judged_r then

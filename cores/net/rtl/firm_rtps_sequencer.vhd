@@ -1,10 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Runs the program of a node in fabric (fusesoc_firm.fabric.control): instructions that copy, compare and add numbers of
--- 1 to 28 bytes in one memory, two cycles for each byte. The memory holds the record of firm_rtps_walker and all tables.
+-- Runs the program of a node in fabric (fusesoc_firm.fabric.control): instructions that copy, compare and add numbers
+-- of 1 to 28 bytes in one memory, two cycles for each byte. The memory holds the record of firm_rtps_walker and all
+-- tables.
 --
--- An instruction is `operation (5 bits) | size (3) | destination (14) | source (14)`. An operand is a mode (2 bits) and a
--- place (12): in the memory itself, or in the entry that register P, E or W selects. If the lowest bit of the operation
--- is set, the source is a number instead.
+-- An instruction is `operation (5 bits) | size (3) | destination (14) | source (14)`. An operand is a mode (2 bits)
+-- and a place (12): in the memory itself, or in the entry that register P, E or W selects. If the lowest bit of the
+-- operation is set, the source is a number instead.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -113,16 +114,16 @@ architecture rtl of firm_rtps_sequencer is
   signal right      : byte_t;
 
   -- The byte that is written, one step later.
-  signal writes_r : std_logic;
-  signal last_r   : std_logic;
-  signal first_r  : std_logic;
-  signal at_r     : address_t := (others => '0');
-  signal count_r  : unsigned(4 downto 0) := (others => '0');  -- its place
-  signal carry_in : std_logic;
-  signal sum      : unsigned(8 downto 0);
-  signal result   : byte_t;
-  signal is_kept  : std_logic;
-  signal is_zero  : std_logic;
+  signal writes_r    : std_logic;
+  signal last_r      : std_logic;
+  signal first_r     : std_logic;
+  signal at_r        : address_t := (others => '0');
+  signal count_r     : unsigned(4 downto 0) := (others => '0');  -- its place
+  signal carry_in    : std_logic;
+  signal sum         : unsigned(8 downto 0);
+  signal result      : byte_t;
+  signal is_kept     : std_logic;
+  signal is_zero     : std_logic;
   signal write_place : address_t;
   signal write_data  : byte_t;
   signal write_valid : std_logic;
@@ -144,8 +145,8 @@ architecture rtl of firm_rtps_sequencer is
 
   -- Byte `place` of a set of the first `count` of 32 numbers; the first one is the highest bit of the last byte.
   function set_byte(count : unsigned(7 downto 0); place : unsigned(1 downto 0)) return byte_t is
-    variable whole  : unsigned(5 downto 0);
-    variable bits   : byte_t := (others => '0');
+    variable whole : unsigned(5 downto 0);
+    variable bits  : byte_t := (others => '0');
   begin
     whole := "0000" & not place;
     for index in 0 to 7 loop

@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node with firm_packet_builder, in a world of events. A row of the file is an event: its kind, the cycles before it,
--- the number of bytes, and the bytes. A negative number of cycles waits until the node has nothing to do.
+-- A node with firm_packet_builder, in a world of events. A row of the file is an event: its kind, the cycles before
+-- it, the number of bytes, and the bytes. A negative number of cycles waits until the node has nothing to do.
 --
 --   0 a packet, 1 a packet that is aborted with its last byte, 2 milliseconds (as many as the number of bytes, without
 --   bytes), 3 a frame to send, 4 a frame that is aborted with its last byte
 --
--- Results go to a file. A frame to the host is `frame` and its bytes; what the node sends is `sent` and the bytes of the
--- packet from the destination on; `refused`, `lost`, `peer` and `endpoint` are pulses; `done` follows each event that
--- waited for the node.
+-- Results go to a file. A frame to the host is `frame` and its bytes; what the node sends is `sent` and the bytes of
+-- the packet from the destination on; `refused`, `lost`, `peer` and `endpoint` are pulses; `done` follows each event
+-- that waited for the node.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -42,7 +42,7 @@ end entity firm_rtps_node_tb;
 
 architecture simulation of firm_rtps_node_tb is
 
-  constant ENDPOINTS   : positive := READERS+WRITERS;
+  constant ENDPOINTS : positive := READERS+WRITERS;
   -- The loop of the program takes fewer cycles if there is nothing to do, and a packet passes the node in fewer ones.
   constant LOOP_CYCLES : positive := 16;
   constant LOOPS       : positive := 6;
@@ -69,14 +69,14 @@ architecture simulation of firm_rtps_node_tb is
   signal sample_tlast  : std_logic := '0';
   signal sample_tready : std_logic;
 
-  signal names_address    : std_logic_vector(9 downto 0);
-  signal names_data       : std_logic_vector(8*ENDPOINTS-1 downto 0);
-  signal program_enable   : std_logic;
-  signal program_address  : std_logic_vector(9 downto 0);
-  signal program_word     : std_logic_vector(35 downto 0);
-  signal packets_enable   : std_logic;
-  signal packets_address  : std_logic_vector(12 downto 0);
-  signal packets_word     : std_logic_vector(10 downto 0);
+  signal names_address   : std_logic_vector(9 downto 0);
+  signal names_data      : std_logic_vector(8*ENDPOINTS-1 downto 0);
+  signal program_enable  : std_logic;
+  signal program_address : std_logic_vector(9 downto 0);
+  signal program_word    : std_logic_vector(35 downto 0);
+  signal packets_enable  : std_logic;
+  signal packets_address : std_logic_vector(12 downto 0);
+  signal packets_word    : std_logic_vector(10 downto 0);
 
   signal m_tdata  : std_logic_vector(7 downto 0);
   signal m_tvalid : std_logic;
@@ -235,13 +235,13 @@ begin
   -- ------------------------------------------------------------------ memories
 
   show_memories : process
-    file names       : text open read_mode is NAMES_FILE;
-    file programs    : text open read_mode is PROGRAM_FILE;
-    file packets     : text open read_mode is PACKETS_FILE;
-    file entries     : text open read_mode is ENTRIES_FILE;
-    variable row     : line;
-    variable count   : natural := 0;
-    variable address : natural;
+    file     names          : text open read_mode is NAMES_FILE;
+    file     programs       : text open read_mode is PROGRAM_FILE;
+    file     packets        : text open read_mode is PACKETS_FILE;
+    file     entries        : text open read_mode is ENTRIES_FILE;
+    variable row            : line;
+    variable count          : natural := 0;
+    variable address        : natural;
     variable name_memory    : name_words_t := (others => (others => '0'));
     variable program_memory : program_words_t := (others => (others => '0'));
     variable packet_memory  : packet_words_t := (others => (others => '0'));
@@ -311,7 +311,7 @@ begin
   end process watch;
 
   play : process
-    file events     : text open read_mode is EVENT_FILE;
+    file     events : text open read_mode is EVENT_FILE;
     variable row    : line;
     variable kind   : integer;
     variable before : integer;
@@ -425,10 +425,10 @@ begin
   end process stall;
 
   record_results : process
-    file results    : text open write_mode is RESULT_FILE;
-    file expected   : text open read_mode is existing(EXPECTED_FILE);
-    variable frame  : line;
-    variable sent   : line;
+    file     results  : text open write_mode is RESULT_FILE;
+    file     expected : text open read_mode is existing(EXPECTED_FILE);
+    variable frame    : line;
+    variable sent     : line;
 
     procedure note(pulse : in std_logic; name : in string) is
       variable row : line;
