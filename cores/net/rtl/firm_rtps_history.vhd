@@ -74,6 +74,7 @@ architecture rtl of firm_rtps_history is
   signal moves     : std_logic;
   signal is_head   : std_logic;
   signal is_full   : std_logic;
+  signal writes    : std_logic;
   signal new_size  : unsigned(BYTE_BITS downto 0);
   signal next_slot : slot_t;
   signal is_good   : std_logic;
@@ -104,18 +105,17 @@ begin
   moves         <= s_axis_tvalid and not has_r;
   is_head       <= '1' when head_r /= HEAD_BYTES else '0';
   is_full       <= size_r(BYTE_BITS);
-  new_size      <= size_r when is_head = '1' or is_full = '1' else size_r + 1;
+  writes        <= moves and not (is_head or is_full or wrong_r);
+  new_size      <= size_r + 1 when writes = '1' else size_r;
   next_slot     <= nexts(to_integer(writer_r));
   is_good       <= not (is_head or wrong_r or is_full or s_axis_tuser(0));
 
   write_payload : process (clk)
   begin
     if rising_edge(clk) then
-      if moves = '1' and is_head = '0' and is_full = '0' then
+      if writes = '1' then
         bytes(to_integer(next_slot & size_r(BYTE_BITS-1 downto 0))) <= s_axis_tdata;
-      end if;
-      if moves = '1' then
-        sizes(to_integer(next_slot)) <= new_size;
+        sizes(to_integer(next_slot))                                <= new_size;
       end if;
     end if;
   end process write_payload;

@@ -129,6 +129,13 @@ architecture rtl of firm_rtps_readers is
   signal reader_r  : std_logic_vector(31 downto 0) := (others => '0');
   signal full_r    : std_logic;  -- its payload found no room
 
+  -- One cycle later, when the number is complete.
+  signal submessage_r : std_logic;
+  signal data_r       : std_logic;  -- it is a sample for this node
+  signal filled_r     : std_logic;  -- with a payload that is whole
+  signal ends_r       : std_logic;
+  signal spoils_r     : std_logic;
+
   signal start_r   : place_t := (others => '0');  -- of the packet's payloads
   signal sample_r  : place_t := (others => '0');  -- of the sample's payload
   signal write_r   : place_t := (others => '0');
@@ -137,11 +144,7 @@ architecture rtl of firm_rtps_readers is
   signal used      : place_t;
   signal has_room  : std_logic;
   signal is_over   : std_logic;
-  signal ends      : std_logic;
-  signal spoils    : std_logic;
-  signal is_part   : std_logic;  -- of a sample that is too long
   signal is_sample : std_logic;
-  signal has_data  : std_logic;
   signal misses_r  : std_logic;  -- a sample of the packet found no room
   signal is_for_it : std_logic;  -- the submessage names no other reader
   signal pushes    : std_logic;
@@ -281,26 +284,42 @@ begin
     end if;
   end process note_sample;
 
+  -- A sample without a payload, or in fragments, is only counted.
+  delay : process (clk)
+  begin
+    if rising_edge(clk) then
+      submessage_r <= is_submessage;
+      data_r       <= '0';
+      if kind = RTPS_DATA or kind = RTPS_DATA_FRAG then
+        data_r <= is_submessage and is_mine;
+      end if;
+      filled_r <= '0';
+      if kind = RTPS_DATA then
+        filled_r <= flags(RTPS_PAYLOAD);
+      end if;
+      ends_r   <= is_whole or is_faulty or is_foreign or is_aborted;
+      spoils_r <= is_foreign or is_aborted;
+      if rst_n = '0' then
+        submessage_r <= '0';
+        data_r       <= '0';
+        ends_r       <= '0';
+      end if;
+    end if;
+  end process delay;
+
   used      <= write_r - read_r;
   has_room  <= not used(PLACE_BITS);
   end_place <= write_r + 1 when payload_valid = '1' and has_room = '1' else write_r;
   is_over   <= full_r or (payload_valid and not has_room);
-  ends      <= is_whole or is_faulty or is_foreign or is_aborted;
-  spoils    <= is_foreign or is_aborted;
   waiting   <= last_r - oldest_r;
   spare     <= not waiting(QUEUE_BITS);
   is_for_it <= '1' when unsigned(reader_r) = 0 else
                '1' when reader_r = x"0000" & std_logic_vector(to_unsigned(FIRST, 8) + ids(to_integer(sender)))
                         & READER_KIND else
                '0';
-  -- One without a payload, or in fragments, is only counted.
-  is_part   <= '1' when kind = RTPS_DATA_FRAG else '0';
-  has_data  <= flags(RTPS_PAYLOAD) and not is_part;
-  is_sample <= is_submessage and is_mine and any(found) and is_for_it and not large_r
-               when kind = RTPS_DATA or is_part = '1' else
-               '0';
-  size      <= resize(end_place - sample_r, SIZE_BITS) when has_data = '1' else (others => '0');
-  pushes    <= is_sample and spare and not (is_over and has_data);
+  is_sample <= data_r and any(found) and is_for_it and not large_r;
+  size      <= resize(end_place - sample_r, SIZE_BITS) when filled_r = '1' else (others => '0');
+  pushes    <= is_sample and spare and not (is_over and filled_r);
 
   write_payload : process (clk)
   begin
@@ -317,7 +336,7 @@ begin
     if rising_edge(clk) then
       if pushes = '1' then
         entries(to_integer(last_r(QUEUE_BITS-1 downto 0)))
-          <= has_data & std_logic_vector(ids(to_integer(sender))) & std_logic_vector(sender)
+          <= filled_r & std_logic_vector(ids(to_integer(sender))) & std_logic_vector(sender)
              & std_logic_vector(marks(to_integer(sender))) & number_r & std_logic_vector(size);
       end if;
     end if;
@@ -335,19 +354,19 @@ begin
       full_r  <= is_over;
       if pushes = '1' then
         last := last_r + 1;
-        if has_data = '1' then
+        if filled_r = '1' then
           place := end_place;
         end if;
       end if;
-      if is_submessage = '1' then
+      if submessage_r = '1' then
         write_r  <= place;
         full_r   <= '0';
         misses_r <= misses_r or (is_sample and not pushes);
       end if;
-      if ends = '1' then
-        is_lost  <= misses_r and not spoils;
+      if ends_r = '1' then
+        is_lost  <= misses_r and not spoils_r;
         misses_r <= '0';
-        if spoils = '1' then
+        if spoils_r = '1' then
           place := start_r;
           last  := first_r;
         end if;
