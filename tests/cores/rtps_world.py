@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+
+import pytest
 
 from fusesoc_firm.fabric.control import main_of
 from tests.bench.model import compiled
@@ -13,13 +16,21 @@ from tests.cores.announcements import Event, Kind, Results, a_node, sent
 from tests.fabric.memories import memories
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
+from tests.shared import made_once
 
 HERE = Path(__file__).parent
 HARDWARE = ("axis/package", "axis/axis", "net/mac", "net/builder", "net/rtps")
 
 
-def build(folder: Path) -> Path:
-    """The program: GHDL's netlist of the hardware, translated by Verilator."""
+def program() -> Path:
+    """The program, which is compiled once; without Verilator, the test is skipped."""
+    if not shutil.which("verilator"):
+        pytest.skip("verilator is not installed")
+    return made_once("rtps_world", _build) / "model" / "Vrtps_world"
+
+
+def _build(folder: Path) -> Path:
+    """GHDL's netlist of the hardware, translated by Verilator."""
     files = memories(a_node(), "rtps_world", folder)
     verilog = netlist("rtps_world", folder, [*files, HERE / "rtps_world.vhd"], core_files(*HARDWARE))
     bench = (HERE / "rtps_world.cpp").read_text(encoding="ascii")
@@ -29,9 +40,9 @@ def build(folder: Path) -> Path:
 class World:
     """A node that runs, of whose host's cycles so many of 100 take nothing."""
 
-    def __init__(self, program: Path, stall: int = 0) -> None:
+    def __init__(self, stall: int = 0) -> None:
         self._process = subprocess.Popen(
-            [program, str(main_of(a_node())), str(stall)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [program(), str(main_of(a_node())), str(stall)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match

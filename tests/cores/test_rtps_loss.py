@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import random
-import shutil
 import struct
 from dataclasses import dataclass, field
 from ipaddress import IPv4Address
-from pathlib import Path
 
 import pytest
 
@@ -15,20 +13,13 @@ from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import LEASE_SECONDS, Endpoint, Node
 from fusesoc_firm.system.derived.model import Network, Quality
 from tests.cores.announcements import HASH, READ, SURE, WRITTEN, Event, Kind, Results
-from tests.cores.rtps_world import World, build
+from tests.cores.rtps_world import World
 from tests.fabric.participant import Participant
 
 SEED = 20261127
 RELIABLE = Quality(depth=1000)
 WRITER = 1  # the one of the node that is reliable
 DEPTH = WRITTEN[WRITER][2].depth
-
-
-@pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if not shutil.which("verilator"):
-        pytest.skip("verilator is not installed")
-    return build(tmp_path_factory.mktemp("world"))
 
 
 def peer_node() -> Node:
@@ -95,12 +86,12 @@ class Pair:
         pytest.param(100_000, 0.01, marks=pytest.mark.thorough),
     ],
 )
-def test_every_sample_arrives_once_and_in_order(program: Path, count: int, loss: float) -> None:
+def test_every_sample_arrives_once_and_in_order(count: int, loss: float) -> None:
     """The node's writer is given samples as fast as its history holds those that have not arrived."""
     writer = next(item for item in peer_node().writers if item.topic == READ[SURE][0])
     wanted = [rtps.XCDR1 + struct.pack("<I", number) for number in range(count)]
     published = given = 0
-    with World(program) as world:
+    with World() as world:
         pair = Pair(world, loss)
         while not (pair.peer.sources and pair.peer.sinks):
             pair.step()
@@ -118,9 +109,9 @@ def test_every_sample_arrives_once_and_in_order(program: Path, count: int, loss:
 
 
 @pytest.mark.check
-def test_a_peer_that_is_silent_is_forgotten_when_its_lease_ends(program: Path) -> None:
+def test_a_peer_that_is_silent_is_forgotten_when_its_lease_ends() -> None:
     """It is then found again, with the same GUID, and gets the samples that follow."""
-    with World(program) as world:
+    with World() as world:
         pair = Pair(world, 0)
         while not (pair.peer.sources and pair.peer.sinks):
             pair.step()

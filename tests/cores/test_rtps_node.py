@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.fabric.control import main_of, slots_of, words_of
-from fusesoc_firm.fabric.names import names
-from fusesoc_firm.fabric.packets import programs_of
+from fusesoc_firm.fabric.control import main_of
 from tests.cores.announcements import SURE, Event, Peers, Results, a_node, expected, sent
-from tests.cores.rtps_world import HARDWARE, World, build
+from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
+from tests.cores.rtps_world import HARDWARE, World
 from tests.fabric.memories import bits
 from tests.fabric.messages import parse
 from tests.hdl.ghdl import Generic, Library, core_files
@@ -21,14 +19,6 @@ from tests.hdl.verilog import loops
 SEED = 20261127
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/builder", "net/rtps")
 NODE = a_node()
-SIZES: dict[str, Generic] = {
-    "WRITERS": len(NODE.writers),
-    "READERS": len(NODE.readers),
-    "SOURCES": 8,
-    "DEPTH": 4096,
-    "SAMPLES": 16,
-    "SLOTS": slots_of(NODE),
-}
 
 
 @pytest.fixture(scope="module")
@@ -40,19 +30,6 @@ def _library(directory: Path, standard: str = "93") -> Library:
     library = Library("firm", directory, standard)
     library.analyse([*core_files(*CORES), *core_files("net/rtps", fileset="tb")])
     return library
-
-
-def _write(path: Path, rows: list[str]) -> None:
-    path.write_text("".join(f"{row}\n" for row in rows), encoding="ascii")
-
-
-def write_memories(folder: Path) -> None:
-    """The files of the node's memories for the bench."""
-    programs = programs_of(NODE)
-    _write(folder / "names.txt", [f"{int.from_bytes(word):0{8 * len(word)}b}" for word in names(NODE.compared)])
-    _write(folder / "program.txt", [f"{word:036b}" for word in words_of(NODE)])
-    _write(folder / "packets.txt", [f"{word:011b}" for word in programs.words])
-    _write(folder / "entries.txt", list(map(str, programs.entries.values())))
 
 
 def _results(library: Library, folder: Path, events: list[Event], **generics: Generic) -> Results:
@@ -71,6 +48,13 @@ def _results(library: Library, folder: Path, events: list[Event], **generics: Ge
             found.sent.append(sent(content))
         found.refused += kind == "refused"
     return found
+
+
+def test_the_data_of_the_core_are_those_of_the_program(tmp_path: Path) -> None:
+    """`python -m tests.cores.rtps_data` writes them again."""
+    write_data(tmp_path)
+    for path in tmp_path.iterdir():
+        assert path.read_bytes() == (DATA / path.name).read_bytes(), path.name
 
 
 def _check(found: Results, wanted: Results) -> None:
@@ -98,33 +82,26 @@ def test_the_sources_do_what_the_reference_does(library: Library, tmp_path: Path
     _check(_results(library, tmp_path, events, SEED=SEED), wanted)
 
 
-@pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if not shutil.which("verilator"):
-        pytest.skip("verilator is not installed")
-    return build(tmp_path_factory.mktemp("world"))
-
-
 @pytest.mark.check
 @pytest.mark.parametrize(
     ("peers", "stall", "seed"),
     [(4, 0, SEED), (9, 30, SEED + 1), (6, 10, SEED + 2), (1, 0, SEED + 3)],
 )
-def test_the_netlist_does_what_the_reference_does(program: Path, peers: int, stall: int, seed: int) -> None:
+def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: int) -> None:
     print(f"seed {seed}")
     events = Peers(peers, seed).run(2000)
     wanted = expected(events)
     _check_kinds(wanted)
-    with World(program, stall) as world:
+    with World(stall) as world:
         _check(world.all(events), wanted)
 
 
 @pytest.mark.check
-def test_a_host_that_takes_nothing_loses_samples_but_no_discovery(program: Path) -> None:
+def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
     """Whole samples are lost: those that come are unchanged. One that comes late counts if later ones were lost."""
     events = Peers(4, SEED, is_sure=False).run(600)
     wanted = expected(events)
-    with World(program, 97) as world:
+    with World(97) as world:
         found = world.all(events)
         assert world.pulses["lost"] > 5
     assert 5 < len(found.frames) < len(wanted.frames)
@@ -133,12 +110,12 @@ def test_a_host_that_takes_nothing_loses_samples_but_no_discovery(program: Path)
 
 
 @pytest.mark.check
-def test_a_list_of_very_many_encodings_counts(program: Path) -> None:
+def test_a_list_of_very_many_encodings_counts() -> None:
     """Its number is a multiple of 65536, of which the lower half is that of a list that is not told."""
     seed = SEED + 3
     print(f"seed {seed}")
     events = Peers(4, seed, exaggerate=True).run(300)
-    with World(program) as world:
+    with World() as world:
         _check(world.all(events), expected(events))
 
 

@@ -117,10 +117,10 @@ architecture rtl of firm_rtps_endpoint is
   signal hashes_r    : mask_t;
   signal has_hash_r  : std_logic;
   signal named_r     : std_logic;  -- the part is that of the hash
-  signal given_r     : std_logic;  -- its reliability was told
-  signal reliable_r  : std_logic;
+  signal given_r     : std_logic := '0';  -- its reliability was told
+  signal reliable_r  : std_logic := '0';
   signal offers      : std_logic;
-  signal transient_r : std_logic;
+  signal transient_r : std_logic := '0';
   signal divided_r   : std_logic;  -- it is in a partition
   signal encodes_r   : std_logic;
 
@@ -128,10 +128,11 @@ architecture rtl of firm_rtps_endpoint is
   signal source_memory : memory_t;
   signal guid_valid    : std_logic;
   signal guid_at       : unsigned(3 downto 0);
+  signal source_place  : unsigned(3 downto 0);
   signal source_byte   : std_logic_vector(7 downto 0);
   signal entity_r      : std_logic_vector(31 downto 0) := (others => '0');
-  signal same_r        : std_logic;
-  signal whole_r       : std_logic;
+  signal same_r        : std_logic := '0';
+  signal whole_r       : std_logic := '0';
 
 begin
 
@@ -378,7 +379,8 @@ begin
                 '0';
   guid_at    <= unsigned(address(3 downto 0)) when has_field = '1' else at(3 downto 0);
 
-  source_byte <= source_memory(to_integer(guid_at));
+  source_place <= guid_at when guid_valid = '1' else (others => '0');
+  source_byte  <= source_memory(to_integer(source_place));
 
   read_guid : process (clk)
   begin

@@ -84,8 +84,8 @@ architecture rtl of firm_rtps_inbox is
   signal in_value    : std_logic;
 
   signal from_r  : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
-  signal large_r : std_logic;
-  signal gone_r  : std_logic;
+  signal large_r : std_logic := '0';
+  signal gone_r  : std_logic := '0';
 
   -- Of the packet that arrives.
   signal mine_r   : std_logic;  -- the last destination was this node, or any

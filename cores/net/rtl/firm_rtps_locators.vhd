@@ -43,10 +43,10 @@ architecture rtl of firm_rtps_locators is
   signal at             : unsigned(15 downto 0);  -- the place in a parameter
   signal comes          : std_logic;
   signal udp_r          : std_logic;              -- the locator is one for UDP over IPv4, so far
-  signal metatraffic_r  : std_logic;
-  signal default_r      : std_logic;
-  signal unicast_r      : std_logic;
-  signal lease_r        : std_logic;
+  signal metatraffic_r  : std_logic := '0';
+  signal default_r      : std_logic := '0';
+  signal unicast_r      : std_logic := '0';
+  signal lease_r        : std_logic := '0';
   signal is_metatraffic : std_logic;
   signal is_default     : std_logic;
   signal is_unicast     : std_logic;

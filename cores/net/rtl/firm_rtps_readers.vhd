@@ -116,7 +116,7 @@ architecture rtl of firm_rtps_readers is
   signal ids      : ids_t := (others => (others => '0'));      -- the reader of each source
   -- Changes when a source's place gets another writer, whose numbers begin anew: samples of the one before may wait.
   signal marks      : marks_t := (others => (others => '0'));
-  signal sources_r  : sources_t;
+  signal sources_r  : sources_t := (others => '0');
   signal reliable_r : sources_t;
 
   -- ------------------------------------------------------------------ the sample that arrives
@@ -173,7 +173,7 @@ architecture rtl of firm_rtps_readers is
   signal writes      : sources_t;
   signal chosen      : source_t;
 
-  signal early       : early_t;
+  signal early       : early_t := (others => (others => '0'));
   signal early_r     : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that came
   signal told_r      : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that were taken
   signal early_used  : unsigned(EARLY_BITS downto 0);

@@ -81,7 +81,7 @@ architecture rtl of firm_rtps_sequencer is
 
   type state_t is (FETCH, DECODE, DESTINATION, SOURCE, TAKING);
   signal state_r   : state_t;
-  signal program_r : program_t;
+  signal program_r : program_t := (others => '0');
   signal depth_r   : unsigned(STACK_BITS-1 downto 0) := (others => '0');
   signal zero_r    : std_logic;
   signal carry_r   : std_logic;

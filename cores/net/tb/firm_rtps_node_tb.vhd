@@ -19,7 +19,7 @@ use firm.firm_sim_pkg.all;
 entity firm_rtps_node_tb is
   generic (
     EVENT_FILE    : string  := "events.txt";
-    NAMES_FILE    : string  := "names.txt";    -- a word of each memory in each row, in binary
+    NAMES_FILE    : string  := "names.txt";    -- a word of each memory in each row, in hexadecimal
     PROGRAM_FILE  : string  := "program.txt";
     PACKETS_FILE  : string  := "packets.txt";
     ENTRIES_FILE  : string  := "entries.txt";  -- the address of each packet
@@ -27,7 +27,7 @@ entity firm_rtps_node_tb is
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;              -- the chance, each cycle, that the host takes nothing
-    MAIN          : integer := 0;              -- the address of the program's loop
+    MAIN          : integer := 28;             -- the address of the program's loop
     WRITERS       : integer := 4;
     READERS       : integer := 3;
     SOURCES       : integer := 8;
@@ -35,8 +35,8 @@ entity firm_rtps_node_tb is
     SAMPLES       : integer := 16;
     SAMPLE        : integer := 64;
     SLOTS         : integer := 16;
-    RELIABLE      : integer := 0;              -- bits of the endpoints
-    TRANSIENT     : integer := 0
+    RELIABLE      : integer := 116;             -- bits of the endpoints
+    TRANSIENT     : integer := 98
   );
 end entity firm_rtps_node_tb;
 
@@ -73,10 +73,10 @@ architecture simulation of firm_rtps_node_tb is
   signal names_data      : std_logic_vector(8*ENDPOINTS-1 downto 0);
   signal program_enable  : std_logic;
   signal program_address : std_logic_vector(9 downto 0);
-  signal program_word    : std_logic_vector(35 downto 0);
+  signal program_word    : std_logic_vector(35 downto 0) := (others => '0');
   signal packets_enable  : std_logic;
   signal packets_address : std_logic_vector(12 downto 0);
-  signal packets_word    : std_logic_vector(10 downto 0);
+  signal packets_word    : std_logic_vector(10 downto 0) := (others => '0');
 
   signal m_tdata  : std_logic_vector(7 downto 0);
   signal m_tvalid : std_logic;
@@ -117,17 +117,21 @@ architecture simulation of firm_rtps_node_tb is
   type name_words_t is array (natural range 0 to 1023) of name_word_t;
   type entries_t is array (natural range 0 to 255) of natural;
 
-  -- A word in binary.
+  -- A word in hexadecimal.
   procedure read_word(row : inout line; word : out std_logic_vector) is
-    variable char : character;
+    variable char  : character;
+    variable value : unsigned(word'length+3 downto 0) := (others => '0');
+    variable digit : natural;
   begin
-    for index in word'range loop
+    while row'length > 0 loop
       read(row, char);
-      word(index) := '0';
-      if char = '1' then
-        word(index) := '1';
+      digit := character'pos(char) - character'pos('0');
+      if digit > 9 then
+        digit := character'pos(char) - character'pos('a') + 10;
       end if;
+      value := value(word'length-1 downto 0) & to_unsigned(digit, 4);
     end loop;
+    word := std_logic_vector(value(word'length-1 downto 0));
   end procedure read_word;
 
 begin
