@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -55,6 +56,10 @@ def test_the_data_of_the_core_are_those_of_the_program(tmp_path: Path) -> None:
     write_data(tmp_path)
     for path in tmp_path.iterdir():
         assert path.read_bytes() == (DATA / path.name).read_bytes(), path.name
+    bench = (DATA.parent / "firm_rtps_node_tb.vhd").read_text(encoding="ascii")
+    defaults = {name: int(value) for name, value in re.findall(r"^    (\w+) +: integer := (\d+)", bench, re.MULTILINE)}
+    wanted = {**SIZES, **bits(NODE), "MAIN": main_of(NODE)}
+    assert {name: defaults[name] for name in wanted} == wanted
 
 
 def _check(found: Results, wanted: Results) -> None:
@@ -66,7 +71,7 @@ def _check(found: Results, wanted: Results) -> None:
 
 
 def _check_kinds(wanted: Results) -> None:
-    """All that a node does happens at least once."""
+    """All that a node does happens."""
     ids = Counter(frame[0] for frame in wanted.frames)
     messages = [message for _, packet in wanted.sent if (message := parse(packet))]
     kinds = Counter(type(item).__name__ for message in messages for item in message.submessages)
@@ -75,11 +80,13 @@ def _check_kinds(wanted: Results) -> None:
 
 
 def test_the_sources_do_what_the_reference_does(library: Library, tmp_path: Path) -> None:
-    print(f"seed {SEED}")
-    events = Peers(3, SEED).run(60)
+    # With this seed, all kinds of packets and frames are among few events.
+    seed = 20261208
+    print(f"seed {seed}")
+    events = Peers(2, seed).run(60)
     wanted = expected(events)
-    assert len(wanted.sent) > 20 and wanted.frames
-    _check(_results(library, tmp_path, events, SEED=SEED), wanted)
+    _check_kinds(wanted)
+    _check(_results(library, tmp_path, events, SEED=seed), wanted)
 
 
 @pytest.mark.check
