@@ -145,7 +145,7 @@ def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
         ("firm_rtps_endpoint", "READERS", 9, "0 to 8"),
         ("firm_rtps_endpoint", "WRITERS", 10, "1 to 9"),
         ("firm_rtps_history", "WRITERS", 9, "1 to 8"),
-        ("firm_rtps_history", "SAMPLE", 48, "powers of two, 2 to 2048"),
+        ("firm_rtps_history", "SAMPLE", 48, "powers of two, 2 to 1024"),
         ("firm_rtps_history", "SLOTS", 512, "powers of two, 2 to 256"),
         ("firm_rtps_readers", "READERS", 9, "0 to 8"),
         ("firm_rtps_readers", "FIRST", 256, "0 to 256-READERS"),

@@ -12,7 +12,7 @@ use firm.firm_axis_pkg.all;
 entity firm_rtps_history is
   generic (
     WRITERS : integer := 1;  -- that send frames, 1 to 8
-    SAMPLE  : integer := 64; -- bytes of a slot, a power of two, 2 to 2048
+    SAMPLE  : integer := 64; -- bytes of a slot, a power of two, 2 to 1024
     SLOTS   : integer := 16  -- a power of two, 2 to 256
   );
   port (
@@ -50,7 +50,7 @@ end entity firm_rtps_history;
 architecture rtl of firm_rtps_history is
 
   constant MOST_WRITERS : positive := 8;
-  constant MOST_BYTES   : positive := 2048;
+  constant MOST_BYTES   : positive := 1024; -- a larger one may need several packets
   constant MOST_SLOTS   : positive := 256;
   constant HEAD_BYTES   : positive := 5;
   constant BYTE_BITS    : positive := clog2(SAMPLE);

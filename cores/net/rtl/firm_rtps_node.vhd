@@ -12,7 +12,7 @@ entity firm_rtps_node is
     WRITERS : integer := 2;    -- of the node, the one of ros_discovery_info included, 1 to 9
     READERS : integer := 1;    -- 0 to 8
     SOURCES : integer := 8;    -- matched writers of peers, 1 to 32
-    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 2048
+    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 1024
     SLOTS   : integer := 16;   -- for the last samples of all writers, a power of two, 2 to 256
     DEPTH   : integer := 2048; -- bytes of waiting discovery, and of waiting payloads; a power of two, 4 to 65536
     SAMPLES : integer := 16    -- that wait for the host, a power of two, 2 or more
