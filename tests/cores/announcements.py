@@ -168,11 +168,14 @@ class _Peer:
 class Peers:
     """Some peers that announce, end, send and leave at random.
 
-    If they exaggerate, so do their lists of encodings. Unless `is_sure`, no writer matches the reliable reader.
+    If they exaggerate, so do their lists of encodings. Unless `is_sure`, no writer matches the reliable reader. `burst`
+    is the largest number of packets for best effort that are sent one after the other.
     """
 
-    def __init__(self, count: int, seed: int, *, exaggerate: bool = False, is_sure: bool = True) -> None:
-        self._is_sure = is_sure
+    def __init__(
+        self, count: int, seed: int, *, exaggerate: bool = False, is_sure: bool = True, burst: int = 5
+    ) -> None:
+        self._is_sure, self._burst = is_sure, burst
         self._exaggerates = exaggerate
         self._chance, self._node = random.Random(seed), a_node()
         self._peers = [self._peer(number) for number in range(count)]
@@ -416,7 +419,7 @@ class Peers:
     def _samples(self, peer: _Peer) -> None:
         """Packets with samples for best effort, one after the other."""
         writers = [item for item in peer.writers if not item.is_sure] or [_Writer(b"none")]
-        for _ in range(self._chance.randrange(1, 6)):
+        for _ in range(self._chance.randrange(1, self._burst + 1)):
             items: list[Submessage] = []
             for _ in range(self._chance.randrange(1, 5)):
                 if self._chance.random() < 0.5:

@@ -106,7 +106,7 @@ def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: 
 @pytest.mark.check
 def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
     """Whole samples are lost: those that come are unchanged. One that comes late counts if later ones were lost."""
-    events = Peers(4, SEED, is_sure=False).run(600)
+    events = Peers(4, SEED, is_sure=False, burst=60).run(600)
     wanted = expected(events)
     with World(97) as world:
         found = world.all(events)

@@ -172,9 +172,11 @@ begin
       conditions         => conditions
     );
 
-  -- The builder's fields and the payload stay until its packet has left; numbers of samples stay while one is judged.
+  -- The builder's fields and the payload stay until its packet has left, and no slot is given to a new sample before;
+  -- numbers of samples stay while one is judged.
   hold   <= '0' when write = '0' else
-            is_busy when write_address(7) = '0' or write_address = AT_SLOT or write_address = AT_START else
+            is_busy when write_address(7) = '0' or write_address = AT_SLOT or write_address = AT_NEXT_SLOT
+                         or write_address = AT_START else
             is_judging when write_address = AT_LOCK and data(0) = '1' else
             '0';
   writes <= write and not hold;
