@@ -256,8 +256,12 @@ begin
 
   pad : process (matches)
   begin
-    padded                       <= (others => '0');
-    padded(ENDPOINTS-1 downto 0) <= matches;
+    padded <= (others => '0');
+    for index in padded'range loop
+      if index < ENDPOINTS then
+        padded(index) <= matches(index);
+      end if;
+    end loop;
   end process pad;
 
   facts <= has_lease & is_gone & has_default & has_metatraffic & has_unicast & is_transient & is_reliable & is_known;
