@@ -130,6 +130,7 @@ def test_the_node_has_no_latch(library: Library) -> None:
     assert library.latches("firm_rtps_node", SIZES) == []
 
 
+@pytest.mark.check
 def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
     *others, node = core_files(*HARDWARE)
     assert loops("firm_rtps_node", tmp_path, [node], others) == []
