@@ -34,6 +34,7 @@ from pathlib import Path
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.packets import Field, packets_of
 from fusesoc_firm.fabric.rtps import Kind
+from fusesoc_firm.system.derived.ethernet import MOST_DEPTH, MOST_SLOTS, kept_of, ring_slots
 from fusesoc_firm.text.render import Rendering
 
 PROGRAM = Path(__file__).with_name("ros2_node.seq")
@@ -41,8 +42,6 @@ MOST_WORDS = 1024
 WORD_BITS = 36
 MOST_PEERS = 8
 MOST_SOURCES = MOST_SINKS = 32
-# Samples of a writer, and of all writers together.
-MOST_DEPTH, MOST_SLOTS = 127, 256
 
 _OPERATIONS = "copy add sub cmp and test mask load store bit step jump call return take".split()
 _SIZES = {size: code for code, size in enumerate((1, 2, 4, 8, 12, 16, 6, 28))}
@@ -131,10 +130,11 @@ class Ring:
 
 def rings_of(node: Node) -> tuple[Ring, ...]:
     """Return the slots of each writer with frames. Raises ValueError if they do not fit."""
-    sizes = [1 << _kept(item).bit_length() for item in node.writers[1:]]
+    sizes = [ring_slots(item.quality) for item in node.writers[1:]]
     for item in node.writers[1:]:
-        if _kept(item) > MOST_DEPTH:
-            raise ValueError(f"{item.topic} keeps {_kept(item)} samples; at most {MOST_DEPTH} are kept")
+        kept = kept_of(item.quality)
+        if kept > MOST_DEPTH:
+            raise ValueError(f"{item.topic} keeps {kept} samples; at most {MOST_DEPTH} are kept")
     if sum(sizes) > MOST_SLOTS:
         raise ValueError(f"the writers need {sum(sizes)} slots for their samples; there are at most {MOST_SLOTS}")
     bases = dict.fromkeys(range(len(sizes)), 0)
@@ -144,12 +144,6 @@ def rings_of(node: Node) -> tuple[Ring, ...]:
         bases[number] = used
         used += sizes[number]
     return tuple(Ring(bases[number], size) for number, size in enumerate(sizes))
-
-
-def _kept(item: Endpoint) -> int:
-    """The samples of a writer that somebody may ask for."""
-    quality = item.quality
-    return quality.depth if quality.is_reliable or quality.is_transient_local else 1
 
 
 def slots_of(node: Node) -> int:
@@ -233,7 +227,7 @@ def _writer(item: Endpoint, samples: int) -> Sequence[str]:
     return (
         f"copy.4 W.number, {samples}",
         "copy.4 W.first, 1",
-        f"copy W.depth, {_kept(item)}",
+        f"copy W.depth, {kept_of(quality)}",
         f"copy W.transient, {int(quality.is_transient_local)}",
     )
 
