@@ -185,11 +185,12 @@ begin
   count_time : process (clk)
   begin
     if rising_edge(clk) then
-      tick_r  <= '0';
-      cycle_r <= cycle_r + 1;
       if cycle_r = CYCLES-1 then
         cycle_r <= 0;
         tick_r  <= '1';
+      else
+        cycle_r <= cycle_r + 1;
+        tick_r  <= '0';
       end if;
       if rst_n = '0' then
         cycle_r <= 0;
