@@ -23,22 +23,15 @@ from tests.ros.cpp_nodes import ros2
 
 SYSTEM = HERE.parents[1] / "specs" / "quat2euler"
 SEED = 20261127
-# Quaternions and points that each peer sends before both wait for all results.
+# Quaternions that each peer sends before both wait for all results.
 LOT, LOTS = 10, 5
-# Topics that come back as they are, the second ones in their directions.
-POINTS = """\
-  - {name: points, middleware: ROS2, mode: subscriber, message: geometry_msgs/Point, topic: /point_in,
-     qos: {profile: sensor_data}, outgoing: [{name: kept_points}]}
-  - {name: kept_points, middleware: ROS2, mode: publisher, message: geometry_msgs/Point, topic: /point_out,
-     qos: {durability: transient_local, depth: 20}}
-"""
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
 
 @pytest.fixture(scope="module")
 def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo with other names, an address and `POINTS`; its simulator is built beside it, once."""
+    """The demo with the names and the address of the other tests here; its simulator is built beside it, once."""
     folder = tmp_path_factory.mktemp("board")
     shutil.copytree(SYSTEM / "rtl", folder / "rtl")
     text = (SYSTEM / "quat2euler_ethernet.yaml").read_text(encoding="utf-8")
@@ -51,7 +44,7 @@ def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert text.count(old) == 1
         text = text.replace(old, new)
     path = folder / "board.yaml"
-    path.write_text(text + POINTS, encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     return path
 
 
@@ -105,7 +98,7 @@ class Lab:
         }
 
     def _peer(self, host: Host, python: str, name: str, environment: dict[str, str]) -> Peer:
-        types = {"euler": "Point", "point": "Point"}, {"quaternion": "Quaternion", "point": "Point"}
+        types = {"euler": "Point"}, {"quaternion": "Quaternion"}
         peer = Peer(host, [python, str(HERE / name), "reliable", *map(json.dumps, types)], environment)
         self._stack.callback(peer.kill)
         return peer
@@ -129,19 +122,17 @@ def lab(specification: Path, tmp_path: Path) -> Iterator[Lab]:
 
 
 def _exchange(peers: dict[str, Peer], chance: random.Random) -> None:
-    """Quaternions and points of both peers, by turns; each peer gets the angles and points of all."""
+    """Quaternions of both peers, by turns; each peer gets the angles of all."""
     model = _model()
-    quaternions = [[chance.uniform(-1, 1) for _ in range(4)] for _ in range(2 * LOT)]
-    points = [[chance.uniform(-1, 1) for _ in range(3)] for _ in range(2 * LOT)]
-    for number, values in enumerate(zip(quaternions, points, strict=True)):
-        [*peers.values()][number % 2].send([*zip(("quaternion", "point"), values, strict=True)])
-    angles = [list(model.quaternion_to_euler(*values)) for values in quaternions]
-    wanted = sorted([*(("euler", values) for values in angles), *(("point", values) for values in points)])
+    sent = [[chance.uniform(-1, 1) for _ in range(4)] for _ in range(2 * LOT)]
+    for number, values in enumerate(sent):
+        [*peers.values()][number % 2].send([("quaternion", values)])
+    wanted = sorted(list(model.quaternion_to_euler(*values)) for values in sent)
     for peer in peers.values():
-        assert sorted(peer.take(len(wanted))) == wanted
+        assert sorted(values for _, values in peer.take(2 * LOT)) == wanted
 
 
-def test_messages_of_both_peers_come_back_to_both(lab: Lab) -> None:
+def test_quaternions_of_both_peers_come_back_as_euler_angles(lab: Lab) -> None:
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     board, peers = lab.board(), lab.peers()
