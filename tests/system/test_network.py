@@ -109,23 +109,14 @@ def test_its_node_has_the_numbers_of_the_specification(path: Path) -> None:
     assert "--   0  rt/lab/turn\n" in node
 
 
-KEPT = """\
-  - {name: state, middleware: ROS2, mode: subscriber, message: sensor_msgs/BatteryState, maxLength: 600,
-     outgoing: [{name: kept}]}
-  - {name: kept, middleware: ROS2, mode: publisher, message: sensor_msgs/BatteryState, maxLength: 600,
-     qos: {durability: transient_local, depth: 5}}
-"""
-
-
 def test_its_node_has_the_qualities_of_the_specification(path: Path) -> None:
-    """From the lowest bit on: subscribers, publishers, and `ros_discovery_info`, which is not in the history."""
-    path.write_text(SPECIFICATION + KEPT, encoding="utf-8")
+    """From the lowest bit on: the subscriber, the publisher, and `ros_discovery_info`, which is not in the history."""
+    first, last = SPECIFICATION.rsplit("{profile: sensor_data}", 1)
+    path.write_text(f"{first}{{durability: transient_local, depth: 5}}{last}", encoding="utf-8")
     node = _files(path.parent)["turtle_system_node.vhd"]
-    assert 'ARE_RELIABLE  : std_logic_vector(4 downto 0) := "11010"' in node
-    assert 'ARE_TRANSIENT : std_logic_vector(4 downto 0) := "11000"' in node
-    # Eight peers with both topics; two slots of the best-effort publisher and eight of the other one.
-    for line in ("SOURCES       => 16", "SAMPLE        => 1024", "SLOTS         => 16"):
-        assert line in node
+    assert 'ARE_RELIABLE  : std_logic_vector(2 downto 0) := "110"' in node
+    assert 'ARE_TRANSIENT : std_logic_vector(2 downto 0) := "110"' in node
+    assert "SLOTS         => 8" in node
 
 
 def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:

@@ -10,7 +10,7 @@ from fusesoc_firm.system.derived.model import Converter, DerivedSystem, NetworkK
 from fusesoc_firm.system.written.specification import Block, Project, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
-MOST_SUBSCRIBERS = MOST_PUBLISHERS = 8
+MOST_SUBSCRIBERS = MOST_PUBLISHERS = 1
 # Bytes of the longest payload: of a sample in one packet, and of a slot of the history.
 LONGEST_TAKEN, LONGEST_SENT = 1344, 1024
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
@@ -33,8 +33,8 @@ def check_ethernet(written: Specification, system: DerivedSystem, faults: Diagno
     message = f"interconnect '{project.interconnect}' "
     _check_clock(project, system.network.phy, system.clock, faults)
     for items, most, name in (
-        (system.subscribers, MOST_SUBSCRIBERS, "subscribers"),
-        (system.publishers, MOST_PUBLISHERS, "publishers"),
+        (system.subscribers, MOST_SUBSCRIBERS, "subscriber"),
+        (system.publishers, MOST_PUBLISHERS, "publisher"),
     ):
         if len(items) > most:
             place = blocks[items[most].block].name.source
