@@ -97,7 +97,8 @@ def _run(command: Sequence[str], folder: Path, answers: bytes) -> tuple[subproce
 
 def _frames(reports: bytes) -> tuple[int, list[bytes]]:
     """The number of questions, and the frames between their ends."""
-    questions, frames, content, place = 0, [], b"", 0
+    frames: list[bytes] = []
+    questions, content, place = 0, b"", 0
     while place < len(reports):
         kind = reports[place : place + 1]
         if kind == b"w":

@@ -56,7 +56,7 @@ architecture simulation of firm_sim_phy is
 
   attribute foreign : string;
   attribute foreign of flush_all_files : procedure is "VHPIDIRECT libc.so.6 fflush";
-  attribute foreign of end_simulation : procedure is "VHPIDIRECT libc.so.6 exit";
+  attribute foreign of end_simulation  : procedure is "VHPIDIRECT libc.so.6 exit";
 
 begin
 
