@@ -72,6 +72,7 @@ class Kind(IntEnum):
     TICKS = 2
     FRAME = 3
     ABORTED_FRAME = 4
+    RUSHED = 5  # milliseconds, one in each cycle; up to 15
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ def expected(events: Sequence[Event], sources: int = 8, sinks: int = 8) -> Resul
         match event.kind:
             case Kind.PACKET:
                 participant.receive(event.data, now)
-            case Kind.TICKS:
+            case Kind.TICKS | Kind.RUSHED:
                 for _ in range(event.count):
                     now += 1
                     participant.tick(now)
@@ -214,6 +215,40 @@ class Peers:
         for _ in range(count):
             self._chance.choices(list(ways), list(ways.values()))[0](self._chance.choice(self._peers))
         return self.events
+
+    def succession(self) -> list[Event]:
+        """A writer ends, and another one gets its place, in one packet with samples that came too early.
+
+        The samples of the second one come when it is asked for them. Then come more writers than find room.
+        """
+        peer, (gone, new) = self._peers[0], (bytes([0, 0, number, rtps.USER_WRITER]) for number in (7, 8))
+        told = DISCOVERY[PUBLICATIONS_WRITER], PUBLICATIONS_WRITER
+        status = (Parameter.STATUS_INFO, bytes([0, 0, 0, 3])), (Parameter.KEY_HASH, peer.prefix + gone)
+        early = [Data(rtps.NO_ENTITY, gone, number, rtps.XCDR1) for number in range(5, 9)]
+        self._come(peer)
+        self._send(peer, Data(*told, 1, self._sure_writer(peer, gone)))
+        self._send(peer, *early, Data(*told, 2, None, status), Data(*told, 3, self._sure_writer(peer, new)))
+        self._send(peer, Heartbeat(rtps.NO_ENTITY, new, 1, 2, 1, False))
+        # Its first request has told nothing of samples; the next one follows half a second later.
+        self.events.append(Event(Kind.TICKS, count=510))
+        for number in (1, 2):
+            self._send(peer, Data(rtps.NO_ENTITY, new, number, rtps.XCDR1 + bytes([number] * 4)))
+        for number in range(4, 12):
+            entity = bytes([0, 0, 16 + number, rtps.USER_WRITER])
+            self._send(peer, Data(*told, number, self._sure_writer(peer, entity)))
+        peer.told[PUBLICATIONS_WRITER] = 11
+        return self.events
+
+    def _sure_writer(self, peer: _Peer, entity: bytes) -> bytes:
+        """The announcement of a writer that matches the reliable reader."""
+        topic, type_, _ = READ[SURE]
+        return self._parameters(
+            peer,
+            (Parameter.ENDPOINT_GUID, peer.prefix + entity),
+            (Parameter.TOPIC_NAME, self._octets(peer, topic.encode() + b"\0")),
+            (Parameter.TYPE_NAME, self._octets(peer, type_.encode() + b"\0")),
+            (Parameter.RELIABILITY, self._word(peer, Reliability.RELIABLE) + bytes(8)),
+        )
 
     # --- packets -----------------------------------------------------------------------------------------------------
 

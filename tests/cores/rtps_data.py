@@ -45,7 +45,9 @@ def write_memories(folder: Path, prefix: str = "") -> None:
 def write_data(folder: Path) -> None:
     """The memories and the events of the core's target."""
     write_memories(folder, "node_")
-    events = Peers(2, SEED).run(TURNS)
+    peers = Peers(2, SEED)
+    peers.succession()
+    events = peers.run(TURNS)
     (folder / "node_events.txt").write_text("".join(event.row for event in events), encoding="ascii")
 
 

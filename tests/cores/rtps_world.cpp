@@ -11,7 +11,7 @@
 #include "bench.h"
 
 static const unsigned LOOP_CYCLES = 16, IDLE_LOOPS = 6;
-enum Kind { PACKET, ABORTED_PACKET, TICKS, FRAME, ABORTED_FRAME };
+enum Kind { PACKET, ABORTED_PACKET, TICKS, FRAME, ABORTED_FRAME, RUSHED };
 
 class World {
  public:
@@ -22,6 +22,12 @@ class World {
   void tick() {
     top_.tick = 1;
     step();
+    top_.tick = 0;
+    wait();
+  }
+  void rush(int count) {
+    top_.tick = 1;
+    while (count-- > 0) step();
     top_.tick = 0;
     wait();
   }
@@ -105,6 +111,8 @@ int main(int, char** arguments) {
     for (int cycle = 0; cycle < before; ++cycle) world.step();
     if (kind == TICKS) {
       for (int count = 0; count < size; ++count) world.tick();
+    } else if (kind == RUSHED) {
+      world.rush(size);
     } else if (kind == FRAME || kind == ABORTED_FRAME) {
       world.frame(bytes, kind == ABORTED_FRAME);
     } else {

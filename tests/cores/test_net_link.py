@@ -41,7 +41,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     return _library(tmp_path_factory.mktemp("link"))
 
 
-def _check(library: Library, folder: Path, **generics: Generic) -> None:
+def _check(library: Library, folder: Path, **generics: Generic) -> tuple[list[bytes], list[list[bytes]]]:
+    """The frames that leave, and those of each source."""
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     sources = [[chance.randbytes(chance.choice((1, 2, 3, 60, 200))) for _ in range(150)] for _ in range(2)]
@@ -57,6 +58,7 @@ def _check(library: Library, folder: Path, **generics: Generic) -> None:
         # The order holds for each source.
         left = iter(came)
         assert all(frame in left for frame in frames)
+    return came, sources
 
 
 @pytest.mark.parametrize(("slow", "stall"), [(0, 0), (30, 40)])
@@ -64,6 +66,12 @@ def test_whole_frames_leave_in_the_order_of_each_source(
     library: Library, tmp_path: Path, slow: int, stall: int
 ) -> None:
     _check(library, tmp_path, SLOW_PERCENT=slow, STALL_PERCENT=stall)
+
+
+def test_no_source_keeps_another_from_sending(library: Library, tmp_path: Path) -> None:
+    """Both always have a frame: they take turns."""
+    came, sources = _check(library, tmp_path)
+    assert came == list(chain.from_iterable(zip(*sources, strict=True)))
 
 
 def test_the_netlist_does_the_same(tmp_path: Path) -> None:

@@ -606,7 +606,7 @@ class Participant:
     def _asked(self, sink: Sink, item: AckNack) -> None:
         was_heard = sink.is_heard
         sink.answer(item)
-        wanted = [number for number in item.missing if number <= sink.history.number]
+        wanted = [number for number in item.missing if 1 <= number <= sink.history.number]
         if gone := [number for number in wanted if number < sink.first]:
             self._send_to(
                 sink.peer,

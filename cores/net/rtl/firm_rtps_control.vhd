@@ -87,6 +87,9 @@ end entity firm_rtps_control;
 architecture rtl of firm_rtps_control is
 
   constant MOST_ENDPOINTS : positive := 24;
+  -- The program is held while a packet leaves: more milliseconds than these are lost.
+  constant TICK_BITS      : positive := 4;
+  constant MOST_TICKS     : positive := 2**TICK_BITS-1;
 
   -- Addresses outside the memory. Fields of the builder are at 0 to 127.
   subtype address_t is std_logic_vector(7 downto 0);
@@ -98,7 +101,7 @@ architecture rtl of firm_rtps_control is
   constant AT_NEXT_SLOT : address_t := x"9b";  -- of this writer
   constant AT_START     : address_t := x"9c";
   constant AT_LOCK      : address_t := x"9d";
-  constant AT_TAKEN     : address_t := x"9e";  -- bit 0: the tick, 1: the early sample, 2: the sample to send
+  constant AT_TAKEN     : address_t := x"9e";  -- bit 0: a tick, 1: the early sample, 2: the sample to send
   constant AT_REFUSED   : address_t := x"9f";  -- bit 0: a peer, 1: an endpoint
   constant AT_PEERS     : address_t := x"b4";
   constant AT_SOURCES   : address_t := x"b5";
@@ -122,7 +125,9 @@ architecture rtl of firm_rtps_control is
   signal facts         : std_logic_vector(7 downto 0);
   signal word          : std_logic_vector(31 downto 0);
 
-  signal tick_r    : std_logic;
+  signal ticks_r   : unsigned(TICK_BITS-1 downto 0);  -- that the program has not taken
+  signal has_tick  : std_logic;
+  signal ends_tick : std_logic;
   signal locked_r  : std_logic;
   signal payload_r : std_logic;
   signal starts    : std_logic;
@@ -147,7 +152,7 @@ begin
            & integer'image(MOST_ENDPOINTS)
     severity failure;
 
-  conditions <= '0' & has_sample & has_early & tick_r;
+  conditions <= '0' & has_sample & has_early & has_tick;
 
   u_sequencer : entity firm.firm_rtps_sequencer
     port map (
@@ -183,7 +188,9 @@ begin
 
   -- ------------------------------------------------------------------ what is written
 
-  starts <= is_at(writes, write_address, AT_START);
+  starts    <= is_at(writes, write_address, AT_START);
+  ends_tick <= is_at(writes, write_address, AT_TAKEN) and data(0);
+  has_tick  <= '0' when ticks_r = 0 else '1';
 
   note : process (clk)
   begin
@@ -208,13 +215,13 @@ begin
       elsif starts = '1' then
         payload_r <= '0';
       end if;
-      if tick = '1' then
-        tick_r <= '1';
-      elsif is_at(writes, write_address, AT_TAKEN) = '1' and data(0) = '1' then
-        tick_r <= '0';
+      if tick = '1' and ends_tick = '0' and ticks_r /= MOST_TICKS then
+        ticks_r <= ticks_r + 1;
+      elsif tick = '0' and ends_tick = '1' then
+        ticks_r <= ticks_r - 1;
       end if;
       if rst_n = '0' then
-        tick_r    <= '0';
+        ticks_r   <= (others => '0');
         locked_r  <= '0';
         payload_r <= '0';
         peers_r   <= (others => '0');

@@ -31,7 +31,8 @@ entity firm_rtps_history is
     slot_writer : in std_logic_vector(2 downto 0);
     slot_next   : in std_logic_vector(7 downto 0);
 
-    -- A sample of this writer has come. The next one is not taken before `is_done`.
+    -- A sample of this writer has come. The next one is not taken before `is_done`. After a reset it is as if one had
+    -- come: the program takes it when it has written the slots of all writers, so that none comes before.
     has_sample : out std_logic;
     writer     : out std_logic_vector(2 downto 0);
     is_done    : in  std_logic;
@@ -43,7 +44,7 @@ entity firm_rtps_history is
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tready : in  std_logic;
 
-    is_refused : out std_logic  -- a pulse for each frame with more than SAMPLE bytes or another id
+    is_refused : out std_logic  -- a pulse for a frame without payload, with more than SAMPLE bytes or another id
   );
 end entity firm_rtps_history;
 
@@ -159,7 +160,7 @@ begin
         head_r     <= (others => '0');
         size_r     <= (others => '0');
         wrong_r    <= '0';
-        has_r      <= '0';
+        has_r      <= '1';
         is_refused <= '0';
       end if;
     end if;

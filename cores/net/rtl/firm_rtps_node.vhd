@@ -78,7 +78,7 @@ entity firm_rtps_node is
     is_sample_lost      : out std_logic;  -- a sample in a packet
     is_peer_refused     : out std_logic;
     is_endpoint_refused : out std_logic;  -- one that matches
-    is_frame_refused    : out std_logic   -- a frame to send, with more than SAMPLE bytes or another id
+    is_frame_refused    : out std_logic   -- a frame to send: without a payload, too long, or of another id
   );
 end entity firm_rtps_node;
 

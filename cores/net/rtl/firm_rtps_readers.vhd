@@ -107,7 +107,7 @@ architecture rtl of firm_rtps_readers is
   type number_bytes_t is array (natural range 0 to 2**SOURCE_BITS-1) of std_logic_vector(7 downto 0);
   type ids_t is array (natural range 0 to 2**SOURCE_BITS-1) of unsigned(ID_BITS-1 downto 0);
   type flags_t is array (natural range 0 to SAMPLES-1) of std_logic_vector(0 downto 0);
-  type early_t is array (natural range 0 to 2**EARLY_BITS-1) of std_logic_vector(SOURCE_BITS+31 downto 0);
+  type early_t is array (natural range 0 to 2**EARLY_BITS-1) of std_logic_vector(SOURCE_BITS+MARK_BITS+31 downto 0);
   type marks_t is array (natural range 0 to 2**SOURCE_BITS-1) of unsigned(MARK_BITS-1 downto 0);
 
   signal payloads : payloads_t;
@@ -178,7 +178,11 @@ architecture rtl of firm_rtps_readers is
   signal told_r      : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that were taken
   signal early_used  : unsigned(EARLY_BITS downto 0);
   signal early_write : std_logic;
-  signal early_entry : std_logic_vector(SOURCE_BITS+31 downto 0);
+  signal early_entry : std_logic_vector(SOURCE_BITS+MARK_BITS+31 downto 0);  -- source, mark, and number
+  signal early_from  : source_t;
+  signal waits_early : std_logic;
+  signal same_early  : std_logic;                                            -- the source is that of the sample
+  signal drops_early : std_logic;
 
   -- ------------------------------------------------------------------ the sample that leaves
   type state_t is (IDLE, CHOOSING, HEADING, SENDING);
@@ -483,8 +487,12 @@ begin
   early_used   <= early_r - told_r;
   early_write  <= judges_r and same_r and strict_r and later_r and not early_used(EARLY_BITS);
   early_entry  <= early(to_integer(told_r(EARLY_BITS-1 downto 0)));
-  has_early    <= '0' when early_used = 0 else '1';
-  early_source <= std_logic_vector(resize(unsigned(early_entry(SOURCE_BITS+31 downto 32)), 5));
+  early_from   <= unsigned(early_entry(SOURCE_BITS+MARK_BITS+31 downto MARK_BITS+32));
+  waits_early  <= '0' when early_used = 0 else '1';
+  same_early   <= '1' when unsigned(early_entry(MARK_BITS+31 downto 32)) = marks(to_integer(early_from)) else '0';
+  drops_early  <= waits_early and not same_early;
+  has_early    <= waits_early and same_early;
+  early_source <= std_logic_vector(resize(early_from, 5));
   early_number <= early_entry(31 downto 0);
 
   note_early : process (clk)
@@ -492,10 +500,10 @@ begin
     if rising_edge(clk) then
       if early_write = '1' then
         early(to_integer(early_r(EARLY_BITS-1 downto 0)))
-          <= std_logic_vector(from_r) & std_logic_vector(new_r(31 downto 0));
+          <= std_logic_vector(from_r) & candidate(AT_SOURCE-1 downto AT_MARK) & std_logic_vector(new_r(31 downto 0));
         early_r <= early_r + 1;
       end if;
-      if takes_early = '1' then
+      if takes_early = '1' or drops_early = '1' then
         told_r <= told_r + 1;
       end if;
       if rst_n = '0' then

@@ -3,7 +3,7 @@
 -- it, the number of bytes, and the bytes. A negative number of cycles waits until the node has nothing to do.
 --
 --   0 a packet, 1 a packet that is aborted with its last byte, 2 milliseconds (as many as the number of bytes, without
---   bytes), 3 a frame to send, 4 a frame that is aborted with its last byte
+--   bytes), 3 a frame to send, 4 a frame that is aborted with its last byte, 5 milliseconds, one in each cycle
 --
 -- Results go to a file. A frame to the host is `frame` and its bytes; what the node sends is `sent` and the bytes of
 -- the packet from the destination on; `refused`, `lost`, `peer` and `endpoint` are pulses; `done` follows each event
@@ -27,7 +27,7 @@ entity firm_rtps_node_tb is
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;              -- the chance, each cycle, that the host takes nothing
-    MAIN          : integer := 28;             -- the address of the program's loop
+    MAIN          : integer := 29;             -- the address of the program's loop
     WRITERS       : integer := 4;
     READERS       : integer := 3;
     SOURCES       : integer := 8;
@@ -51,6 +51,7 @@ architecture simulation of firm_rtps_node_tb is
   constant ABORTED_PACKET : natural := 1;
   constant TICKS          : natural := 2;
   constant ABORTED_FRAME  : natural := 4;
+  constant RUSHED         : natural := 5;
 
   signal clk   : std_logic := '0';
   signal rst_n : std_logic := '0';
@@ -395,6 +396,12 @@ begin
           tick <= '0';
           wait_until_idle;
         end loop;
+      elsif kind = RUSHED then
+        tick <= '1';
+        for count in 1 to size loop
+          wait until rising_edge(clk);
+        end loop;
+        tick <= '0';
       elsif kind <= ABORTED_PACKET then
         send_packet;
       else
