@@ -227,7 +227,7 @@ class Peers:
         early = [Data(rtps.NO_ENTITY, gone, number, rtps.XCDR1) for number in range(5, 9)]
         self._come(peer)
         self._send(peer, Data(*told, 1, self._sure_writer(peer, gone)))
-        self._send(peer, *early, Data(*told, 2, None, status), Data(*told, 3, self._sure_writer(peer, new)))
+        self._send(peer, Data(*told, 2, None, status), Data(*told, 3, self._sure_writer(peer, new)), *early)
         self._send(peer, Heartbeat(rtps.NO_ENTITY, new, 1, 2, 1, False))
         # Its first request has told nothing of samples; the next one follows half a second later.
         self.events.append(Event(Kind.TICKS, count=510))
