@@ -190,7 +190,7 @@ def _print_json(data: object) -> None:
 
 
 def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
-    from fusesoc_firm.fabric.ethernet import ethernet_node
+    from fusesoc_firm.fabric.ethernet import ethernet_node, history_bytes
     from fusesoc_firm.fabric.ros1 import memory_of
     from fusesoc_firm.system.views.show import counts, default_lengths
 
@@ -199,12 +199,14 @@ def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -
     system = loaded.system
     _check_stimuli(loaded, stimuli)
     memory = memory_of(system, loaded.libraries)
-    ethernet_node(system, loaded.libraries)
+    node = ethernet_node(system, loaded.libraries)
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
     for line in default_lengths(system):
         print(line)
     if memory:
         print(f"the node needs {len(memory)} bytes of memory for its program and texts")
+    if node:
+        print(f"the node needs {history_bytes(system, node)} bytes of memory for the last messages of its publishers")
 
 
 def _check_stimuli(loaded: LoadedSystem, paths: Iterable[Path]) -> None:

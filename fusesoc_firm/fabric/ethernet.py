@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.control import MOST_PEERS, MOST_SINKS, MOST_SOURCES, Sizes, memory_of_control, slots_of
 from fusesoc_firm.fabric.names import LONGEST_NAME, memory_of_names
 from fusesoc_firm.fabric.node import Node, node_of
 from fusesoc_firm.fabric.packets import memory_of, programs_of
 from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.system.derived.ethernet import longest_sent
+from fusesoc_firm.system.derived.ethernet import slot_bytes
 from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entity
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Context, Rendering, render
 
 _NODE_TEMPLATE = "vhdl/net_node.vhd"
-_SHORTEST_SAMPLE = 2
 
 
 def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> dict[str, str]:
@@ -29,11 +29,12 @@ def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibr
     node, entity = ethernet_node(system, libraries), node_entity(system)
     if node is None:
         return {}
-    packets, names = f"{system.entity}_packets", f"{system.entity}_names"
+    memories = {name: f"{system.entity}_{name}" for name in ("control", "packets", "names")}
     made = [
-        memory_of(node, packets, frames_of(node.network)),
-        memory_of_names(node.readers, names),
-        Rendering(_NODE_TEMPLATE, _configuration(system, node, {"entity": entity, "packets": packets, "names": names})),
+        memory_of_control(node, memories["control"], _sizes(node)),
+        memory_of(node, memories["packets"], frames_of(node.network)),
+        memory_of_names(node.compared, memories["names"]),
+        Rendering(_NODE_TEMPLATE, _configuration(system, node, {"entity": entity, **memories})),
     ]
     return {f"{item.context['entity']}.vhd": render(item.template, item.context) for item in made}
 
@@ -46,7 +47,7 @@ def ethernet_node(system: DerivedSystem, libraries: Mapping[Middleware, MessageL
     if system.network is None or system.network.kind is not NetworkKind.ETHERNET:
         return None
     node = node_of(system, libraries)
-    for item in node.readers:
+    for item in node.compared:
         for name in (item.topic, item.type):
             if len(name) > LONGEST_NAME:
                 fail(
@@ -56,8 +57,19 @@ def ethernet_node(system: DerivedSystem, libraries: Mapping[Middleware, MessageL
     return node
 
 
+def history_bytes(system: DerivedSystem, node: Node) -> int:
+    """Return the bytes of the memory of the last samples."""
+    return slots_of(node) * slot_bytes(system.publishers)
+
+
+def _sizes(node: Node) -> Sizes:
+    """Return the tables' sizes: room for each topic of each peer, as far as the hardware has it."""
+    sources, sinks = (MOST_PEERS * len(items) for items in (node.readers, node.writers))
+    return Sizes(MOST_PEERS, max(1, min(MOST_SOURCES, sources)), min(MOST_SINKS, sinks))
+
+
 def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:
-    """Return the configuration of the node; the hardware has one writer of samples."""
+    """Return the configuration of the node."""
     assert system.clock is not None
     network, programs = node.network, programs_of(node, frames_of(node.network))
     numbers = {name: number for number, name in enumerate(programs.entries)}
@@ -79,15 +91,17 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "dotted": str(network.address),
         "ports": ", ".join(f"{port} ({name})" for name, port in ports.items()),
         "udp_ports": "".join(f"{port:04x}" for port in reversed(ports.values())),
-        "writer": node.writers[-1].entity.hex(),
         "reader_count": len(node.readers),
-        "name_bits": 8 * len(node.readers),
         "writer_count": len(node.writers),
-        "wants_reliable": _bits(item.quality.is_reliable for item in node.readers),
-        "wants_transient": _bits(item.quality.is_transient_local for item in node.readers),
+        "endpoint_count": len(node.compared),
+        "name_bits": 8 * len(node.compared),
+        "are_reliable": _bits(item.quality.is_reliable for item in node.compared),
+        "are_transient": _bits(item.quality.is_transient_local for item in node.compared),
+        "source_count": _sizes(node).sources,
         "program_bits": programs.address_bits,
         "clock_hz": round(system.clock),
-        "sample": max(_SHORTEST_SAMPLE, 1 << (longest_sent(system.publishers) - 1).bit_length()),
+        "sample": slot_bytes(system.publishers),
+        "slot_count": slots_of(node),
         "report_packet": numbers[REPORT],
         "probe_packet": numbers[PROBE],
     }

@@ -75,6 +75,11 @@ class Node:
         """The endpoints that receive, in the order of their sequence numbers in discovery."""
         return tuple(item for item in self.endpoints if not item.is_writer)
 
+    @property
+    def compared(self) -> tuple[Endpoint, ...]:
+        """The endpoints as the hardware compares them with those of peers: `ros_discovery_info` is the last one."""
+        return (*self.readers, *self.writers[1:], self.writers[0])
+
     @cached_property
     def participant_data(self) -> bytes:
         """The payload that announces the node (SPDP)."""

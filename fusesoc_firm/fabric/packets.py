@@ -140,6 +140,7 @@ def packets_of(node: Node) -> dict[str, Packet]:
         **_endpoints(node, "writer", node.writers, publications),
         **_endpoints(node, "reader", node.readers, subscriptions),
         "graph": _to_peer(node, graph),
+        "graph_told": _to_peer(node, graph, _heartbeat()),
         "sample": _to_peer(node, _sample()),
         "sample_told": _to_peer(node, _sample(), _heartbeat()),
         "fragment": _to_peer(node, _fragment()),

@@ -132,7 +132,8 @@ class _Bits:
             return [inputs[0][gate.numbers[0] + bit :][:1] for bit in range(width)]
         if gate.kind.startswith("$dyn_"):
             return self._of_element(gate, inputs, width)
-        return [[*chain(*inputs)]] * width
+        is_memory = gate.kind == "$mem_rd" and output == 0  # for its next port
+        return [(bit,) for bit in inputs[0]] if is_memory else [[*chain(*inputs)]] * width
 
     def _of_instance(self, gate: Instance, output: int, inputs: Sequence[Sequence[int]]) -> list[Sequence[int]]:
         module = self._search.modules[gate.kind]

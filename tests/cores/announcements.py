@@ -1,96 +1,141 @@
-"""Packets of peers that announce writers and send samples, and what a node's readers make of them: the reference."""
+"""What peers, a host and a clock do to a node, at random, and what the reference participant makes of it."""
 
 from __future__ import annotations
 
 import random
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from ipaddress import IPv4Address
 
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.rtps import PUBLICATIONS_WRITER, SUBSCRIPTIONS_WRITER, Durability, Parameter, Reliability
 from fusesoc_firm.system.derived.model import Network, Quality
-from tests.fabric.messages import AckNack, Data, Gap, Heartbeat, InfoDestination, Numbers, Submessage, Writer, parse
+from tests.fabric.messages import (
+    AckNack,
+    Address,
+    Data,
+    DataFrag,
+    Gap,
+    Heartbeat,
+    InfoDestination,
+    Numbers,
+    Submessage,
+    Writer,
+)
 from tests.fabric.participant import DISCOVERY, Limits, Participant
 
 HASH = "RIHS01_" + "5af0" * 16
-TOPICS = (("rt/count_in", "std_msgs::msg::dds_::UInt32_"), ("rt/count_input", "std_msgs::msg::dds_::String_"))
 _DURABLE = Quality(is_reliable=False, is_transient_local=True)
 _BEST_EFFORT, _LATCHED = Quality(is_reliable=False), Quality(is_transient_local=True, depth=1)
-# Cycles after a packet of discovery, in which the node has done what it has to.
-_LONG = 1300
+_RELIABLE = Quality(depth=3)
+# Of the readers, and of the writers with frames.
+READ = (
+    ("rt/count_in", "std_msgs::msg::dds_::UInt32_", _BEST_EFFORT),
+    ("rt/count_input", "std_msgs::msg::dds_::String_", _DURABLE),
+    ("rt/turn", "geometry_msgs::msg::dds_::Quaternion_", _RELIABLE),
+)
+WRITTEN = (
+    ("rt/out", "std_msgs::msg::dds_::UInt32_", _BEST_EFFORT),
+    ("rt/sure", "std_msgs::msg::dds_::UInt32_", _RELIABLE),
+    ("rt/kept", "std_msgs::msg::dds_::String_", Quality(is_transient_local=True, depth=2)),
+)
+SURE = 2  # the reader that is reliable
+SAMPLE = 64  # bytes of the longest payload that the node sends
+_IDLE = -1  # an event that waits until the node has nothing to do
+_GAP = 12  # cycles between two packets, at least
+_ETHERNET, _UDP = 14, 42  # bytes before the header of IPv4, and before the payload of UDP
 Inline = tuple[tuple[int, bytes], ...]
+Sent = tuple[Address, bytes]
 
 
 def a_node() -> Node:
-    """A node that reads two topics; one name begins as the other. The second reader wants durable writers."""
+    """A node that reads and writes three topics; one name begins as another."""
     address = IPv4Address("192.0.2.9")
     network = Network(bytes.fromhex("020000000002"), address, IPv4Address("255.255.255.0"), None, "board", "/", 0)
-    readers = [
-        Endpoint(topic, type_, HASH, bytes([0, 0, number, rtps.USER_READER]), quality)
-        for number, ((topic, type_), quality) in enumerate(zip(TOPICS, (_BEST_EFFORT, _DURABLE), strict=True), 2)
-    ]
     graph = Endpoint("ros_discovery_info", "graph", HASH, bytes([0, 0, 1, rtps.USER_WRITER]), _LATCHED)
-    writer = Endpoint("rt/out", "type", HASH, bytes([0, 0, 4, rtps.USER_WRITER]), _BEST_EFFORT)
-    return Node(network, (graph, *readers, writer), 16)
+    kinds = [rtps.USER_READER] * len(READ) + [rtps.USER_WRITER] * len(WRITTEN)
+    others = [
+        Endpoint(topic, type_, HASH, bytes([0, 0, number, kind]), quality)
+        for number, ((topic, type_, quality), kind) in enumerate(zip(READ + WRITTEN, kinds, strict=True), 2)
+    ]
+    return Node(network, (graph, *others), 16)
+
+
+class Kind(IntEnum):
+    """The kinds of events at a node."""
+
+    PACKET = 0
+    ABORTED_PACKET = 1
+    TICKS = 2
+    FRAME = 3
+    ABORTED_FRAME = 4
+    RUSHED = 5  # milliseconds, one in each cycle; up to 15
 
 
 @dataclass(frozen=True)
-class Step:
-    """A packet at the node, with the cycles before it."""
+class Event:
+    """An event, and the cycles before it; `count` milliseconds, or bytes."""
 
-    before: int
-    packet: bytes
-    is_aborted: bool = False
+    kind: Kind
+    data: bytes = b""
+    count: int = 0
+    before: int = _IDLE
 
     @property
     def row(self) -> str:
         """The row for the bench."""
-        numbers = self.before, int(self.is_aborted), len(self.packet), *self.packet
+        numbers = self.kind, self.before, self.count or len(self.data), *self.data
         return " ".join(map(str, numbers)) + "\n"
 
 
 @dataclass
 class Results:
-    """Frames to the host; requests as destination, reader, writer, base and size of the set; sizes of sent samples."""
+    """Frames to the host, packets, and how many frames to send were refused."""
 
     frames: list[bytes] = field(default_factory=list)
-    requests: list[tuple[bytes, bytes, bytes, int, int]] = field(default_factory=list)
-    samples: list[int] = field(default_factory=list)
+    sent: list[Sent] = field(default_factory=list)
+    refused: int = 0
 
 
-def expected(steps: Sequence[Step], sources: int) -> Results:
-    """What the reference does with packets."""
-    node, results = a_node(), Results()
+def expected(events: Sequence[Event], sources: int = 8, sinks: int = 8) -> Results:
+    """What the reference does."""
+    node, results, now = a_node(), Results(), 0
 
     def take(endpoint: Endpoint, payload: bytes) -> None:
         results.frames.append(struct.pack("<BI", node.readers.index(endpoint), len(payload)) + payload)
 
-    participant = Participant(node, take, Limits(peers=8, matches=sources))
-    for step in steps:
-        if step.is_aborted:
-            continue
-        participant.receive(step.packet, 0)
-        for _, packet in participant.outbox:
-            message = parse(packet)
-            assert message
-            results.requests += _requests(message.submessages)
+    # Fragments are not put together: a sample that needs them is too long.
+    participant = Participant(node, take, Limits(sources=sources, sinks=sinks, longest=1344))
+    participant.start(now)
+    for event in events:
+        match event.kind:
+            case Kind.PACKET:
+                participant.receive(event.data, now)
+            case Kind.TICKS | Kind.RUSHED:
+                for _ in range(event.count):
+                    now += 1
+                    participant.tick(now)
+            case Kind.FRAME:
+                _publish(participant, event.data, results, now)
+        results.sent += participant.outbox
         participant.outbox.clear()
     print(participant.counts)
     return results
 
 
-def _requests(items: Sequence[Submessage]) -> list[tuple[bytes, bytes, bytes, int, int]]:
-    """The answers to heartbeats."""
-    prefix, found = b"", []
-    for item in items:
-        if isinstance(item, InfoDestination):
-            prefix = item.prefix
-        elif isinstance(item, AckNack) and item.is_final:
-            found.append((prefix, item.reader, item.writer, item.missing.base, item.missing.size))
-    return found
+def _publish(participant: Participant, frame: bytes, results: Results, now: int) -> None:
+    if frame[0] >= len(WRITTEN) or not 1 <= len(frame) - 5 <= SAMPLE:
+        results.refused += 1
+    else:
+        participant.publish(participant.node.writers[1 + frame[0]], frame[5:], now)
+
+
+def sent(frame: bytes) -> Sent:
+    """The address and the message of a frame that a node sent."""
+    return Address(str(IPv4Address(frame[30:34])), int.from_bytes(frame[36:38])), frame[_UDP:]
 
 
 @dataclass
@@ -99,6 +144,15 @@ class _Writer:
 
     entity: bytes
     number: int = 0
+    is_sure: bool = False
+
+
+@dataclass
+class _Reader:
+    """A peer's reader, and the number of the node's writer."""
+
+    entity: bytes
+    ours: int
 
 
 @dataclass
@@ -109,17 +163,26 @@ class _Peer:
     is_little: bool
     told: dict[bytes, int] = field(default_factory=lambda: dict.fromkeys(DISCOVERY, 0))
     writers: list[_Writer] = field(default_factory=list)
+    readers: list[_Reader] = field(default_factory=list)
 
 
 class Peers:
-    """Some peers that announce, end, send and leave at random; if they exaggerate, so do their lists of encodings."""
+    """Some peers that announce, end, send and leave at random.
 
-    def __init__(self, count: int, seed: int, *, exaggerate: bool = False) -> None:
+    If they exaggerate, so do their lists of encodings. Unless `is_sure`, no writer matches the reliable reader. `burst`
+    is the largest number of packets for best effort that are sent one after the other.
+    """
+
+    def __init__(
+        self, count: int, seed: int, *, exaggerate: bool = False, is_sure: bool = True, burst: int = 5
+    ) -> None:
+        self._is_sure, self._burst = is_sure, burst
         self._exaggerates = exaggerate
         self._chance, self._node = random.Random(seed), a_node()
         self._peers = [self._peer(number) for number in range(count)]
-        self.steps: list[Step] = []
-        self._was_slow = False
+        self.events: list[Event] = []
+        self._was_slow = True
+        self._published = [0] * len(WRITTEN)
 
     def _peer(self, number: int) -> _Peer:
         # The prefixes of two peers differ in one byte only.
@@ -128,25 +191,77 @@ class Peers:
         prefix[11] = number
         return _Peer(bytes(prefix), self._chance.random() < 0.7)
 
-    def run(self, count: int) -> list[Step]:
+    def run(self, count: int) -> list[Event]:
         """That many turns, after all peers have come."""
         for peer in self._peers:
             self._come(peer)
-        ways = {self._announce: 6, self._samples: 20, self._end: 3, self._tell: 3, self._leave: 1, self._skip: 1}
+        ways = {
+            self._announce: 10,
+            self._samples: 12,
+            self._sure_samples: 12,
+            self._user_told: 4,
+            self._user_gap: 2,
+            self._announce_reader: 8,
+            self._ask: 8,
+            self._publish: 10,
+            self._end: 3,
+            self._end_reader: 1,
+            self._tell: 3,
+            self._ask_discovery: 3,
+            self._wait: 8,
+            self._leave: 1,
+            self._skip: 1,
+        }
         for _ in range(count):
             self._chance.choices(list(ways), list(ways.values()))[0](self._chance.choice(self._peers))
-        return self.steps
+        return self.events
+
+    def succession(self) -> list[Event]:
+        """A writer ends, and another one gets its place, in one packet with samples that came too early.
+
+        The samples of the second one come when it is asked for them. Then come more writers than find room.
+        """
+        peer, (gone, new) = self._peers[0], (bytes([0, 0, number, rtps.USER_WRITER]) for number in (7, 8))
+        told = DISCOVERY[PUBLICATIONS_WRITER], PUBLICATIONS_WRITER
+        status = (Parameter.STATUS_INFO, bytes([0, 0, 0, 3])), (Parameter.KEY_HASH, peer.prefix + gone)
+        early = [Data(rtps.NO_ENTITY, gone, number, rtps.XCDR1) for number in range(5, 9)]
+        self._come(peer)
+        self._send(peer, Data(*told, 1, self._sure_writer(peer, gone)))
+        self._send(peer, Data(*told, 2, None, status), Data(*told, 3, self._sure_writer(peer, new)), *early)
+        self._send(peer, Heartbeat(rtps.NO_ENTITY, new, 1, 2, 1, False))
+        # Its first request has told nothing of samples; the next one follows half a second later.
+        self.events.append(Event(Kind.TICKS, count=510))
+        for number in (1, 2):
+            self._send(peer, Data(rtps.NO_ENTITY, new, number, rtps.XCDR1 + bytes([number] * 4)))
+        for number in range(4, 12):
+            entity = bytes([0, 0, 16 + number, rtps.USER_WRITER])
+            self._send(peer, Data(*told, number, self._sure_writer(peer, entity)))
+        peer.told[PUBLICATIONS_WRITER] = 11
+        return self.events
+
+    def _sure_writer(self, peer: _Peer, entity: bytes) -> bytes:
+        """The announcement of a writer that matches the reliable reader."""
+        topic, type_, _ = READ[SURE]
+        return self._parameters(
+            peer,
+            (Parameter.ENDPOINT_GUID, peer.prefix + entity),
+            (Parameter.TOPIC_NAME, self._octets(peer, topic.encode() + b"\0")),
+            (Parameter.TYPE_NAME, self._octets(peer, type_.encode() + b"\0")),
+            (Parameter.RELIABILITY, self._word(peer, Reliability.RELIABLE) + bytes(8)),
+        )
 
     # --- packets -----------------------------------------------------------------------------------------------------
 
     def _send(self, peer: _Peer, *items: Submessage, is_slow: bool = True) -> None:
         chance = self._chance
         packet = Writer(is_little=peer.is_little).message(peer.prefix, *items)
-        before = _LONG if self._was_slow else chance.choice([0, 0, 3, 100])
+        before = _IDLE if is_slow or self._was_slow else _GAP + chance.choice([0, 0, 3, 100])
         self._was_slow = is_slow
         if chance.random() < 0.1:
-            self.steps.append(Step(before, packet[: chance.randrange(1, len(packet) + 1)], is_aborted=True))
-        self.steps.append(Step(before, packet))
+            part = packet[: chance.randrange(1, len(packet) + 1)]
+            self.events.append(Event(Kind.ABORTED_PACKET, part, before=before))
+            before = max(before, _GAP)
+        self.events.append(Event(Kind.PACKET, packet, before=before))
 
     def _parameters(self, peer: _Peer, *items: tuple[int, bytes]) -> bytes:
         order = "<" if peer.is_little else ">"
@@ -167,8 +282,10 @@ class Peers:
     # --- turns -------------------------------------------------------------------------------------------------------
 
     def _come(self, peer: _Peer) -> None:
+        lease = [(Parameter.LEASE_DURATION, self._word(peer, 1000, 0))] if self._chance.random() < 0.7 else []
         listed = self._parameters(
             peer,
+            *lease,
             (Parameter.PARTICIPANT_GUID, peer.prefix + rtps.PARTICIPANT),
             (Parameter.DEFAULT_UNICAST_LOCATOR, self._locator(peer, 7413)),
             (Parameter.METATRAFFIC_UNICAST_LOCATOR, self._locator(peer, 7412)),
@@ -180,7 +297,7 @@ class Peers:
         status = (Parameter.STATUS_INFO, bytes([0, 0, 0, 3])), (Parameter.KEY_HASH, peer.prefix + rtps.PARTICIPANT)
         self._send(peer, Data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 2, None, status))
         if self._chance.random() < 0.8:
-            peer.told, peer.writers = dict.fromkeys(DISCOVERY, 0), []
+            peer.told, peer.writers, peer.readers = dict.fromkeys(DISCOVERY, 0), [], []
             self._come(peer)
 
     def _discover(self, peer: _Peer, writer: bytes, payload: bytes | None, inline: Inline, *, is_key: bool) -> None:
@@ -215,15 +332,32 @@ class Peers:
         chance = self._chance
         is_known = bool(peer.writers) and chance.random() < 0.1
         entity = chance.choice(peer.writers).entity if is_known else self._new_entity()
-        writer = SUBSCRIPTIONS_WRITER if chance.random() < 0.1 else PUBLICATIONS_WRITER
-        if writer == PUBLICATIONS_WRITER and all(item.entity != entity for item in peer.writers):
-            peer.writers.append(_Writer(entity))
+        topic = chance.choice(READ if self._is_sure else READ[:SURE])
+        if all(item.entity != entity for item in peer.writers):
+            peer.writers.append(_Writer(entity, is_sure=topic == READ[SURE]))
+        self._announce_endpoint(peer, PUBLICATIONS_WRITER, entity, topic[:2])
+
+    def _announce_reader(self, peer: _Peer) -> None:
+        chance = self._chance
+        is_known = bool(peer.readers) and chance.random() < 0.1
+        entity = chance.choice(peer.readers).entity if is_known else self._new_entity()[:3] + bytes([rtps.USER_READER])
+        ours = chance.randrange(len(WRITTEN) + 1)
+        topic = ("ros_discovery_info", "graph") if ours == len(WRITTEN) else WRITTEN[ours][:2]
+        if all(item.entity != entity for item in peer.readers):
+            peer.readers.append(_Reader(entity, ours))
+        self._announce_endpoint(peer, SUBSCRIPTIONS_WRITER, entity, topic)
+
+    def _announce_endpoint(self, peer: _Peer, writer: bytes, entity: bytes, names: tuple[str, str]) -> None:
+        chance = self._chance
         guids, inline = self._guids(peer, entity)
-        listed = [*self._names(peer), *guids]
+        is_durable = writer == PUBLICATIONS_WRITER and chance.random() < 0.7
+        listed = [*self._names(peer, *names, is_durable), *guids]
+        if chance.random() < 0.4:
+            listed.append((Parameter.UNICAST_LOCATOR, self._locator(peer, chance.choice([7500, 9000]))))
         chance.shuffle(listed)
         if chance.random() < 0.1:
             # Of two, the first one counts.
-            listed.append((Parameter.TOPIC_NAME, self._octets(peer, TOPICS[0][0].encode() + b"\0")))
+            listed.append((Parameter.TOPIC_NAME, self._octets(peer, READ[0][0].encode() + b"\0")))
         payload = self._parameters(peer, *listed)
         if not inline and chance.random() < 0.05:
             payload = payload[: chance.randrange(len(payload))]
@@ -243,16 +377,23 @@ class Peers:
         inline: Inline = ((Parameter.KEY_HASH, guid if way == 1 else bytes(16)),) if way in (1, 2) else ()
         return list(parameters), inline
 
-    def _names(self, peer: _Peer) -> list[tuple[int, bytes]]:
-        """The parameters of a writer, of which one name may be wrong."""
+    def _names(self, peer: _Peer, topic: str, type_: str, is_durable: bool) -> list[tuple[int, bytes]]:
+        """The parameters of an endpoint, of which one name may be wrong."""
         chance = self._chance
-        topic, type_ = chance.choice(TOPICS)
         hash_ = HASH
-        way = chance.randrange(20)
+        # Half of them match whatever the node wants or offers, unless they want something durable.
+        way = chance.randrange(40) if not self._exaggerates else 20
+        if way > 20:
+            return [
+                (Parameter.TOPIC_NAME, self._octets(peer, topic.encode() + b"\0")),
+                (Parameter.TYPE_NAME, self._octets(peer, type_.encode() + b"\0")),
+                (Parameter.RELIABILITY, self._word(peer, chance.choice([1, 2, 2, 2, 2])) + bytes(8)),
+                (Parameter.DURABILITY, self._word(peer, int(is_durable or topic == WRITTEN[2][0]))),
+            ]
         if way == 0:
             topic = chance.choice([topic[:-1], topic + "s", "", "rt/" + "x" * 300])
         elif way == 1:
-            type_ = chance.choice([TOPICS[0][1], TOPICS[1][1], type_ + "_", ""])
+            type_ = chance.choice([READ[0][1], READ[1][1], type_ + "_", ""])
         elif way == 2:
             hash_ = chance.choice([HASH[:-1], HASH + "0", HASH[:-1] + "1", "RIHS01_", "1"])
         return [
@@ -304,9 +445,16 @@ class Peers:
         else:
             self._discover(peer, PUBLICATIONS_WRITER, None, (status, (Parameter.KEY_HASH, guid)), is_key=False)
 
+    def _end_reader(self, peer: _Peer) -> None:
+        if peer.readers:
+            status = (Parameter.STATUS_INFO, bytes([0, 0, 0, 3]))
+            key = (Parameter.KEY_HASH, peer.prefix + self._chance.choice(peer.readers).entity)
+            self._discover(peer, SUBSCRIPTIONS_WRITER, None, (status, key), is_key=False)
+
     def _samples(self, peer: _Peer) -> None:
-        """Packets with samples, one after the other."""
-        for _ in range(self._chance.randrange(1, 6)):
+        """Packets with samples for best effort, one after the other."""
+        writers = [item for item in peer.writers if not item.is_sure] or [_Writer(b"none")]
+        for _ in range(self._chance.randrange(1, self._burst + 1)):
             items: list[Submessage] = []
             for _ in range(self._chance.randrange(1, 5)):
                 if self._chance.random() < 0.5:
@@ -314,16 +462,99 @@ class Peers:
                         [self._node.prefix] * 6 + [bytes(12)] * 2 + [bytes(11) + b"\1", self._node.prefix[:11] + b"\1"]
                     )
                     items.append(InfoDestination(self._chance.choice(others)))
-                items.append(self._sample(self._chance.choice(peer.writers) if peer.writers else _Writer(b"none")))
+                items.append(self._sample(self._chance.choice(writers)))
             self._send(peer, *items, is_slow=False)
             if self._chance.random() < 0.1:
-                step = self.steps[-1]
-                self.steps[-1] = Step(step.before, step.packet[: self._chance.randrange(1, len(step.packet))])
+                event = self.events[-1]
+                part = event.data[: self._chance.randrange(1, len(event.data))]
+                self.events[-1] = Event(Kind.PACKET, part, before=event.before)
 
     def _sample(self, writer: _Writer) -> Data:
         chance = self._chance
         writer.number += chance.choice([1, 1, 1, 1, 3, 0, -1, 255, 1 << 32 if chance.random() < 0.05 else 1])
+        return self._data(writer, max(0, writer.number))
+
+    def _data(self, writer: _Writer, number: int) -> Data:
+        chance = self._chance
         readers = [item.entity for item in self._node.readers]
-        reader = chance.choice([rtps.NO_ENTITY, *readers, *readers, bytes([0, 0, 4, rtps.USER_READER])])
+        reader = chance.choice([rtps.NO_ENTITY, *readers, *readers, bytes([0, 0, 4, rtps.USER_WRITER])])
         payload = rtps.XCDR1 + chance.randbytes(chance.choice([0, 1, 4, 8, 60]))
-        return Data(reader, writer.entity, max(0, writer.number), payload)
+        return Data(reader, writer.entity, number, payload)
+
+    def _sure(self, peer: _Peer) -> _Writer:
+        # Later ones seldom found room.
+        return self._chance.choice([item for item in peer.writers if item.is_sure][:2] or [_Writer(b"none")])
+
+    def _sure_samples(self, peer: _Peer) -> None:
+        """Samples for a reliable reader: some are lost, repeated or sent late, without a payload or in fragments."""
+        chance, writer = self._chance, self._sure(peer)
+        numbers = [writer.number + chance.choice([1, 1, 1, 1, 1, 2, 3, 0, -1])]
+        if chance.random() < 0.5:
+            # As if they had been asked for.
+            numbers = list(range(max(1, writer.number - 8), writer.number + 2))
+        for number in numbers:
+            writer.number = max(writer.number, number)
+            item: Data | DataFrag = self._data(writer, max(0, number))
+            if chance.random() < 0.9:
+                item = replace(item, reader=chance.choice([rtps.NO_ENTITY, self._node.readers[SURE].entity]))
+            way = chance.randrange(12)
+            if way == 0:
+                item = Data(item.reader, item.writer, item.number, None)
+            elif way == 1:
+                item = DataFrag(item.reader, item.writer, item.number, 1, 1, 1024, 4096, chance.randbytes(1024))
+            self._send(peer, self._destination(), item)
+
+    def _user_told(self, peer: _Peer) -> None:
+        writer, chance = self._sure(peer), self._chance
+        first = max(0, chance.choice([1, 1, 1, writer.number, writer.number + 1, writer.number - 3]))
+        last = max(0, writer.number + chance.choice([0, 0, 0, 2, -1]))
+        writer.number = max(writer.number, last)
+        reader = chance.choice([rtps.NO_ENTITY, self._node.readers[SURE].entity, self._node.readers[0].entity])
+        self._send(peer, self._destination(), Heartbeat(reader, writer.entity, first, last, 9, chance.random() < 0.5))
+
+    def _user_gap(self, peer: _Peer) -> None:
+        writer, chance = self._sure(peer), self._chance
+        start = max(1, writer.number + chance.choice([-2, 0, 1, 1, 2]))
+        base = start + chance.choice([0, 1, 1, 3])
+        others = Numbers.of([base + place for place in range(20) if chance.random() < 0.6], base)
+        self._send(peer, self._destination(), Gap(self._node.readers[SURE].entity, writer.entity, start, others))
+        writer.number = max(writer.number, base - 1)
+
+    def _ask(self, peer: _Peer) -> None:
+        """A reader acknowledges, and asks for samples."""
+        chance = self._chance
+        if not peer.readers:
+            return
+        reader = chance.choice(peer.readers[:3])
+        last = 1 if reader.ours == len(WRITTEN) else self._published[reader.ours]
+        base = max(0, last + chance.choice([1, 1, 1, 0, -1, -2, -5, -5, -6, -300]))
+        wanted = [base + place for place in range(chance.choice([0, 0, 1, 5, 8, 40])) if chance.random() < 0.7]
+        writer = self._node.writers[0 if reader.ours == len(WRITTEN) else 1 + reader.ours]
+        if chance.random() < 0.1:
+            writer = chance.choice(self._node.writers)
+        answer = AckNack(reader.entity, writer.entity, Numbers.of(wanted, base), 3, chance.random() < 0.6)
+        self._send(peer, self._destination(), answer)
+
+    def _ask_discovery(self, peer: _Peer) -> None:
+        chance = self._chance
+        writer = chance.choice(list(DISCOVERY))
+        base = chance.randrange(6)
+        wanted = [base + place for place in range(chance.choice([0, 3, 9])) if chance.random() < 0.7]
+        answer = AckNack(DISCOVERY[writer], writer, Numbers.of(wanted, base), 3, chance.random() < 0.5)
+        self._send(peer, self._destination(), answer)
+
+    def _publish(self, _: _Peer) -> None:
+        """A frame of the Manager, seldom one that is refused or aborted."""
+        chance = self._chance
+        size = chance.choice([4, 8, 12, SAMPLE, SAMPLE, SAMPLE + 1, SAMPLE + 40 if chance.random() < 0.2 else 8])
+        number = chance.choice([*range(len(WRITTEN)), *range(len(WRITTEN)), *range(len(WRITTEN)), len(WRITTEN), 255])
+        frame = bytes([number]) + struct.pack("<I", size) + rtps.XCDR1 + chance.randbytes(size - 4)
+        is_aborted = chance.random() < 0.1
+        self.events.append(Event(Kind.ABORTED_FRAME if is_aborted else Kind.FRAME, frame))
+        if number < len(WRITTEN) and size <= SAMPLE and not is_aborted:
+            self._published[number] += 1
+        self._was_slow = True
+
+    def _wait(self, _: _Peer) -> None:
+        self.events.append(Event(Kind.TICKS, count=self._chance.choice([1, 3, 19, 20, 21, 40])))
+        self._was_slow = True

@@ -41,6 +41,15 @@ def fragments(host: Host, number: int, data: bytes, size: int = 1480) -> list[by
     ]
 
 
+def is_fragment(frame: bytes) -> bool:
+    """Whether a frame has a fragment for the host, as the hardware takes it."""
+    size, word = struct.unpack_from(">HxxH", frame, 16)
+    is_ours = frame[:6] == MAC and not frame[6] & 1 and frame[12:15] == b"\x08\0\x45" and frame[30:34] == ADDRESS
+    if not is_ours or frame[23] != _UDP or not word & 0x3FFF or size <= 20 or checksum(frame[14:34]):
+        return False
+    return not word & _MORE or (size - 20) % 8 == 0
+
+
 @dataclass
 class Reassembly:
     """The model: packets in the order of their completion, and the number of what was dropped."""
@@ -57,14 +66,11 @@ class Reassembly:
             self._take(frame)
 
     def _take(self, frame: bytes) -> None:
+        if not is_fragment(frame):
+            return
         size, number, word = struct.unpack_from(">HHH", frame, 16)
-        is_ours = frame[:6] == MAC and not frame[6] & 1 and frame[12:15] == b"\x08\0\x45" and frame[30:34] == ADDRESS
         offset, more = 8 * (word & 0x1FFF), bool(word & _MORE)
-        if not is_ours or frame[23] != _UDP or not word & 0x3FFF or size <= 20 or checksum(frame[14:34]):
-            return
         data = frame[34 : 14 + size]
-        if more and (size - 20) % 8:
-            return
         key = frame[26:30] + number.to_bytes(2)
         header, known = self._parts.get(key, (frame[:34], b""))
         end = offset + size - 20

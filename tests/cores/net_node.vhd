@@ -1,12 +1,20 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node in fabric at a GMII: found by ARP, pings and ROS 2, in the domain 0, at 192.0.2.9 and 02:00:00:00:00:02. Every
--- hundredth `tick` a sample of std_msgs/UInt32 is sent, which counts from 0; samples of peers leave as frames.
+-- A node in fabric at a GMII: found by ARP, pings and ROS 2, in the domain 0, at 192.0.2.9 and 02:00:00:00:00:02.
+-- Frames of the host are samples to send, and samples of peers leave as frames.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 
 entity net_node is
+  generic (
+    WRITERS   : integer := 4;
+    READERS   : integer := 3;
+    SAMPLE    : integer := 256; -- see firm_rtps_node
+    SLOTS     : integer := 256;
+    RELIABLE  : integer := 0;   -- a bit for each endpoint
+    TRANSIENT : integer := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -17,28 +25,30 @@ entity net_node is
     tx_en : out std_logic;
     txd   : out std_logic_vector(7 downto 0);
 
+    -- Frames of the host.
+    s_axis_tdata  : in  std_logic_vector(7 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
     -- Frames to the host.
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    peers_known   : out std_logic_vector(7 downto 0);
-    sources_known : out std_logic_vector(7 downto 0)
+    peer_count   : out std_logic_vector(7 downto 0);
+    source_count : out std_logic_vector(7 downto 0);
+    sink_count   : out std_logic_vector(7 downto 0)
   );
 end entity net_node;
 
 architecture rtl of net_node is
 
-  constant MAC          : std_logic_vector(47 downto 0) := x"020000000002";
-  constant ADDRESS      : std_logic_vector(31 downto 0) := x"c0000209";
-  constant SAMPLE_BYTES : positive := 8;
-  constant PERIOD       : positive := 100;
-  constant WRITERS      : positive := 3;
-  constant READERS      : positive := 2;
-  constant SOURCES      : positive := 8;
-  constant WANTED       : std_logic_vector(READERS-1 downto 0) := (others => '0');
-  constant NODE_PREFIX  : std_logic_vector(95 downto 0) := x"0000" & MAC & x"00000000";
+  constant MAC         : std_logic_vector(47 downto 0) := x"020000000002";
+  constant ADDRESS     : std_logic_vector(31 downto 0) := x"c0000209";
+  constant ENDPOINTS   : positive := READERS+WRITERS;
+  constant NODE_PREFIX : std_logic_vector(95 downto 0) := x"0000" & MAC & x"00000000";
 
   signal received_tdata  : std_logic_vector(7 downto 0);
   signal received_tuser  : std_logic_vector(0 downto 0);
@@ -52,32 +62,27 @@ architecture rtl of net_node is
   signal source_mac : std_logic_vector(47 downto 0);
 
   signal names_address : std_logic_vector(9 downto 0);
-  signal names_data    : std_logic_vector(8*READERS-1 downto 0);
+  signal names_data    : std_logic_vector(8*ENDPOINTS-1 downto 0);
+
+  signal control_enable  : std_logic;
+  signal control_address : std_logic_vector(9 downto 0);
+  signal control_word    : std_logic_vector(35 downto 0);
 
   signal start           : std_logic;
   signal packet          : std_logic_vector(7 downto 0);
-  signal entry           : std_logic_vector(11 downto 0);
+  signal entry           : std_logic_vector(12 downto 0);
   signal payload_bytes   : std_logic_vector(15 downto 0);
   signal is_busy         : std_logic;
   signal build_valid     : std_logic;
   signal build_address   : std_logic_vector(6 downto 0);
   signal build_data      : std_logic_vector(7 downto 0);
   signal program_enable  : std_logic;
-  signal program_address : std_logic_vector(11 downto 0);
+  signal program_address : std_logic_vector(12 downto 0);
   signal program_word    : std_logic_vector(10 downto 0);
 
   signal payload_tdata  : std_logic_vector(7 downto 0);
   signal payload_tvalid : std_logic;
   signal payload_tready : std_logic;
-
-  signal sample_tdata  : std_logic_vector(7 downto 0);
-  signal sample_tvalid : std_logic;
-  signal sample_tlast  : std_logic;
-  signal sample_tready : std_logic;
-  signal place_r       : unsigned(2 downto 0);
-  signal sends_r       : std_logic;
-  signal number_r      : unsigned(31 downto 0);
-  signal wait_r        : natural range 0 to PERIOD-1;
 
   -- Replies, then packets.
   signal sources_tdata  : std_logic_vector(15 downto 0);
@@ -160,11 +165,21 @@ begin
       data    => names_data
     );
 
+  u_control : entity work.net_node_control
+    port map (
+      clk     => clk,
+      enable  => control_enable,
+      address => control_address,
+      word    => control_word
+    );
+
   u_node : entity firm.firm_rtps_node
     generic map (
       WRITERS => WRITERS,
       READERS => READERS,
-      SOURCES => SOURCES,
+      SOURCES => 8,
+      SAMPLE  => SAMPLE,
+      SLOTS   => SLOTS,
       DEPTH   => 4096
     )
     port map (
@@ -172,9 +187,11 @@ begin
       rst_n               => rst_n,
       tick                => tick,
       prefix              => NODE_PREFIX,
-      sample_writer       => x"00000403",
-      wants_reliable      => WANTED,
-      wants_transient     => WANTED,
+      are_reliable        => std_logic_vector(to_unsigned(RELIABLE, ENDPOINTS)),
+      are_transient       => std_logic_vector(to_unsigned(TRANSIENT, ENDPOINTS)),
+      program_enable      => control_enable,
+      program_address     => control_address,
+      program_word        => control_word,
       packet_tdata        => udp_tdata,
       packet_tuser        => udp_tuser,
       packet_tvalid       => udp_tvalid,
@@ -186,10 +203,11 @@ begin
       frame_tvalid        => m_axis_tvalid,
       frame_tlast         => m_axis_tlast,
       frame_tready        => m_axis_tready,
-      sample_tdata        => sample_tdata,
-      sample_tvalid       => sample_tvalid,
-      sample_tlast        => sample_tlast,
-      sample_tready       => sample_tready,
+      sample_tdata        => s_axis_tdata,
+      sample_tuser        => "0",
+      sample_tvalid       => s_axis_tvalid,
+      sample_tlast        => s_axis_tlast,
+      sample_tready       => s_axis_tready,
       start               => start,
       packet              => packet,
       payload_bytes       => payload_bytes,
@@ -200,13 +218,14 @@ begin
       payload_tdata       => payload_tdata,
       payload_tvalid      => payload_tvalid,
       payload_tready      => payload_tready,
-      peers_known         => peers_known,
-      sources_known       => sources_known,
-      is_lost             => open,
-      is_full             => open,
-      is_unmatched        => open,
-      is_dropped          => open,
-      is_long             => open
+      peer_count          => peer_count,
+      source_count        => source_count,
+      sink_count          => sink_count,
+      is_discovery_lost   => open,
+      is_sample_lost      => open,
+      is_peer_refused     => open,
+      is_endpoint_refused => open,
+      is_frame_refused    => open
     );
 
   u_packets : entity work.net_node_packets
@@ -221,7 +240,7 @@ begin
 
   u_builder : entity firm.firm_packet_builder
     generic map (
-      ADDRESS_BITS => 12
+      ADDRESS_BITS => 13
     )
     port map (
       clk             => clk,
@@ -244,44 +263,6 @@ begin
       m_axis_tlast    => sources_tlast(1),
       m_axis_tready   => sources_tready(1)
     );
-
-  -- ------------------------------------------------------------------ samples
-
-  sample_tvalid <= sends_r;
-  sample_tlast  <= '1' when place_r = SAMPLE_BYTES-1 else '0';
-  -- The header of little-endian XCDR 1, then the number.
-  sample_tdata  <= x"01" when place_r = 1 else
-                   std_logic_vector(number_r(7 downto 0)) when place_r = 4 else
-                   std_logic_vector(number_r(15 downto 8)) when place_r = 5 else
-                   std_logic_vector(number_r(23 downto 16)) when place_r = 6 else
-                   std_logic_vector(number_r(31 downto 24)) when place_r = 7 else
-                   x"00";
-
-  count : process (clk)
-  begin
-    if rising_edge(clk) then
-      if sends_r = '1' and sample_tready = '1' then
-        place_r <= place_r + 1;
-        if sample_tlast = '1' then
-          sends_r  <= '0';
-          number_r <= number_r + 1;
-        end if;
-      end if;
-      if tick = '1' then
-        wait_r <= wait_r - 1;
-        if wait_r = 0 then
-          wait_r  <= PERIOD-1;
-          sends_r <= '1';
-        end if;
-      end if;
-      if rst_n = '0' then
-        place_r  <= (others => '0');
-        sends_r  <= '0';
-        number_r <= (others => '0');
-        wait_r   <= PERIOD-1;
-      end if;
-    end if;
-  end process count;
 
   -- ------------------------------------------------------------------ frames of two sources
 

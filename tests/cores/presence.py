@@ -15,10 +15,15 @@ _QUERY, _REPORT = 0x11, 0x16
 
 
 def query(
-    group: bytes = bytes(4), *, options: bytes = _ROUTER_ALERT, further: bytes = b"", kind: int = _QUERY
+    group: bytes = bytes(4),
+    *,
+    options: bytes = _ROUTER_ALERT,
+    further: bytes = b"",
+    kind: int = _QUERY,
+    tenths: int = 10,
 ) -> bytes:
     """A query about a group or about all (RFC 2236); with `further`, one of version 3 (RFC 3376)."""
-    message = struct.pack(">BBH4s", kind, 10, 0, group) + further
+    message = struct.pack(">BBH4s", kind, tenths, 0, group) + further
     message = message[:2] + struct.pack(">H", checksum(message)) + message[4:]
     target = group if any(group) else ALL_SYSTEMS
     length = 20 + len(options) + len(message)

@@ -12,6 +12,7 @@
 
 #include <cstring>
 #include <deque>
+#include <random>
 
 #include "bench.h"
 
@@ -43,17 +44,23 @@ class Tap {
     poll(events, 2, milliseconds);
     return events[1].revents == 0;
   }
+  // Lose so many of 100 frames each way, at random.
+  void lose(unsigned percent) { loss_ = percent; }
   Bytes read() const {
     uint8_t bytes[2048];
     const ssize_t size = ::read(device_, bytes, sizeof bytes);
-    return size > 0 ? Bytes(bytes, bytes + size) : Bytes();
+    return size > 0 && !is_lost() ? Bytes(bytes, bytes + size) : Bytes();
   }
   void write(const Bytes& frame) const {
-    if (::write(device_, frame.data(), frame.size()) < 0) fail("the kernel does not take a frame");
+    if (!is_lost() && ::write(device_, frame.data(), frame.size()) < 0) fail("the kernel does not take a frame");
   }
 
  private:
+  bool is_lost() const { return loss_ > 0 && random_() % 100 < loss_; }
+
   int device_;
+  unsigned loss_ = 0;
+  mutable std::mt19937 random_{20261127};
 };
 
 template <class Top>

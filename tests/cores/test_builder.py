@@ -36,7 +36,7 @@ def _jobs(seed: int, longest: int) -> tuple[list[str], list[str]]:
     jobs, frames = [], []
     for name, entry in PROGRAMS.entries.items():
         has_payload = name.startswith(("sample", "fragment"))
-        for size in [1, 2, 3, 4, chance.randrange(5, longest), longest] if has_payload else [0]:
+        for size in [0, 1, 2, 3, 4, chance.randrange(5, longest), longest] if has_payload else [0]:
             fields, payload = random_fields(chance), chance.randbytes(size)
             jobs.append(_row(entry, *fields.memory(), size, *payload))
             frame = run(PROGRAMS, name, fields, payload)

@@ -89,6 +89,39 @@ def test_an_answer_is_delayed_and_given_once(library: Library, tmp_path: Path) -
     assert first + DELAY < ms <= first + DELAY + 2 * 60 // TICK_CYCLES
 
 
+def _answers(library: Library, folder: Path, *queries: tuple[int, int]) -> list[int]:
+    """The milliseconds of the answers after the first query; each comes at a millisecond and allows some tenths."""
+    rows, now = [], 0
+    for ms, tenths in queries:
+        frame = query(tenths=tenths)
+        rows.append(_row(frame, (4200 + ms) * TICK_CYCLES - now))
+        now = (4200 + ms) * TICK_CYCLES + len(frame)
+    events = _events(library, folder, rows, MAC_END=63)
+    return [ms - 4200 for ms, what in events if what == "report" and ms >= 4200]
+
+
+@pytest.mark.parametrize(
+    ("tenths", "wait"), [(0, 504), (1, 56), (2, 120), (3, 248), (5, 248), (6, 504), (100, 504), (255, 504)]
+)
+def test_an_answer_comes_within_the_time_that_the_query_allows(
+    library: Library, tmp_path: Path, tenths: int, wait: int
+) -> None:
+    (ms,) = _answers(library, tmp_path, (0, tenths))
+    # A frame takes some milliseconds here.
+    assert wait < ms <= wait + 2 * 60 // TICK_CYCLES
+
+
+@pytest.mark.parametrize(
+    ("queries", "wait"),
+    [(((0, 10), (100, 1)), 156), (((0, 10), (100, 2), (110, 1)), 166), (((0, 1), (30, 10)), 56)],
+)
+def test_the_query_that_is_answered_first_counts(
+    library: Library, tmp_path: Path, queries: tuple[tuple[int, int], ...], wait: int
+) -> None:
+    (ms,) = _answers(library, tmp_path, *queries)
+    assert wait < ms <= wait + 2 * 60 // TICK_CYCLES
+
+
 def test_the_netlist_does_the_same(tmp_path: Path) -> None:
     library = _library(tmp_path)
     library.replace_by_netlist("firm_net_presence", {})

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cores.fragments import HOSTS, Reassembly, fragments, packet
+from tests.cores.fragments import HOSTS, Reassembly, fragments, is_fragment, packet
 from tests.cores.requests import MAC, echo_request
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
@@ -41,6 +41,11 @@ def _run(library: Library, folder: Path, rows: list[Row], **generics: Generic) -
     shown = (folder / "packets.txt").read_text(encoding="ascii").splitlines()
     frames = [bytes(map(int, line.split()[2:])) for line in shown if line.startswith("0 ")]
     return frames, [line for line in shown if line[0] not in "01"]
+
+
+def _passing(sent: list[bytes]) -> list[bytes]:
+    """The frames that pass without being aborted."""
+    return [frame for frame in sent if not is_fragment(frame)]
 
 
 def _parts(frames: list[bytes], sent: list[bytes]) -> tuple[list[bytes], list[bytes]]:
@@ -93,12 +98,13 @@ def test_packets_are_whole_and_other_frames_pass(library: Library, tmp_path: Pat
     frames, events = _run(library, tmp_path, rows, PACKETS=packets, SLOW_PERCENT=slow, TICKS=65535, SEED=seed)
     passed, made = _parts(frames, sent)
     assert made == model.whole
-    assert passed == sent
+    assert passed == _passing(sent)
     assert events == ["dropped"] * model.dropped
 
 
-def test_frames_that_come_while_a_packet_leaves_wait(library: Library, tmp_path: Path) -> None:
-    """Two hosts send at once, with the gaps of Ethernet; frames and packets leave whole, in their order."""
+@pytest.mark.parametrize("gap", [0, 14])
+def test_frames_that_come_while_a_packet_leaves_wait(library: Library, tmp_path: Path, gap: int) -> None:
+    """Two hosts send at once, with the shortest gaps and those of Ethernet; all leave whole, in their order."""
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     sent = []
@@ -107,12 +113,10 @@ def test_frames_that_come_while_a_packet_leaves_wait(library: Library, tmp_path:
         pairs = zip(*(fragments(HOSTS[host], number, data[number + host]) for host in range(2)), strict=True)
         sent += list(chain.from_iterable(pairs))
         sent += [echo_request(bytes([number]) * 30), echo_request(bytes([number + 1]) * 60)]
-    frames, events = _run(library, tmp_path, [(8, False, frame) for frame in sent], PACKETS=4, DEPTH=65536)
+    frames, events = _run(library, tmp_path, [(gap, False, frame) for frame in sent], PACKETS=4, DEPTH=65536)
     passed, made = _parts(frames, sent)
     assert events == []
-    # Fragments do not wait.
-    echoes = [frame for frame in sent if frame[23] == 1]
-    assert [frame for frame in passed if frame[23] == 1] == echoes
+    assert passed == _passing(sent)
     model = Reassembly(4, BYTES)
     model.take(sent)
     assert sorted(made) == sorted(model.whole)
@@ -126,11 +130,11 @@ def test_the_longest_packet_of_ipv4(library: Library, tmp_path: Path) -> None:
     rows = [(0, False, frame) for frame in sent]
     frames, events = _run(library, tmp_path, rows, PACKETS=1, BYTES=65536, LAST_CYCLES=70000)
     assert events == []
-    assert frames[len(sent) :][0][34:] == data
+    assert [frame[34:] for frame in frames] == [data]
     too_long = [*sent[:-1], packet(HOSTS[0], 1, data[65120:] + b"a", offset=65120)]
     rows = [(0, False, frame) for frame in too_long]
     frames, events = _run(library, tmp_path, rows, PACKETS=1, BYTES=65536, LAST_CYCLES=70000)
-    assert (frames, events) == (too_long, ["dropped"])
+    assert (frames, events) == ([], ["dropped"])
 
 
 def test_a_packet_that_stops_is_given_up(library: Library, tmp_path: Path) -> None:
@@ -142,16 +146,28 @@ def test_a_packet_that_stops_is_given_up(library: Library, tmp_path: Path) -> No
             *((wait if place == 0 else 0, False, frame) for place, frame in enumerate(good)),
         ]
         frames, events = _run(library, tmp_path, rows, PACKETS=1, TICKS=4, TICK_CYCLES=1000)
-        assert len(frames) == 1 + len(good) + whole
+        assert len(frames) == whole
         # The packet that is given up, and before that each fragment without a place.
         assert events == ["dropped"] * (1 if whole else 1 + len(good))
 
 
+def test_a_packet_is_whole_or_given_up_but_not_both(library: Library, tmp_path: Path) -> None:
+    """The time of each is over before, in, or after its last fragment."""
+    rows: list[Row] = []
+    for number in range(24):
+        first, last = fragments(HOSTS[0], number, bytes([number]) * 2000)
+        rows += [(5000, False, first), (1800 + 100 * number, False, last)]
+    frames, events = _run(library, tmp_path, rows, PACKETS=1, TICKS=4, TICK_CYCLES=1000)
+    assert 4 < len(frames) < 20
+    # The packet, and its last fragment.
+    assert events == ["dropped"] * 2 * (24 - len(frames))
+
+
 def test_a_frame_without_room_is_lost(library: Library, tmp_path: Path) -> None:
-    sent = [*fragments(HOSTS[0], 1, bytes(2048)), *[echo_request(bytes([number]) * 200) for number in range(10)]]
-    rows = [(0, False, frame) for frame in sent]
+    others = [echo_request(bytes([number]) * 200) for number in range(10)]
+    rows = [(0, False, frame) for frame in [*fragments(HOSTS[0], 1, bytes(2048)), *others]]
     frames, events = _run(library, tmp_path, rows, DEPTH=512)
-    assert events == ["lost"] * (len(sent) + 1 - len(frames))
+    assert events == ["lost"] * (len(others) + 1 - len(frames))
     assert len(events) > 3
 
 
@@ -161,7 +177,7 @@ def test_frames_of_others_are_never_reassembled(library: Library, tmp_path: Path
     sent += [packet(HOSTS[0], 2, data[:1480], more=True, protocol=1), packet(HOSTS[0], 2, data[1480:], offset=1480)]
     frames, events = _run(library, tmp_path, [(0, False, frame) for frame in sent])
     # The last one is of UDP, and has no beginning.
-    assert (frames, events) == (sent, ["dropped"])
+    assert (frames, events) == (sent[:-1], ["dropped"])
 
 
 def test_the_netlist_does_the_same(tmp_path: Path) -> None:
@@ -173,7 +189,7 @@ def test_the_netlist_does_the_same(tmp_path: Path) -> None:
     model = Reassembly(2, BYTES)
     model.take(sent)
     frames, events = _run(library, tmp_path, rows, PACKETS=2)
-    assert _parts(frames, sent) == (sent, model.whole)
+    assert _parts(frames, sent) == (_passing(sent), model.whole)
     assert events == ["dropped"] * model.dropped
 
 

@@ -56,10 +56,11 @@ DISCOVERY = {PUBLICATIONS_WRITER: PUBLICATIONS_READER, SUBSCRIPTIONS_WRITER: SUB
 
 @dataclass(frozen=True)
 class Limits:
-    """The sizes of a node's tables: peers, matched endpoints, samples in reassembly, and bytes of a payload."""
+    """The sizes of a node's tables: peers, their writers and readers that match, samples in reassembly, and bytes."""
 
     peers: int = 8
-    matches: int = 32
+    sources: int = 32
+    sinks: int = 32
     reassemblies: int = 2
     longest: int = 65536
 
@@ -91,13 +92,14 @@ class Window:
 
 @dataclass
 class Peer:
-    """Another participant: where it listens, its lease, and the state of discovery between the two."""
+    """Another participant: where it listens, the seconds of its lease, and the state of discovery between the two."""
 
+    slot: int
     prefix: bytes
     metatraffic: Address
     user: Address
     lease: int
-    heard: int
+    left: int
     windows: dict[bytes, Window] = field(default_factory=lambda: {writer: Window() for writer in DISCOVERY})
     acknowledged: set[bytes] = field(default_factory=set)
     next_request: int = 0
@@ -120,6 +122,7 @@ class Reassembly:
 class Source:
     """A peer's writer that a reader of the node matches; `expected` is the next number to take."""
 
+    slot: int
     peer: Peer
     entity: bytes
     endpoint: Endpoint
@@ -167,6 +170,7 @@ class Sink:
     of. Cyclone DDS does so. Thus heartbeats tell of no sample until the reader has answered one.
     """
 
+    slot: int
     peer: Peer
     entity: bytes
     history: History
@@ -220,6 +224,8 @@ class Participant:
         }
         self._group = Address(rtps.MULTICAST, rtps.multicast_port(node.network.domain))
         self._writer = Writer()
+        self._started = 0
+        self._seconds = 0
         self._announcements = 0
         self._next_announcement = 0
         self._count = 0
@@ -229,7 +235,7 @@ class Participant:
 
     def start(self, now: int) -> None:
         """End an earlier life of the node, whose GUID is the same, and begin."""
-        self._now = now
+        self._now = self._started = now
         self.leave()
         self._next_announcement = now + AFTER_FAREWELL
         graph = self.node.writers[0]
@@ -258,8 +264,11 @@ class Participant:
             self._announcements += 1
             self._next_announcement = now + (SOON if self._announcements < FIRST_ANNOUNCEMENTS else LATER)
             self._announce(self._group)
-        for peer in list(self.peers.values()):
-            if now - peer.heard > peer.lease:
+        passed = (now - self._started) // 1000 - self._seconds
+        self._seconds += passed
+        for peer in sorted(self.peers.values(), key=_slot):
+            peer.left -= passed
+            if peer.left <= 0:
                 self.counts["leases that ended"] += 1
                 self._forget(peer)
             else:
@@ -363,7 +372,7 @@ class Participant:
             return
         self.counts["faulty packets"] += not message.is_whole
         if peer := self.peers.get(message.prefix):
-            peer.heard = now
+            peer.left = peer.lease
         is_mine = True
         for item in message.submessages:
             if isinstance(item, InfoDestination):
@@ -401,10 +410,12 @@ class Participant:
         if len(self.peers) == self._limits.peers:
             self.counts["peers without room"] += 1
             return
-        seconds, _ = facts.integers(Parameter.LEASE_DURATION, "iI") or (100, 0)
+        seconds, _ = facts.integers(Parameter.LEASE_DURATION, "II") or (100, 0)
         user = facts.address(Parameter.DEFAULT_UNICAST_LOCATOR) or metatraffic
-        peer = self.peers[prefix] = Peer(prefix, metatraffic, user, 1000 * max(1, seconds), self._now)
-        self._announce(metatraffic)
+        # The first second may be short.
+        lease = min(max(1, seconds), 65534) + 1
+        slot = _free(self.peers.values())
+        peer = self.peers[prefix] = Peer(slot, prefix, metatraffic, user, lease, lease)
         self._tick_peer(peer)
 
     def _forget(self, peer: Peer) -> None:
@@ -433,10 +444,10 @@ class Participant:
             peer.acknowledged.discard(item.writer)
         wanted = [number for number in item.missing if 1 <= number <= len(announced)]
         for number in wanted:
-            told = [self._discovery_heartbeat(item.writer)] if number == wanted[-1] else []
-            data = Data(item.reader, item.writer, number, announced[number - 1])
-            self._send_to(peer, peer.metatraffic, data, *told)
-        if not wanted and item.writer not in peer.acknowledged:
+            self._send_to(
+                peer, peer.metatraffic, Data(DISCOVERY[item.writer], item.writer, number, announced[number - 1])
+            )
+        if item.writer not in peer.acknowledged:
             self._send_to(peer, peer.metatraffic, self._discovery_heartbeat(item.writer))
 
     # --- matching --------------------------------------------------------------------------------------------------
@@ -481,20 +492,23 @@ class Participant:
         same = [_ours(item) for item in known if _is(item, peer, entity)]
         if any(ours is endpoint or ours.topic != endpoint.topic for ours in same):
             return
-        if len(known) == self._limits.matches:
+        used, most = (self.sinks, self._limits.sinks) if endpoint.is_writer else (self.sources, self._limits.sources)
+        if len(used) == most:
             self.counts["endpoints without room"] += 1
             return
+        slot = _free(used)
         address = facts.address(Parameter.UNICAST_LOCATOR) or peer.user
         if not endpoint.is_writer:
-            self.sources.append(Source(peer, entity, endpoint, address))
+            source = Source(slot, peer, entity, endpoint, address)
+            self.sources = sorted([*self.sources, source], key=_slot)
             if endpoint.quality.is_reliable:
-                self._request(self.sources[-1])
+                self._request(source)
             return
         history = self.histories[endpoint.entity]
         is_reliable, wants_history = _quality(facts, is_writer=False)
         start = 1 if endpoint.quality.is_transient_local and wants_history else history.number + 1
-        sink = Sink(peer, entity, history, address, is_reliable, start)
-        self.sinks.append(sink)
+        sink = Sink(slot, peer, entity, history, address, is_reliable, start)
+        self.sinks = sorted([*self.sinks, sink], key=_slot)
         if is_reliable:
             self._send_heartbeat(sink)
         else:
@@ -592,7 +606,7 @@ class Participant:
     def _asked(self, sink: Sink, item: AckNack) -> None:
         was_heard = sink.is_heard
         sink.answer(item)
-        wanted = [number for number in item.missing if number <= sink.history.number]
+        wanted = [number for number in item.missing if 1 <= number <= sink.history.number]
         if gone := [number for number in wanted if number < sink.first]:
             self._send_to(
                 sink.peer,
@@ -612,6 +626,16 @@ class Participant:
         for place in item.missing:
             if 1 <= place <= -(-len(payload) // FRAGMENT_BYTES) and len(payload) > FRAGMENT_BYTES:
                 self._send_to(sink.peer, sink.address, _fragment(ends, payload, place))
+
+
+def _slot(item: Peer | Source | Sink) -> int:
+    return item.slot
+
+
+def _free(items: Iterable[Peer | Source | Sink]) -> int:
+    """The lowest number of an entry that is not used."""
+    used = {item.slot for item in items}
+    return next(number for number in range(len(used) + 1) if number not in used)
 
 
 def _guid(prefix: bytes) -> bytes:

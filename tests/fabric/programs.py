@@ -87,7 +87,7 @@ def random_fields(chance: random.Random) -> Fields:
 
 
 def run(programs: Programs, name: str, fields: Fields, payload: bytes = b"") -> bytes:
-    """The frame without padding and FCS."""
+    """The frame without padding and FCS; an empty payload is one byte there."""
     memory, padded = fields.memory(), payload + bytes(-len(payload) % 4)
     words = list(_words(programs, programs.entries[name]))
     prelude = bytes(_constant(word, memory) for word in words[:_PRELUDE])
@@ -99,7 +99,13 @@ def run(programs: Programs, name: str, fields: Fields, payload: bytes = b"") -> 
     frame = b""
     for word in words[_PRELUDE:]:
         source = word >> 8 & 3
-        frame += padded if source == 2 else results[word & 7 :][:1] if source == 3 else bytes([_constant(word, memory)])
+        frame += (
+            (padded or b"\0")
+            if source == 2
+            else results[word & 7 :][:1]
+            if source == 3
+            else bytes([_constant(word, memory)])
+        )
     return frame
 
 

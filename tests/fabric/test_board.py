@@ -14,12 +14,10 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.fabric.names import memory_of_names
-from fusesoc_firm.fabric.packets import memory_of
-from fusesoc_firm.text.render import render
 from tests.bench.model import compiled
 from tests.fabric.echo_node import node_in
 from tests.fabric.hosts import Host, switched
+from tests.fabric.memories import bits, memories
 from tests.fabric.test_peers import HERE, Peer, Process, _why_not
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
@@ -31,7 +29,7 @@ HARDWARE = core_files(*PARTS)
 SAMPLES = 200
 # Samples that a peer sends at once. The TAP device drops frames after 500, and nobody sends them again at best effort.
 LOT = 50
-TYPES = {"count": "UInt32", "words": "String"}
+TYPES = {"count": "UInt32", "words": "String", "sure": "String"}
 SPECIFICATION = """\
 project:
   name: board
@@ -43,23 +41,14 @@ blocks:
      qos: {reliability: best_effort}, outgoing: [{name: count}]}
   - {name: words, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /words_in,
      qos: {reliability: best_effort}, outgoing: [{name: said}]}
+  - {name: sure, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /sure_in,
+     outgoing: [{name: surely}]}
   - {name: count, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /count_out,
      qos: {reliability: best_effort}}
   - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_out,
      qos: {reliability: best_effort}}
+  - {name: surely, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /sure_out}
 """
-
-
-def memories(folder: Path) -> list[Path]:
-    """The programs of the node's packets, and the names of its readers' topics."""
-    path = folder / "node.yaml"
-    path.write_text(SPECIFICATION, encoding="utf-8")
-    node = node_in(path)
-    written = []
-    for rendering in (memory_of(node, "net_node_packets"), memory_of_names(node.readers, "net_node_names")):
-        written.append(folder / f"{rendering.context['entity']}.vhd")
-        written[-1].write_text(render(rendering.template, rendering.context), encoding="utf-8")
-    return written
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +57,11 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not shutil.which("verilator"):
         pytest.skip("verilator is not installed")
     folder = tmp_path_factory.mktemp("node")
-    verilog = netlist("net_node", folder, [*memories(folder), CORES / "net_node.vhd"], HARDWARE)
+    path = folder / "node.yaml"
+    path.write_text(SPECIFICATION, encoding="utf-8")
+    node = node_in(path)
+    files = memories(node, "net_node", folder)
+    verilog = netlist("net_node", folder, [*files, CORES / "net_node.vhd"], HARDWARE, (), **bits(node))
     bench = (CORES / "net_node.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "net_node", bench, folder, [CORES])
 
@@ -82,25 +75,24 @@ class Lab:
         self._switch.run("ip", "tuntap", "add", "dev", "tap0", "mode", "tap")
         self._switch.run("ip", "link", "set", "tap0", "master", "switch", "up")
 
-    def board(self) -> Process:
+    def board(self, *options: str) -> Process:
         """The simulated board."""
-        started = Process(self._switch, [str(self._program)])
+        started = Process(self._switch, [str(self._program), *options])
         self._stack.callback(started.kill)
         assert started.line() == {"ready": True}
         return started
 
-    def peers(self, *written: str) -> dict[str, Peer]:
-        """A peer of each kind that reads the board's topic, and writes some."""
+    def peers(self, *written: str, read: str = "count", reliability: str = "best_effort") -> dict[str, Peer]:
+        """A peer of each kind that reads a topic of the board, and writes some."""
+        options = [reliability, *(json.dumps({name: TYPES[name] for name in names}) for names in ([read], written))]
         others = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DOMAIN_ID")
         environment = {name: value for name, value in self._ros.environment.items() if name not in others}
         return {
-            "rclpy": self._peer(self._hosts[0], self._ros.python, "ros_peer.py", environment, written),
-            "cyclone": self._peer(self._hosts[1], sys.executable, "cyclone_peer.py", dict(os.environ), written),
+            "rclpy": self._peer(self._hosts[0], self._ros.python, "ros_peer.py", environment, options),
+            "cyclone": self._peer(self._hosts[1], sys.executable, "cyclone_peer.py", dict(os.environ), options),
         }
 
-    def _peer(self, host: Host, python: str, name: str, environment: dict[str, str], written: tuple[str, ...]) -> Peer:
-        types = ({"count": "UInt32"}, {topic: TYPES[topic] for topic in written})
-        options = ["best_effort", *map(json.dumps, types)]
+    def _peer(self, host: Host, python: str, name: str, environment: dict[str, str], options: list[str]) -> Peer:
         peer = Peer(host, [python, str(HERE / name), *options], environment)
         self._stack.callback(peer.kill)
         return peer
@@ -120,8 +112,9 @@ def numbers(peer: Peer, count: int) -> list[int]:
     return [int(values[0]) for _, values in peer.take(count)]
 
 
-def wait_for(board: Process, peers: int, sources: int) -> None:
-    while board.line() != {"peers": peers, "sources": sources}:
+def wait_for(board: Process, peers: int, sources: int, sinks: int) -> None:
+    """Wait until the board knows so many peers and their writers and readers, that of the graph of rclpy included."""
+    while board.line() != {"peers": peers, "sources": sources, "sinks": sinks}:
         pass
 
 
@@ -162,9 +155,9 @@ def test_both_peers_see_the_hardware_and_get_its_samples_in_order(lab: Lab) -> N
     # The writer of /count_out and the reader of /count_in.
     assert [end[:3] for end in graph["ends"]] == [["board", "/", "std_msgs/msg/UInt32"]] * 2
     assert all(end[3].startswith("RIHS01_") for end in graph["ends"])
-    wait_for(board, 2, 0)
+    wait_for(board, 2, 0, 3)
     peers["cyclone"].tell('"farewell"\n')
-    wait_for(board, 1, 0)
+    wait_for(board, 1, 0, 2)
     # The node runs on, and the other peer is not disturbed.
     came = numbers(peers["rclpy"], 20)
     assert came == list(range(came[0], came[0] + 20))
@@ -181,7 +174,7 @@ def test_both_peers_see_the_hardware_and_get_its_samples_in_order(lab: Lab) -> N
 def test_samples_of_both_peers_become_frames_once_and_in_order(lab: Lab) -> None:
     board, peers = lab.board(), lab.peers("count", "words")
     print({name: peer.wait_until_matched() for name, peer in peers.items()})
-    wait_for(board, 2, 4)
+    wait_for(board, 2, 4, 3)
     sent: list[list[str | int]] = []
     for place in range(len(peers)):
         # A value tells of whom it is; texts have many lengths.
@@ -199,7 +192,7 @@ def test_samples_of_both_peers_become_frames_once_and_in_order(lab: Lab) -> None
             wanted = [value for value in values if isinstance(value, kind)]
             assert [value for value in found if value in wanted] == wanted
     peers["cyclone"].tell('"farewell"\n')
-    wait_for(board, 1, 2)
+    wait_for(board, 1, 2, 2)
     # The other one is not disturbed.
     peers["rclpy"].tell(["words", ["more"]])
     while "frame" not in (line := board.line()):
@@ -207,3 +200,22 @@ def test_samples_of_both_peers_become_frames_once_and_in_order(lab: Lab) -> None
     assert sample(bytes.fromhex(line["frame"])) == "more"
     print(line["cycles"], "cycles from the last byte at the GMII to the first beat")
     assert line["cycles"] <= 16
+
+
+@pytest.mark.check
+@pytest.mark.xdist_group("fabric")
+@pytest.mark.parametrize("loss", [0, 20])
+def test_reliable_samples_return_to_both_peers_whatever_is_lost(lab: Lab, loss: int) -> None:
+    """The board returns each text of each peer to both."""
+    board, peers = lab.board("echo", str(loss)), lab.peers("sure", read="sure", reliability="reliable")
+    print({name: peer.wait_until_matched() for name, peer in peers.items()})
+    wait_for(board, 2, 2, 3)
+    sent = {name: [f"{name} {number} {'.' * number}" for number in range(SAMPLES)] for name in peers}
+    for begin in range(0, SAMPLES, LOT):
+        for name, peer in peers.items():
+            for text in sent[name][begin : begin + LOT]:
+                peer.tell(["sure", [text]])
+        for peer in peers.values():
+            came = [values[0] for _, values in peer.take(2 * LOT)]
+            for texts in sent.values():
+                assert [text for text in came if text in texts] == texts[begin : begin + LOT]

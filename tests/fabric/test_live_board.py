@@ -99,7 +99,7 @@ class Lab:
 
     def _peer(self, host: Host, python: str, name: str, environment: dict[str, str]) -> Peer:
         types = {"euler": "Point"}, {"quaternion": "Quaternion"}
-        peer = Peer(host, [python, str(HERE / name), "best_effort", *map(json.dumps, types)], environment)
+        peer = Peer(host, [python, str(HERE / name), "reliable", *map(json.dumps, types)], environment)
         self._stack.callback(peer.kill)
         return peer
 

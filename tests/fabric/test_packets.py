@@ -43,12 +43,14 @@ def expected(name: str, fields: Fields, payload: bytes) -> list[Submessage]:
     heartbeat = Heartbeat(*ends, fields.first, fields.last, fields.count)
     data = Data(*ends, fields.number, payload + bytes(-len(payload) % 4))
     part = DataFrag(*ends, fields.number, fields.fragment, 1, FRAGMENT_BYTES, fields.sample_bytes, data.payload or b"")
+    graph = Data(fields.reader, NODE.writers[0].entity, 1, NODE.graph + bytes(-len(NODE.graph) % 4))
     acknowledge = AckNack(*ends, Numbers(fields.number), fields.count)
     missing = Numbers(fields.fragment, 32, fields.fragment_set)
     publications = rtps.PUBLICATIONS_READER, rtps.PUBLICATIONS_WRITER
     subscriptions = rtps.SUBSCRIPTIONS_READER, rtps.SUBSCRIPTIONS_WRITER
     packets: dict[str, list[Submessage]] = {
-        "graph": [Data(fields.reader, NODE.writers[0].entity, 1, NODE.graph + bytes(-len(NODE.graph) % 4))],
+        "graph": [graph],
+        "graph_told": [graph, heartbeat],
         "sample": [data],
         "sample_told": [data, heartbeat],
         "fragment": [part],

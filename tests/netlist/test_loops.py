@@ -128,6 +128,24 @@ def test_a_loop_of_signals_is_named(tmp_path: Path, statements: str) -> None:
         assert sentence.startswith(f"{tmp_path}/design.vhd:")
 
 
+@pytest.mark.parametrize(("address", "has_loop"), [("w", False), ("v", True)])
+def test_a_memory_depends_on_the_address_of_each_port_alone(tmp_path: Path, address: str, has_loop: bool) -> None:
+    """The second port reads at what the first one shows, or at what it shows itself."""
+    memory = "  type words_t is array (0 to 3) of std_logic_vector(7 downto 0);\n  signal words : words_t;\n"
+    statements = f"""
+  write : process (clk)
+  begin
+    if rising_edge(clk) then
+      words(to_integer(unsigned(index))) <= v;
+    end if;
+  end process write;
+  w <= words(to_integer(unsigned(index)));
+  v <= words(to_integer(unsigned({address}(1 downto 0))));
+"""
+    text = DESIGN.replace("  signal r    : std_logic;\n", f"  signal r    : std_logic;\n{memory}")
+    assert bool(found(tmp_path, design=text.format(statements))) == has_loop
+
+
 def test_the_ports_of_a_loop_through_instances_are_named(tmp_path: Path) -> None:
     """First those of the stage whose valid waits for a ready, though the other comes first in the loop."""
     said = found(

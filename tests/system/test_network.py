@@ -34,7 +34,8 @@ def path(tmp_path: Path) -> Path:
 
 def test_it_is_checked_and_shown(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["system", "check", str(path)]) == 0
-    capsys.readouterr()
+    # Two slots of 64 bytes, of which a quaternion takes 36.
+    assert "the node needs 128 bytes of memory for the last messages of its publishers\n" in capsys.readouterr().out
     assert main(["system", "show", str(path)]) == 0
     shown = yaml.safe_load(capsys.readouterr().out)["System"]
     assert shown["interconnect"] == "ethernet"
@@ -68,7 +69,7 @@ def _files(folder: Path, **parameters: str) -> dict[str, str]:
 
 def test_its_node_comes_before_its_top_level(path: Path) -> None:
     names = [*_files(path.parent)]
-    parts = ("packets", "names", "node")
+    parts = ("control", "packets", "names", "node")
     assert [name for name in names if name.startswith("turtle_system_")] == [
         f"turtle_system_{name}.vhd" for name in parts
     ]
@@ -106,6 +107,16 @@ def test_its_node_has_the_numbers_of_the_specification(path: Path) -> None:
     ):
         assert line in node
     assert "--   0  rt/lab/turn\n" in node
+
+
+def test_its_node_has_the_qualities_of_the_specification(path: Path) -> None:
+    """From the lowest bit on: the subscriber, the publisher, and `ros_discovery_info`, which is not in the history."""
+    first, last = SPECIFICATION.rsplit("{profile: sensor_data}", 1)
+    path.write_text(f"{first}{{durability: transient_local, depth: 5}}{last}", encoding="utf-8")
+    node = _files(path.parent)["turtle_system_node.vhd"]
+    assert 'ARE_RELIABLE  : std_logic_vector(2 downto 0) := "110"' in node
+    assert 'ARE_TRANSIENT : std_logic_vector(2 downto 0) := "110"' in node
+    assert "SLOTS         => 8" in node
 
 
 def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:

@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Reassembles the fragments of UDP datagrams (RFC 791). Frames pass through as they come, the fragments among them
--- included, which firm_udp_receiver drops; when a packet is complete, it is sent as one frame without fragments. Frames
--- that come meanwhile wait in a store, except fragments, and leave by turns with further packets.
+-- Reassembles the fragments of UDP datagrams (RFC 791). Frames pass through as they come; those with a fragment for
+-- this host are aborted, since only here it is known whether one is missing. When a packet is complete, it is sent as
+-- one frame without fragments. Frames that come meanwhile wait in a store, except fragments, and leave by turns with
+-- further packets.
 --
 -- Fragments of several packets may be interleaved, but those of each packet come in order, as hosts send them and an
 -- Ethernet keeps them. So the state of a packet is its size so far, whatever the number of fragments. A packet that
@@ -34,7 +35,7 @@ entity firm_ipv4_reassembly is
     s_axis_tvalid : in std_logic;
     s_axis_tlast  : in std_logic;
 
-    -- The same, and reassembled packets.
+    -- The same, in which fragments are aborted, and reassembled packets.
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
@@ -113,6 +114,7 @@ architecture rtl of firm_ipv4_reassembly is
 
   signal found : slots_t;                                   -- the packet of the fragment
   signal known : slot_t;
+  signal fed   : slots_t;                                   -- the packet whose fragment is under way
 
   -- The beat one cycle later, and what is done with it.
   signal beat_r    : byte_t := (others => '0');
@@ -120,6 +122,7 @@ architecture rtl of firm_ipv4_reassembly is
   signal ends_r    : std_logic;
   signal aborted_r : std_logic;
   signal slot_r    : slot_t := (others => '0');
+  signal own_r     : std_logic;                             -- it is a fragment for this host
   signal taken_r   : std_logic;                             -- these are the packet's next bytes
   signal refused_r : std_logic;                             -- the fragment belongs to no packet
   signal broken_r  : std_logic;                             -- a fragment before it is missing
@@ -149,8 +152,8 @@ architecture rtl of firm_ipv4_reassembly is
   signal head_r      : byte_t := (others => '0');
   signal sent_byte   : byte_t;
 
+  signal user         : std_logic_vector(0 downto 0);        -- of the frame that comes; a fragment is aborted
   signal store_valid  : std_logic;
-  signal store_user   : std_logic_vector(0 downto 0);
   signal stored_data  : byte_t;
   signal stored_valid : std_logic;
   signal stored_last  : std_logic;
@@ -286,10 +289,12 @@ begin
         if (not used_r) /= NO_SLOT then
           has_free_r <= '1';
         end if;
+        own_r     <= '0';
         taken_r   <= '0';
         refused_r <= '0';
         broken_r  <= '0';
       elsif s_axis_tvalid = '1' and place_r = DATA_PLACE and mine_r = '1' and folded(check_r) = x"ffff" then
+        own_r   <= '1';
         left_r  <= bytes_r;
         write_r <= offset_r;
         slot_r  <= known;
@@ -315,6 +320,7 @@ begin
       if rst_n = '0' then
         moves_r   <= '0';
         ends_r    <= '0';
+        own_r     <= '0';
         taken_r   <= '0';
         refused_r <= '0';
         broken_r  <= '0';
@@ -348,6 +354,8 @@ begin
   end process access_head;
 
   is_good <= ends_r and not aborted_r;
+  -- A packet is not given up while its fragment comes.
+  fed     <= found when mine_r = '1' and (place_r >= DATA_PLACE or ends_r = '1') else NO_SLOT;
 
   keep_packets : process (clk)
   begin
@@ -355,8 +363,9 @@ begin
       is_dropped <= is_good and (refused_r or (taken_r and not is_whole));
       for index in 0 to PACKETS-1 loop
         if tick = '1' and used_r(index) = '1' and whole_r(index) = '0' then
-          ages_r(index) <= ages_r(index) + 1;
-          if ages_r(index) = TICKS-1 then
+          if ages_r(index) /= TICKS-1 then
+            ages_r(index) <= ages_r(index) + 1;
+          elsif fed(index) = '0' then
             used_r(index) <= '0';
             is_dropped    <= '1';
           end if;
@@ -394,8 +403,8 @@ begin
            '0' when state_r = PASSING else
            '1';
 
-  store_valid   <= s_axis_tvalid and waits;
-  store_user(0) <= s_axis_tuser(0) or mine_r when place_r >= DATA_PLACE else s_axis_tuser(0);
+  store_valid <= s_axis_tvalid and waits;
+  user(0)     <= s_axis_tuser(0) or own_r when place_r > DATA_PLACE else s_axis_tuser(0);
 
   u_store : entity firm.firm_mac_store
     generic map (
@@ -405,7 +414,7 @@ begin
       clk           => clk,
       rst_n         => rst_n,
       s_axis_tdata  => s_axis_tdata,
-      s_axis_tuser  => store_user,
+      s_axis_tuser  => user,
       s_axis_tvalid => store_valid,
       s_axis_tlast  => s_axis_tlast,
       m_axis_tdata  => stored_data,
@@ -426,8 +435,9 @@ begin
       shown_at_r  <= out_place_r;
       if state_r = PASSING then
         out_place_r <= (others => '0');
+        -- In the last of these cycles, a packet begins: the next frame finds that it has to wait.
         if s_axis_tvalid = '1' or place_r /= 0 then
-          gap_r <= GAP;
+          gap_r <= GAP-1;
         elsif gap_r /= 0 then
           gap_r <= gap_r - 1;
         elsif whole_r /= NO_SLOT then
@@ -491,7 +501,7 @@ begin
   begin
     if rising_edge(clk) then
       m_axis_tdata  <= s_axis_tdata;
-      m_axis_tuser  <= s_axis_tuser;
+      m_axis_tuser  <= user;
       m_axis_tvalid <= s_axis_tvalid and not waits;
       m_axis_tlast  <= s_axis_tlast;
       if state_r = SENDING then

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host's two streams of a system that is a node of ROS 2 itself: firm_rtps_node between Ethernet frames, which come
--- from the bytes of a line, and streams of any width. The memories outside, of packets and of names, make it a node. It
--- answers ARP and ping, too, and keeps its place in the network.
+-- from the bytes of a line, and streams of any width. The memories outside make it a node: its program, its packets
+-- and its names. It answers ARP and ping, too, and keeps its place in the network.
 --
 -- The board does not ask for MAC addresses: it sends to peers only, and sends a peer's packets to the MAC address from
 -- which the peer's announcement came, that of the peer or of the router to it.
@@ -13,9 +13,11 @@ entity firm_net_link is
   generic (
     WIDTH        : integer := 8;
     CLOCK_HZ     : integer := 125000000;
-    WRITERS      : integer := 2;   -- of the node, that of ros_discovery_info included
+    WRITERS      : integer := 2;   -- see firm_rtps_node
     READERS      : integer := 1;
-    SAMPLE       : integer := 64;  -- bytes of the longest payload that is sent, a power of two, 2 to 128
+    SOURCES      : integer := 8;
+    SAMPLE       : integer := 64;
+    SLOTS        : integer := 16;
     PROGRAM_BITS : integer := 12;  -- of an address in the memory of packets
     -- Numbers of packets.
     REPORT_PACKET : integer := 0;
@@ -30,19 +32,21 @@ entity firm_net_link is
     address   : in std_logic_vector(31 downto 0);
     udp_ports : in std_logic_vector(47 downto 0);
 
-    -- The entity of the writer that sends samples, and what the readers want of a writer: see firm_rtps_node.
-    sample_writer   : in std_logic_vector(31 downto 0);
-    wants_reliable  : in std_logic_vector(READERS-1 downto 0);
-    wants_transient : in std_logic_vector(READERS-1 downto 0);
+    -- The quality of the node's endpoints: see firm_rtps_node.
+    are_reliable  : in std_logic_vector(READERS+WRITERS-1 downto 0);
+    are_transient : in std_logic_vector(READERS+WRITERS-1 downto 0);
 
-    -- The memories that fusesoc_firm.fabric.packets and fusesoc_firm.fabric.names make.
+    -- The memories that fusesoc_firm.fabric.control, fusesoc_firm.fabric.packets and fusesoc_firm.fabric.names make.
+    control_enable  : out std_logic;
+    control_address : out std_logic_vector(9 downto 0);
+    control_word    : in  std_logic_vector(35 downto 0);
     packet          : out std_logic_vector(7 downto 0);
     entry           : in  std_logic_vector(PROGRAM_BITS-1 downto 0);
     program_enable  : out std_logic;
     program_address : out std_logic_vector(PROGRAM_BITS-1 downto 0);
     program_word    : in  std_logic_vector(10 downto 0);
     names_address   : out std_logic_vector(9 downto 0);
-    names_data      : in  std_logic_vector(8*READERS-1 downto 0);
+    names_data      : in  std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
 
     -- The line: of firm_gmii, firm_mii or firm_rmii.
     rx_step : in  std_logic;
@@ -76,9 +80,9 @@ entity firm_net_link is
     --   2  a fragment is dropped
     --   3  a reply to ARP or ping, or a packet of discovery, has no room
     --   4  a peer has no room
-    --   5  a matching writer of a peer has no room
+    --   5  a matching writer or reader of a peer has no room
     --   6  a sample has no room
-    --   7  a sample to send is too long
+    --   7  a frame to send has too long a payload, or the id of no writer
     --   8  another host has the board's address
     network_error : out std_logic_vector(8 downto 0)
   );
@@ -88,9 +92,7 @@ architecture rtl of firm_net_link is
 
   constant PORTS    : positive := 3;
   constant GROUP_IP : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
-  constant SOURCES  : positive := 8;     -- matched writers of peers
   constant DEPTH    : positive := 4096;  -- bytes of waiting discovery, and of waiting payloads
-  constant HELD     : positive := 256;   -- bytes of a payload to send
 
   function cycles_of(hertz : integer) return positive is
   begin
@@ -131,31 +133,24 @@ architecture rtl of firm_net_link is
   signal source_mac      : std_logic_vector(47 downto 0);
   signal prefix          : std_logic_vector(95 downto 0);
 
-  signal in_tdata      : std_logic_vector(7 downto 0);
-  signal in_tvalid     : std_logic;
-  signal in_tlast      : std_logic;
-  signal in_tready     : std_logic;
-  signal out_tdata     : std_logic_vector(7 downto 0);
-  signal out_tuser     : std_logic_vector(0 downto 0);
-  signal out_tvalid    : std_logic;
-  signal out_tlast     : std_logic;
-  signal out_tready    : std_logic;
-  signal sample_tdata  : std_logic_vector(7 downto 0);
-  signal sample_tvalid : std_logic;
-  signal sample_tlast  : std_logic;
-  signal sample_tready : std_logic;
+  signal in_tdata   : std_logic_vector(7 downto 0);
+  signal in_tvalid  : std_logic;
+  signal in_tlast   : std_logic;
+  signal in_tready  : std_logic;
+  signal out_tdata  : std_logic_vector(7 downto 0);
+  signal out_tuser  : std_logic_vector(0 downto 0);
+  signal out_tvalid : std_logic;
+  signal out_tlast  : std_logic;
+  signal out_tready : std_logic;
 
-  -- Packets of the node, which waits for the builder, and of its presence.
+  -- Packets of the node, and of its presence.
   signal node_start    : std_logic;
   signal node_packet   : std_logic_vector(7 downto 0);
   signal node_bytes    : std_logic_vector(15 downto 0);
-  signal node_busy     : std_logic;
-  signal held_r        : std_logic;  -- a packet of the node waits for the end of another one
   signal wants_report  : std_logic;
   signal wants_probe   : std_logic;
   signal is_sent       : std_logic;
   signal start         : std_logic;
-  signal is_node       : std_logic;
   signal payload_bytes : std_logic_vector(15 downto 0);
   signal is_busy       : std_logic;
 
@@ -180,8 +175,6 @@ architecture rtl of firm_net_link is
   signal is_too_long   : std_logic;
   signal is_reply_lost : std_logic;
   signal is_lost       : std_logic;
-  signal is_long       : std_logic;
-  signal is_refused    : std_logic;
 
 begin
 
@@ -192,11 +185,12 @@ begin
   count_time : process (clk)
   begin
     if rising_edge(clk) then
-      tick_r  <= '0';
-      cycle_r <= cycle_r + 1;
       if cycle_r = CYCLES-1 then
         cycle_r <= 0;
         tick_r  <= '1';
+      else
+        cycle_r <= cycle_r + 1;
+        tick_r  <= '0';
       end if;
       if rst_n = '0' then
         cycle_r <= 0;
@@ -296,6 +290,7 @@ begin
       READERS => READERS,
       SOURCES => SOURCES,
       SAMPLE  => SAMPLE,
+      SLOTS   => SLOTS,
       DEPTH   => DEPTH
     )
     port map (
@@ -303,9 +298,11 @@ begin
       rst_n               => rst_n,
       tick                => tick_r,
       prefix              => prefix,
-      sample_writer       => sample_writer,
-      wants_reliable      => wants_reliable,
-      wants_transient     => wants_transient,
+      are_reliable        => are_reliable,
+      are_transient       => are_transient,
+      program_enable      => control_enable,
+      program_address     => control_address,
+      program_word        => control_word,
       packet_tdata        => datagram_tdata,
       packet_tuser        => datagram_tuser,
       packet_tvalid       => datagram_tvalid,
@@ -317,27 +314,29 @@ begin
       frame_tvalid        => in_tvalid,
       frame_tlast         => in_tlast,
       frame_tready        => in_tready,
-      sample_tdata        => sample_tdata,
-      sample_tvalid       => sample_tvalid,
-      sample_tlast        => sample_tlast,
-      sample_tready       => sample_tready,
+      sample_tdata        => out_tdata,
+      sample_tuser        => out_tuser,
+      sample_tvalid       => out_tvalid,
+      sample_tlast        => out_tlast,
+      sample_tready       => out_tready,
       start               => node_start,
       packet              => node_packet,
       payload_bytes       => node_bytes,
-      is_busy             => node_busy,
+      is_busy             => is_busy,
       build_field_valid   => field_valid,
       build_field_address => field_address,
       build_field_data    => field_data,
       payload_tdata       => payload_tdata,
       payload_tvalid      => payload_tvalid,
       payload_tready      => payload_tready,
-      peers_known         => open,
-      sources_known       => open,
-      is_lost             => is_lost,
-      is_full             => network_error(4),
-      is_unmatched        => network_error(5),
-      is_dropped          => network_error(6),
-      is_long             => is_long
+      peer_count          => open,
+      source_count        => open,
+      sink_count          => open,
+      is_discovery_lost   => is_lost,
+      is_sample_lost      => network_error(6),
+      is_peer_refused     => network_error(4),
+      is_endpoint_refused => network_error(5),
+      is_frame_refused    => network_error(7)
     );
 
   u_streams : entity firm.firm_net_streams
@@ -370,45 +369,16 @@ begin
       from_tready   => out_tready
     );
 
-  u_samples : entity firm.firm_net_samples
-    generic map (
-      DEPTH => HELD
-    )
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      s_axis_tdata  => out_tdata,
-      s_axis_tuser  => out_tuser,
-      s_axis_tvalid => out_tvalid,
-      s_axis_tlast  => out_tlast,
-      s_axis_tready => out_tready,
-      m_axis_tdata  => sample_tdata,
-      m_axis_tvalid => sample_tvalid,
-      m_axis_tlast  => sample_tlast,
-      m_axis_tready => sample_tready,
-      is_long       => is_refused
-    );
-
   -- ------------------------------------------------------------------ packets
 
-  is_node       <= node_start or held_r;
-  start         <= (is_node or wants_report or wants_probe) and not is_busy;
-  is_sent       <= start and not is_node;
-  packet        <= node_packet when is_node = '1' else
+  -- The node starts a packet only while the builder is not busy. Its presence has constant frames, which neither need
+  -- nor change the fields and the payload that the node has prepared; so they may leave between any two packets.
+  start         <= node_start or ((wants_report or wants_probe) and not is_busy);
+  is_sent       <= not node_start and (wants_report or wants_probe) and not is_busy;
+  packet        <= node_packet when node_start = '1' else
                    number_of(REPORT_PACKET) when wants_report = '1' else
                    number_of(PROBE_PACKET);
-  payload_bytes <= node_bytes when is_node = '1' else (others => '0');
-  node_busy     <= is_busy or held_r;
-
-  hold_packet : process (clk)
-  begin
-    if rising_edge(clk) then
-      held_r <= is_node and is_busy;
-      if rst_n = '0' then
-        held_r <= '0';
-      end if;
-    end if;
-  end process hold_packet;
+  payload_bytes <= node_bytes when node_start = '1' else (others => '0');
 
   u_builder : entity firm.firm_packet_builder
     generic map (
@@ -471,6 +441,5 @@ begin
 
   network_error(0) <= is_broken or is_too_long;
   network_error(3) <= is_reply_lost or is_lost;
-  network_error(7) <= is_long or is_refused;
 
 end architecture rtl;

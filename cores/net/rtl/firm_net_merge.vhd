@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Sends the frames of several sources, one frame at a time; of sources that wait, the first one is sent.
+-- Sends the frames of several sources, one frame at a time. Of sources that wait, the next one after the source of
+-- the last frame is sent, so that none keeps the others from sending.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -29,6 +30,9 @@ architecture rtl of firm_net_merge is
   subtype sources_t is std_logic_vector(SOURCES-1 downto 0);
   constant NO_SOURCE : sources_t := (others => '0');
 
+  signal after_r  : sources_t;  -- the sources after that of the last frame
+  signal later    : sources_t;  -- those of them that wait
+  signal waiting  : sources_t;
   signal first    : sources_t;  -- the source to begin with, if one waits
   signal chosen_r : sources_t;  -- the source of the frame that is under way
   signal chosen   : sources_t;
@@ -41,13 +45,16 @@ begin
     report "firm_net_merge: SOURCES is " & integer'image(SOURCES) & "; legal: 1 or more"
     severity failure;
 
-  find_first : process (s_axis_tvalid)
+  later   <= s_axis_tvalid and after_r;
+  waiting <= s_axis_tvalid when later = NO_SOURCE else later;
+
+  find_first : process (waiting)
     variable found : std_logic;
   begin
     found := '0';
     for index in 0 to SOURCES-1 loop
-      first(index) <= s_axis_tvalid(index) and not found;
-      found        := found or s_axis_tvalid(index);
+      first(index) <= waiting(index) and not found;
+      found        := found or waiting(index);
     end loop;
   end process find_first;
 
@@ -78,16 +85,23 @@ begin
   s_axis_tready <= chosen when m_axis_tready = '1' else NO_SOURCE;
 
   follow : process (clk)
+    variable found : std_logic;
   begin
     if rising_edge(clk) then
       if valid = '1' then
         chosen_r <= chosen;
         if m_axis_tready = '1' and last = '1' then
           chosen_r <= NO_SOURCE;
+          found    := '0';
+          for index in 0 to SOURCES-1 loop
+            after_r(index) <= found;
+            found          := found or chosen(index);
+          end loop;
         end if;
       end if;
       if rst_n = '0' then
         chosen_r <= NO_SOURCE;
+        after_r  <= NO_SOURCE;
       end if;
     end if;
   end process follow;

@@ -67,14 +67,30 @@ architecture rtl of firm_net_presence is
   signal claims_r : std_logic;  -- it names the board's address as its sender's
   signal query_r  : std_logic;
   signal meant_r  : std_logic;  -- the query is about the board's group, or all groups
+  signal limit_r  : unsigned(8 downto 0) := (others => '0');  -- bits of the delay that the query allows
   signal ended_r  : std_logic;  -- a frame that is not aborted
 
   signal ms_r      : natural range 0 to SECOND-1;
   signal seconds_r : unsigned(5 downto 0) := (others => '0');
   signal asked_r   : std_logic;
-  signal delay_r   : unsigned(8 downto 0) := (others => '0');  -- milliseconds to the answer
+  signal delay     : unsigned(8 downto 0);                     -- milliseconds to the answer, of the last query
+  signal delay_r   : unsigned(8 downto 0) := (others => '0');  -- of the answer that waits
   signal report_r  : std_logic;
   signal probe_r   : std_logic;
+
+  -- The bits of a delay that stays within the time that a query allows, in tenths of a second. 0 is that of version 1,
+  -- which allows ten seconds.
+  function limit_of(tenths : byte_t) return unsigned is
+  begin
+    if unsigned(tenths) = 1 then
+      return "000111111";
+    elsif unsigned(tenths) = 2 then
+      return "001111111";
+    elsif unsigned(tenths) >= 3 and unsigned(tenths) <= 5 then
+      return "011111111";
+    end if;
+    return "111111111";
+  end function limit_of;
 
   -- Whether a byte at `place` is not that of `wanted`.
   function differs(place : unsigned; byte : byte_t; wanted : bytes_t) return boolean is
@@ -127,6 +143,8 @@ begin
           query_r <= '0';
         elsif place_r > PROTOCOL_PLACE and place_r = igmp_r and s_axis_tdata /= QUERY then
           query_r <= '0';
+        elsif place_r > PROTOCOL_PLACE and place_r = igmp_r + 1 then
+          limit_r <= limit_of(s_axis_tdata);
         elsif place_r > PROTOCOL_PLACE and place_r = igmp_r + (QUERY_BYTES-1)
               and (recent(31 downto 0) = NO_GROUP or recent(31 downto 0) = group_ip) then
           meant_r <= '1';
@@ -153,7 +171,9 @@ begin
   wants_probe  <= probe_r and not report_r;
 
   -- Boards that are asked together answer at different times: the lower bits of the MAC address tell the delay of up to
-  -- half a second, which is less than any query allows.
+  -- half a second. Of two queries, the one that is answered first counts.
+  delay <= unsigned(mac(5 downto 0)) & "000" and limit_r;
+
   keep_time : process (clk)
   begin
     if rising_edge(clk) then
@@ -177,9 +197,9 @@ begin
           report_r <= '1';
         end if;
       end if;
-      if ended_r = '1' and query_r = '1' and meant_r = '1' and asked_r = '0' then
+      if ended_r = '1' and query_r = '1' and meant_r = '1' and (asked_r = '0' or delay < delay_r) then
         asked_r <= '1';
-        delay_r <= unsigned(mac(5 downto 0)) & "000";
+        delay_r <= delay;
       end if;
       if rst_n = '0' then
         ms_r      <= 0;

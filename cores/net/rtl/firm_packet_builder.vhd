@@ -19,8 +19,9 @@ entity firm_packet_builder is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of
-    -- four bytes; its size is 0 if the program has no payload.
+    -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of four bytes; its
+    -- size is 0 if the program has no payload, and only then. If it is 0 nevertheless, one byte is sent in its place:
+    -- the frame cannot be right, but it has neither a pause nor 64 KiB.
     start         : in  std_logic;
     entry         : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
     payload_bytes : in  std_logic_vector(15 downto 0);
@@ -121,7 +122,7 @@ begin
   payload    <= fetched_r when source = FROM_PAYLOAD else '0';
   is_padding <= '1' when real_r = 0 else '0';
   has_byte   <= s_axis_tvalid or is_padding or not payload;
-  is_final   <= '1' when payload = '0' or padded_r = 1 else '0';
+  is_final   <= '1' when payload = '0' or padded_r <= 1 else '0';
   advance    <= m_axis_tready or not (valid_r and is_sent);
   moves      <= advance and fetched_r and has_byte;
 

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Reads how a peer announces a writer (SEDP, a publication), and tells which of the node's readers match it: those with
--- the same topic, type and hash of the type, if what the writer offers is enough for them.
+-- Reads how a peer announces a writer or a reader (SEDP), and tells which of the node's endpoints of the other kind
+-- match it: those with the same topic, type and hash of the type, if what the writer offers is enough for the reader.
 --
 -- Of several parameters with the same id, the first one counts, as in the reference participant
 -- (tests/fabric/participant.py).
@@ -12,7 +12,8 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_endpoint is
   generic (
-    READERS : integer := 1 -- of the node, 1 to 8
+    READERS : integer := 1; -- of the node, 0 to 8
+    WRITERS : integer := 1  -- of the node, 1 to 9
   );
   port (
     clk : in std_logic;
@@ -29,32 +30,30 @@ entity firm_rtps_endpoint is
     place     : in std_logic_vector(15 downto 0);
     is_little : in std_logic;
     is_last   : in std_logic;
+    is_reader : in std_logic;  -- the peer announces a reader; constant from the payload's first byte on
 
-    -- What the readers want of a writer.
-    wants_reliable  : in std_logic_vector(READERS-1 downto 0);
-    wants_transient : in std_logic_vector(READERS-1 downto 0);
+    -- Of the node's endpoints, of which the readers are the first ones.
+    are_reliable  : in std_logic_vector(READERS+WRITERS-1 downto 0);
+    are_transient : in std_logic_vector(READERS+WRITERS-1 downto 0);
 
-    -- A memory that fusesoc_firm.fabric.names makes: a byte for each reader, one cycle after the address.
+    -- A memory that fusesoc_firm.fabric.names makes: a byte for each endpoint, one cycle after the address.
     names_address : out std_logic_vector(9 downto 0);
-    names_data    : in  std_logic_vector(8*READERS-1 downto 0);
+    names_data    : in  std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
 
     -- From three cycles after the last word on.
-    matches  : out std_logic_vector(READERS-1 downto 0);
-    is_known : out std_logic;  -- the GUID was told, and is one of the sender
-
-    -- A byte of the GUID, while no word comes.
-    guid_place : in  std_logic_vector(3 downto 0);
-    guid_byte  : out std_logic_vector(7 downto 0);
-    -- A byte of its last four, when it comes.
-    entity_valid : out std_logic;
-    entity_place : out std_logic_vector(1 downto 0);
-    entity_data  : out std_logic_vector(7 downto 0)
+    matches      : out std_logic_vector(READERS+WRITERS-1 downto 0);
+    is_known     : out std_logic;  -- the GUID was told, and is one of the sender
+    is_reliable  : out std_logic;  -- the peer's endpoint
+    is_transient : out std_logic;
+    entity_id    : out std_logic_vector(31 downto 0)  -- the first byte on the line highest
   );
 end entity firm_rtps_endpoint;
 
 architecture rtl of firm_rtps_endpoint is
 
   constant MOST_READERS : positive := 8;
+  constant MOST_WRITERS : positive := 9;
+  constant ENDPOINTS    : positive := READERS+WRITERS;
   constant PREFIX_BYTES : positive := 12;
   constant GUID_BYTES   : positive := 16;
   constant WORD_BYTES   : positive := 4;
@@ -70,7 +69,7 @@ architecture rtl of firm_rtps_endpoint is
   constant LAST_PLACE      : positive := 255;  -- of a part; a longer one stays there
   constant MOST_ENCODINGS  : positive := 16;
 
-  subtype mask_t is std_logic_vector(READERS-1 downto 0);
+  subtype mask_t is std_logic_vector(ENDPOINTS-1 downto 0);
   type memory_t is array (natural range 0 to 15) of std_logic_vector(7 downto 0);
 
   -- Parameters that came before.
@@ -113,15 +112,17 @@ architecture rtl of firm_rtps_endpoint is
   signal mask       : mask_t;
   signal mask_r     : mask_t;
 
-  signal topics_r     : mask_t;
-  signal types_r      : mask_t;
-  signal hashes_r     : mask_t;
-  signal has_hash_r   : std_logic;
-  signal named_r      : std_logic;  -- the part is that of the hash
-  signal reliable_r   : std_logic;
-  signal transient_r  : std_logic;
-  signal divided_r    : std_logic;  -- it is in a partition
-  signal encodes_r    : std_logic;
+  signal topics_r    : mask_t;
+  signal types_r     : mask_t;
+  signal hashes_r    : mask_t;
+  signal has_hash_r  : std_logic;
+  signal named_r     : std_logic;  -- the part is that of the hash
+  signal given_r     : std_logic := '0';  -- its reliability was told
+  signal reliable_r  : std_logic := '0';
+  signal offers      : std_logic;
+  signal transient_r : std_logic := '0';
+  signal divided_r   : std_logic;  -- it is in a partition
+  signal encodes_r   : std_logic;
 
   -- ------------------------------------------------------------------ its GUID
   signal source_memory : memory_t;
@@ -130,13 +131,16 @@ architecture rtl of firm_rtps_endpoint is
   signal source_place  : unsigned(3 downto 0);
   signal source_byte   : std_logic_vector(7 downto 0);
   signal entity_r      : std_logic_vector(31 downto 0) := (others => '0');
-  signal same_r        : std_logic;
-  signal whole_r       : std_logic;
+  signal same_r        : std_logic := '0';
+  signal whole_r       : std_logic := '0';
 
 begin
 
-  assert READERS >= 1 and READERS <= MOST_READERS
-    report "firm_rtps_endpoint: READERS is " & integer'image(READERS) & "; legal: 1 to " & integer'image(MOST_READERS)
+  assert READERS >= 0 and READERS <= MOST_READERS
+    report "firm_rtps_endpoint: READERS is " & integer'image(READERS) & "; legal: 0 to " & integer'image(MOST_READERS)
+    severity failure;
+  assert WRITERS >= 1 and WRITERS <= MOST_WRITERS
+    report "firm_rtps_endpoint: WRITERS is " & integer'image(WRITERS) & "; legal: 1 to " & integer'image(MOST_WRITERS)
     severity failure;
 
   comes      <= s_valid and is_value;
@@ -233,8 +237,8 @@ begin
 
   part_bytes <= before_r when value_r = SEMICOLON else before_r + 1;
 
-  compare : for reader in 0 to READERS-1 generate
-    equal(reader) <= '1' when names_data(8*reader+7 downto 8*reader) = value_r else '0';
+  compare : for index in 0 to ENDPOINTS-1 generate
+    equal(index) <= '1' when names_data(8*index+7 downto 8*index) = value_r else '0';
   end generate compare;
 
   mask <= mask_r when checks_r = '0' else
@@ -246,7 +250,7 @@ begin
     if rising_edge(clk) then
       mask_r <= mask;
       if hash_r = '1' then
-        -- The part begins with "typehash=", which is the same for all readers.
+        -- The part begins with "typehash=", which is the same for all endpoints.
         if before_r = HASH_NAME_BYTES-1 then
           named_r <= mask(0);
         end if;
@@ -283,6 +287,7 @@ begin
         elsif id = RTPS_RELIABILITY then
           seen_reliable_r <= '1';
           if seen_reliable_r = '0' and unsigned(size) >= WORD_BYTES then
+            given_r    <= '1';
             reliable_r <= '0';
             if beyond_r = '0' and number_r = RELIABLE then
               reliable_r <= '1';
@@ -324,7 +329,7 @@ begin
         types_r         <= (others => '0');
         has_hash_r      <= '0';
         named_r         <= '0';
-        reliable_r      <= '1';
+        given_r         <= '0';
         transient_r     <= '0';
         divided_r       <= '0';
         encodes_r       <= '1';
@@ -332,25 +337,39 @@ begin
     end if;
   end process note_value;
 
-  tell : process (topics_r, types_r, hashes_r, has_hash_r, reliable_r, transient_r, divided_r, encodes_r,
-                  wants_reliable, wants_transient)
-    variable found : mask_t;
+  -- Each kind of endpoint has a default of its own.
+  offers <= reliable_r when given_r = '1' else not is_reader;
+
+  tell : process (topics_r, types_r, hashes_r, has_hash_r, offers, transient_r, divided_r, encodes_r, is_reader,
+                  are_reliable, are_transient)
+    variable found     : mask_t;
+    variable is_enough : boolean;
   begin
     found := topics_r and types_r;
     if has_hash_r = '1' then
       found := found and hashes_r;
     end if;
-    if reliable_r = '0' then
-      found := found and not wants_reliable;
-    end if;
-    if transient_r = '0' then
-      found := found and not wants_transient;
-    end if;
     if divided_r = '1' or encodes_r = '0' then
       found := (others => '0');
     end if;
+    for index in found'range loop
+      -- What is wanted has to be offered, by the peer's writer or by the node's.
+      if index < READERS then
+        is_enough := is_reader = '0' and (are_reliable(index) and not offers) = '0'
+                     and (are_transient(index) and not transient_r) = '0';
+      else
+        is_enough := is_reader = '1' and (offers and not are_reliable(index)) = '0'
+                     and (transient_r and not are_transient(index)) = '0';
+      end if;
+      if not is_enough then
+        found(index) := '0';
+      end if;
+    end loop;
     matches <= found;
   end process tell;
+
+  is_reliable  <= offers;
+  is_transient <= transient_r;
 
   -- ------------------------------------------------------------------ its GUID
 
@@ -360,7 +379,7 @@ begin
                 '0';
   guid_at    <= unsigned(address(3 downto 0)) when has_field = '1' else at(3 downto 0);
 
-  source_place <= guid_at when guid_valid = '1' else unsigned(guid_place);
+  source_place <= guid_at when guid_valid = '1' else (others => '0');
   source_byte  <= source_memory(to_integer(source_place));
 
   read_guid : process (clk)
@@ -394,15 +413,7 @@ begin
     end if;
   end process read_guid;
 
-  is_known     <= whole_r and same_r;
-  entity_valid <= '1' when guid_valid = '1' and guid_at >= PREFIX_BYTES else '0';
-  entity_place <= std_logic_vector(guid_at(1 downto 0));
-  entity_data  <= data;
-
-  guid_byte <= entity_r(31 downto 24) when guid_place = "1100" else
-               entity_r(23 downto 16) when guid_place = "1101" else
-               entity_r(15 downto 8) when guid_place = "1110" else
-               entity_r(7 downto 0) when guid_place = "1111" else
-               source_byte;
+  is_known  <= whole_r and same_r;
+  entity_id <= entity_r;
 
 end architecture rtl;

@@ -44,13 +44,9 @@ entity firm_rtps_inbox is
     is_mine : out std_logic;
 
     -- Of the submessage, from its last word on.
-    kind     : out std_logic_vector(7 downto 0);
-    flags    : out std_logic_vector(7 downto 0);
     writer   : out std_logic_vector(31 downto 0);
-    number   : out std_logic_vector(31 downto 0);  -- RECORD_NUMBER, and RECORD_SECOND: the lower half
-    second   : out std_logic_vector(31 downto 0);
-    is_large : out std_logic;                      -- one of both is larger
-    is_gone  : out std_logic;                      -- its status says that the instance ended
+    is_large : out std_logic;  -- one of its sequence numbers has more than 32 bits
+    is_gone  : out std_logic;  -- its status says that the instance ended
 
     -- Of the byte of a payload: see firm_rtps_parameters.
     begins    : out std_logic;
@@ -87,13 +83,9 @@ architecture rtl of firm_rtps_inbox is
   signal list_valid  : std_logic;
   signal in_value    : std_logic;
 
-  signal kind_r   : std_logic_vector(7 downto 0) := (others => '0');
-  signal flags_r  : std_logic_vector(7 downto 0) := (others => '0');
-  signal from_r   : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
-  signal number_r : std_logic_vector(31 downto 0) := (others => '0');
-  signal second_r : std_logic_vector(31 downto 0) := (others => '0');
-  signal large_r  : std_logic;
-  signal gone_r   : std_logic;
+  signal from_r  : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
+  signal large_r : std_logic := '0';
+  signal gone_r  : std_logic := '0';
 
   -- Of the packet that arrives.
   signal mine_r   : std_logic;  -- the last destination was this node, or any
@@ -112,19 +104,6 @@ architecture rtl of firm_rtps_inbox is
     end if;
     return '0';
   end function is_zero;
-
-  -- A number with another byte at its place.
-  function placed(before : std_logic_vector(31 downto 0); byte : std_logic_vector(7 downto 0);
-    where  : unsigned(1 downto 0)) return std_logic_vector is
-    variable result : std_logic_vector(31 downto 0) := before;
-  begin
-    for index in 0 to 3 loop
-      if where = index then
-        result(8*index+7 downto 8*index) := byte;
-      end if;
-    end loop;
-    return result;
-  end function placed;
 
 begin
 
@@ -221,18 +200,11 @@ begin
     if rising_edge(clk) then
       if takes = '1' then
         if at = RECORD_KIND then
-          kind_r  <= value;
           gone_r  <= '0';
           large_r <= '0';
-        elsif at = RECORD_FLAGS then
-          flags_r <= value;
         elsif at >= RECORD_WRITER and at < RECORD_WRITER+4 then
           from_r <= from_r(23 downto 0) & value;
-        elsif at >= RECORD_NUMBER and at < RECORD_NUMBER+4 then
-          number_r <= placed(number_r, value, at(1 downto 0));
-        elsif at >= RECORD_SECOND and at < RECORD_SECOND+4 then
-          second_r <= placed(second_r, value, at(1 downto 0));
-        elsif at >= RECORD_NUMBER+4 and at < RECORD_SECOND+8 then
+        elsif at >= RECORD_NUMBER and at < RECORD_SECOND+8 and at(2) = '1' then
           large_r <= large_r or not is_zero(value);
         elsif at = RECORD_STATUS+3 then
           gone_r <= value(0) or value(1);
@@ -241,11 +213,7 @@ begin
     end if;
   end process note_submessage;
 
-  kind     <= kind_r;
-  flags    <= flags_r;
   writer   <= from_r;
-  number   <= number_r;
-  second   <= second_r;
   is_large <= large_r;
   is_gone  <= gone_r;
 

@@ -1,18 +1,19 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node of ROS 2 above UDP: packets of RTPS in, frames `id | length | payload` and jobs for firm_packet_builder out.
--- It announces itself, notes its peers, and has readers of several topics and a writer of one, best effort.
+-- A node of ROS 2 above UDP: packets of RTPS in, frames `id | length | payload` and jobs for firm_packet_builder out,
+-- and the other way round. It announces itself, finds its peers, and matches their readers and writers with its own.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
+use firm.firm_axis_pkg.all;
 use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_node is
   generic (
-    PEERS   : integer := 8;    -- 1 to 8
-    WRITERS : integer := 2;    -- 2 to 234: see firm_rtps_control
-    READERS : integer := 1;    -- 1 to 8
+    WRITERS : integer := 2;    -- of the node, the one of ros_discovery_info included, 1 to 9
+    READERS : integer := 1;    -- 0 to 8
     SOURCES : integer := 8;    -- matched writers of peers, 1 to 32
-    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 128
+    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 1024
+    SLOTS   : integer := 16;   -- for the last samples of all writers, a power of two, 2 to 256
     DEPTH   : integer := 2048; -- bytes of waiting discovery, and of waiting payloads; a power of two, 4 to 65536
     SAMPLES : integer := 16    -- that wait for the host, a power of two, 2 or more
   );
@@ -21,12 +22,16 @@ entity firm_rtps_node is
     rst_n : in std_logic;
     tick  : in std_logic;  -- a pulse each millisecond
 
-    -- The prefix of the node, and the entity of the writer that sends samples; the first byte on the line highest.
-    prefix        : in std_logic_vector(95 downto 0);
-    sample_writer : in std_logic_vector(31 downto 0);
-    -- What the readers want of a writer.
-    wants_reliable  : in std_logic_vector(READERS-1 downto 0);
-    wants_transient : in std_logic_vector(READERS-1 downto 0);
+    -- The prefix of the node; the first byte on the line highest.
+    prefix : in std_logic_vector(95 downto 0);
+    -- The quality of the readers (lowest), of the writers with frames, and of the writer of ros_discovery_info.
+    are_reliable  : in std_logic_vector(READERS+WRITERS-1 downto 0);
+    are_transient : in std_logic_vector(READERS+WRITERS-1 downto 0);
+
+    -- The memory that fusesoc_firm.fabric.control makes.
+    program_enable  : out std_logic;
+    program_address : out std_logic_vector(9 downto 0);
+    program_word    : in  std_logic_vector(35 downto 0);
 
     -- Payloads of firm_udp_receiver.
     packet_tdata  : in std_logic_vector(7 downto 0);
@@ -37,7 +42,7 @@ entity firm_rtps_node is
 
     -- The memory that fusesoc_firm.fabric.names makes.
     names_address : out std_logic_vector(9 downto 0);
-    names_data    : in  std_logic_vector(8*READERS-1 downto 0);
+    names_data    : in  std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
 
     -- Frames to the host.
     frame_tdata  : out std_logic_vector(7 downto 0);
@@ -45,8 +50,9 @@ entity firm_rtps_node is
     frame_tlast  : out std_logic;
     frame_tready : in  std_logic;
 
-    -- Samples, with the header of their encoding.
+    -- Frames to send; their id is the number of the writer. Payloads have the header of their encoding.
     sample_tdata  : in  std_logic_vector(7 downto 0);
+    sample_tuser  : in  std_logic_vector(0 downto 0);
     sample_tvalid : in  std_logic;
     sample_tlast  : in  std_logic;
     sample_tready : out std_logic;
@@ -63,20 +69,23 @@ entity firm_rtps_node is
     payload_tvalid      : out std_logic;
     payload_tready      : in  std_logic;
 
-    peers_known   : out std_logic_vector(7 downto 0);
-    sources_known : out std_logic_vector(SOURCES-1 downto 0);
-    -- Pulses.
-    is_lost      : out std_logic;  -- a packet of discovery without room
-    is_full      : out std_logic;  -- a peer without room
-    is_unmatched : out std_logic;  -- a writer that matches, without room
-    is_dropped   : out std_logic;  -- a sample without room, see firm_rtps_readers
-    is_long      : out std_logic   -- a sample to send, with more than SAMPLE bytes
+    -- Entries in use.
+    peer_count   : out std_logic_vector(7 downto 0);
+    source_count : out std_logic_vector(7 downto 0);
+    sink_count   : out std_logic_vector(7 downto 0);
+    -- Pulses: something good found no room, or no place in a table.
+    is_discovery_lost   : out std_logic;  -- a packet of discovery
+    is_sample_lost      : out std_logic;  -- a sample in a packet
+    is_peer_refused     : out std_logic;
+    is_endpoint_refused : out std_logic;  -- one that matches
+    is_frame_refused    : out std_logic   -- a frame to send: without a payload, too long, or of another id
   );
 end entity firm_rtps_node;
 
 architecture rtl of firm_rtps_node is
 
   constant FIRST_READER : positive := 2;  -- 1 is the writer of ros_discovery_info
+  constant ENDPOINTS    : positive := READERS+WRITERS;
 
   signal field_valid   : std_logic;
   signal field_address : std_logic_vector(RECORD_BITS-1 downto 0);
@@ -91,40 +100,61 @@ architecture rtl of firm_rtps_node is
   signal is_foreign    : std_logic;
   signal is_aborted    : std_logic;
 
-  signal take       : std_logic;
-  signal takes      : std_logic;
-  signal has_word   : std_logic;
-  signal has_field  : std_logic;
-  signal address    : std_logic_vector(RECORD_BITS-1 downto 0);
-  signal data       : std_logic_vector(7 downto 0);
-  signal is_end     : std_logic;
-  signal is_mine    : std_logic;
-  signal told_kind  : std_logic_vector(7 downto 0);
-  signal told_flags : std_logic_vector(7 downto 0);
-  signal writer     : std_logic_vector(31 downto 0);
-  signal number     : std_logic_vector(31 downto 0);
-  signal second     : std_logic_vector(31 downto 0);
-  signal is_large   : std_logic;
-  signal is_gone    : std_logic;
-  signal begins     : std_logic;
-  signal is_value   : std_logic;
-  signal id         : std_logic_vector(15 downto 0);
-  signal size       : std_logic_vector(15 downto 0);
-  signal place      : std_logic_vector(15 downto 0);
-  signal is_little  : std_logic;
-  signal is_last    : std_logic;
+  signal take      : std_logic;
+  signal takes     : std_logic;
+  signal has_word  : std_logic;
+  signal has_field : std_logic;
+  signal address   : std_logic_vector(RECORD_BITS-1 downto 0);
+  signal data      : std_logic_vector(7 downto 0);
+  signal is_end    : std_logic;
+  signal is_mine   : std_logic;
+  signal writer    : std_logic_vector(31 downto 0);
+  signal is_large  : std_logic;
+  signal is_gone   : std_logic;
+  signal begins    : std_logic;
+  signal is_value  : std_logic;
+  signal id        : std_logic_vector(15 downto 0);
+  signal size      : std_logic_vector(15 downto 0);
+  signal place     : std_logic_vector(15 downto 0);
+  signal is_little : std_logic;
+  signal is_last   : std_logic;
 
-  signal matches       : std_logic_vector(READERS-1 downto 0);
-  signal is_known      : std_logic;
-  signal guid_place    : std_logic_vector(3 downto 0);
-  signal guid_byte     : std_logic_vector(7 downto 0);
-  signal entity_valid  : std_logic;
-  signal entity_place  : std_logic_vector(1 downto 0);
-  signal entity_data   : std_logic_vector(7 downto 0);
-  signal is_announced  : std_logic;
-  signal is_left       : std_logic;
-  signal peer          : std_logic_vector(2 downto 0);
-  signal readers_busy  : std_logic;
+  signal is_reader       : std_logic;
+  signal matches         : std_logic_vector(ENDPOINTS-1 downto 0);
+  signal is_known        : std_logic;
+  signal is_reliable     : std_logic;
+  signal is_transient    : std_logic;
+  signal entity_id       : std_logic_vector(31 downto 0);
+  signal record_valid    : std_logic;
+  signal record_address  : std_logic_vector(RECORD_BITS-1 downto 0);
+  signal has_metatraffic : std_logic;
+  signal has_default     : std_logic;
+  signal has_unicast     : std_logic;
+  signal has_lease       : std_logic;
+
+  signal source       : std_logic_vector(4 downto 0);
+  signal key_write    : std_logic;
+  signal note_write   : std_logic;
+  signal number_write : std_logic;
+  signal write_place  : std_logic_vector(3 downto 0);
+  signal write_data   : std_logic_vector(7 downto 0);
+  signal read_place   : std_logic_vector(2 downto 0);
+  signal number_byte  : std_logic_vector(7 downto 0);
+  signal is_locked    : std_logic;
+  signal is_judging   : std_logic;
+  signal has_early    : std_logic;
+  signal early_source : std_logic_vector(4 downto 0);
+  signal early_number : std_logic_vector(31 downto 0);
+  signal takes_early  : std_logic;
+
+  signal slot_valid  : std_logic;
+  signal slot_writer : std_logic_vector(2 downto 0);
+  signal has_sample  : std_logic;
+  signal sender      : std_logic_vector(2 downto 0);
+  signal is_done     : std_logic;
+  signal shows       : std_logic;
+  signal has_payload : std_logic;
+  signal slot_bytes  : std_logic_vector(15 downto 0);
 
 begin
 
@@ -178,11 +208,7 @@ begin
       data          => data,
       is_end        => is_end,
       is_mine       => is_mine,
-      kind          => told_kind,
-      flags         => told_flags,
       writer        => writer,
-      number        => number,
-      second        => second,
       is_large      => is_large,
       is_gone       => is_gone,
       begins        => begins,
@@ -192,15 +218,13 @@ begin
       place         => place,
       is_little     => is_little,
       is_last       => is_last,
-      is_lost       => is_lost
+      is_lost       => is_discovery_lost
     );
 
-  takes <= take and has_word;
+  takes     <= take and has_word;
+  is_reader <= '1' when writer = RTPS_SUBSCRIPTIONS_WRITER else '0';
 
-  u_endpoint : entity firm.firm_rtps_endpoint
-    generic map (
-      READERS => READERS
-    )
+  u_locators : entity firm.firm_rtps_locators
     port map (
       clk             => clk,
       s_valid         => takes,
@@ -214,17 +238,42 @@ begin
       place           => place,
       is_little       => is_little,
       is_last         => is_last,
-      wants_reliable  => wants_reliable,
-      wants_transient => wants_transient,
-      names_address   => names_address,
-      names_data      => names_data,
-      matches         => matches,
-      is_known        => is_known,
-      guid_place      => guid_place,
-      guid_byte       => guid_byte,
-      entity_valid    => entity_valid,
-      entity_place    => entity_place,
-      entity_data     => entity_data
+      record_valid    => record_valid,
+      record_address  => record_address,
+      has_metatraffic => has_metatraffic,
+      has_default     => has_default,
+      has_unicast     => has_unicast,
+      has_lease       => has_lease
+    );
+
+  u_endpoint : entity firm.firm_rtps_endpoint
+    generic map (
+      READERS => READERS,
+      WRITERS => WRITERS
+    )
+    port map (
+      clk           => clk,
+      s_valid       => takes,
+      has_field     => has_field,
+      address       => address,
+      data          => data,
+      begins        => begins,
+      is_value      => is_value,
+      id            => id,
+      size          => size,
+      place         => place,
+      is_little     => is_little,
+      is_last       => is_last,
+      is_reader     => is_reader,
+      are_reliable  => are_reliable,
+      are_transient => are_transient,
+      names_address => names_address,
+      names_data    => names_data,
+      matches       => matches,
+      is_known      => is_known,
+      is_reliable   => is_reliable,
+      is_transient  => is_transient,
+      entity_id     => entity_id
     );
 
   u_readers : entity firm.firm_rtps_readers
@@ -251,80 +300,118 @@ begin
       is_foreign    => is_foreign,
       is_aborted    => is_aborted,
       is_mine       => is_mine,
-      matches       => matches,
-      is_known      => is_known,
-      guid_place    => guid_place,
-      guid_byte     => guid_byte,
-      entity_valid  => entity_valid,
-      entity_place  => entity_place,
-      entity_data   => entity_data,
-      is_announced  => is_announced,
-      is_gone       => is_gone,
-      peer          => peer,
-      is_left       => is_left,
-      is_busy       => readers_busy,
+      source        => source,
+      key_write     => key_write,
+      note_write    => note_write,
+      number_write  => number_write,
+      write_place   => write_place,
+      write_data    => write_data,
+      read_place    => read_place,
+      number_byte   => number_byte,
+      is_locked     => is_locked,
+      is_judging    => is_judging,
+      has_early     => has_early,
+      early_source  => early_source,
+      early_number  => early_number,
+      takes_early   => takes_early,
       m_axis_tdata  => frame_tdata,
       m_axis_tvalid => frame_tvalid,
       m_axis_tlast  => frame_tlast,
       m_axis_tready => frame_tready,
-      sources_known => sources_known,
-      is_full       => is_unmatched,
-      is_lost       => is_dropped
+      is_lost       => is_sample_lost
     );
+
+  u_history : entity firm.firm_rtps_history
+    generic map (
+      WRITERS => max(1, WRITERS-1),
+      SAMPLE  => SAMPLE,
+      SLOTS   => SLOTS
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => sample_tdata,
+      s_axis_tuser  => sample_tuser,
+      s_axis_tvalid => sample_tvalid,
+      s_axis_tlast  => sample_tlast,
+      s_axis_tready => sample_tready,
+      slot_valid    => slot_valid,
+      slot_writer   => slot_writer,
+      slot_next     => write_data,
+      has_sample    => has_sample,
+      writer        => sender,
+      is_done       => is_done,
+      shows         => shows,
+      slot          => write_data,
+      payload_bytes => slot_bytes,
+      m_axis_tdata  => payload_tdata,
+      m_axis_tready => payload_tready,
+      is_refused    => is_frame_refused
+    );
+
+  payload_tvalid <= '1';
+  payload_bytes  <= gated(slot_bytes, has_payload);
 
   u_control : entity firm.firm_rtps_control
     generic map (
-      PEERS   => PEERS,
-      WRITERS => WRITERS,
-      READERS => READERS,
-      SAMPLE  => SAMPLE
+      ENDPOINTS => ENDPOINTS
     )
     port map (
       clk                 => clk,
       rst_n               => rst_n,
       tick                => tick,
-      sample_writer       => sample_writer,
+      program_enable      => program_enable,
+      program_address     => program_address,
+      program_word        => program_word,
       take                => take,
       has_word            => has_word,
-      has_field           => has_field,
-      address             => address,
-      data                => data,
       is_end              => is_end,
-      kind                => told_kind,
-      flags               => told_flags,
-      writer              => writer,
-      number              => number,
-      second              => second,
+      record_valid        => record_valid,
+      record_address      => record_address,
+      record_data         => data,
       is_large            => is_large,
       is_gone             => is_gone,
-      begins              => begins,
-      is_value            => is_value,
-      id                  => id,
-      size                => size,
-      place               => place,
-      is_little           => is_little,
-      is_last             => is_last,
-      is_announced        => is_announced,
-      is_left             => is_left,
-      peer                => peer,
-      readers_busy        => readers_busy,
-      s_axis_tdata        => sample_tdata,
-      s_axis_tvalid       => sample_tvalid,
-      s_axis_tlast        => sample_tlast,
-      s_axis_tready       => sample_tready,
-      is_long             => is_long,
+      has_metatraffic     => has_metatraffic,
+      has_default         => has_default,
+      has_unicast         => has_unicast,
+      has_lease           => has_lease,
+      is_known            => is_known,
+      is_reliable         => is_reliable,
+      is_transient        => is_transient,
+      matches             => matches,
+      entity_id           => entity_id,
+      source              => source,
+      key_write           => key_write,
+      note_write          => note_write,
+      number_write        => number_write,
+      write_place         => write_place,
+      write_data          => write_data,
+      read_place          => read_place,
+      number_byte         => number_byte,
+      is_locked           => is_locked,
+      is_judging          => is_judging,
+      has_early           => has_early,
+      early_source        => early_source,
+      early_number        => early_number,
+      takes_early         => takes_early,
+      slot_valid          => slot_valid,
+      slot_writer         => slot_writer,
+      has_sample          => has_sample,
+      writer              => sender,
+      is_done             => is_done,
+      shows               => shows,
       start               => start,
       packet              => packet,
-      payload_bytes       => payload_bytes,
+      has_payload         => has_payload,
       is_busy             => is_busy,
       build_field_valid   => build_field_valid,
       build_field_address => build_field_address,
       build_field_data    => build_field_data,
-      m_axis_tdata        => payload_tdata,
-      m_axis_tvalid       => payload_tvalid,
-      m_axis_tready       => payload_tready,
-      peers_known         => peers_known,
-      is_full             => is_full
+      peer_count          => peer_count,
+      source_count        => source_count,
+      sink_count          => sink_count,
+      is_peer_refused     => is_peer_refused,
+      is_endpoint_refused => is_endpoint_refused
     );
 
 end architecture rtl;

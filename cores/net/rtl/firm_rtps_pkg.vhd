@@ -48,9 +48,17 @@ package firm_rtps_pkg is
   constant RECORD_KEY_HASH    : natural  := 96;  -- 16 bytes
   constant RECORD_KIND        : natural  := 112; -- 1 byte
   constant RECORD_FLAGS       : natural  := 113; -- 1 byte
-  -- Of the packet. firm_rtps_control adds what a participant tells of its addresses, at 134 to 143 and 156 to 159.
+  -- Of the packet.
   constant RECORD_SOURCE_MAC  : natural  := 128; -- 6 bytes, as on the line
   constant RECORD_SOURCE      : natural  := 144; -- 12 bytes: the sender's prefix
+  -- What a payload of discovery tells, which firm_rtps_locators adds.
+  constant RECORD_METATRAFFIC_IP   : natural := 136; -- 4 bytes
+  constant RECORD_METATRAFFIC_PORT : natural := 140; -- 2 bytes
+  constant RECORD_DEFAULT_PORT     : natural := 142; -- 2 bytes
+  constant RECORD_DEFAULT_IP       : natural := 156; -- 4 bytes
+  constant RECORD_LEASE            : natural := 160; -- 4 bytes: seconds
+  constant RECORD_UNICAST_IP       : natural := 164; -- 4 bytes
+  constant RECORD_UNICAST_PORT     : natural := 168; -- 2 bytes
 
   -- Writers of discovery.
   constant RTPS_PARTICIPANT_WRITER   : std_logic_vector(31 downto 0) := x"000100c2";
@@ -58,6 +66,7 @@ package firm_rtps_pkg is
   constant RTPS_SUBSCRIPTIONS_WRITER : std_logic_vector(31 downto 0) := x"000004c2";
 
   -- Parameters of discovery.
+  constant RTPS_LEASE               : std_logic_vector(15 downto 0) := x"0002";
   constant RTPS_TOPIC_NAME          : std_logic_vector(15 downto 0) := x"0005";
   constant RTPS_TYPE_NAME           : std_logic_vector(15 downto 0) := x"0007";
   constant RTPS_RELIABILITY         : std_logic_vector(15 downto 0) := x"001a";

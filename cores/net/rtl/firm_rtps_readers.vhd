@@ -1,9 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The readers of a node in fabric, best effort: notes the writers of peers that match them, and gives each sample of
--- these writers as a frame `id | length | payload`, once and in order. The id is the number of the reader.
+-- The readers of a node in fabric: gives each sample of the writers of peers that match them as a frame
+-- `id | length | payload`, once and in order. The id is the number of the reader. Which writers match, and what to do
+-- about missing samples, is decided by the program of firm_rtps_sequencer.
 --
--- The writer of a sample is looked up while the packet arrives. The sample then waits until the packet is known to be
--- good, and only then its number is compared with that of the last one.
+-- The writer of a sample is looked up while the packet arrives. When the packet is known to be good, the sample's
+-- number is compared with the next one of its writer: a reliable reader takes that one only, and another one takes
+-- any later one as well. A sample that is taken waits for the host.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -13,7 +15,7 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_readers is
   generic (
-    READERS : integer := 1;    -- of the node, 1 to 8
+    READERS : integer := 1;    -- of the node, 0 to 8
     FIRST   : integer := 2;    -- the number in the entity id of the first one; those of the others follow
     SOURCES : integer := 8;    -- matched writers, 1 to 32
     BYTES   : integer := 2048; -- of payloads that wait, a power of two, 4 to 65536
@@ -39,23 +41,26 @@ entity firm_rtps_readers is
     -- From firm_rtps_inbox: the submessage is for this node.
     is_mine : in std_logic;
 
-    -- From firm_rtps_endpoint.
-    matches      : in  std_logic_vector(READERS-1 downto 0);
-    is_known     : in  std_logic;
-    guid_place   : out std_logic_vector(3 downto 0);
-    guid_byte    : in  std_logic_vector(7 downto 0);
-    entity_valid : in  std_logic;
-    entity_place : in  std_logic_vector(1 downto 0);
-    entity_data  : in  std_logic_vector(7 downto 0);
+    -- What the program notes about the writer with number `source`: a byte of its GUID; whether there is one (bit 7),
+    -- its reader's reliability (bit 6) and number (bits 2 to 0); a byte of its next sample's number, the lowest
+    -- first.
+    source       : in  std_logic_vector(4 downto 0);
+    key_write    : in  std_logic;
+    note_write   : in  std_logic;
+    number_write : in  std_logic;
+    write_place  : in  std_logic_vector(3 downto 0);
+    write_data   : in  std_logic_vector(7 downto 0);
+    read_place   : in  std_logic_vector(2 downto 0);
+    number_byte  : out std_logic_vector(7 downto 0);
+    -- While `is_locked` is high, no number changes but by the program. It may rise while `is_judging` is low.
+    is_locked  : in  std_logic;
+    is_judging : out std_logic;
 
-    -- A pulse: the peer with this number announced the writer that firm_rtps_endpoint shows, or ended it.
-    is_announced : in std_logic;
-    is_gone      : in std_logic;
-    peer         : in std_logic_vector(2 downto 0);
-    -- A pulse: the peer with this number is forgotten.
-    is_left : in std_logic;
-
-    is_busy : out std_logic;  -- notes a writer; no word may come
+    -- A sample that a reliable reader cannot take yet.
+    has_early    : out std_logic;
+    early_source : out std_logic_vector(4 downto 0);
+    early_number : out std_logic_vector(31 downto 0);
+    takes_early  : in  std_logic;
 
     -- Frames.
     m_axis_tdata  : out std_logic_vector(7 downto 0);
@@ -63,10 +68,7 @@ entity firm_rtps_readers is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    sources_known : out std_logic_vector(SOURCES-1 downto 0);
-    is_full       : out std_logic;  -- a pulse for each matching writer without room
-    -- A pulse for each sample without room, also one that is repeated or whose packet is aborted later.
-    is_lost : out std_logic
+    is_lost : out std_logic  -- a pulse for each good packet with a sample without room
   );
 end entity firm_rtps_readers;
 
@@ -81,11 +83,17 @@ architecture rtl of firm_rtps_readers is
   constant HEAD_BYTES   : positive := 5;   -- of a frame
   constant READER_KIND  : std_logic_vector(7 downto 0) := x"04";
   constant ID_BITS      : positive := 3;
-  constant PEER_BITS    : positive := 3;
+  constant NUMBER_BYTES : positive := NUMBER_BITS/8;
+  constant EARLY_BITS   : positive := 4;
   constant SOURCE_BITS  : positive := max(1, clog2(SOURCES));
   constant PLACE_BITS   : positive := max(1, clog2(BYTES));
   constant QUEUE_BITS   : positive := max(1, clog2(SAMPLES));
-  constant SAMPLE_BITS  : positive := SOURCE_BITS+MARK_BITS+NUMBER_BITS+SIZE_BITS;
+  -- A sample that waits: size of its payload, number, mark and number of its source, reader, whether it has a payload.
+  constant AT_NUMBER    : positive := SIZE_BITS;
+  constant AT_MARK      : positive := AT_NUMBER+NUMBER_BITS;
+  constant AT_SOURCE    : positive := AT_MARK+MARK_BITS;
+  constant AT_ID        : positive := AT_SOURCE+SOURCE_BITS;
+  constant SAMPLE_BITS  : positive := AT_ID+ID_BITS+1;
 
   subtype sources_t is std_logic_vector(SOURCES-1 downto 0);
   subtype source_t is unsigned(SOURCE_BITS-1 downto 0);
@@ -96,27 +104,37 @@ architecture rtl of firm_rtps_readers is
 
   type payloads_t is array (natural range 0 to BYTES-1) of std_logic_vector(7 downto 0);
   type samples_t is array (natural range 0 to SAMPLES-1) of std_logic_vector(SAMPLE_BITS-1 downto 0);
-  type numbers_t is array (natural range 0 to 2**SOURCE_BITS-1) of number_t;
+  type number_bytes_t is array (natural range 0 to 2**SOURCE_BITS-1) of std_logic_vector(7 downto 0);
   type ids_t is array (natural range 0 to 2**SOURCE_BITS-1) of unsigned(ID_BITS-1 downto 0);
-  type peers_t is array (natural range 0 to SOURCES-1) of unsigned(PEER_BITS-1 downto 0);
+  type flags_t is array (natural range 0 to SAMPLES-1) of std_logic_vector(0 downto 0);
+  type early_t is array (natural range 0 to 2**EARLY_BITS-1) of std_logic_vector(SOURCE_BITS+MARK_BITS+31 downto 0);
   type marks_t is array (natural range 0 to 2**SOURCE_BITS-1) of unsigned(MARK_BITS-1 downto 0);
 
   signal payloads : payloads_t;
   signal entries  : samples_t := (others => (others => '0'));
-  signal numbers  : numbers_t := (others => (others => '0'));  -- the next number of each source
+  signal kept     : flags_t := (others => "0");                -- samples that the host gets
   signal ids      : ids_t := (others => (others => '0'));      -- the reader of each source
   -- Changes when a source's place gets another writer, whose numbers begin anew: samples of the one before may wait.
-  signal marks    : marks_t := (others => (others => '0'));
+  signal marks      : marks_t := (others => (others => '0'));
+  signal sources_r  : sources_t := (others => '0');
+  signal reliable_r : sources_t;
 
   -- ------------------------------------------------------------------ the sample that arrives
   signal key_valid : std_logic;
   signal key_place : std_logic_vector(3 downto 0);
   signal found     : sources_t;
-  signal source    : source_t;
+  signal sender    : source_t;
   signal number_r  : std_logic_vector(NUMBER_BITS-1 downto 0) := (others => '0');
   signal large_r   : std_logic;
   signal reader_r  : std_logic_vector(31 downto 0) := (others => '0');
   signal full_r    : std_logic;  -- its payload found no room
+
+  -- One cycle later, when the number is complete.
+  signal submessage_r : std_logic;
+  signal data_r       : std_logic;  -- it is a sample for this node
+  signal filled_r     : std_logic;  -- with a payload that is whole
+  signal ends_r       : std_logic;
+  signal spoils_r     : std_logic;
 
   signal start_r   : place_t := (others => '0');  -- of the packet's payloads
   signal sample_r  : place_t := (others => '0');  -- of the sample's payload
@@ -126,50 +144,58 @@ architecture rtl of firm_rtps_readers is
   signal used      : place_t;
   signal has_room  : std_logic;
   signal is_over   : std_logic;
-  signal ends      : std_logic;
-  signal spoils    : std_logic;
   signal is_sample : std_logic;
+  signal misses_r  : std_logic;  -- a sample of the packet found no room
   signal is_for_it : std_logic;  -- the submessage names no other reader
   signal pushes    : std_logic;
+  signal size      : size_t;
   signal spare     : std_logic;
   signal first_r   : count_t := (others => '0');  -- of the packet's samples
   signal last_r    : count_t := (others => '0');  -- after those that arrived
   signal waiting   : count_t;
   signal oldest_r  : count_t := (others => '0');
 
+  -- ------------------------------------------------------------------ the sample that is judged
+  signal judged_r    : count_t := (others => '0');
+  signal judges_r    : std_logic;
+  signal candidate   : std_logic_vector(SAMPLE_BITS-1 downto 0);
+  signal judge_place : source_t;
+  signal number      : number_t;  -- the next one of that source
+  signal from_r      : source_t := (others => '0');
+  signal new_r       : number_t := (others => '0');
+  signal next_number : number_t;
+  signal same_r      : std_logic;  -- the source is that of the sample
+  signal equal_r     : std_logic;
+  signal later_r     : std_logic;
+  signal shows_r     : std_logic;
+  signal strict_r    : std_logic;
+  signal is_taken    : std_logic;
+  signal writes      : sources_t;
+  signal chosen      : source_t;
+
+  signal early       : early_t := (others => (others => '0'));
+  signal early_r     : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that came
+  signal told_r      : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that were taken
+  signal early_used  : unsigned(EARLY_BITS downto 0);
+  signal early_write : std_logic;
+  signal early_entry : std_logic_vector(SOURCE_BITS+MARK_BITS+31 downto 0);  -- source, mark, and number
+  signal early_from  : source_t;
+  signal waits_early : std_logic;
+  signal same_early  : std_logic;                                            -- the source is that of the sample
+  signal drops_early : std_logic;
+
   -- ------------------------------------------------------------------ the sample that leaves
-  type state_t is (IDLE, JUDGING, HEADING, SENDING);
+  type state_t is (IDLE, CHOOSING, HEADING, SENDING);
   signal state_r   : state_t;
   signal shown     : std_logic_vector(SAMPLE_BITS-1 downto 0);
-  signal from_r    : source_t := (others => '0');
-  signal is_new_r  : std_logic;
+  signal keeps_r   : std_logic;
   signal size_r    : size_t := (others => '0');
   signal left_r    : size_t := (others => '0');
   signal id_r      : unsigned(ID_BITS-1 downto 0) := (others => '0');
-  signal next_r    : number_t := (others => '0');
   signal place_r   : unsigned(2 downto 0) := (others => '0');
   signal read_next : place_t;
   signal payload_r : std_logic_vector(7 downto 0) := (others => '0');
   signal moves     : std_logic;
-
-  -- ------------------------------------------------------------------ writers
-  signal sources_r : sources_t;
-  signal peers_r   : peers_t := (others => (others => '0'));
-  signal known     : sources_t;  -- with the entity that is announced
-  signal same      : sources_t;  -- the same, of the same peer
-  signal free      : source_t;
-  signal has_free  : std_logic;
-  signal reader    : unsigned(ID_BITS-1 downto 0);
-  signal notes_r   : std_logic;
-  signal index_r   : unsigned(3 downto 0) := (others => '0');
-  signal to_r      : source_t := (others => '0');
-  signal writes    : sources_t;
-
-  signal number_place : source_t;
-  signal number_write : std_logic;
-  signal new_number   : number_t;
-
-  signal all_ones  : sources_t;
 
   -- The lowest bit that is set.
   function lowest(mask : std_logic_vector; bits : positive) return unsigned is
@@ -195,8 +221,8 @@ architecture rtl of firm_rtps_readers is
 
 begin
 
-  assert READERS >= 1 and READERS <= MOST_READERS
-    report "firm_rtps_readers: READERS is " & integer'image(READERS) & "; legal: 1 to " & integer'image(MOST_READERS)
+  assert READERS >= 0 and READERS <= MOST_READERS
+    report "firm_rtps_readers: READERS is " & integer'image(READERS) & "; legal: 0 to " & integer'image(MOST_READERS)
     severity failure;
   assert FIRST >= 0 and FIRST + READERS <= 256
     report "firm_rtps_readers: FIRST is " & integer'image(FIRST) & "; legal: 0 to 256-READERS"
@@ -236,11 +262,11 @@ begin
       used        => sources_r,
       matches     => found,
       writes      => writes,
-      write_place => std_logic_vector(index_r),
-      write_data  => guid_byte
+      write_place => write_place,
+      write_data  => write_data
     );
 
-  source <= lowest(found, SOURCE_BITS);
+  sender <= lowest(found, SOURCE_BITS);
 
   note_sample : process (clk)
   begin
@@ -262,22 +288,42 @@ begin
     end if;
   end process note_sample;
 
+  -- A sample without a payload, or in fragments, is only counted.
+  delay : process (clk)
+  begin
+    if rising_edge(clk) then
+      submessage_r <= is_submessage;
+      data_r       <= '0';
+      if kind = RTPS_DATA or kind = RTPS_DATA_FRAG then
+        data_r <= is_submessage and is_mine;
+      end if;
+      filled_r <= '0';
+      if kind = RTPS_DATA then
+        filled_r <= flags(RTPS_PAYLOAD);
+      end if;
+      ends_r   <= is_whole or is_faulty or is_foreign or is_aborted;
+      spoils_r <= is_foreign or is_aborted;
+      if rst_n = '0' then
+        submessage_r <= '0';
+        data_r       <= '0';
+        ends_r       <= '0';
+      end if;
+    end if;
+  end process delay;
+
   used      <= write_r - read_r;
   has_room  <= not used(PLACE_BITS);
   end_place <= write_r + 1 when payload_valid = '1' and has_room = '1' else write_r;
   is_over   <= full_r or (payload_valid and not has_room);
-  ends      <= is_whole or is_faulty or is_foreign or is_aborted;
-  spoils    <= is_foreign or is_aborted;
   waiting   <= last_r - oldest_r;
   spare     <= not waiting(QUEUE_BITS);
   is_for_it <= '1' when unsigned(reader_r) = 0 else
-               '1' when reader_r = x"0000" & std_logic_vector(to_unsigned(FIRST, 8) + ids(to_integer(source)))
+               '1' when reader_r = x"0000" & std_logic_vector(to_unsigned(FIRST, 8) + ids(to_integer(sender)))
                         & READER_KIND else
                '0';
-  is_sample <= is_submessage and is_mine and any(found) and is_for_it and not large_r and flags(RTPS_PAYLOAD)
-               when kind = RTPS_DATA else
-               '0';
-  pushes    <= is_sample and spare and not is_over;
+  is_sample <= data_r and any(found) and is_for_it and not large_r;
+  size      <= resize(end_place - sample_r, SIZE_BITS) when filled_r = '1' else (others => '0');
+  pushes    <= is_sample and spare and not (is_over and filled_r);
 
   write_payload : process (clk)
   begin
@@ -294,8 +340,8 @@ begin
     if rising_edge(clk) then
       if pushes = '1' then
         entries(to_integer(last_r(QUEUE_BITS-1 downto 0)))
-          <= std_logic_vector(source) & std_logic_vector(marks(to_integer(source))) & number_r
-             & std_logic_vector(resize(end_place - sample_r, SIZE_BITS));
+          <= filled_r & std_logic_vector(ids(to_integer(sender))) & std_logic_vector(sender)
+             & std_logic_vector(marks(to_integer(sender))) & number_r & std_logic_vector(size);
       end if;
     end if;
   end process write_sample;
@@ -311,16 +357,20 @@ begin
       write_r <= end_place;
       full_r  <= is_over;
       if pushes = '1' then
-        place := end_place;
-        last  := last_r + 1;
+        last := last_r + 1;
+        if filled_r = '1' then
+          place := end_place;
+        end if;
       end if;
-      if is_submessage = '1' then
-        write_r <= place;
-        full_r  <= '0';
-        is_lost <= is_sample and not pushes;
+      if submessage_r = '1' then
+        write_r  <= place;
+        full_r   <= '0';
+        misses_r <= misses_r or (is_sample and not pushes);
       end if;
-      if ends = '1' then
-        if spoils = '1' then
+      if ends_r = '1' then
+        is_lost  <= misses_r and not spoils_r;
+        misses_r <= '0';
+        if spoils_r = '1' then
           place := start_r;
           last  := first_r;
         end if;
@@ -338,22 +388,140 @@ begin
         first_r  <= (others => '0');
         last_r   <= (others => '0');
         full_r   <= '0';
+        misses_r <= '0';
         is_lost  <= '0';
       end if;
     end if;
   end process gather;
 
+  -- ------------------------------------------------------------------ samples that are judged
+
+  candidate   <= entries(to_integer(judged_r(QUEUE_BITS-1 downto 0)));
+  chosen      <= unsigned(source(SOURCE_BITS-1 downto 0));
+  judge_place <= chosen when is_locked = '1' else
+                 from_r when judges_r = '1' else
+                 unsigned(candidate(AT_ID-1 downto AT_SOURCE));
+  is_taken    <= judges_r and same_r and (equal_r or (later_r and not strict_r));
+  next_number <= new_r + 1;
+  is_judging  <= '0' when judges_r = '0' and judged_r = first_r else '1';
+
+  judge : process (clk)
+    variable new_number : number_t;
+  begin
+    if rising_edge(clk) then
+      judges_r <= '0';
+      if judges_r = '1' then
+        judged_r <= judged_r + 1;
+      elsif is_locked = '0' and judged_r /= first_r then
+        judges_r   <= '1';
+        new_number := unsigned(candidate(AT_MARK-1 downto AT_NUMBER));
+        from_r     <= judge_place;
+        new_r      <= new_number;
+        strict_r   <= reliable_r(to_integer(judge_place));
+        shows_r    <= candidate(SAMPLE_BITS-1);
+        same_r     <= '0';
+        equal_r    <= '0';
+        later_r    <= '0';
+        if unsigned(candidate(AT_SOURCE-1 downto AT_MARK)) = marks(to_integer(judge_place)) then
+          same_r <= '1';
+        end if;
+        if new_number = number then
+          equal_r <= '1';
+        end if;
+        if new_number > number then
+          later_r <= '1';
+        end if;
+      end if;
+      if rst_n = '0' then
+        judges_r <= '0';
+        judged_r <= (others => '0');
+      end if;
+    end if;
+  end process judge;
+
+  keep_sample : process (clk)
+  begin
+    if rising_edge(clk) then
+      if judges_r = '1' then
+        kept(to_integer(judged_r(QUEUE_BITS-1 downto 0)))(0) <= is_taken and shows_r;
+      end if;
+    end if;
+  end process keep_sample;
+
+  all_bytes : for index in 0 to NUMBER_BYTES-1 generate
+
+    signal digits : number_bytes_t := (others => (others => '0'));
+    signal takes  : std_logic;
+    signal digit  : std_logic_vector(7 downto 0);
+
+  begin
+
+    takes <= '1' when is_taken = '1' or (number_write = '1' and unsigned(write_place(2 downto 0)) = index) else '0';
+    digit <= std_logic_vector(next_number(8*index+7 downto 8*index)) when is_taken = '1' else write_data;
+
+    write_number : process (clk)
+    begin
+      if rising_edge(clk) then
+        if takes = '1' then
+          digits(to_integer(judge_place)) <= digit;
+        end if;
+      end if;
+    end process write_number;
+
+    number(8*index+7 downto 8*index) <= unsigned(digits(to_integer(judge_place)));
+
+  end generate all_bytes;
+
+  show_number : process (number, read_place)
+  begin
+    number_byte <= (others => '0');
+    for index in 0 to NUMBER_BYTES-1 loop
+      if unsigned(read_place) = index then
+        number_byte <= std_logic_vector(number(8*index+7 downto 8*index));
+      end if;
+    end loop;
+  end process show_number;
+
+  -- ------------------------------------------------------------------ samples that come too early
+
+  early_used   <= early_r - told_r;
+  early_write  <= judges_r and same_r and strict_r and later_r and not early_used(EARLY_BITS);
+  early_entry  <= early(to_integer(told_r(EARLY_BITS-1 downto 0)));
+  early_from   <= unsigned(early_entry(SOURCE_BITS+MARK_BITS+31 downto MARK_BITS+32));
+  waits_early  <= '0' when early_used = 0 else '1';
+  same_early   <= '1' when unsigned(early_entry(MARK_BITS+31 downto 32)) = marks(to_integer(early_from)) else '0';
+  drops_early  <= waits_early and not same_early;
+  has_early    <= waits_early and same_early;
+  early_source <= std_logic_vector(resize(early_from, 5));
+  early_number <= early_entry(31 downto 0);
+
+  note_early : process (clk)
+  begin
+    if rising_edge(clk) then
+      if early_write = '1' then
+        early(to_integer(early_r(EARLY_BITS-1 downto 0)))
+          <= std_logic_vector(from_r) & candidate(AT_SOURCE-1 downto AT_MARK) & std_logic_vector(new_r(31 downto 0));
+        early_r <= early_r + 1;
+      end if;
+      if takes_early = '1' or drops_early = '1' then
+        told_r <= told_r + 1;
+      end if;
+      if rst_n = '0' then
+        early_r <= (others => '0');
+        told_r  <= (others => '0');
+      end if;
+    end if;
+  end process note_early;
+
   -- ------------------------------------------------------------------ samples that leave
 
   shown     <= entries(to_integer(oldest_r(QUEUE_BITS-1 downto 0)));
   moves     <= m_axis_tready when state_r = HEADING or state_r = SENDING else '0';
-  read_next <= read_r + resize(size_r, PLACE_BITS+1) when state_r = JUDGING and is_new_r = '0' and notes_r = '0' else
+  read_next <= read_r + resize(size_r, PLACE_BITS+1) when state_r = CHOOSING and keeps_r = '0' else
                read_r + 1 when state_r = SENDING and moves = '1' else
                read_r;
 
   leave : process (clk)
-    variable source_of : source_t;
-    variable number    : number_t;
 
     procedure finish is
     begin
@@ -365,30 +533,17 @@ begin
     if rising_edge(clk) then
       read_r <= read_next;
       if state_r = IDLE then
-        source_of := unsigned(shown(SAMPLE_BITS-1 downto SAMPLE_BITS-SOURCE_BITS));
-        number    := unsigned(shown(SIZE_BITS+NUMBER_BITS-1 downto SIZE_BITS));
-        from_r    <= source_of;
-        size_r    <= unsigned(shown(SIZE_BITS-1 downto 0));
-        left_r    <= unsigned(shown(SIZE_BITS-1 downto 0));
-        id_r      <= ids(to_integer(source_of));
-        next_r    <= number + 1;
-        place_r   <= (others => '0');
-        is_new_r  <= '0';
-        if number >= numbers(to_integer(source_of))
-           and unsigned(shown(SIZE_BITS+NUMBER_BITS+MARK_BITS-1 downto SIZE_BITS+NUMBER_BITS))
-               = marks(to_integer(source_of)) then
-          is_new_r <= '1';
+        size_r  <= unsigned(shown(SIZE_BITS-1 downto 0));
+        left_r  <= unsigned(shown(SIZE_BITS-1 downto 0));
+        id_r    <= unsigned(shown(SAMPLE_BITS-2 downto AT_ID));
+        keeps_r <= kept(to_integer(oldest_r(QUEUE_BITS-1 downto 0)))(0);
+        place_r <= (others => '0');
+        if oldest_r /= judged_r then
+          state_r <= CHOOSING;
         end if;
-        if oldest_r /= first_r then
-          state_r <= JUDGING;
-        end if;
-      elsif state_r = JUDGING then
-        -- The source's place may be getting another writer, so the sample is judged again.
-        if notes_r = '1' then
-          state_r <= IDLE;
-        elsif is_new_r = '1' then
-          state_r <= HEADING;
-        else
+      elsif state_r = CHOOSING then
+        state_r <= HEADING;
+        if keeps_r = '0' then
           finish;
         end if;
       elsif state_r = HEADING then
@@ -427,101 +582,29 @@ begin
 
   -- ------------------------------------------------------------------ writers
 
-  all_ones <= (others => '1');
+  choose_keys : for entry in 0 to SOURCES-1 generate
+    writes(entry) <= key_write when chosen = entry else '0';
+  end generate choose_keys;
 
-  u_entities : entity firm.firm_net_keys
-    generic map (
-      ENTRIES   => SOURCES,
-      KEY_BYTES => 4,
-      TAIL      => 1
-    )
-    port map (
-      clk                     => clk,
-      s_valid                 => entity_valid,
-      s_place(3 downto 2)     => "00",
-      s_place(1 downto 0)     => entity_place,
-      s_data                  => entity_data,
-      used                    => all_ones,
-      matches                 => known,
-      writes                  => writes,
-      write_place(3 downto 2) => "00",
-      write_place(1 downto 0) => std_logic_vector(index_r(1 downto 0)),
-      write_data              => guid_byte
-    );
-
-  compare : for entry in 0 to SOURCES-1 generate
-    same(entry)   <= known(entry) and sources_r(entry) when peers_r(entry) = unsigned(peer) else '0';
-    writes(entry) <= notes_r when to_r = entry else '0';
-  end generate compare;
-
-  has_free   <= any(not sources_r);
-  free       <= lowest(not sources_r, SOURCE_BITS);
-  -- Of several readers of one topic, only the first gets the samples.
-  reader     <= lowest(matches, ID_BITS);
-  guid_place <= std_logic_vector(index_r);
-  is_busy    <= notes_r;
-
-  note_writers : process (clk)
-    variable left : sources_t;
+  note_writer : process (clk)
   begin
     if rising_edge(clk) then
-      is_full <= '0';
-      left    := sources_r;
-      if notes_r = '1' then
-        index_r <= index_r + 1;
-        if index_r = GUID_BYTES-1 then
-          notes_r <= '0';
-          left    := left or writes;
+      if note_write = '1' then
+        ids(to_integer(chosen)) <= unsigned(write_data(ID_BITS-1 downto 0));
+        if write_data(7) = '1' then
+          marks(to_integer(chosen)) <= marks(to_integer(chosen)) + 1;
         end if;
-      elsif is_announced = '1' and is_known = '1' then
-        if is_gone = '1' then
-          left := left and not same;
-        elsif any(same) = '0' and any(matches) = '1' then
-          is_full <= not has_free;
-          if has_free = '1' then
-            notes_r                 <= '1';
-            to_r                    <= free;
-            index_r                 <= (others => '0');
-            ids(to_integer(free))   <= reader;
-            marks(to_integer(free)) <= marks(to_integer(free)) + 1;
-            for entry in peers_r'range loop
-              if free = entry then
-                peers_r(entry) <= unsigned(peer);
-              end if;
-            end loop;
-          end if;
-        end if;
-      end if;
-      if is_left = '1' then
-        for entry in left'range loop
-          if peers_r(entry) = unsigned(peer) then
-            left(entry) := '0';
+        for entry in sources_r'range loop
+          if chosen = entry then
+            sources_r(entry)  <= write_data(7);
+            reliable_r(entry) <= write_data(6);
           end if;
         end loop;
       end if;
-      sources_r <= left;
       if rst_n = '0' then
         sources_r <= (others => '0');
-        notes_r   <= '0';
-        is_full   <= '0';
       end if;
     end if;
-  end process note_writers;
-
-  -- A new writer begins with 1; after a sample, the next one follows. The memory has one write port.
-  number_place <= to_r when notes_r = '1' else from_r;
-  number_write <= '1' when notes_r = '1' or (state_r = JUDGING and is_new_r = '1') else '0';
-  new_number   <= to_unsigned(1, NUMBER_BITS) when notes_r = '1' else next_r;
-
-  note_numbers : process (clk)
-  begin
-    if rising_edge(clk) then
-      if number_write = '1' then
-        numbers(to_integer(number_place)) <= new_number;
-      end if;
-    end if;
-  end process note_numbers;
-
-  sources_known <= sources_r;
+  end process note_writer;
 
 end architecture rtl;

@@ -79,7 +79,6 @@ begin
       FRAME_FILE   => FRAME_FILE,
       SEED         => SEED,
       SLOW_PERCENT => SLOW_PERCENT,
-      GAP_CYCLES   => 12,
       LAST_CYCLES  => LAST_CYCLES
     )
     port map (

@@ -1,9 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Sends frames to the board 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether
--- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a millisecond, and what is asked
--- for or reported then: `report`, `probe` or `taken`. A packet is sent up to four cycles after it is asked for.
+-- Sends frames to the board 192.0.2.2, 02:00:00:00:00:02, of which MAC_END is the last byte. A row of the file is a
+-- frame: the cycles before it, whether it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results
+-- is a millisecond, and what is asked for or reported then: `report`, `probe` or `taken`. A packet is sent up to four
+-- cycles after it is asked for.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 use ieee.math_real.all;
 use std.textio.all;
 library firm;
@@ -14,6 +16,7 @@ entity firm_net_presence_tb is
     FRAME_FILE    : string  := "frames.txt";
     RESULT_FILE   : string  := "presence.txt";
     EXPECTED_FILE : string  := "";
+    MAC_END       : integer := 2;
     SEED          : integer := 1;
     SLOW_PERCENT  : integer := 0;    -- the chance, each cycle, that no byte comes
     TICK_CYCLES   : integer := 8;    -- of a millisecond
@@ -24,6 +27,7 @@ end entity firm_net_presence_tb;
 architecture simulation of firm_net_presence_tb is
 
   constant LONGEST_DELAY : real := 4.0;
+  constant MAC           : std_logic_vector(47 downto 0) := x"0200000000" & std_logic_vector(to_unsigned(MAC_END, 8));
 
   signal clk   : std_logic := '0';
   signal rst_n : std_logic;
@@ -50,7 +54,7 @@ begin
       clk           => clk,
       rst_n         => rst_n,
       tick          => tick,
-      mac           => x"020000000002",
+      mac           => MAC,
       address       => x"c0000202",
       group_ip      => x"efff0001",
       s_axis_tdata  => tdata,

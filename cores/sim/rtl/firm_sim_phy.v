@@ -5,7 +5,7 @@
 `timescale 1ns / 1ps
 
 module firm_sim_phy #(
-  parameter BITS = 8
+  parameter BITS = 8  // 2, 4 or 8
 ) (
   output reg             clk,
   output reg             rst_n,
@@ -23,7 +23,7 @@ module firm_sim_phy #(
   localparam MOST_BYTES   = 65536;
 
   integer answers, reports;              // files
-  integer low, high;                     // bytes of an answer
+  integer low, high;                     // bytes of an answer; negative after the file's end
   integer size, place, bits;             // of the frame to the system, and of its byte
   integer rest;                          // cycles without a frame to come
   integer taken_bits;
@@ -39,11 +39,15 @@ module firm_sim_phy #(
       cycles = 0;
       low    = $fgetc(answers);
       high   = $fgetc(answers);
-      if (high < 0)
+      size = high < 0 ? 0 : low + 256 * high;
+      for (place = 0; place < size && high >= 0; place = place + 1) begin
+        high        = $fgetc(answers);
+        line[place] = high;
+      end
+      if (high < 0) begin
         $finish;
-      size = low + 256 * high;
-      for (place = 0; place < size; place = place + 1)
-        line[place] = $fgetc(answers);
+        size = 0;
+      end
       place = 0;
       bits  = 0;
       rest  = size == 0 ? QUIET_CYCLES : GAP_CYCLES;
@@ -91,6 +95,8 @@ module firm_sim_phy #(
   endtask
 
   initial begin : phy
+    if (BITS != 2 && BITS != 4 && BITS != 8)
+      $fatal(1, "firm_sim_phy: BITS is %0d; legal: 2, 4, 8", BITS);
     answers = $fopen("/dev/fd/3", "rb");
     reports = $fopen("/dev/fd/4", "wb");
     if (answers == 0 || reports == 0)

@@ -8,15 +8,15 @@
 --     e          the end of this frame
 --
 -- After each 'w', it reads at file descriptor 3: the number of bytes of the frame (2 bytes, the lowest first; 0
--- without a frame), and these bytes. The simulation ends with the file. `firm live` starts it
--- (docs/reference/network.md).
+-- without a frame), and these bytes. The simulation ends where the file ends, a frame that is not whole with it.
+-- `firm live` starts it (docs/reference/network.md).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 
 entity firm_sim_phy is
   generic (
-    BITS : integer := 8
+    BITS : integer := 8 -- 2, 4 or 8
   );
   port (
     clk   : out std_logic;
@@ -40,24 +40,35 @@ architecture simulation of firm_sim_phy is
   type pipe_t is file of character;
   type bytes_t is array (natural range <>) of std_logic_vector(7 downto 0);
 
-  -- VHDL-93 cannot flush a file, so the C library does: `fflush(NULL)`.
+  -- VHDL-93 can neither flush a file nor end the simulation without an error, so the C library does: `fflush(NULL)` and
+  -- `exit(0)`.
   procedure flush_all_files(zero : in integer) is
   begin
     assert false
       report "firm_sim_phy: this simulator does not support VHPIDIRECT, so it cannot flush files" severity failure;
   end procedure flush_all_files;
 
+  procedure end_simulation(status : in integer) is
+  begin
+    assert false
+      report "firm_sim_phy: this simulator does not support VHPIDIRECT, so it ends with an error" severity failure;
+  end procedure end_simulation;
+
   attribute foreign : string;
   attribute foreign of flush_all_files : procedure is "VHPIDIRECT libc.so.6 fflush";
+  attribute foreign of end_simulation  : procedure is "VHPIDIRECT libc.so.6 exit";
 
 begin
+
+  assert BITS = 2 or BITS = 4 or BITS = 8
+    report "firm_sim_phy: BITS is " & integer'image(BITS) & "; legal: 2, 4, 8"
+    severity failure;
 
   phy : process
 
     file answers : pipe_t;
     file reports : pipe_t;
 
-    variable is_over    : boolean := false;
     variable line       : bytes_t(0 to MOST_BYTES-1);
     variable size       : natural := 0;               -- of the frame to the system
     variable place      : natural := 0;
@@ -83,12 +94,11 @@ begin
     procedure next_byte(number : out natural) is
       variable answer : character;
     begin
-      number  := 0;
-      is_over := is_over or endfile(answers);
-      if not is_over then
-        read(answers, answer);
-        number := character'pos(answer);
+      if endfile(answers) then
+        end_simulation(0);
       end if;
+      read(answers, answer);
+      number := character'pos(answer);
     end procedure next_byte;
 
     procedure ask is
@@ -172,7 +182,7 @@ begin
       clk <= '0';
     end loop;
     rst_n <= '1';
-    while not is_over loop
+    loop
       wait for HALF_PERIOD;
       clk <= '1';
       wait for HALF_PERIOD;
@@ -181,7 +191,6 @@ begin
       take;
       show;
     end loop;
-    wait;
   end process phy;
 
 end architecture simulation;

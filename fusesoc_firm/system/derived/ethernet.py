@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
 from fusesoc_firm.frame.length import length_of
-from fusesoc_firm.system.derived.model import Converter, DerivedSystem, NetworkKind, Phy
-from fusesoc_firm.system.written.specification import BEST_EFFORT, RELIABLE, VOLATILE, Block, Project, Specification
-from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.system.derived.model import Converter, DerivedSystem, NetworkKind, Phy, Quality
+from fusesoc_firm.system.written.specification import Block, Project, Specification
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
-MOST_SUBSCRIBERS, PUBLISHERS = 8, 1
-# Bytes of the longest payload: of a sample in one packet, and of the node's memory for a sample to send.
-LONGEST_TAKEN, LONGEST_SENT = 1344, 128
+MOST_SUBSCRIBERS = MOST_PUBLISHERS = 1
+# Bytes of the longest payload: of a sample in one packet, and of a slot of the history.
+LONGEST_TAKEN, LONGEST_SENT = 1344, 1024
+# Samples of a writer that others may ask for, and slots for the samples of all writers together.
+MOST_DEPTH, MOST_SLOTS = 127, 256
+_SHORTEST_SLOT = 2
 # The frequencies of clk in MHz that the line of each PHY needs, and the hint about them.
 _CLOCKS = {
     Phy.GMII: ((125, 125), "125 MHz, which is also the clock of the line"),
@@ -30,24 +33,33 @@ def check_ethernet(written: Specification, system: DerivedSystem, faults: Diagno
     message = f"interconnect '{project.interconnect}' "
     _check_clock(project, system.network.phy, system.clock, faults)
     for items, most, name in (
-        (system.subscribers, MOST_SUBSCRIBERS, "subscribers"),
-        (system.publishers, PUBLISHERS, "published topic"),
+        (system.subscribers, MOST_SUBSCRIBERS, "subscriber"),
+        (system.publishers, MOST_PUBLISHERS, "publisher"),
     ):
         if len(items) > most:
             place = blocks[items[most].block].name.source
             faults.error(f"{message}allows {most} {name} so far, not {len(items)}", place)
-    for item in (*system.subscribers, *system.publishers):
-        _check_reliability(item, blocks[item.block], message, faults)
     for item in system.subscribers:
         _check_size(item, blocks[item.block], LONGEST_TAKEN, faults)
     for item in system.publishers:
-        _check_durability(item, blocks[item.block], message, faults)
         _check_size(item, blocks[item.block], LONGEST_SENT, faults)
+    _check_history(system.publishers, blocks, message, faults)
 
 
-def longest_sent(publishers: Iterable[Converter]) -> int:
-    """Return the bytes of the longest payload that a node sends."""
-    return max(map(_longest, publishers))
+def slot_bytes(publishers: Iterable[Converter]) -> int:
+    """Return the bytes of a slot, a power of two: the longest payload that a node sends fits in."""
+    longest = max(map(_longest, publishers), default=1)
+    return max(_SHORTEST_SLOT, 1 << (longest - 1).bit_length())
+
+
+def kept_of(quality: Quality) -> int:
+    """Return the number of a writer's samples that others may ask for."""
+    return quality.depth if quality.is_reliable or quality.is_transient_local else 1
+
+
+def ring_slots(quality: Quality) -> int:
+    """Return the number of a writer's slots, a power of two: one of them is for the sample that comes."""
+    return 1 << kept_of(quality).bit_length()
 
 
 def _longest(item: Converter) -> int:
@@ -72,19 +84,29 @@ def _check_clock(project: Project, phy: Phy, clock: Fraction | None, faults: Dia
             faults.error(message, project.clock.source, f"legal here: {hint}")
 
 
-def _check_reliability(item: Converter, block: Block, message: str, faults: Diagnostics) -> None:
-    if item.quality.is_reliable:
-        given = block.qos and (block.qos.reliability or block.qos.profile)
-        place = given.source if given else block.name.source
-        hint = f"add 'qos: {{reliability: {BEST_EFFORT}}}' to the block"
-        faults.error(f"{message}cannot make '{item.block}' {RELIABLE} yet", place, hint)
+def _check_history(
+    publishers: Iterable[Converter], blocks: Mapping[str, Block], message: str, faults: Diagnostics
+) -> None:
+    """Note a publisher with too many kept messages, or else the first one for whose messages no slot is left."""
+    used = 0
+    for item in publishers:
+        block, kept = blocks[item.block], kept_of(item.quality)
+        if kept > MOST_DEPTH:
+            text = f"{message}keeps up to {MOST_DEPTH} messages of a topic, not {kept} of '{item.block}'"
+            faults.error(text, _place_of_depth(block), f"add 'depth: {MOST_DEPTH}' or less to the block's 'qos'")
+            continue
+        before, used = used, used + ring_slots(item.quality)
+        if before <= MOST_SLOTS < used:
+            text = f"{message}has {MOST_SLOTS} slots for the last messages; with '{item.block}', it needs {used}"
+            hint = "give publishers a smaller 'depth' in 'qos': each needs a power of two of slots, more than its depth"
+            faults.error(text, _place_of_depth(block), hint)
 
 
-def _check_durability(item: Converter, block: Block, message: str, faults: Diagnostics) -> None:
-    if item.quality.is_transient_local and block.qos is not None:
-        key = "durability" if block.qos.durability else "profile"
-        hint = f"legal here: {VOLATILE}"
-        faults.error(f"{message}cannot latch the topic of '{item.block}' yet", block.qos.place(key), hint)
+def _place_of_depth(block: Block) -> SourceRef | None:
+    """Return where a block says how many messages are kept."""
+    if block.qos is None:
+        return block.name.source
+    return block.qos.place("profile" if block.qos.profile and block.qos.depth is None else "depth")
 
 
 def _check_size(item: Converter, block: Block, longest: int, faults: Diagnostics) -> None:

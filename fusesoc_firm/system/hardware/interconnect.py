@@ -77,7 +77,7 @@ NETWORK_FAULTS = (
     "a fragment is dropped",
     "a reply to ARP or ping, or a packet of discovery, has no room",
     "another node has no room",
-    "a publisher of another node, of a topic that is received, has no room",
+    "a publisher or subscriber of another node, of a topic of the board, has no room",
     "a message of another node has no room",
     "a message to send is too long",
     "another host has the address of the board",

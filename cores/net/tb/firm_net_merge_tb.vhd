@@ -1,7 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Sends two streams of frames through firm_net_samples each, and the payloads through firm_net_merge. A row of a file
--- is a frame of the Manager: whether it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results
--- is a frame that leaves: the number of bytes, and the bytes; or `long` with the number of the stream.
+-- Sends the frames of two sources through firm_net_merge. A row of a file, and of the results, is a frame: the number
+-- of bytes, and the bytes.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -10,23 +9,22 @@ use std.textio.all;
 library firm;
 use firm.firm_sim_pkg.all;
 
-entity firm_net_samples_tb is
+entity firm_net_merge_tb is
   generic (
-    DEPTH         : integer := 64;
     FIRST_FILE    : string  := "first.txt";
     SECOND_FILE   : string  := "second.txt";
-    RESULT_FILE   : string  := "samples.txt";
+    RESULT_FILE   : string  := "merged.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     -- The chances, each cycle, that no byte comes, and that the reader takes nothing.
     SLOW_PERCENT  : integer := 0;
     STALL_PERCENT : integer := 0
   );
-end entity firm_net_samples_tb;
+end entity firm_net_merge_tb;
 
-architecture simulation of firm_net_samples_tb is
+architecture simulation of firm_net_merge_tb is
 
-  constant LAST_CYCLES : positive := 20 * DEPTH;
+  constant LAST_CYCLES : positive := 8;
 
   signal clk    : std_logic := '0';
   signal rst_n  : std_logic := '0';
@@ -34,15 +32,9 @@ architecture simulation of firm_net_samples_tb is
   signal over   : boolean   := false;
 
   signal s_tdata  : std_logic_vector(15 downto 0);
-  signal s_tuser  : std_logic_vector(1 downto 0) := "00";
   signal s_tvalid : std_logic_vector(1 downto 0) := "00";
   signal s_tlast  : std_logic_vector(1 downto 0) := "00";
   signal s_tready : std_logic_vector(1 downto 0);
-  signal m_tdata  : std_logic_vector(15 downto 0);
-  signal m_tvalid : std_logic_vector(1 downto 0);
-  signal m_tlast  : std_logic_vector(1 downto 0);
-  signal m_tready : std_logic_vector(1 downto 0);
-  signal is_long  : std_logic_vector(1 downto 0);
 
   signal tdata  : std_logic_vector(7 downto 0);
   signal tvalid : std_logic;
@@ -63,29 +55,9 @@ begin
 
   streams : for stream in 0 to 1 generate
 
-    u_samples : entity firm.firm_net_samples
-      generic map (
-        DEPTH => DEPTH
-      )
-      port map (
-        clk              => clk,
-        rst_n            => rst_n,
-        s_axis_tdata     => s_tdata(8*stream+7 downto 8*stream),
-        s_axis_tuser(0)  => s_tuser(stream),
-        s_axis_tvalid    => s_tvalid(stream),
-        s_axis_tlast     => s_tlast(stream),
-        s_axis_tready    => s_tready(stream),
-        m_axis_tdata     => m_tdata(8*stream+7 downto 8*stream),
-        m_axis_tvalid    => m_tvalid(stream),
-        m_axis_tlast     => m_tlast(stream),
-        m_axis_tready    => m_tready(stream),
-        is_long          => is_long(stream)
-      );
-
     play : process
       file frames       : text open read_mode is file_of(stream);
       variable row      : line;
-      variable abort    : integer;
       variable size     : integer;
       variable byte     : integer;
       variable random_1 : positive := SEED;
@@ -95,7 +67,6 @@ begin
       wait until rising_edge(clk) and rst_n = '1';
       while not endfile(frames) loop
         readline(frames, row);
-        read(row, abort);
         read(row, size);
         for place in 1 to size loop
           read(row, byte);
@@ -108,14 +79,10 @@ begin
           s_tvalid(stream) <= '1';
           if place = size then
             s_tlast(stream) <= '1';
-            if abort = 1 then
-              s_tuser(stream) <= '1';
-            end if;
           end if;
           wait until rising_edge(clk) and s_tready(stream) = '1';
           s_tvalid(stream) <= '0';
           s_tlast(stream)  <= '0';
-          s_tuser(stream)  <= '0';
         end loop;
       end loop;
       done(stream) <= '1';
@@ -131,10 +98,10 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      s_axis_tdata  => m_tdata,
-      s_axis_tvalid => m_tvalid,
-      s_axis_tlast  => m_tlast,
-      s_axis_tready => m_tready,
+      s_axis_tdata  => s_tdata,
+      s_axis_tvalid => s_tvalid,
+      s_axis_tlast  => s_tlast,
+      s_axis_tready => s_tready,
       m_axis_tdata  => tdata,
       m_axis_tvalid => tvalid,
       m_axis_tlast  => tlast,
@@ -179,12 +146,6 @@ begin
     while not over loop
       wait until rising_edge(clk) or over;
       next when over or rst_n = '0';
-      for stream in 0 to 1 loop
-        if is_long(stream) = '1' then
-          write(row, "long " & integer'image(stream));
-          write_result(results, expected, EXPECTED_FILE, row);
-        end if;
-      end loop;
       next when tvalid = '0' or tready = '0';
       size := size + 1;
       write(content, ' ' & integer'image(to_integer(unsigned(tdata))));

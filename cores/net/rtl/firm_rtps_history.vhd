@@ -1,0 +1,191 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Holds the last samples of a node's writers: takes frames `id | length | payload`, each into a slot of its writer,
+-- and gives the payload of a slot to firm_packet_builder as often as it is asked for. Which slots are whose is in the
+-- program of firm_rtps_sequencer, which tells where the next sample of each writer goes. The slot after the last one
+-- is not among those that may be asked for, so that a sample can come while another one leaves.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_rtps_history is
+  generic (
+    WRITERS : integer := 1;  -- that send frames, 1 to 8
+    SAMPLE  : integer := 64; -- bytes of a slot, a power of two, 2 to 1024
+    SLOTS   : integer := 16  -- a power of two, 2 to 256
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- Frames; the id is the number of the writer.
+    s_axis_tdata  : in  std_logic_vector(7 downto 0);
+    s_axis_tuser  : in  std_logic_vector(0 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- The slot of the next sample of a writer.
+    slot_valid  : in std_logic;
+    slot_writer : in std_logic_vector(2 downto 0);
+    slot_next   : in std_logic_vector(7 downto 0);
+
+    -- A sample of this writer has come. The next one is not taken before `is_done`. After a reset it is as if one had
+    -- come: the program takes it when it has written the slots of all writers, so that none comes before.
+    has_sample : out std_logic;
+    writer     : out std_logic_vector(2 downto 0);
+    is_done    : in  std_logic;
+
+    -- Shows the payload of a slot, from two cycles after `shows` on.
+    shows         : in  std_logic;
+    slot          : in  std_logic_vector(7 downto 0);
+    payload_bytes : out std_logic_vector(15 downto 0);
+    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tready : in  std_logic;
+
+    is_refused : out std_logic  -- a pulse for a frame without payload, with more than SAMPLE bytes or another id
+  );
+end entity firm_rtps_history;
+
+architecture rtl of firm_rtps_history is
+
+  constant MOST_WRITERS : positive := 8;
+  constant MOST_BYTES   : positive := 1024; -- a larger one may need several packets
+  constant MOST_SLOTS   : positive := 256;
+  constant HEAD_BYTES   : positive := 5;
+  constant BYTE_BITS    : positive := clog2(SAMPLE);
+  constant SLOT_BITS    : positive := clog2(SLOTS);
+
+  subtype slot_t is unsigned(SLOT_BITS-1 downto 0);
+  type bytes_t is array (natural range 0 to SLOTS*SAMPLE-1) of std_logic_vector(7 downto 0);
+  type sizes_t is array (natural range 0 to SLOTS-1) of unsigned(BYTE_BITS downto 0);
+  type slots_t is array (natural range 0 to MOST_WRITERS-1) of slot_t;
+
+  signal bytes : bytes_t;
+  signal sizes : sizes_t := (others => (others => '0'));
+  signal nexts : slots_t := (others => (others => '0'));
+
+  -- The frame that comes.
+  signal head_r    : unsigned(2 downto 0);
+  signal writer_r  : unsigned(2 downto 0) := (others => '0');
+  signal size_r    : unsigned(BYTE_BITS downto 0) := (others => '0');
+  signal wrong_r   : std_logic;  -- it is refused
+  signal has_r     : std_logic;
+  signal moves     : std_logic;
+  signal is_head   : std_logic;
+  signal is_full   : std_logic;
+  signal writes    : std_logic;
+  signal new_size  : unsigned(BYTE_BITS downto 0);
+  signal next_slot : slot_t;
+  signal is_good   : std_logic;
+
+  -- The payload that leaves.
+  signal slot_r    : slot_t := (others => '0');
+  signal place_r   : unsigned(BYTE_BITS-1 downto 0) := (others => '0');
+  signal next_read : unsigned(BYTE_BITS-1 downto 0);
+  signal byte_r    : std_logic_vector(7 downto 0) := (others => '0');
+
+begin
+
+  assert WRITERS >= 1 and WRITERS <= MOST_WRITERS
+    report "firm_rtps_history: WRITERS is " & integer'image(WRITERS) & "; legal: 1 to " & integer'image(MOST_WRITERS)
+    severity failure;
+  assert SAMPLE >= 2 and SAMPLE <= MOST_BYTES and 2**clog2(SAMPLE) = SAMPLE
+    report "firm_rtps_history: SAMPLE is " & integer'image(SAMPLE) & "; legal: powers of two, 2 to "
+           & integer'image(MOST_BYTES)
+    severity failure;
+  assert SLOTS >= 2 and SLOTS <= MOST_SLOTS and 2**clog2(SLOTS) = SLOTS
+    report "firm_rtps_history: SLOTS is " & integer'image(SLOTS) & "; legal: powers of two, 2 to "
+           & integer'image(MOST_SLOTS)
+    severity failure;
+
+  -- ------------------------------------------------------------------ frames
+
+  s_axis_tready <= not has_r;
+  moves         <= s_axis_tvalid and not has_r;
+  is_head       <= '1' when head_r /= HEAD_BYTES else '0';
+  is_full       <= size_r(BYTE_BITS);
+  writes        <= moves and not (is_head or is_full or wrong_r);
+  new_size      <= size_r + 1 when writes = '1' else size_r;
+  next_slot     <= nexts(to_integer(writer_r));
+  is_good       <= not (is_head or wrong_r or is_full or s_axis_tuser(0));
+
+  write_payload : process (clk)
+  begin
+    if rising_edge(clk) then
+      if writes = '1' then
+        bytes(to_integer(next_slot & size_r(BYTE_BITS-1 downto 0))) <= s_axis_tdata;
+        sizes(to_integer(next_slot))                                <= new_size;
+      end if;
+    end if;
+  end process write_payload;
+
+  write_slot : process (clk)
+  begin
+    if rising_edge(clk) then
+      if slot_valid = '1' then
+        nexts(to_integer(unsigned(slot_writer))) <= unsigned(slot_next(SLOT_BITS-1 downto 0));
+      end if;
+    end if;
+  end process write_slot;
+
+  take_frame : process (clk)
+  begin
+    if rising_edge(clk) then
+      is_refused <= '0';
+      if is_done = '1' then
+        has_r <= '0';
+      end if;
+      if moves = '1' then
+        size_r <= new_size;
+        if is_head = '1' then
+          head_r <= head_r + 1;
+          if head_r = 0 then
+            writer_r <= unsigned(s_axis_tdata(2 downto 0));
+            if unsigned(s_axis_tdata) >= WRITERS then
+              wrong_r <= '1';
+            end if;
+          end if;
+        end if;
+        if s_axis_tlast = '1' then
+          head_r     <= (others => '0');
+          size_r     <= (others => '0');
+          wrong_r    <= '0';
+          has_r      <= is_good;
+          is_refused <= not is_good and not s_axis_tuser(0);
+        end if;
+      end if;
+      if rst_n = '0' then
+        head_r     <= (others => '0');
+        size_r     <= (others => '0');
+        wrong_r    <= '0';
+        has_r      <= '1';
+        is_refused <= '0';
+      end if;
+    end if;
+  end process take_frame;
+
+  has_sample <= has_r;
+  writer     <= std_logic_vector(writer_r);
+
+  -- ------------------------------------------------------------------ payloads
+
+  next_read <= place_r + 1 when m_axis_tready = '1' else place_r;
+
+  read_payload : process (clk)
+  begin
+    if rising_edge(clk) then
+      byte_r  <= bytes(to_integer(slot_r & next_read));
+      place_r <= next_read;
+      if shows = '1' then
+        slot_r  <= unsigned(slot(SLOT_BITS-1 downto 0));
+        place_r <= (others => '0');
+      end if;
+    end if;
+  end process read_payload;
+
+  payload_bytes <= std_logic_vector(resize(sizes(to_integer(slot_r)), 16));
+  m_axis_tdata  <= byte_r;
+
+end architecture rtl;

@@ -1,0 +1,418 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Runs the program of a node in fabric (fusesoc_firm.fabric.control): instructions that copy, compare and add numbers
+-- of 1 to 28 bytes in one memory, two cycles for each byte. The memory holds the record of firm_rtps_walker and all
+-- tables.
+--
+-- An instruction is `operation (5 bits) | size (3) | destination (14) | source (14)`. An operand is a mode (2 bits)
+-- and a place (12): in the memory itself, or in the entry that register P, E or W selects. If the lowest bit of the
+-- operation is set, the source is a number instead.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_rtps_pkg.all;
+
+entity firm_rtps_sequencer is
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- The program: a memory that shows the word one cycle after `program_enable`, and keeps it.
+    program_enable  : out std_logic;
+    program_address : out std_logic_vector(9 downto 0);
+    program_word    : in  std_logic_vector(35 downto 0);
+
+    -- Words of firm_rtps_inbox, which TAKE moves up to the end of a submessage, and what they write to the record.
+    take           : out std_logic;
+    has_word       : in  std_logic;
+    is_end         : in  std_logic;
+    record_valid   : in  std_logic;
+    record_address : in  std_logic_vector(RECORD_BITS-1 downto 0);
+    record_data    : in  std_logic_vector(7 downto 0);
+
+    -- Addresses 256 to 511 of the memory are outside. A read's data follow its address at once. While `hold` is high,
+    -- everything waits.
+    port_index         : out std_logic_vector(5 downto 0);  -- register E
+    port_write         : out std_logic;
+    port_write_address : out std_logic_vector(7 downto 0);
+    port_write_data    : out std_logic_vector(7 downto 0);
+    port_read_address  : out std_logic_vector(7 downto 0);
+    port_read_data     : in  std_logic_vector(7 downto 0);
+    hold               : in  std_logic;
+
+    conditions : in std_logic_vector(3 downto 0)  -- of jumps
+  );
+end entity firm_rtps_sequencer;
+
+architecture rtl of firm_rtps_sequencer is
+
+  constant ADDRESS_BITS : positive := 12;
+  constant STACK_BITS   : positive := 3;
+
+  -- The lowest bit is that of a number as the source.
+  constant OP_COPY   : std_logic_vector(3 downto 0) := "0000";
+  constant OP_ADD    : std_logic_vector(3 downto 0) := "0001";
+  constant OP_SUB    : std_logic_vector(3 downto 0) := "0010";
+  constant OP_CMP    : std_logic_vector(3 downto 0) := "0011";  -- SUB without a result
+  constant OP_AND    : std_logic_vector(3 downto 0) := "0100";
+  constant OP_TEST   : std_logic_vector(3 downto 0) := "0101";  -- AND without a result
+  constant OP_MASK   : std_logic_vector(3 downto 0) := "0110";  -- a set of so many first numbers
+  constant OP_LOAD   : std_logic_vector(3 downto 0) := "0111";  -- a register
+  constant OP_STORE  : std_logic_vector(3 downto 0) := "1000";  -- a register
+  constant OP_BIT    : std_logic_vector(3 downto 0) := "1001";  -- tests number X of the record's set
+  constant OP_STEP   : std_logic_vector(3 downto 0) := "1010";  -- a register: add one, compare with a number
+  constant OP_JUMP   : std_logic_vector(3 downto 0) := "1011";
+  constant OP_CALL   : std_logic_vector(3 downto 0) := "1100";
+  constant OP_RETURN : std_logic_vector(3 downto 0) := "1101";
+  constant OP_TAKE   : std_logic_vector(3 downto 0) := "1110";
+
+  constant IN_PEER  : std_logic_vector(1 downto 0) := "01";
+  constant IN_ENTRY : std_logic_vector(1 downto 0) := "10";
+  constant IN_TABLE : std_logic_vector(1 downto 0) := "11";
+
+  subtype byte_t is std_logic_vector(7 downto 0);
+  subtype address_t is unsigned(ADDRESS_BITS-1 downto 0);
+  subtype program_t is unsigned(9 downto 0);
+  type memory_t is array (natural range 0 to 2**ADDRESS_BITS-1) of byte_t;
+  type stack_t is array (natural range 0 to 2**STACK_BITS-1) of program_t;
+
+  signal memory : memory_t := (others => (others => '0'));
+  signal stack  : stack_t;
+
+  type state_t is (FETCH, DECODE, DESTINATION, SOURCE, TAKING);
+  signal state_r   : state_t;
+  signal program_r : program_t := (others => '0');
+  signal depth_r   : unsigned(STACK_BITS-1 downto 0) := (others => '0');
+  signal zero_r    : std_logic;
+  signal carry_r   : std_logic;
+
+  -- Registers. The entries of P have 64 bytes, those of E 32 and those of W 16.
+  signal peer_r  : unsigned(2 downto 0) := (others => '0');
+  signal entry_r : unsigned(5 downto 0) := (others => '0');
+  signal table_r : unsigned(5 downto 0) := (others => '0');
+  signal index_r : unsigned(7 downto 0) := (others => '0');
+
+  -- ------------------------------------------------------------------ the instruction
+  signal kind      : std_logic_vector(3 downto 0);
+  signal is_number : std_logic;
+  signal size      : unsigned(4 downto 0);  -- bytes, less one
+  signal chosen    : unsigned(1 downto 0);  -- register: P, E, W, X
+  signal stepped   : unsigned(7 downto 0);
+  signal flag      : std_logic;
+  signal is_true   : std_logic;
+
+  -- ------------------------------------------------------------------ its bytes
+  signal to_r       : address_t := (others => '0');
+  signal from_r     : address_t := (others => '0');
+  signal place_r    : unsigned(4 downto 0) := (others => '0');  -- of the byte that is read
+  signal read_place : address_t;
+  signal memory_r   : byte_t := (others => '0');
+  signal outside_r  : std_logic;  -- the byte is not in the memory
+  signal port_r     : byte_t := (others => '0');
+  signal value      : byte_t;
+  signal left_r     : byte_t := (others => '0');
+  signal right      : byte_t;
+
+  -- The byte that is written, one step later.
+  signal writes_r    : std_logic;
+  signal last_r      : std_logic;
+  signal first_r     : std_logic;
+  signal at_r        : address_t := (others => '0');
+  signal count_r     : unsigned(4 downto 0) := (others => '0');  -- its place
+  signal carry_in    : std_logic;
+  signal sum         : unsigned(8 downto 0);
+  signal result      : byte_t;
+  signal is_kept     : std_logic;
+  signal is_zero     : std_logic;
+  signal write_place : address_t;
+  signal write_data  : byte_t;
+  signal write_valid : std_logic;
+
+  function address_of(operand : std_logic_vector(13 downto 0); peer : unsigned(2 downto 0);
+    entry : unsigned(5 downto 0); table : unsigned(5 downto 0)) return address_t is
+    variable place : address_t := unsigned(operand(11 downto 0));
+  begin
+    if operand(13 downto 12) = IN_PEER then
+      place := "010" & peer & place(5 downto 0);
+    elsif operand(13 downto 12) = IN_ENTRY then
+      place := '1' & entry & place(4 downto 0);
+    elsif operand(13 downto 12) = IN_TABLE then
+      -- From 512 on, so that tables 32 to 63 are in the entries of peers.
+      place := '0' & (table(5)) & (not table(5)) & table(4 downto 0) & place(3 downto 0);
+    end if;
+    return place;
+  end function address_of;
+
+  -- Byte `place` of a set of the first `count` of 32 numbers; the first one is the highest bit of the last byte.
+  function set_byte(count : unsigned(7 downto 0); place : unsigned(1 downto 0)) return byte_t is
+    variable whole : unsigned(5 downto 0);
+    variable bits  : byte_t := (others => '0');
+  begin
+    whole := "0000" & not place;
+    for index in 0 to 7 loop
+      if (count(5 downto 3) > whole(2 downto 0))
+         or (count(5 downto 3) = whole(2 downto 0) and count(2 downto 0) > 7-index) then
+        bits(index) := '1';
+      end if;
+    end loop;
+    return bits;
+  end function set_byte;
+
+begin
+
+  kind      <= program_word(35 downto 32);
+  is_number <= program_word(31);
+  chosen    <= unsigned(program_word(15 downto 14));
+
+  choose_size : process (program_word)
+  begin
+    size <= to_unsigned(27, 5);
+    if program_word(30 downto 28) = "000" then
+      size <= to_unsigned(0, 5);
+    elsif program_word(30 downto 28) = "001" then
+      size <= to_unsigned(1, 5);
+    elsif program_word(30 downto 28) = "010" then
+      size <= to_unsigned(3, 5);
+    elsif program_word(30 downto 28) = "011" then
+      size <= to_unsigned(7, 5);
+    elsif program_word(30 downto 28) = "100" then
+      size <= to_unsigned(11, 5);
+    elsif program_word(30 downto 28) = "101" then
+      size <= to_unsigned(15, 5);
+    elsif program_word(30 downto 28) = "110" then
+      size <= to_unsigned(5, 5);
+    end if;
+  end process choose_size;
+
+  stepped <= resize(peer_r, 8) + 1 when chosen = 0 else
+             resize(entry_r, 8) + 1 when chosen = 1 else
+             resize(table_r, 8) + 1 when chosen = 2 else
+             index_r + 1;
+
+  -- ------------------------------------------------------------------ the order of things
+
+  -- Of a jump: bits 17 to 15 say which condition, bit 14 whether it is inverted.
+  choose_condition : process (program_word, zero_r, carry_r, conditions)
+  begin
+    flag <= '1';
+    if program_word(17) = '1' then
+      flag <= conditions(to_integer(unsigned(program_word(16 downto 15))));
+    elsif program_word(16 downto 15) = "01" then
+      flag <= zero_r;
+    elsif program_word(16 downto 15) = "10" then
+      flag <= carry_r;
+    end if;
+  end process choose_condition;
+
+  is_true         <= flag xor program_word(14);
+  program_enable  <= '1' when state_r = FETCH and hold = '0' else '0';
+  program_address <= std_logic_vector(program_r);
+  take            <= '1' when state_r = TAKING else '0';
+
+  run : process (clk)
+  begin
+    if rising_edge(clk) then
+      if hold = '0' then
+        if state_r = FETCH then
+          state_r   <= DECODE;
+          program_r <= program_r + 1;
+        elsif state_r = DECODE then
+          state_r <= FETCH;
+          if kind = OP_JUMP then
+            if is_true = '1' then
+              program_r <= unsigned(program_word(9 downto 0));
+            end if;
+          elsif kind = OP_CALL then
+            program_r <= unsigned(program_word(9 downto 0));
+            depth_r   <= depth_r + 1;
+          elsif kind = OP_RETURN then
+            program_r <= stack(to_integer(depth_r - 1));
+            depth_r   <= depth_r - 1;
+          elsif kind = OP_STEP then
+            if chosen = 0 then
+              peer_r <= stepped(2 downto 0);
+            elsif chosen = 1 then
+              entry_r <= stepped(5 downto 0);
+            elsif chosen = 2 then
+              table_r <= stepped(5 downto 0);
+            else
+              index_r <= stepped;
+            end if;
+            zero_r <= '0';
+            if stepped = unsigned(program_word(7 downto 0)) then
+              zero_r <= '1';
+            end if;
+          elsif kind = OP_TAKE then
+            state_r <= TAKING;
+          else
+            state_r <= DESTINATION;
+          end if;
+        elsif state_r = DESTINATION then
+          state_r <= SOURCE;
+          -- The last byte is being written.
+          if last_r = '1' and writes_r = '1' then
+            state_r <= FETCH;
+          end if;
+        elsif state_r = SOURCE then
+          state_r <= DESTINATION;
+        elsif state_r = TAKING then
+          carry_r <= has_word and is_end;
+          if has_word = '0' or is_end = '1' then
+            state_r <= FETCH;
+          end if;
+        end if;
+        if writes_r = '1' then
+          carry_r <= sum(8) xor is_kept;
+          zero_r  <= is_zero and (zero_r or first_r);
+          if kind = OP_LOAD then
+            if chosen = 0 then
+              peer_r <= unsigned(result(2 downto 0));
+            elsif chosen = 1 then
+              entry_r <= unsigned(result(5 downto 0));
+            elsif chosen = 2 then
+              table_r <= unsigned(result(5 downto 0));
+            else
+              index_r <= unsigned(result);
+            end if;
+          end if;
+        end if;
+      end if;
+      if rst_n = '0' then
+        state_r   <= FETCH;
+        program_r <= (others => '0');
+        depth_r   <= (others => '0');
+      end if;
+    end if;
+  end process run;
+
+  keep_return : process (clk)
+  begin
+    if rising_edge(clk) then
+      if state_r = DECODE and kind = OP_CALL then
+        stack(to_integer(depth_r)) <= program_r;
+      end if;
+    end if;
+  end process keep_return;
+
+  -- ------------------------------------------------------------------ bytes that are read
+
+  read_place <= from_r when state_r = SOURCE else to_r;
+  value      <= port_read_data when outside_r = '1' else memory_r;
+  port_read_address <= port_r;
+
+  read_bytes : process (clk)
+  begin
+    if rising_edge(clk) then
+      if hold = '0' then
+        memory_r  <= memory(to_integer(read_place));
+        port_r    <= std_logic_vector(read_place(7 downto 0));
+        outside_r <= '0';
+        if read_place(11 downto 8) = 1 then
+          outside_r <= '1';
+        end if;
+        writes_r <= '0';
+        if state_r = DECODE then
+          place_r <= (others => '0');
+          to_r    <= address_of(program_word(27 downto 14), peer_r, entry_r, table_r);
+          from_r  <= address_of(program_word(13 downto 0), peer_r, entry_r, table_r);
+          if kind = OP_BIT then
+            to_r <= to_unsigned(RECORD_SET/32, 7) & index_r(7 downto 3);
+          end if;
+        elsif state_r = SOURCE then
+          left_r   <= value;
+          to_r     <= to_r + 1;
+          place_r  <= place_r + 1;
+          at_r     <= to_r;
+          count_r  <= place_r;
+          writes_r <= '1';
+          first_r  <= '0';
+          if place_r = 0 then
+            first_r <= '1';
+          end if;
+          last_r <= '0';
+          if place_r = size then
+            last_r <= '1';
+          end if;
+          if kind /= OP_MASK then
+            from_r <= from_r + 1;
+          end if;
+        end if;
+      end if;
+      if rst_n = '0' then
+        writes_r <= '0';
+      end if;
+    end if;
+  end process read_bytes;
+
+  -- ------------------------------------------------------------------ bytes that are written
+
+  choose_right : process (is_number, program_word, count_r, value, kind, index_r, peer_r, entry_r, table_r)
+  begin
+    right <= value;
+    if kind = OP_BIT then
+      right <= (others => '0');
+      for index in 0 to 7 loop
+        if index_r(2 downto 0) = 7-index then
+          right(index) <= '1';
+        end if;
+      end loop;
+    elsif kind = OP_STORE then
+      right <= std_logic_vector(index_r);
+      if program_word(1 downto 0) = "00" then
+        right <= "00000" & std_logic_vector(peer_r);
+      elsif program_word(1 downto 0) = "01" then
+        right <= "00" & std_logic_vector(entry_r);
+      elsif program_word(1 downto 0) = "10" then
+        right <= "00" & std_logic_vector(table_r);
+      end if;
+    elsif is_number = '1' then
+      right <= (others => '0');
+      if count_r = 0 then
+        right <= program_word(7 downto 0);
+      elsif count_r = 1 then
+        right <= "00" & program_word(13 downto 8);
+      end if;
+    end if;
+  end process choose_right;
+
+  -- A difference is a sum with the inverted number, whose carry is the inverse of a borrow.
+  is_kept  <= '1' when kind = OP_SUB or kind = OP_CMP else '0';
+  carry_in <= is_kept when first_r = '1' else carry_r xor is_kept;
+
+  compute : process (left_r, right, is_kept, carry_in)
+    variable term  : unsigned(7 downto 0);
+    variable carry : unsigned(0 downto 0);
+  begin
+    carry(0) := carry_in;
+    term     := unsigned(right);
+    if is_kept = '1' then
+      term := not unsigned(right);
+    end if;
+    sum <= resize(unsigned(left_r), 9) + term + carry;
+  end process compute;
+
+  result <= std_logic_vector(sum(7 downto 0)) when kind = OP_ADD or is_kept = '1' else
+            left_r and right when kind = OP_AND or kind = OP_TEST or kind = OP_BIT else
+            set_byte(unsigned(right), count_r(1 downto 0)) when kind = OP_MASK else
+            right;
+  is_zero <= '1' when unsigned(result) = 0 else '0';
+
+  write_valid <= '0' when kind = OP_CMP or kind = OP_TEST or kind = OP_BIT or kind = OP_LOAD else writes_r;
+  port_write  <= write_valid when at_r(11 downto 8) = 1 else '0';
+  port_write_address <= std_logic_vector(at_r(7 downto 0));
+  port_write_data    <= result;
+  port_index         <= std_logic_vector(entry_r);
+
+  write_place <= "0000" & unsigned(record_address) when state_r = TAKING else at_r;
+  write_data  <= record_data when state_r = TAKING else result;
+
+  write_bytes : process (clk)
+  begin
+    if rising_edge(clk) then
+      if (state_r = TAKING and record_valid = '1') or (state_r /= TAKING and write_valid = '1') then
+        memory(to_integer(write_place)) <= write_data;
+      end if;
+    end if;
+  end process write_bytes;
+
+end architecture rtl;

@@ -1,0 +1,56 @@
+"""The files of `firm_rtps_node_tb`: memories of a node, and events.
+
+    python -m tests.cores.rtps_data
+
+writes those of the core's target `sim_node`; what the node does then is in `node_results.txt`, of which the bench makes
+a new one, `results.txt`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fusesoc_firm.fabric.control import main_of, slots_of, words_of
+from fusesoc_firm.fabric.names import names
+from fusesoc_firm.fabric.packets import programs_of
+from tests.cores.announcements import Peers, a_node
+from tests.hdl.ghdl import CORES, Generic
+
+DATA = CORES / "net" / "tb" / "data"
+NODE = a_node()
+SEED, TURNS = 20261127, 15
+SIZES: dict[str, Generic] = {
+    "WRITERS": len(NODE.writers),
+    "READERS": len(NODE.readers),
+    "SOURCES": 8,
+    "DEPTH": 4096,
+    "SAMPLES": 16,
+    "SLOTS": slots_of(NODE),
+}
+
+
+def write_memories(folder: Path, prefix: str = "") -> None:
+    """The memories, a word in each row."""
+    programs = programs_of(NODE)
+    rows = {
+        "names": [word.hex() for word in names(NODE.compared)],
+        "program": [f"{word:09x}" for word in words_of(NODE)],
+        "packets": [f"{word:03x}" for word in programs.words],
+        "entries": list(map(str, programs.entries.values())),
+    }
+    for name, texts in rows.items():
+        (folder / f"{prefix}{name}.txt").write_text("".join(f"{text}\n" for text in texts), encoding="ascii")
+
+
+def write_data(folder: Path) -> None:
+    """The memories and the events of the core's target."""
+    write_memories(folder, "node_")
+    peers = Peers(2, SEED)
+    peers.succession()
+    events = peers.run(TURNS)
+    (folder / "node_events.txt").write_text("".join(event.row for event in events), encoding="ascii")
+
+
+if __name__ == "__main__":
+    write_data(DATA)
+    print(f"the program's loop is at {main_of(NODE)}")

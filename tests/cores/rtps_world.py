@@ -1,0 +1,85 @@
+"""A node in fabric as a program (`rtps_world.vhd`), to which events are sent."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.fabric.control import main_of
+from tests.bench.model import compiled
+from tests.cores.announcements import Event, Kind, Results, a_node, sent
+from tests.fabric.memories import memories
+from tests.hdl.ghdl import core_files
+from tests.hdl.verilog import netlist
+from tests.shared import made_once
+
+HERE = Path(__file__).parent
+HARDWARE = ("axis/package", "axis/axis", "net/mac", "net/builder", "net/rtps")
+
+
+def program() -> Path:
+    """The program, which is compiled once; without Verilator, the test is skipped."""
+    if not shutil.which("verilator"):
+        pytest.skip("verilator is not installed")
+    return made_once("rtps_world", _build) / "model" / "Vrtps_world"
+
+
+def _build(folder: Path) -> Path:
+    """GHDL's netlist of the hardware, translated by Verilator."""
+    files = memories(a_node(), "rtps_world", folder)
+    verilog = netlist("rtps_world", folder, [*files, HERE / "rtps_world.vhd"], core_files(*HARDWARE))
+    bench = (HERE / "rtps_world.cpp").read_text(encoding="ascii")
+    return compiled(verilog.read_text(encoding="utf-8"), "rtps_world", bench, folder, [HERE])
+
+
+class World:
+    """A node that runs, of whose host's cycles so many of 100 take nothing."""
+
+    def __init__(self, stall: int = 0) -> None:
+        self._process = subprocess.Popen(
+            [program(), str(main_of(a_node())), str(stall)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self.pulses: Counter[str] = Counter()
+        self.entries = [0, 0, 0]  # peers, and their writers and readers that match
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def do(self, event: Event) -> Results:
+        """What an event causes, if the node had nothing to do before."""
+        assert self._process.stdin and self._process.stdout
+        self._process.stdin.write(event.row)
+        self._process.stdin.flush()
+        found = Results()
+        while (row := self._process.stdout.readline()) != "done\n":
+            assert row, "the node ended"
+            kind, *numbers = row.split()
+            content = bytes(map(int, numbers))
+            if kind == "entries":
+                self.entries = list(map(int, numbers))
+            elif kind == "frame":
+                found.frames.append(content)
+            elif kind == "sent":
+                found.sent.append(sent(content))
+            else:
+                self.pulses[kind] += 1
+        return found
+
+    def all(self, events: Sequence[Event]) -> Results:
+        """What events cause."""
+        found = Results()
+        for event in [*events, Event(Kind.TICKS, count=0)]:
+            some = self.do(event)
+            found.frames += some.frames
+            found.sent += some.sent
+        found.refused = self.pulses["refused"]
+        return found

@@ -1,0 +1,199 @@
+"""A node in lock-step with the reference participant: each packet and each frame, in their order."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.fabric.control import main_of
+from tests.cores.announcements import SURE, WRITTEN, Event, Kind, Peers, Results, a_node, expected, sent
+from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
+from tests.cores.rtps_world import HARDWARE, World
+from tests.fabric.memories import bits
+from tests.fabric.messages import AckNack, parse
+from tests.hdl.ghdl import Generic, Library, core_files
+from tests.hdl.verilog import loops
+
+SEED = 20261127
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/builder", "net/rtps")
+NODE = a_node()
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return _library(tmp_path_factory.mktemp("node"))
+
+
+def _library(directory: Path, standard: str = "93") -> Library:
+    library = Library("firm", directory, standard)
+    library.analyse([*core_files(*CORES), *core_files("net/rtps", fileset="tb")])
+    return library
+
+
+def _results(library: Library, folder: Path, events: list[Event], **generics: Generic) -> Results:
+    (folder / "events.txt").write_text("".join(event.row for event in events), encoding="ascii")
+    write_memories(folder)
+    given = {**SIZES, **bits(NODE), "MAIN": main_of(NODE), **generics}
+    result = library.run("firm_rtps_node_tb", given, directory=folder, seconds=600)
+    assert result.exit_code == 0, result.output
+    found = Results()
+    for row in (folder / "results.txt").read_text(encoding="ascii").splitlines():
+        kind, *numbers = row.split()
+        content = bytes(map(int, numbers))
+        if kind == "frame":
+            found.frames.append(content)
+        elif kind == "sent":
+            found.sent.append(sent(content))
+        found.refused += kind == "refused"
+    return found
+
+
+def test_the_data_of_the_core_are_those_of_the_program(tmp_path: Path) -> None:
+    """`python -m tests.cores.rtps_data` writes them again."""
+    write_data(tmp_path)
+    for path in tmp_path.iterdir():
+        assert path.read_bytes() == (DATA / path.name).read_bytes(), path.name
+    bench = (DATA.parent / "firm_rtps_node_tb.vhd").read_text(encoding="ascii")
+    defaults = {name: int(value) for name, value in re.findall(r"^    (\w+) +: integer := (\d+)", bench, re.MULTILINE)}
+    wanted = {**SIZES, **bits(NODE), "MAIN": main_of(NODE)}
+    assert {name: defaults[name] for name in wanted} == wanted
+
+
+def _check(found: Results, wanted: Results) -> None:
+    for place, (ours, theirs) in enumerate(zip(found.sent, wanted.sent, strict=False)):
+        assert ours == theirs, f"packet {place}: {ours[0]} {parse(ours[1])} instead of {theirs[0]} {parse(theirs[1])}"
+    assert len(found.sent) == len(wanted.sent)
+    assert found.frames == wanted.frames
+    assert found.refused == wanted.refused
+
+
+def _check_kinds(wanted: Results) -> None:
+    """All that a node does happens."""
+    ids = Counter(frame[0] for frame in wanted.frames)
+    messages = [message for _, packet in wanted.sent if (message := parse(packet))]
+    kinds = Counter(type(item).__name__ for message in messages for item in message.submessages)
+    print(ids, kinds)
+    assert min(ids[0], ids[1], ids[SURE], kinds["AckNack"], kinds["Heartbeat"], kinds["Gap"], kinds["Data"]) >= 2
+
+
+def test_the_sources_do_what_the_reference_does(library: Library, tmp_path: Path) -> None:
+    # With this seed, all kinds of packets and frames are among few events.
+    seed = 20261302
+    print(f"seed {seed}")
+    events = Peers(2, seed).run(90)
+    wanted = expected(events)
+    _check_kinds(wanted)
+    _check(_results(library, tmp_path, events, SEED=seed), wanted)
+
+
+def test_frames_that_come_with_the_first_cycle_are_kept(library: Library, tmp_path: Path) -> None:
+    """They wait until the program has written where they belong; readers ask for them later."""
+    # With this seed, some of them are sent again.
+    seed = 20261428
+    print(f"seed {seed}")
+    first = [
+        Event(Kind.FRAME, bytes([number, 8, 0, 0, 0]) + bytes(range(8)), before=0) for number in range(len(WRITTEN))
+    ]
+    events = [*first, *Peers(2, seed).run(60)]
+    wanted = expected(events)
+    assert any(bytes(range(8)) in packet for _, packet in wanted.sent)
+    _check(_results(library, tmp_path, events, SEED=seed), wanted)
+
+
+def test_milliseconds_that_the_program_cannot_take_at_once_are_counted(library: Library, tmp_path: Path) -> None:
+    print(f"seed {SEED}")
+    events = [
+        part
+        for event in Peers(2, SEED).run(40)
+        for part in (_rushed(event.count) if event.kind is Kind.TICKS else [event])
+    ]
+    _check(_results(library, tmp_path, events, SEED=SEED), expected(events))
+
+
+def _rushed(count: int) -> list[Event]:
+    """Up to 15 at once."""
+    return [Event(Kind.RUSHED, count=min(15, count - done)) for done in range(0, count, 15)]
+
+
+def test_an_early_sample_of_a_writer_is_not_counted_for_its_successor(library: Library, tmp_path: Path) -> None:
+    print(f"seed {SEED}")
+    events = Peers(1, SEED).succession()
+    wanted = expected(events)
+    messages = [message for _, packet in wanted.sent if (message := parse(packet))]
+    items = [item for message in messages for item in message.submessages]
+    assert (1, 2) in [tuple(item.missing) for item in items if isinstance(item, AckNack)]
+    _check(_results(library, tmp_path, events), wanted)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(
+    ("peers", "stall", "seed"),
+    [(4, 0, SEED), (9, 30, SEED + 2), (6, 10, SEED + 2), (1, 0, SEED + 3)],
+)
+def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: int) -> None:
+    print(f"seed {seed}")
+    events = Peers(peers, seed).run(2000)
+    wanted = expected(events)
+    _check_kinds(wanted)
+    with World(stall) as world:
+        _check(world.all(events), wanted)
+
+
+@pytest.mark.check
+def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
+    """Whole samples are lost: those that come are unchanged. One that comes late counts if later ones were lost."""
+    events = Peers(4, SEED, is_sure=False, burst=60).run(600)
+    wanted = expected(events)
+    with World(97) as world:
+        found = world.all(events)
+        assert world.pulses["lost"] > 5
+    assert 5 < len(found.frames) < len(wanted.frames)
+    assert all(any(frame[5:] in event.data for event in events) for frame in found.frames)
+    assert found.sent == wanted.sent
+
+
+@pytest.mark.check
+def test_a_list_of_very_many_encodings_counts() -> None:
+    """Its number is a multiple of 65536, of which the lower half is that of a list that is not told."""
+    seed = SEED + 3
+    print(f"seed {seed}")
+    events = Peers(4, seed, exaggerate=True).run(300)
+    with World() as world:
+        _check(world.all(events), expected(events))
+
+
+def test_the_node_has_no_latch(library: Library) -> None:
+    assert library.latches("firm_rtps_node", SIZES) == []
+
+
+@pytest.mark.check
+def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
+    *others, node = core_files(*HARDWARE)
+    assert loops("firm_rtps_node", tmp_path, [node], others) == []
+
+
+@pytest.mark.parametrize(
+    ("entity", "generic", "value", "legal"),
+    [
+        ("firm_net_keys", "ENTRIES", 33, "1 to 32"),
+        ("firm_net_keys", "KEY_BYTES", 17, "2 to 16"),
+        ("firm_net_keys", "TAIL", 16, "1 to 15"),
+        ("firm_rtps_control", "ENDPOINTS", 25, "1 to 24"),
+        ("firm_rtps_endpoint", "READERS", 9, "0 to 8"),
+        ("firm_rtps_endpoint", "WRITERS", 10, "1 to 9"),
+        ("firm_rtps_history", "WRITERS", 9, "1 to 8"),
+        ("firm_rtps_history", "SAMPLE", 48, "powers of two, 2 to 1024"),
+        ("firm_rtps_history", "SLOTS", 512, "powers of two, 2 to 256"),
+        ("firm_rtps_readers", "READERS", 9, "0 to 8"),
+        ("firm_rtps_readers", "FIRST", 256, "0 to 256-READERS"),
+        ("firm_rtps_readers", "BYTES", 1000, "powers of two, 4 to 65536"),
+        ("firm_rtps_readers", "SAMPLES", 3, "powers of two, 2 or more"),
+    ],
+)
+def test_bad_generics_are_refused(library: Library, entity: str, generic: str, value: int, legal: str) -> None:
+    result = library.run(entity, {generic: value})
+    assert result.exit_code != 0
+    assert f"{entity}: {generic} is {value}; legal: {legal}" in result.output
