@@ -23,6 +23,7 @@ from fusesoc_firm.node.carrier import Answer, Call
 from fusesoc_firm.node.description import describe
 from fusesoc_firm.node.node import HardwareListener, NodeSettings
 from fusesoc_firm.node.python_node import python_node
+from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from tests.node.fake_node import FakeHardware, Run, until
@@ -250,6 +251,31 @@ def test_a_result_does_not_overtake_feedback(tmp_path: Path) -> None:
     until(server.results)
     server.run.stop()
     assert [item for item, _ in server.received()] == [1, 1, 1, 1, 1, 2]
+
+
+@pytest.mark.parametrize("overflow", Overflow)
+def test_a_full_queue_loses_no_result(peer: Make, overflow: Overflow) -> None:
+    """The hardware takes nothing while feedback of three goals comes; only feedback is lost, and counted as its own."""
+    server = peer(NodeSettings(depth=2, overflow=overflow))
+    gate = threading.Event()
+    for number in range(3):
+        server.order(number)
+    for number in range(3):
+        identity = server.accept(number)
+        assert server.asker.hardware
+        server.asker.hardware._gate = gate
+        for step in range(0 if overflow is Overflow.BLOCK else 4):
+            server.feed(identity, step)
+        server.finish(identity, SUCCEEDED[server.version], number, number)
+    until(lambda: server.run.node.statistics.actions["count"].succeeded == 3)
+    gate.set()
+    until(lambda: len(server.results()) == 3)
+    server.run.stop()
+    assert server.results() == [(SUCCEEDED[server.version], number) for number in range(3)]
+    inputs = server.run.node.statistics.inputs
+    (action,) = server.description.actions
+    assert inputs[action.result].dropped == 0
+    assert (inputs[action.feedback].dropped > 0) == (overflow is not Overflow.BLOCK)
 
 
 def test_hardware_cancels_its_goal(peer: Make) -> None:

@@ -296,6 +296,9 @@ class Engines {
       const auto [first, second] = action.is_server ? std::pair(action.goal, action.cancel)
                                                     : std::pair(action.feedback, action.result);
       configuration.shared_queues[second] = first;
+      // Only feedback may be lost.
+      configuration.queue_depths[second] = kUnlimitedDepth;
+      if (action.is_server) configuration.queue_depths[first] = kUnlimitedDepth;
     }
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
