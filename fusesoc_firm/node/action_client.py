@@ -36,7 +36,7 @@ from fusesoc_firm.node.action_types import (
     STATES,
     NodeAction,
 )
-from fusesoc_firm.node.calls import CallLine
+from fusesoc_firm.node.calls import CallLine, Start
 from fusesoc_firm.node.carrier import Answer, Call
 from fusesoc_firm.node.queues import ClosedError
 
@@ -86,7 +86,7 @@ class ActionClient(ActionEnd):
 
     messages: Messages
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         super().__init__(action, counts, put, report)
         self._numbers = count()
         # A message to the hardware must not be sent with the first lock: the hardware may wait for `take`.
@@ -95,7 +95,7 @@ class ActionClient(ActionEnd):
         self._goals: dict[int, _Goal] = {}
         self._current: _Goal | None = None
         self._is_ending = False
-        self._line = CallLine(action.time_limit, self._hand_over, self._handed_back, has_numbers=True)
+        self._line = CallLine(action.time_limit, self._hand_over, self._handed_back, start, from_hardware=True)
 
     def start(self, ways: Ways) -> None:
         """Begin to send goals."""
@@ -263,10 +263,10 @@ class Ros1Client(ActionClient):
     is published earlier would be lost.
     """
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         self.messages: Ros1Messages = Ros1Messages()
         self._heard = -math.inf
-        super().__init__(action, counts, put, report)
+        super().__init__(action, counts, put, report, start)
 
     def taken(self, topic: int, payload: bytes) -> None:
         """Take states, feedback or a result."""
@@ -307,12 +307,12 @@ class Ros1Client(ActionClient):
 class Ros2Client(ActionClient):
     """A client of an action of ROS 2, which calls three services for each goal."""
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         self.messages: Ros2Messages = Ros2Messages()
         self._call_numbers = count()
         # The attempt to send the last goal that was lost: the server may accept it late.
         self._late: tuple[int, _Goal] | None = None
-        super().__init__(action, counts, put, report)
+        super().__init__(action, counts, put, report, start)
 
     def taken(self, topic: int, payload: bytes) -> None:
         """Take states or feedback."""

@@ -9,6 +9,7 @@ from fusesoc_firm.node.action_client import Ros1Client, Ros2Client
 from fusesoc_firm.node.action_end import ActionEnd, GoalCounts, Put, Report, Ways
 from fusesoc_firm.node.action_server import Ros1Server, Ros2Server
 from fusesoc_firm.node.action_types import NodeAction
+from fusesoc_firm.node.calls import Start
 from fusesoc_firm.node.carrier import Answer, Answered, Call, Called, Carrier, Taken
 from fusesoc_firm.node.description import NodeDescription
 
@@ -26,10 +27,10 @@ _ENDS: Mapping[tuple[int, bool], type[Ros1Server | Ros2Server | Ros1Client | Ros
 class NodeActions:
     """The goals of all actions of a node, between carriers and hardware; any thread may call the methods."""
 
-    def __init__(self, description: NodeDescription, put: Put, report: Report) -> None:
+    def __init__(self, description: NodeDescription, put: Put, report: Report, start: Start) -> None:
         self.counts = {action.block: GoalCounts() for action in description.actions}
         self._ends = [
-            _ENDS[action.ros, action.is_server](action, self.counts[action.block], put, report)
+            _ENDS[action.ros, action.is_server](action, self.counts[action.block], put, report, start)
             for action in description.actions
         ]
         # The numbers of the actions' topics and services follow those of the others.
@@ -38,6 +39,7 @@ class NodeActions:
         self._first_topic, self._first_service = len(description.subscribers), len(description.services)
         self._first_published = len(description.publishers)
         self._has_ended = threading.Event()
+        self._start = start
 
     def start(self, carriers: Mapping[int, Carrier]) -> None:
         """Begin to exchange goals; `carriers` are those of `Node.run`."""
@@ -48,7 +50,7 @@ class NodeActions:
             published += len(end.action.publishers)
             service += len(end.action.services)
         if self._ends:
-            threading.Thread(target=self._tick, daemon=True).start()
+            self._start(self._tick)
 
     def taken(self, event: Taken) -> bool:
         """Take a message from ROS, if it belongs to an action; return whether it does."""

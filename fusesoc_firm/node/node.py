@@ -133,8 +133,13 @@ class Node:
     ) -> None:
         """Open the transport. May raise `TransportError`."""
         self._report = _Reporter(settings.report)
-        self._calls = NodeCalls(description.services, self._put_service_message, self._report)
-        self._actions = NodeActions(description, self._put_service_message, self._report)
+        self._is_wanted_to_end = threading.Event()
+        self._drains = threading.Event()
+        self._is_over = threading.Event()
+        self._fault: BaseException | None = None
+        self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
+        self._calls = NodeCalls(description.services, self._put_service_message, self._report, self._start)
+        self._actions = NodeActions(description, self._put_service_message, self._report, self._start)
         self.statistics = Statistics.of(description, self._calls.counts, self._actions.counts)
         self._description = description
         self._open_transport = open_transport
@@ -161,11 +166,6 @@ class Node:
             # A result must not overtake feedback, nor a cancellation its goal.
             self._queues.share(self._numbers[second], self._numbers[first])
         self._carriers: Mapping[int, Carrier] = {}
-        self._is_wanted_to_end = threading.Event()
-        self._drains = threading.Event()
-        self._is_over = threading.Event()
-        self._fault: BaseException | None = None
-        self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
         self._offered = self._declined = self._handled = 0
         self._is_counted = False
         self._failed_restarts = 0

@@ -481,15 +481,36 @@ def test_goals_are_canceled_when_the_node_ends(peer: Make, monkeypatch: pytest.M
 
 
 def test_too_many_goals_are_lost(peer: Make) -> None:
+    """Their results come in their turn."""
     server = peer()
     for number in range(MOST_WAITING + 2):
         server.order(number)
     identity = server.accept()
-    until(lambda: server.run.node.statistics.actions["count"].lost == 1)
-    assert server.results() == [(LOST[server.version], 0 if server.version == 1 else None)]
-    assert server.canceled() == []
-    assert server.goal() == identity
+    until(lambda: server.run.node.statistics.actions["count"].goals == MOST_WAITING + 2)
+    assert server.results() == []
+    server.order_cancel()
+    server.finish(identity, SUCCEEDED[server.version], 5)
+    until(lambda: len(server.results()) == MOST_WAITING + 2)
     server.run.stop()
+    nothing = 0 if server.version == 1 else None
+    recalled = [(RECALLED[server.version], nothing)] * MOST_WAITING
+    assert server.results() == [(SUCCEEDED[server.version], 5), *recalled, (LOST[server.version], nothing)]
+    assert server.run.node.statistics.actions["count"].lost == 1
+
+
+@pytest.mark.parametrize("place", ["tick", "line"])
+def test_a_fault_in_a_thread_of_an_action_ends_the_run(peer: Make, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    fault = RuntimeError("a fault")
+
+    def fail(*_: object) -> None:
+        raise fault
+
+    server = peer()
+    end = server.run.node._actions._ends[0]
+    monkeypatch.setattr(end, *(("tick", fail) if place == "tick" else ("_begin", fail)))
+    server.order(4)
+    server.run.wait()
+    assert server.run.error is fault
 
 
 def test_broken_messages_harm_nobody(peer: Make) -> None:
