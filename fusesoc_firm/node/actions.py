@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from fusesoc_firm.node.action_client import Ros1Client, Ros2Client
@@ -15,6 +16,7 @@ from fusesoc_firm.node.description import NodeDescription
 
 # s
 _TICK_SECONDS = 0.1
+_ACCEPT_SECONDS = 1.0
 # The ends by the version of ROS and whether the hardware is the server.
 _ENDS: Mapping[tuple[int, bool], type[Ros1Server | Ros2Server | Ros1Client | Ros2Client]] = {
     (1, True): Ros1Server,
@@ -100,10 +102,16 @@ class NodeActions:
         """Whether no goal has to be waited for before the node ends."""
         return all(end.is_idle for end in self._ends)
 
-    def give_up(self) -> None:
-        """Cancel the goals of the hardware at their servers, since the node ends; ROS still takes messages."""
+    def give_up(self, seconds: float) -> None:
+        """Cancel the goals of the hardware at their servers, since the node ends; ROS still takes messages.
+
+        Servers of ROS 2 have to accept a goal before that; this is waited for, but not for longer than some seconds.
+        """
         for end in self._ends:
             end.give_up()
+        latest = time.monotonic() + min(seconds, _ACCEPT_SECONDS)
+        for end in self._ends:
+            end.wait_until_canceled(latest - time.monotonic())
 
     def close(self) -> None:
         """Let all goals fail that have not ended."""

@@ -206,7 +206,7 @@ class Node:
         # Without one of its threads, the node cannot process what it has received.
         is_whole = self._fault is None or isinstance(self._fault, TransportError | CarrierError)
         latest = time.monotonic() + (self._settings.drain if is_whole else 0.0)
-        self._actions.give_up()
+        self._actions.give_up(_left(latest))
         for carrier in carriers.values():
             carrier.stop()
         for carrier in carriers.values():
