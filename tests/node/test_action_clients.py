@@ -560,8 +560,12 @@ def test_a_result_after_the_time_limit_does_not_change_the_state(peer: Make, mon
             payload = filled(server.result_frame, {"status": state, "result": {"sequence": [5]}})
         end._finish(goal, payload)
 
+    def begun(goal: Any) -> None:
+        found.append(goal)
+        begin(goal)
+
     begin = end._begin
-    monkeypatch.setattr(end, "_begin", lambda goal: (found.append(goal), begin(goal)))
+    monkeypatch.setattr(end, "_begin", begun)
     monkeypatch.setattr(end, "_report", late)
     server.order(4)
     server.accept()
