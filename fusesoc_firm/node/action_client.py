@@ -36,12 +36,14 @@ from fusesoc_firm.node.action_types import (
     STATES,
     NodeAction,
 )
-from fusesoc_firm.node.calls import CallLine
+from fusesoc_firm.node.calls import CallLine, Start
 from fusesoc_firm.node.carrier import Answer, Call
 from fusesoc_firm.node.queues import ClosedError
 
 # s; what a server has not received is sent again.
 _AGAIN_SECONDS = 0.5
+# Lost goals that a server may accept late.
+MOST_LATE = 100
 # s; a server of actionlib that has published no states for so long is not there.
 _HEARD_SECONDS = 2.0
 
@@ -76,6 +78,11 @@ class _Goal:
     fault: str = ""
     requests: dict[int, _Request] = field(default_factory=dict)
 
+    @property
+    def named(self) -> Reference:
+        """The goal as cancellations of the hardware mean it; without a time of its own, that of its arrival counts."""
+        return self.own if any(self.own.stamp) else self.own._replace(stamp=self.sent.stamp)
+
 
 class ActionClient(ActionEnd):
     """The goals of the hardware for one action; any thread may call the methods.
@@ -86,16 +93,18 @@ class ActionClient(ActionEnd):
 
     messages: Messages
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         super().__init__(action, counts, put, report)
         self._numbers = count()
         # A message to the hardware must not be sent with the first lock: the hardware may wait for `take`.
         self._lock, self._sending = threading.RLock(), threading.Lock()
+        # What `wait_until_canceled` waits for.
+        self._progress = threading.Condition(self._lock)
         # The goals that have not ended; the one that the server has.
         self._goals: dict[int, _Goal] = {}
         self._current: _Goal | None = None
         self._is_ending = False
-        self._line = CallLine(action.time_limit, self._hand_over, self._handed_back, has_numbers=True)
+        self._line = CallLine(action.time_limit, self._hand_over, self._handed_back, start, from_hardware=True)
 
     def start(self, ways: Ways) -> None:
         """Begin to send goals."""
@@ -128,7 +137,7 @@ class ActionClient(ActionEnd):
         """Cancel goals; one that waits ends when it would have been sent."""
         with self._lock:
             for goal in self._goals.values():
-                if wanted.means(goal.own) and not goal.is_canceled:
+                if wanted.means(goal.named) and not goal.is_canceled:
                     goal.is_canceled = True
                     if goal is self._current:
                         # The server has not been silent about a cancellation that it does not have yet.
@@ -157,15 +166,14 @@ class ActionClient(ActionEnd):
                 self._current, goal.was_sent = goal, True
                 self._begin(goal)
                 return
-            goal.state = State.CANCELED
-        self._line.settle(Answer(b""), goal.number)
+            self._settle(goal, State.CANCELED)
 
     def _take_feedback(self, payload: bytes) -> None:
         goal = self._named(payload)
         if goal is None:
             return
         with self._sending:
-            if goal is self._current:
+            if goal is self._current and not goal.is_forgotten:
                 self._put(self.action.feedback, self.messages.renamed(payload, goal.own))
 
     def _named(self, payload: bytes) -> _Goal | None:
@@ -188,8 +196,14 @@ class ActionClient(ActionEnd):
 
     def _finish(self, goal: _Goal, payload: bytes) -> None:
         """Take the result for the hardware; raise `ValueError` if it is invalid."""
-        goal.state = self.messages.state(payload)
-        self._line.settle(Answer(payload), goal.number)
+        self._settle(goal, self.messages.state(payload), payload)
+
+    def _settle(self, goal: _Goal, state: State, payload: bytes = b"") -> None:
+        """Let a goal end with a state, unless it has ended; without a payload, the node makes the result."""
+        with self._lock:
+            # The line hands the goal back when the lock is free.
+            if goal.number in self._goals and self._line.settle(Answer(payload), goal.number):
+                goal.state = state
 
     def _handed_back(self, call: Call, answer: Answer) -> None:
         with self._lock:
@@ -201,10 +215,11 @@ class ActionClient(ActionEnd):
                 if goal.was_sent and not goal.cancel_was_sent:
                     self._give_up(goal)
             setattr(self.counts, goal.state.value, getattr(self.counts, goal.state.value) + 1)
-        reason = f"{answer.reason}: {goal.fault}" if goal.fault else answer.reason
-        if goal.state is State.LOST:
+            reason = f"{answer.reason}: {goal.fault}" if goal.fault else answer.reason
+            status = Status(goal.own, goal.state, goal.was_sent, reason.encode())
+            self._progress.notify_all()
+        if status.state is State.LOST:
             self._report(f"a goal of '{self.action.block}' is lost: {reason}")
-        status = Status(goal.own, goal.state, goal.was_sent, reason.encode())
         result = answer.payload or self.messages.result(status, self.action.no_result)
         if not goal.is_forgotten:
             with self._sending, suppress(ClosedError):
@@ -227,7 +242,14 @@ class ActionClient(ActionEnd):
         """Cancel all goals, and those that follow."""
         with self._lock:
             self._is_ending = True
-        self._cancel(Reference(b"", NO_STAMP))
+            self._cancel(Reference(b"", NO_STAMP))
+            if self._current and not self._current.cancel_was_sent:
+                self._cancel_early(self._current)
+
+    def wait_until_canceled(self, seconds: float) -> None:
+        """Wait for the answer of a server that has a goal and may not have accepted it yet."""
+        with self._lock:
+            self._progress.wait_for(lambda: not (self._current and self._is_being_sent(self._current)), seconds)
 
     def close(self) -> None:
         """Let all goals end."""
@@ -252,6 +274,14 @@ class ActionClient(ActionEnd):
         """Cancel the goal that the server has, as soon as the server knows it."""
 
     @abstractmethod
+    def _cancel_early(self, goal: _Goal) -> None:
+        """Cancel the goal that the server has, if the server permits this before it knows the goal."""
+
+    @abstractmethod
+    def _is_being_sent(self, goal: _Goal) -> bool:
+        """Return whether an answer has to come before the goal can be canceled."""
+
+    @abstractmethod
     def _give_up(self, goal: _Goal) -> None:
         """Cancel a goal that is lost."""
 
@@ -263,10 +293,10 @@ class Ros1Client(ActionClient):
     is published earlier would be lost.
     """
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         self.messages: Ros1Messages = Ros1Messages()
         self._heard = -math.inf
-        super().__init__(action, counts, put, report)
+        super().__init__(action, counts, put, report, start)
 
     def taken(self, topic: int, payload: bytes) -> None:
         """Take states, feedback or a result."""
@@ -299,6 +329,14 @@ class Ros1Client(ActionClient):
         if goal.is_known:
             self._give_up(goal)
 
+    def _cancel_early(self, goal: _Goal) -> None:
+        # A server of actionlib keeps the cancellation of a goal that has not arrived.
+        if goal.tried > -math.inf:
+            self._give_up(goal)
+
+    def _is_being_sent(self, goal: _Goal) -> bool:
+        return False
+
     def _give_up(self, goal: _Goal) -> None:
         goal.cancel_was_sent = True
         self._publish(CANCEL, self.messages.cancel(Reference(goal.sent.id, NO_STAMP)))
@@ -307,12 +345,12 @@ class Ros1Client(ActionClient):
 class Ros2Client(ActionClient):
     """A client of an action of ROS 2, which calls three services for each goal."""
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         self.messages: Ros2Messages = Ros2Messages()
         self._call_numbers = count()
-        # The attempt to send the last goal that was lost: the server may accept it late.
-        self._late: tuple[int, _Goal] | None = None
-        super().__init__(action, counts, put, report)
+        # Lost goals by the numbers of their last attempts: the server may accept them late.
+        self._late: dict[int, _Goal] = {}
+        super().__init__(action, counts, put, report, start)
 
     def taken(self, topic: int, payload: bytes) -> None:
         """Take states or feedback."""
@@ -335,6 +373,7 @@ class Ros2Client(ActionClient):
             else:
                 with self._reporting():
                     self._take_answer(goal, service, answer.payload)
+            self._progress.notify_all()
 
     def _take_answer(self, goal: _Goal, service: int, payload: bytes) -> None:
         self._told(goal)
@@ -344,8 +383,7 @@ class Ros2Client(ActionClient):
                 if goal.is_canceled:
                     self._cancel_current(goal)
             else:
-                goal.state = State.REJECTED
-                self._line.settle(Answer(b""), goal.number)
+                self._settle(goal, State.REJECTED)
         elif service == GET_RESULT:
             if self.messages.is_unknown(payload):
                 self._line.settle(Answer(reason="the server does not know it"), goal.number)
@@ -354,10 +392,11 @@ class Ros2Client(ActionClient):
 
     def _take_late(self, service: int, number: int, answer: Answer) -> None:
         """Cancel a goal that was lost, and is accepted late."""
-        if service == SEND_GOAL and self._late and self._late[0] == number and answer.payload is not None:
+        goal = self._late.pop(number, None) if service == SEND_GOAL else None
+        if goal and answer.payload is not None:
             with self._reporting():
                 if self.messages.is_accepted(answer.payload):
-                    self._give_up(self._late[1])
+                    self._request_cancel(goal)
 
     def _new_id(self) -> bytes:
         return uuid4().bytes
@@ -375,11 +414,23 @@ class Ros2Client(ActionClient):
         if GET_RESULT in goal.requests:
             self._give_up(goal)
 
+    def _cancel_early(self, goal: _Goal) -> None:
+        # See `_is_being_sent`.
+        pass
+
+    def _is_being_sent(self, goal: _Goal) -> bool:
+        send = goal.requests.get(SEND_GOAL)
+        return send is not None and send.again is None and GET_RESULT not in goal.requests
+
     def _give_up(self, goal: _Goal) -> None:
         goal.cancel_was_sent = True
-        send = goal.requests.get(SEND_GOAL)
-        if send and goal.state is State.LOST:
-            self._late = send.number, goal
+        if goal.state is State.LOST and self._is_being_sent(goal):
+            self._late[goal.requests[SEND_GOAL].number] = goal
+            if len(self._late) > MOST_LATE:
+                del self._late[next(iter(self._late))]
+        self._request_cancel(goal)
+
+    def _request_cancel(self, goal: _Goal) -> None:
         self._request(goal, CANCEL_GOAL, self.messages.cancel(Reference(goal.sent.id, NO_STAMP)))
 
     def _request(self, goal: _Goal, service: int, payload: bytes) -> None:

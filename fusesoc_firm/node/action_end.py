@@ -105,6 +105,9 @@ class ActionEnd(ABC):
     def give_up(self) -> None:
         """Take note that the node ends, while ROS still takes messages."""
 
+    def wait_until_canceled(self, seconds: float) -> None:  # noqa: B027  (servers have nothing to wait for)
+        """Wait some seconds at most, until `give_up` has its effect at servers."""
+
     @abstractmethod
     def close(self) -> None:
         """Let all goals fail that have not ended."""

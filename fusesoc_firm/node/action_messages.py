@@ -75,7 +75,8 @@ class Reference(NamedTuple):
         """Return whether a cancellation concerns a goal: one by its id, all until a time, or all."""
         if not any(self.id) and not any(self.stamp):
             return True
-        return goal.id == self.id or (any(self.stamp) and goal.stamp <= self.stamp)
+        is_named = any(self.id) and goal.id == self.id
+        return is_named or (any(self.stamp) and goal.stamp <= self.stamp)
 
 
 class Status(NamedTuple):

@@ -35,7 +35,7 @@ from fusesoc_firm.node.action_types import (
     STATES,
     NodeAction,
 )
-from fusesoc_firm.node.calls import CallLine
+from fusesoc_firm.node.calls import CallLine, Start
 from fusesoc_firm.node.carrier import Answer, Call
 from fusesoc_firm.node.queues import ClosedError
 
@@ -89,7 +89,7 @@ class ActionServer(ActionEnd):
     _accepts_waiting: bool
     messages: Messages
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         super().__init__(action, counts, put, report)
         self._numbers = count()
         self._lock, self._sending = threading.RLock(), threading.Lock()
@@ -97,7 +97,7 @@ class ActionServer(ActionEnd):
         self._goals: dict[bytes, _Goal] = {}
         self._calls: dict[int, _Goal] = {}
         self._current: _Goal | None = None
-        self._line = CallLine(action.time_limit, self._hand_over, self._handed_back, has_numbers=False)
+        self._line = CallLine(action.time_limit, self._hand_over, self._handed_back, start, from_hardware=False)
 
     def start(self, ways: Ways) -> None:
         """Begin to tell clients of goals."""
@@ -330,14 +330,14 @@ class Ros1Server(ActionServer):
     _most_kept = MOST_KEPT_ROS1
     _accepts_waiting = False
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         self.messages: Ros1Messages = Ros1Messages()
         # Goals and cancellations have topics of their own, so a cancellation may arrive first.
         self._early: dict[bytes, None] = {}
         self._canceled_until = (0, 0)
         self._told = -math.inf
         self._has_news = False
-        super().__init__(action, counts, put, report)
+        super().__init__(action, counts, put, report, start)
 
     def taken(self, topic: int, payload: bytes) -> None:
         """Take a goal or a cancellation."""
@@ -411,9 +411,9 @@ class Ros2Server(ActionServer):
     _most_kept = MOST_KEPT
     _accepts_waiting = True
 
-    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report) -> None:
+    def __init__(self, action: NodeAction, counts: GoalCounts, put: Put, report: Report, start: Start) -> None:
         self.messages: Ros2Messages = Ros2Messages()
-        super().__init__(action, counts, put, report)
+        super().__init__(action, counts, put, report, start)
 
     def taken(self, topic: int, payload: bytes) -> None:
         """Do nothing: goals are calls."""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from fusesoc_firm.node.action_client import Ros1Client, Ros2Client
 from fusesoc_firm.node.action_end import ActionEnd, GoalCounts, Put, Report, Ways
 from fusesoc_firm.node.action_server import Ros1Server, Ros2Server
 from fusesoc_firm.node.action_types import NodeAction
+from fusesoc_firm.node.calls import Start
 from fusesoc_firm.node.carrier import Answer, Answered, Call, Called, Carrier, Taken
 from fusesoc_firm.node.description import NodeDescription
 
 # s
 _TICK_SECONDS = 0.1
+_ACCEPT_SECONDS = 1.0
 # The ends by the version of ROS and whether the hardware is the server.
 _ENDS: Mapping[tuple[int, bool], type[Ros1Server | Ros2Server | Ros1Client | Ros2Client]] = {
     (1, True): Ros1Server,
@@ -26,10 +29,10 @@ _ENDS: Mapping[tuple[int, bool], type[Ros1Server | Ros2Server | Ros1Client | Ros
 class NodeActions:
     """The goals of all actions of a node, between carriers and hardware; any thread may call the methods."""
 
-    def __init__(self, description: NodeDescription, put: Put, report: Report) -> None:
+    def __init__(self, description: NodeDescription, put: Put, report: Report, start: Start) -> None:
         self.counts = {action.block: GoalCounts() for action in description.actions}
         self._ends = [
-            _ENDS[action.ros, action.is_server](action, self.counts[action.block], put, report)
+            _ENDS[action.ros, action.is_server](action, self.counts[action.block], put, report, start)
             for action in description.actions
         ]
         # The numbers of the actions' topics and services follow those of the others.
@@ -38,6 +41,7 @@ class NodeActions:
         self._first_topic, self._first_service = len(description.subscribers), len(description.services)
         self._first_published = len(description.publishers)
         self._has_ended = threading.Event()
+        self._start = start
 
     def start(self, carriers: Mapping[int, Carrier]) -> None:
         """Begin to exchange goals; `carriers` are those of `Node.run`."""
@@ -48,7 +52,7 @@ class NodeActions:
             published += len(end.action.publishers)
             service += len(end.action.services)
         if self._ends:
-            threading.Thread(target=self._tick, daemon=True).start()
+            self._start(self._tick)
 
     def taken(self, event: Taken) -> bool:
         """Take a message from ROS, if it belongs to an action; return whether it does."""
@@ -98,10 +102,16 @@ class NodeActions:
         """Whether no goal has to be waited for before the node ends."""
         return all(end.is_idle for end in self._ends)
 
-    def give_up(self) -> None:
-        """Cancel the goals of the hardware at their servers, since the node ends; ROS still takes messages."""
+    def give_up(self, seconds: float) -> None:
+        """Cancel the goals of the hardware at their servers, since the node ends; ROS still takes messages.
+
+        Servers of ROS 2 have to accept a goal before that; this is waited for, but not for longer than some seconds.
+        """
         for end in self._ends:
             end.give_up()
+        latest = time.monotonic() + min(seconds, _ACCEPT_SECONDS)
+        for end in self._ends:
+            end.wait_until_canceled(latest - time.monotonic())
 
     def close(self) -> None:
         """Let all goals fail that have not ended."""

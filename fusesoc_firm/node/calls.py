@@ -18,10 +18,15 @@ from fusesoc_firm.node.carrier import Answer, Answered, Call, Called, Carrier
 from fusesoc_firm.node.queues import ClosedError
 from fusesoc_firm.node.services import NodeService
 
+# Starts a thread; an exception in it ends the node's run.
+Start = Callable[[Callable[[], None]], threading.Thread]
+
 # Calls of one service that may wait; a further call fails.
 MOST_WAITING = 1000
 # s; short time limits are exceeded by busy hosts.
 LEAST_WAIT = 2.0
+
+_ENDED = Answer(reason="the node ends")
 
 
 @dataclass
@@ -40,6 +45,9 @@ class CallLine:
     An answer that does not tell its call and comes late would be taken for that of the next call. Therefore, if a call
     is not answered in time, or if more may follow its answer, the next call waits until something follows or until
     `rest`, but for another `limit` seconds at most, or for `LEAST_WAIT` seconds if this is longer.
+
+    The hardware receives the answers to its calls in their order, and from the line's thread: the thread that receives
+    calls from the hardware must not wait until the hardware takes an answer.
     """
 
     def __init__(
@@ -47,36 +55,40 @@ class CallLine:
         limit: float,
         hand_over: Callable[[Call], None],
         answer: Callable[[Call, Answer], None],
+        start: Start,
         *,
-        has_numbers: bool,
+        from_hardware: bool,
     ) -> None:
         """Create a line that answers each call once, by `answer`; `hand_over` may raise `ClosedError`.
 
-        With `has_numbers`, each answer tells its call.
+        Calls of the hardware (`from_hardware`) have answers that tell their call.
         """
         self._limit = limit
         self._hand_over = hand_over
         self._give = answer
-        self._has_numbers = has_numbers
-        self._waiting: deque[Call] = deque()
+        self._from_hardware = from_hardware
+        # Calls, with the answers to those that are refused.
+        self._waiting: deque[tuple[Call, Answer | None]] = deque()
         self._held: Call | None = None
         self._answer: Answer | None = None
         self._is_final = self._is_late = False
-        self._is_closed = False
+        self._is_closed = self._has_ended = False
         self._is_extended = False
         self._changed = threading.Condition()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+        self._thread = start(self._run)
 
     def put(self, call: Call) -> None:
         """Add a call; it fails if too many calls wait, or if the line is closed."""
+        refusal = Answer(reason="too many calls wait, or the node ends")
         with self._changed:
-            is_taken = not self._is_closed and len(self._waiting) < MOST_WAITING
-            if is_taken:
-                self._waiting.append(call)
+            is_refused = self._is_closed or len(self._waiting) >= MOST_WAITING
+            # A call of the hardware that is refused keeps its turn.
+            has_turn = not is_refused or (self._from_hardware and not self._has_ended)
+            if has_turn:
+                self._waiting.append((call, refusal if is_refused else None))
                 self._changed.notify_all()
-        if not is_taken:
-            self._give(call, Answer(reason="too many calls wait, or the node ends"))
+        if not has_turn:
+            self._give(call, refusal)
 
     def settle(self, answer: Answer, number: int | None = None, *, is_final: bool = True) -> bool:
         """Answer the call that is under way, if it has this `number`; return whether there is such a call.
@@ -118,32 +130,37 @@ class CallLine:
         self._thread.join()
 
     def _run(self) -> None:
-        ended = Answer(reason="the node ends")
-        while call := self._next():
+        while waiting := self._next():
+            call, refusal = waiting
+            if refusal:
+                self._give(call, refusal)
+                continue
             try:
                 self._hand_over(call)
             except ClosedError:
-                self._give(call, ended)
-                break
+                with self._changed:
+                    self._is_closed = True
             answer = self._wait()
-            self._give(call, answer or (ended if self._is_closed else self._no_answer()))
+            self._give(call, answer or (_ENDED if self._is_closed else self._no_answer()))
             self._wait_for_late()
-        for call in self._rest():
-            self._give(call, ended)
 
     def _no_answer(self) -> Answer:
         return Answer(reason=f"no answer within {self._limit:g} s")
 
-    def _next(self) -> Call | None:
-        """Return the next call, or None if the line is closed."""
+    def _next(self) -> tuple[Call, Answer | None] | None:
+        """Return the next call, and its answer if it is refused, or None if the line is closed and empty."""
         with self._changed:
             self._held = self._answer = None
             self._is_late = False
             self._changed.wait_for(lambda: self._is_closed or self._waiting)
-            if self._is_closed:
+            if not self._waiting:
+                self._has_ended = True
                 return None
-            self._held = self._waiting.popleft()
-            return self._held
+            call, refusal = self._waiting.popleft()
+            if self._is_closed:
+                return call, refusal or _ENDED
+            self._held = call
+            return call, refusal
 
     def _wait(self) -> Answer | None:
         """Return the answer to the call under way, or None if it does not come in time or the line is closed."""
@@ -157,18 +174,10 @@ class CallLine:
     def _wait_for_late(self) -> None:
         """Wait for what may follow from the hardware for the call under way."""
         with self._changed:
-            if self._has_numbers or (self._answer and self._is_final):
+            if self._from_hardware or (self._answer and self._is_final):
                 return
             self._answer, self._is_late = None, True
             self._changed.wait_for(lambda: self._is_closed or self._answer, max(self._limit, LEAST_WAIT))
-
-    def _rest(self) -> list[Call]:
-        with self._changed:
-            self._is_closed = True
-            self._held = None
-            rest = [*self._waiting]
-            self._waiting.clear()
-            return rest
 
 
 class NodeCalls:
@@ -179,12 +188,14 @@ class NodeCalls:
         services: Sequence[NodeService],
         put: Callable[[str, bytes], None],
         report: Callable[[str], None],
+        start: Start,
     ) -> None:
         """Prepare the calls; `put` sends a payload to a block of the hardware, and may raise `ClosedError`."""
         self.counts = {service.block: CallCounts() for service in services}
         self._services = services
         self._put = put
         self._report = report
+        self._start = start
         self._numbers = count()
         self._lines: list[CallLine] = []
         self._carriers: Mapping[int, Carrier] = {}
@@ -200,7 +211,8 @@ class NodeCalls:
                 service.time_limit,
                 partial(self._to_hardware if service.is_server else self._to_ros, number),
                 partial(self._answer_ros if service.is_server else self._answer_hardware, number),
-                has_numbers=not service.is_server,
+                self._start,
+                from_hardware=not service.is_server,
             )
             for number, service in enumerate(self._services)
         ]

@@ -4,12 +4,12 @@
     node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails permanently
 
 A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next; the
-two subscribers of an action share one) and is sent as a frame. If no message waits and the hardware is ready, the
-thread that takes the message sends it. The response returns as bursts, which are joined. If software is part of the
-system, the thread that delivers a message calls the software's functions. While a function runs, the node takes no
-burst from the hardware; the hardware stalls as with any accelerator that is not ready. A function's output never waits
-for space in a queue, since this could cause a deadlock: if the output's queue to the hardware is full, a message is
-dropped and counted.
+two subscribers of an action share one, which loses only feedback) and is sent as a frame. If no message waits and the
+hardware is ready, the thread that takes the message sends it. The response returns as bursts, which are joined. If
+software is part of the system, the thread that delivers a message calls the software's functions. While a function
+runs, the node takes no burst from the hardware; the hardware stalls as with any accelerator that is not ready. A
+function's output never waits for space in a queue, since this could cause a deadlock: if the output's queue to the
+hardware is full, a message is dropped and counted.
 """
 
 from __future__ import annotations
@@ -133,8 +133,13 @@ class Node:
     ) -> None:
         """Open the transport. May raise `TransportError`."""
         self._report = _Reporter(settings.report)
-        self._calls = NodeCalls(description.services, self._put_service_message, self._report)
-        self._actions = NodeActions(description, self._put_service_message, self._report)
+        self._is_wanted_to_end = threading.Event()
+        self._drains = threading.Event()
+        self._is_over = threading.Event()
+        self._fault: BaseException | None = None
+        self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
+        self._calls = NodeCalls(description.services, self._put_service_message, self._report, self._start)
+        self._actions = NodeActions(description, self._put_service_message, self._report, self._start)
         self.statistics = Statistics.of(description, self._calls.counts, self._actions.counts)
         self._description = description
         self._open_transport = open_transport
@@ -145,23 +150,22 @@ class Node:
         self._watch = settings.watch
         self._inputs = description.inputs
         self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
-        # A result must not overtake feedback, nor a cancellation its goal.
-        pairs = [
-            (item.cancel, item.goal) if item.is_server else (item.result, item.feedback) for item in description.actions
-        ]
-        self._shared_queues = {self._numbers[second]: self._numbers[first] for second, first in pairs}
         self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
         self._subscriber_names, self._publisher_names = converter_names(description)
         self._status = StatusExchange(self._put_status_request) if description.has_status_frames else None
+        pairs = [
+            (item.goal, item.cancel) if item.is_server else (item.feedback, item.result) for item in description.actions
+        ]
+        # Of the messages of actions, only feedback may be lost.
+        kept = {block for pair in pairs for block in pair} - {item.feedback for item in description.actions}
         # The last queue is that of the status.
-        depths = [*(self._depth(item) for item in self._inputs), *([1] if self._status else [])]
+        depths = [None if item.block in kept else self._depth(item) for item in self._inputs]
+        depths += [1] if self._status else []
         self._queues: SubscriberQueues[_Message] = SubscriberQueues(len(depths), depths, overflow=settings.overflow)
+        for first, second in pairs:
+            # A result must not overtake feedback, nor a cancellation its goal.
+            self._queues.share(self._numbers[second], self._numbers[first])
         self._carriers: Mapping[int, Carrier] = {}
-        self._is_wanted_to_end = threading.Event()
-        self._drains = threading.Event()
-        self._is_over = threading.Event()
-        self._fault: BaseException | None = None
-        self._lock, self._restarting, self._sending = threading.RLock(), threading.Lock(), threading.Lock()
         self._offered = self._declined = self._handled = 0
         self._is_counted = False
         self._failed_restarts = 0
@@ -179,10 +183,6 @@ class Node:
             waiting = self._queues.waiting(number)
             found[item.block] = Load(waiting, self._depth(item), dropped, counts.refused, counts.lost)
         return found
-
-    def _queue_of(self, number: int) -> int:
-        """Return the number of the queue of an input."""
-        return self._shared_queues.get(number, number)
 
     def _depth(self, item: NodeTopic | Crossing) -> int:
         return self._settings.depth or (item.depth if isinstance(item, NodeTopic) else DEFAULT_DEPTH)
@@ -206,7 +206,7 @@ class Node:
         # Without one of its threads, the node cannot process what it has received.
         is_whole = self._fault is None or isinstance(self._fault, TransportError | CarrierError)
         latest = time.monotonic() + (self._settings.drain if is_whole else 0.0)
-        self._actions.give_up()
+        self._actions.give_up(_left(latest))
         for carrier in carriers.values():
             carrier.stop()
         for carrier in carriers.values():
@@ -364,10 +364,10 @@ class Node:
             counts.received += 1
             self._offered += 1
         if is_alone and self._software is None and self._hardware.transport.is_ready():
-            self._queues.pass_by(self._queue_of(number))
+            self._queues.pass_by(number)
             self._handle(number, message)
             return
-        is_there = self._queues.put(self._queue_of(number), message, timeout)
+        is_there = self._queues.put(number, message, timeout)
         if not is_there and self._settings.overflow is Overflow.BLOCK:
             # No other thread counts this message.
             with self._lock:

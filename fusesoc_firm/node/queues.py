@@ -128,26 +128,40 @@ class SubscriberQueues(Generic[Item]):
     def __init__(
         self,
         subscribers: int,
-        capacity: int | Sequence[int],
+        capacity: int | Sequence[int | None],
         policy: Policy | None = None,
         overflow: Overflow = Overflow.DROP_OLDEST,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         """Create queues; the default `policy` is least recently used; `clock` returns ns.
 
-        `capacity` is the number of frames in each queue, or the numbers of all queues.
+        `capacity` is the number of frames of each subscriber, or the numbers of all; None: no limit.
         """
-        capacities = [capacity] * subscribers if isinstance(capacity, int) else [*capacity]
-        if subscribers < 1 or len(capacities) != subscribers or min(capacities) < 1:
+        capacities: list[int | None] = [capacity] * subscribers if isinstance(capacity, int) else [*capacity]
+        if (
+            subscribers < 1
+            or len(capacities) != subscribers
+            or any(each is not None and each < 1 for each in capacities)
+        ):
             raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 or more")
         self._policy = policy or LeastRecentlyUsed(subscribers)
         self._capacities = capacities
         self._overflow = overflow
         self._clock = clock
-        self._queues: list[deque[tuple[int, Item]]] = [deque() for _ in range(subscribers)]
+        self._shared: dict[int, int] = {}
+        # Each item with its arrival and its subscriber.
+        self._queues: list[deque[tuple[int, int, Item]]] = [deque() for _ in range(subscribers)]
+        self._waiting = [0] * subscribers
         self._dropped = [0] * subscribers
         self._closed = False
         self._changed = Condition()
+
+    def share(self, subscriber: int, other: int) -> None:
+        """Let a subscriber's items wait in the queue of another one, so that they are read in the order of both.
+
+        Each of them keeps its own capacity. This is called before the first item.
+        """
+        self._shared[subscriber] = other
 
     def put(self, subscriber: int, item: Item, timeout: float | None = None) -> bool:
         """Add an item; return whether it is queued.
@@ -158,18 +172,20 @@ class SubscriberQueues(Generic[Item]):
         """
         if not 0 <= subscriber < len(self._queues):
             raise IndexError(f"subscriber is {subscriber}; legal: 0 to {len(self._queues) - 1}")
-        queue, capacity = self._queues[subscriber], self._capacities[subscriber]
+        queue, capacity = self._queues[self._queue_of(subscriber)], self._capacities[subscriber]
         with self._changed:
             if self._overflow is Overflow.BLOCK:
-                self._changed.wait_for(lambda: self._closed or len(queue) < capacity, timeout)
+                self._changed.wait_for(lambda: self._closed or self._waiting[subscriber] != capacity, timeout)
             if self._closed:
                 raise ClosedError("the queues are closed")
-            if len(queue) == capacity:
+            if self._waiting[subscriber] == capacity:
                 self._dropped[subscriber] += self._overflow is not Overflow.BLOCK
                 if self._overflow is not Overflow.DROP_OLDEST:
                     return False
-                queue.popleft()
-            queue.append((self._clock(), item))
+                del queue[next(place for place, (_, owner, _) in enumerate(queue) if owner == subscriber)]
+                self._waiting[subscriber] -= 1
+            queue.append((self._clock(), subscriber, item))
+            self._waiting[subscriber] += 1
             self._changed.notify_all()
             return True
 
@@ -185,9 +201,10 @@ class SubscriberQueues(Generic[Item]):
                 if self._closed:
                     raise ClosedError("the queues are closed and empty")
                 raise EmptyError(f"no frame arrived in {timeout} s")
-            subscriber = min(waiting, key=lambda index: self._policy.key(index, self._queues[index][0][0]))
-            _, item = self._queues[subscriber].popleft()
-            self._policy.served(subscriber)
+            served = min(waiting, key=lambda index: self._policy.key(index, self._queues[index][0][0]))
+            _, subscriber, item = self._queues[served].popleft()
+            self._waiting[subscriber] -= 1
+            self._policy.served(served)
             self._changed.notify_all()
             return subscriber, item
 
@@ -209,18 +226,22 @@ class SubscriberQueues(Generic[Item]):
     def pass_by(self, subscriber: int) -> None:
         """Record that an item of a subscriber was served without a queue."""
         with self._changed:
-            self._policy.served(subscriber)
+            self._policy.served(self._queue_of(subscriber))
 
-    def dropped_by_first(self, queues: int) -> int:
-        """Return the number of items that the first queues have dropped together."""
+    def dropped_by_first(self, subscribers: int) -> int:
+        """Return the number of items of the first subscribers that were dropped together."""
         with self._changed:
-            return sum(self._dropped[:queues])
+            return sum(self._dropped[:subscribers])
 
     def waiting(self, subscriber: int) -> int:
-        """Return the number of items in a subscriber's queue."""
-        return len(self._queues[subscriber])
+        """Return the number of a subscriber's items that wait."""
+        with self._changed:
+            return self._waiting[subscriber]
 
     def dropped(self, subscriber: int) -> int:
-        """Return the number of items that a subscriber's queue has dropped."""
+        """Return the number of a subscriber's items that were dropped."""
         with self._changed:
             return self._dropped[subscriber]
+
+    def _queue_of(self, subscriber: int) -> int:
+        return self._shared.get(subscriber, subscriber)

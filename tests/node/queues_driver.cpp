@@ -1,5 +1,6 @@
 // Speaks for firm/queues.hpp. `queues POLICY OVERFLOW CAPACITY SUBSCRIBERS DEADLINE... TRANSFER...`, then a line for each
 // `put SUBSCRIBER TIME`, `get` and `close`; each line of input gives one of output. An item is its number.
+// `shared OVERFLOW CAPACITY` makes queues of three subscribers; number 1 shares the queue of number 0, and has no limit.
 // With an argument, threads write and read instead: every item must come once, and in order.
 #include <firm/queues.hpp>
 
@@ -10,6 +11,22 @@
 using Queues = firm::SubscriberQueues<int>;
 
 static std::int64_t now = 0;
+
+static firm::Overflow overflow_of(const std::string& word) {
+  return word == "drop_oldest"   ? firm::Overflow::kDropOldest
+         : word == "drop_newest" ? firm::Overflow::kDropNewest
+                                 : firm::Overflow::kBlock;
+}
+
+static std::unique_ptr<Queues> make_shared(std::istringstream& words) {
+  std::string overflow;
+  std::size_t capacity;
+  words >> overflow >> capacity;
+  const std::vector<std::size_t> capacities{capacity, firm::kUnlimitedDepth, capacity};
+  auto queues = std::make_unique<Queues>(capacities, nullptr, overflow_of(overflow), [] { return now; });
+  queues->share(1, 0);
+  return queues;
+}
 
 static std::unique_ptr<Queues> make(std::istringstream& words) {
   std::string policy, overflow;
@@ -23,10 +40,7 @@ static std::unique_ptr<Queues> make(std::istringstream& words) {
   if (policy == "round_robin") chosen = std::make_unique<firm::RoundRobin>(subscribers);
   if (policy == "edf") chosen = std::make_unique<firm::EarliestDeadlineFirst>(deadlines);
   if (policy == "lst") chosen = std::make_unique<firm::LeastSlackTime>(deadlines, transfers);
-  const auto rule = overflow == "drop_oldest"   ? firm::Overflow::kDropOldest
-                    : overflow == "drop_newest" ? firm::Overflow::kDropNewest
-                                                : firm::Overflow::kBlock;
-  return std::make_unique<Queues>(subscribers, capacity, std::move(chosen), rule, [] { return now; });
+  return std::make_unique<Queues>(subscribers, capacity, std::move(chosen), overflow_of(overflow), [] { return now; });
 }
 
 static void answer(Queues& queues, std::istringstream& words, const std::string& command, int number) {
@@ -97,8 +111,8 @@ int main(int count, char**) {
     std::istringstream words(line);
     words >> command;
     try {
-      if (command == "queues") {
-        queues = make(words);
+      if (command == "queues" || command == "shared") {
+        queues = command == "queues" ? make(words) : make_shared(words);
         std::cout << "ready\n";
       } else {
         answer(*queues, words, command, number);

@@ -6,6 +6,7 @@ import random
 import re
 import struct
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from fusesoc_firm.node.carrier import Answer, Call
 from fusesoc_firm.node.description import describe
 from fusesoc_firm.node.node import HardwareListener, NodeSettings
 from fusesoc_firm.node.python_node import python_node
+from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from tests.node.fake_node import FakeHardware, Run, until
@@ -252,6 +254,31 @@ def test_a_result_does_not_overtake_feedback(tmp_path: Path) -> None:
     assert [item for item, _ in server.received()] == [1, 1, 1, 1, 1, 2]
 
 
+@pytest.mark.parametrize("overflow", Overflow)
+def test_a_full_queue_loses_no_result(peer: Make, overflow: Overflow) -> None:
+    """The hardware takes nothing while feedback of three goals comes; only feedback is lost, and counted as its own."""
+    server = peer(NodeSettings(depth=2, overflow=overflow))
+    gate = threading.Event()
+    for number in range(3):
+        server.order(number)
+    for number in range(3):
+        identity = server.accept(number)
+        assert server.asker.hardware
+        server.asker.hardware._gate = gate
+        for step in range(0 if overflow is Overflow.BLOCK else 4):
+            server.feed(identity, step)
+        server.finish(identity, SUCCEEDED[server.version], number, number)
+    until(lambda: server.run.node.statistics.actions["count"].succeeded == 3)
+    gate.set()
+    until(lambda: len(server.results()) == 3)
+    server.run.stop()
+    assert server.results() == [(SUCCEEDED[server.version], number) for number in range(3)]
+    inputs = server.run.node.statistics.inputs
+    (action,) = server.description.actions
+    assert inputs[action.result].dropped == 0
+    assert (inputs[action.feedback].dropped > 0) == (overflow is not Overflow.BLOCK)
+
+
 def test_hardware_cancels_its_goal(peer: Make) -> None:
     """Without an id or with that of the goal; another id has no effect."""
     server = peer()
@@ -403,15 +430,23 @@ def test_a_server_that_does_not_know_a_goal_loses_it(tmp_path: Path) -> None:
     assert "a goal of 'count' is lost: the server does not know it" in server.run.reports
 
 
-def test_a_goal_that_is_accepted_late_is_canceled(tmp_path: Path) -> None:
+def test_goals_that_are_accepted_late_are_canceled(tmp_path: Path) -> None:
+    """Each of them, in any order, also if others have followed."""
     server = Peer(tmp_path, 2, time_limit=0.2)
-    server.order(4)
-    identity = server.goal()
-    until(server.results)
-    server.accept()
-    until(lambda: len(server.canceled()) == 2)
+    identities = []
+    for number in range(3):
+        server.order(number)
+        identities.append(server.goal(number))
+        until(lambda: len(server.results()) == number + 1)  # noqa: B023
+    server.order(3)
+    server.goal(3)
+    for number in (1, 0):
+        server.accept(number)
+    server.accept(2, is_accepted=False)
+    until(lambda: len(server.canceled()) >= 5)
     server.run.stop()
-    assert server.canceled() == [server.cancellation(identity)] * 2
+    late = [server.canceled().count(server.cancellation(identity)) for identity in identities]
+    assert late == [2, 2, 1]
 
 
 def test_restarted_hardware_gets_no_result_of_goals_before(peer: Make) -> None:
@@ -424,6 +459,7 @@ def test_restarted_hardware_gets_no_result_of_goals_before(peer: Make) -> None:
     assert server.asker.hardware
     server.asker.hardware.close()
     until(lambda: server.canceled() == [server.cancellation(identity)])
+    server.feed(identity, 2)
     server.finish(identity, CANCELED[server.version], 4)
     until(lambda: server.run.node.statistics.actions["count"].canceled == 2)
     server.order(6)
@@ -431,6 +467,8 @@ def test_restarted_hardware_gets_no_result_of_goals_before(peer: Make) -> None:
     server.finish(third, SUCCEEDED[server.version], 6, 1)
     until(lambda: server.results() == [(SUCCEEDED[server.version], 6)])
     server.run.stop()
+    # The hardware that was restarted receives nothing of the goals before.
+    assert [item for item, _ in server.received()] == [2]
 
 
 def test_goals_are_canceled_when_the_node_ends(peer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -454,16 +492,121 @@ def test_goals_are_canceled_when_the_node_ends(peer: Make, monkeypatch: pytest.M
     assert server.run.is_complete
 
 
+def test_a_goal_that_is_not_accepted_yet_is_canceled_when_the_node_ends(
+    peer: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While ROS still takes messages. In ROS 2, its server has to accept it before."""
+    server = peer()
+    canceled: list[list[bytes]] = []
+
+    def stop() -> None:
+        canceled.append(server.canceled())
+        stop_carrier()
+
+    stop_carrier = server.run.carrier.stop
+    monkeypatch.setattr(server.run.carrier, "stop", stop)
+    server.order(4)
+    identity = server.goal()
+    server.run.node.stop()
+    if server.version == 2:
+        until(lambda: server.run.node._actions._ends[0]._is_ending)  # type: ignore[union-attr]
+        server.accept()
+    server.run.wait()
+    assert canceled == [[server.cancellation(identity)]]
+
+
+def test_a_server_that_does_not_answer_does_not_hold_the_end(tmp_path: Path) -> None:
+    server = Peer(tmp_path, 2)
+    server.order(4)
+    server.goal()
+    server.run.stop()
+    assert server.run.is_complete
+
+
+def test_goals_until_a_time_are_canceled(peer: Make) -> None:
+    """Those of which the node has learned before; the goals of the hardware may lack ids and times."""
+    server = peer()
+    server.order(1)
+    first = server.accept()
+    seconds = int(time.time()) + 1
+    until(lambda: time.time() > seconds + 0.1)
+    server.order(2)
+    until(lambda: server.run.node.statistics.actions["count"].goals == 2)
+    stamp = struct.pack("<II", seconds, 0)
+    server.asker.send(1, stamp + bytes(4) if server.version == 1 else b"\0\1\0\0" + bytes(16) + stamp)
+    until(lambda: server.canceled() == [server.cancellation(first)])
+    server.finish(first, CANCELED[server.version], 1)
+    second = server.accept(1)
+    server.finish(second, SUCCEEDED[server.version], 2, 1)
+    until(lambda: len(server.results()) == 2)
+    server.run.stop()
+    assert server.results() == [(CANCELED[server.version], 1), (SUCCEEDED[server.version], 2)]
+
+
+def test_a_result_after_the_time_limit_does_not_change_the_state(peer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread that takes it has found the goal before; it goes on while the lost goal is being reported."""
+    server = peer(time_limit=0.2)
+    end: Any = server.run.node._actions._ends[0]
+    report = server.run.reports.append
+    state = SUCCEEDED[server.version]
+    found: list[Any] = []
+
+    def late(text: str) -> None:
+        report(text)
+        (goal,) = found
+        if server.version == 1:
+            payload = server._told(server.result_frame, goal.sent.id, {"result": 5}, state)
+        else:
+            payload = filled(server.result_frame, {"status": state, "result": {"sequence": [5]}})
+        end._finish(goal, payload)
+
+    def begun(goal: Any) -> None:
+        found.append(goal)
+        begin(goal)
+
+    begin = end._begin
+    monkeypatch.setattr(end, "_begin", begun)
+    monkeypatch.setattr(end, "_report", late)
+    server.order(4)
+    server.accept()
+    until(server.results)
+    server.run.stop()
+    assert server.results() == [(LOST[server.version], 0 if server.version == 1 else None)]
+    counts = server.run.node.statistics.actions["count"]
+    assert (counts.lost, counts.succeeded) == (1, 0)
+
+
 def test_too_many_goals_are_lost(peer: Make) -> None:
+    """Their results come in their turn."""
     server = peer()
     for number in range(MOST_WAITING + 2):
         server.order(number)
     identity = server.accept()
-    until(lambda: server.run.node.statistics.actions["count"].lost == 1)
-    assert server.results() == [(LOST[server.version], 0 if server.version == 1 else None)]
-    assert server.canceled() == []
-    assert server.goal() == identity
+    until(lambda: server.run.node.statistics.actions["count"].goals == MOST_WAITING + 2)
+    assert server.results() == []
+    server.order_cancel()
+    server.finish(identity, SUCCEEDED[server.version], 5)
+    until(lambda: len(server.results()) == MOST_WAITING + 2)
     server.run.stop()
+    nothing = 0 if server.version == 1 else None
+    recalled = [(RECALLED[server.version], nothing)] * MOST_WAITING
+    assert server.results() == [(SUCCEEDED[server.version], 5), *recalled, (LOST[server.version], nothing)]
+    assert server.run.node.statistics.actions["count"].lost == 1
+
+
+@pytest.mark.parametrize("place", ["tick", "line"])
+def test_a_fault_in_a_thread_of_an_action_ends_the_run(peer: Make, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    fault = RuntimeError("a fault")
+
+    def fail(*_: object) -> None:
+        raise fault
+
+    server = peer()
+    end = server.run.node._actions._ends[0]
+    monkeypatch.setattr(end, *(("tick", fail) if place == "tick" else ("_begin", fail)))
+    server.order(4)
+    server.run.wait()
+    assert server.run.error is fault
 
 
 def test_broken_messages_harm_nobody(peer: Make) -> None:

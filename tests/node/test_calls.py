@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,12 @@ def description(limit: float = 30.0, **changes: Any) -> NodeDescription:
     """The node of the service, with another time limit in s."""
     (service,) = DESCRIPTION.services
     return replace(DESCRIPTION, services=(replace(service, time_limit=limit, **changes),))
+
+
+def started(work: Callable[[], None]) -> threading.Thread:
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    return thread
 
 
 class Server:
@@ -134,7 +141,8 @@ def test_a_late_answer_is_nobody_elses() -> None:
         0.05,
         lambda call: handed.append(call.number),
         lambda call, answer: given.append((call.number, answer)),
-        has_numbers=False,
+        started,
+        from_hardware=False,
     )
     line.put(Call(0, b""))
     line.put(Call(1, b""))
@@ -161,7 +169,11 @@ def test_calls_fail_when_the_node_ends_and_when_too_many_wait() -> None:
     gate = threading.Event()
     given: list[tuple[int, str]] = []
     line = CallLine(
-        60, lambda _: gate.set(), lambda call, answer: given.append((call.number, answer.reason)), has_numbers=False
+        60,
+        lambda _: gate.set(),
+        lambda call, answer: given.append((call.number, answer.reason)),
+        started,
+        from_hardware=False,
     )
     line.put(Call(0, b""))
     gate.wait()
@@ -172,6 +184,36 @@ def test_calls_fail_when_the_node_ends_and_when_too_many_wait() -> None:
     assert sorted(number for number, _ in given) == [*range(MOST_WAITING + 2)]
     line.put(Call(9999, b""))
     assert given[-1][0] == 9999
+
+
+def test_calls_of_hardware_that_are_refused_wait_for_their_turn() -> None:
+    """The thread that receives from the hardware does not send answers to it, also while the node ends."""
+    gate, begun = threading.Event(), threading.Event()
+    given: list[tuple[int, bytes | None]] = []
+    answering: set[threading.Thread] = set()
+
+    def hand_over(call: Call) -> None:
+        begun.set()
+        gate.wait()
+        line.settle(Answer(b"%d" % call.number), call.number)
+
+    def answer(call: Call, found: Answer) -> None:
+        answering.add(threading.current_thread())
+        given.append((call.number, found.payload))
+
+    line = CallLine(60, hand_over, answer, started, from_hardware=True)
+    line.put(Call(0, b""))
+    begun.wait()
+    for number in range(1, MOST_WAITING + 3):
+        line.put(Call(number, b""))
+    assert given == []
+    gate.set()
+    until(lambda: len(given) == MOST_WAITING + 3)
+    assert given == [(number, b"%d" % number if number <= MOST_WAITING else None) for number in range(MOST_WAITING + 3)]
+    assert threading.current_thread() not in answering
+    line.close()
+    line.put(Call(9999, b""))
+    assert given[-1] == (9999, None)
 
 
 def test_calls_in_hardware_that_is_restarted_fail() -> None:

@@ -257,6 +257,29 @@ def test_illegal_numbers_are_named() -> None:
         LeastSlackTime([1, 2], [1])
 
 
+SHARED = ["put 0 1", "put 1 2", "put 1 3", "put 0 4", "put 0 5", "put 2 6", "get", "get", "get", "get", "get", "get"]
+
+
+@pytest.mark.parametrize(
+    ("overflow", "puts", "gets"),
+    [
+        ("drop_oldest", ["kept 0"] * 4 + ["kept 1", "kept 0"], ["1 2", "2 6", "1 3", "0 4", "0 5", "empty"]),
+        ("drop_newest", ["kept 0"] * 4 + ["refused 1", "kept 0"], ["0 1", "2 6", "1 2", "1 3", "0 4", "empty"]),
+        ("block", ["kept 0"] * 4 + ["refused 0", "kept 0"], ["0 1", "2 6", "1 2", "1 3", "0 4", "empty"]),
+    ],
+)
+def test_subscribers_that_share_a_queue_have_a_capacity_each(
+    driver: Driver, overflow: str, puts: list[str], gets: list[str]
+) -> None:
+    """Subscriber 1 shares the queue of 0, and loses nothing."""
+    assert driver.answers([f"shared {overflow} 2", *SHARED]) == ["ready", *puts, *gets]
+    player = Player(["lru", overflow, "2", "3", *["0"] * 6])
+    player.queues = SubscriberQueues(3, [2, None, 2], None, Overflow(overflow), lambda: player.now)
+    player.queues.share(1, 0)
+    lines = [(number, line.split()) for number, line in enumerate(SHARED, 1)]
+    assert [player.answer(number, words[0], words[1:]) for number, words in lines] == [*puts, *gets]
+
+
 def test_drops_of_the_first_queues_are_counted_without_those_of_others() -> None:
     """A node's last queue is that of the status, whose requests are not messages."""
     queues: SubscriberQueues[int] = SubscriberQueues(3, 1)

@@ -25,13 +25,19 @@ HELD = 0x70
 class Kind(IntEnum):
     """The upper bits of a goal, if they are not 0.
 
-    It is rejected; after feedback, it is aborted with the result 7, kills the server, or waits for a cancellation.
+    It is rejected; after feedback, it is aborted with the result 7, kills the server, or waits for a cancellation; in
+    ROS 2, it is accepted late, and waits for a cancellation.
     """
 
     REJECTED = 1
     ABORTED = 2
     DEADLY = 3
     WAITING = 4
+    LATE = 5
+
+
+# s; a time limit is shorter.
+LATE_SECONDS = 3
 
 
 def say(goal: int, state: str) -> None:
@@ -41,7 +47,7 @@ def say(goal: int, state: str) -> None:
 def pursue(goal: int, feed: Callable[[int], None], is_canceled: Callable[[], bool]) -> tuple[str, int]:
     """The word of the state, and the number of the result."""
     kind = goal >> 20
-    is_held = goal & HELD == HELD or kind == Kind.WAITING
+    is_held = goal & HELD == HELD or kind in (Kind.WAITING, Kind.LATE)
     for step in range(1, (1 if kind or is_held else goal % 4) + 1):
         feed(goal + step)
     if kind == Kind.DEADLY:
@@ -134,6 +140,8 @@ def ros2(action: str) -> None:
         if request.order >> 20 == Kind.REJECTED:
             say(request.order, "REJECTED")
             return GoalResponse.REJECT
+        if request.order >> 20 == Kind.LATE:
+            time.sleep(LATE_SECONDS)
         return GoalResponse.ACCEPT
 
     def run(handle: Any) -> Any:

@@ -234,3 +234,23 @@ def test_a_node_that_ends_cancels_its_goal(place: Planner, language: str) -> Non
         assert hardware.told() == (order, FEEDBACK, order + 1)
         assert node.stop() == 0, node.said()
         assert json.loads(server.line()) == [order, "CANCELED"]
+
+
+@pytest.mark.parametrize("language", ["python", "cpp"])
+def test_goals_that_are_accepted_late_are_canceled(place: Planner, language: str) -> None:
+    """Each of them, although others have followed."""
+    if place.version == 1:
+        pytest.skip("actionlib cancels goals before they are accepted")
+    orders = [(Kind.LATE << 20) + number for number in range(2)]
+    with place.server() as server, place.node(language, "1 s") as (node, hardware):
+        # The server has to be found before.
+        found = None
+        while found != (4, SUCCEEDED[2], 4):
+            hardware.send(4)
+            found = hardware.until_result()[1]
+        hardware.send(*orders)
+        assert [hardware.until_result() for _ in orders] == [([], (order, LOST[2], 0)) for order in orders]
+        ended: set[tuple[int, str]] = set()
+        while not ended >= {(order, "CANCELED") for order in orders}:
+            ended.add(tuple(json.loads(server.line())))
+        assert node.stop() == 0, node.said()

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import functools
 import time
+from collections import defaultdict, deque
+from contextlib import suppress
 from typing import Any
 
 from .channel import DIAGNOSTICS, DONE, STOP, Channel
 from .managed import managed_node, waiting_group
 from .ros import FLUSH_SECONDS, KINDS, LOOK_SECONDS, BridgeError, Ends, Gaps, Ros, type_report
 from .ros2_types import SERVICE_DEPTH, message_class, service_class
+
+# The calls of a service that may be answered late.
+_MOST_PENDING = 100
 
 
 class Ros2(Ros):
@@ -31,9 +36,10 @@ class Ros2(Ros):
         self._executor.add_node(self._node)
         # The number of callbacks so far.
         self._handled = 0
-        # The functions that send responses, and the futures of calls by the hardware, by service.
+        # The functions that send responses, by service.
         self._senders: dict[int, Any] = {}
-        self._called: dict[int, tuple[Any, ...]] = {}
+        # The futures of the latest calls by the hardware, by service: goals may be accepted late.
+        self._called: dict[int, deque[Any]] = defaultdict(deque)
         self._stops_at: float | None = None
         self._looks_at = 0.0
         self._ends = Ends()
@@ -142,20 +148,22 @@ class Ros2(Ros):
         if not client.service_is_ready():
             self.give_answer(service, number, None, f"there is no server of {client.srv_name}")
             return
-        # The engine no longer waits for an earlier call.
-        for earlier in self._called.pop(service, ()):
-            client.remove_pending_request(earlier)
         try:
             future = client.call_async(deserialize_message(payload, client.srv_type.Request))
         except Exception as error:  # noqa: BLE001 - the request is malformed
             self.give_answer(service, number, None, str(error))
             return
-        self._called[service] = (future,)
+        called = self._called[service]
+        called.append(future)
+        if len(called) > _MOST_PENDING:
+            client.remove_pending_request(called.popleft())
         future.add_done_callback(functools.partial(self._called_back, service, number))
 
     def _called_back(self, service: int, number: int, future: Any) -> None:
         from rclpy.serialization import serialize_message
 
+        with suppress(ValueError):
+            self._called[service].remove(future)
         if not future.cancelled():
             self.give_answer(service, number, serialize_message(future.result()))
 

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -32,12 +33,13 @@ namespace firm {
 class ActionClient {
  public:
   // `is_first`: the action is one of ROS 1.
-  ActionClient(const Action& action, bool is_first, PutPayload put)
+  ActionClient(const Action& action, bool is_first, PutPayload put, FaultHandler on_fault)
       : action_(action),
         is_first_(is_first),
         put_(std::move(put)),
         line_(action.limit, true,
-              [this](const Bytes& key, std::uint64_t number) { hand_over(key_of(key), number); }) {}
+              [this](const Bytes& key, std::uint64_t number) { hand_over(key_of(key), number); },
+              std::move(on_fault)) {}
 
   ActionClient(const ActionClient&) = delete;
   ActionClient& operator=(const ActionClient&) = delete;
@@ -103,7 +105,7 @@ class ActionClient {
     const std::lock_guard<std::mutex> sending(sending_);
     const bool is_current = [&] {
       const Lock lock(mutex_);
-      return goal == current_;
+      return goal == current_ && !goal->is_forgotten;
     }();
     if (is_current) send(action_.feedback, renamed);
   }
@@ -126,6 +128,15 @@ class ActionClient {
     const Lock lock(mutex_);
     is_ending_ = true;
     cancel({});
+    // A server of actionlib keeps the cancellation of a goal that has not arrived.
+    const bool was_published = is_first_ && current_ && current_->tried != Time{};
+    if (was_published && !current_->cancel_was_sent) give_up(current_);
+  }
+
+  // Wait for the answer of a server of ROS 2 that has a goal and may not have accepted it yet, until this time.
+  void wait_until_canceled(std::chrono::steady_clock::time_point latest) {
+    std::unique_lock<std::recursive_mutex> lock(mutex_);
+    progress_.wait_until(lock, latest, [this] { return !current_ || !is_being_sent(*current_); });
   }
 
   // Let all goals end.
@@ -167,9 +178,13 @@ class ActionClient {
     bool is_canceled = false;
     bool cancel_was_sent = false;
     bool is_forgotten = false;
+    bool has_ended = false;
     Time tried{};
     std::string fault;
     std::map<std::size_t, Request> requests;
+
+    // As cancellations of the hardware mean it; without a time of its own, that of its arrival counts.
+    GoalReference named() const { return {own.id, own.stamp.is_zero() ? sent.stamp : own.stamp}; }
   };
   using GoalPointer = std::shared_ptr<Goal>;
 
@@ -205,9 +220,8 @@ class ActionClient {
         begin(goal);
         return;
       }
-      goal->state = GoalState::kCanceled;
+      settle(*goal, GoalState::kCanceled);
     }
-    line_.settle({Bytes{}}, number);
   }
 
   // Return the goal of the hardware that feedback or a result of ROS 1 concerns; others belong to other clients.
@@ -227,10 +241,13 @@ class ActionClient {
   }
 
   // Take the result for the hardware. Throws MessageError.
-  void finish(Goal& goal, const Bytes& payload) {
+  void finish(Goal& goal, const Bytes& payload) { settle(goal, messages().state(payload), payload); }
+
+  // Let a goal end with a state, unless it has ended; without a payload, the node makes the result.
+  void settle(Goal& goal, GoalState state, const Bytes& payload = {}) {
     const Lock lock(mutex_);
-    goal.state = messages().state(payload);
-    line_.settle({payload}, goal.number);
+    // The line hands the goal back when the mutex is free.
+    if (!goal.has_ended && line_.settle({payload}, goal.number)) goal.state = state;
   }
 
   void handed_back(std::uint64_t key, const Answer& answer) {
@@ -240,6 +257,8 @@ class ActionClient {
       const Lock lock(mutex_);
       goal = goals_.at(key);
       goals_.erase(key);
+      goal->has_ended = true;
+      progress_.notify_all();
       if (current_ == goal) current_ = nullptr;
       const std::string reason = goal->fault.empty() ? answer.reason : answer.reason + ": " + goal->fault;
       if (!answer.payload) {
@@ -272,7 +291,7 @@ class ActionClient {
   void cancel(const GoalReference& wanted) {
     const Lock lock(mutex_);
     for (const auto& [key, goal] : goals_) {
-      if (goal->is_canceled || !wanted.means(goal->own)) continue;
+      if (goal->is_canceled || !wanted.means(goal->named())) continue;
       goal->is_canceled = true;
       if (goal != current_) continue;
       // The server has not been silent about a cancellation that it does not have yet.
@@ -309,6 +328,12 @@ class ActionClient {
     if (is_first_ ? goal->is_known : goal->requests.count(Action::kGetResult) > 0) give_up(goal);
   }
 
+  // Return whether an answer has to come before the goal can be canceled.
+  static bool is_being_sent(const Goal& goal) {
+    const auto send = goal.requests.find(Action::kSendGoal);
+    return send != goal.requests.end() && !send->second.again && goal.requests.count(Action::kGetResult) == 0;
+  }
+
   void give_up(const GoalPointer& goal) {
     goal->cancel_was_sent = true;
     // Without a time, which would mean all goals before.
@@ -341,6 +366,7 @@ class ActionClient {
 
   void answered(const GoalPointer& goal, std::size_t service, std::uint64_t number, const Answer& answer) {
     const Lock lock(mutex_);
+    progress_.notify_all();
     Request& made = goal->requests[service];
     if (made.number != number) return;
     try {
@@ -366,8 +392,7 @@ class ActionClient {
         request(goal, Action::kGetResult, Ros2ActionMessages::request(goal->sent));
         if (goal->is_canceled) cancel_current(goal);
       } else {
-        goal->state = GoalState::kRejected;
-        line_.settle({Bytes{}}, goal->number);
+        settle(*goal, GoalState::kRejected);
       }
     } else if (service == Action::kGetResult) {
       if (Ros2ActionMessages::is_unknown(payload)) {
@@ -401,6 +426,7 @@ class ActionClient {
   Time heard_{};  // the last states
   GoalStatistics statistics_;
   unsigned reported_ = 0;
+  std::condition_variable_any progress_;  // of the current goal
   CallLine line_;  // the last member, as its thread uses the others
 };
 

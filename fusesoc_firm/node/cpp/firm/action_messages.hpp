@@ -55,7 +55,7 @@ struct GoalReference {
   // Return whether this cancellation concerns a goal: one by its id, all until a time, or all.
   bool means(const GoalReference& goal) const {
     if (!has_id() && stamp.is_zero()) return true;
-    return goal.id == id || (!stamp.is_zero() && goal.stamp <= stamp);
+    return (has_id() && goal.id == id) || (!stamp.is_zero() && goal.stamp <= stamp);
   }
 };
 

@@ -43,11 +43,11 @@ class ActionServer {
   static constexpr std::size_t kMostEarly = 100;
 
   // `is_first`: the action is one of ROS 1.
-  ActionServer(const Action& action, bool is_first, PutPayload put)
+  ActionServer(const Action& action, bool is_first, PutPayload put, FaultHandler on_fault)
       : action_(action),
         is_first_(is_first),
         put_(std::move(put)),
-        line_(action.limit, false, [this](const Bytes& key, std::uint64_t) { hand_over(key); }) {}
+        line_(action.limit, false, [this](const Bytes& key, std::uint64_t) { hand_over(key); }, std::move(on_fault)) {}
 
   ActionServer(const ActionServer&) = delete;
   ActionServer& operator=(const ActionServer&) = delete;

@@ -4,6 +4,7 @@
 // The behaviour equals that of fusesoc_firm/node/actions.py.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -26,12 +27,12 @@ namespace firm {
 // The goals of all actions of a node, between the middleware and the hardware. Any thread may call the functions.
 class NodeActions {
  public:
-  NodeActions(const std::vector<Action>& actions, bool is_first, const PutPayload& put) {
+  NodeActions(const std::vector<Action>& actions, bool is_first, const PutPayload& put, const FaultHandler& on_fault) {
     for (const auto& action : actions) {
       if (action.is_server) {
-        servers_.push_back(std::make_unique<ActionServer>(action, is_first, put));
+        servers_.push_back(std::make_unique<ActionServer>(action, is_first, put, on_fault));
       } else {
-        clients_.push_back(std::make_unique<ActionClient>(action, is_first, put));
+        clients_.push_back(std::make_unique<ActionClient>(action, is_first, put, on_fault));
       }
       order_.push_back(action.is_server);
     }
@@ -113,6 +114,8 @@ class NodeActions {
   void drain(std::chrono::nanoseconds longest) {
     const auto latest = std::chrono::steady_clock::now() + longest;
     for (const auto& client : clients_) client->give_up();
+    const auto answered = std::min(latest, std::chrono::steady_clock::now() + kAcceptTime);
+    for (const auto& client : clients_) client->wait_until_canceled(answered);
     for (const auto& server : servers_) server->drain(latest);
     for (const auto& server : servers_) server->close();
     for (const auto& client : clients_) client->close();
@@ -128,6 +131,9 @@ class NodeActions {
   }
 
  private:
+  // Servers of ROS 2 have to accept a goal before it can be canceled.
+  static constexpr std::chrono::seconds kAcceptTime{1};
+
   template <typename Ros>
   static std::vector<PublishBytes> advertised(Ros& ros, const Action& action) {
     std::vector<PublishBytes> publishers;

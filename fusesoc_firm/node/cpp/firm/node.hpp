@@ -43,7 +43,8 @@ struct NodeConfiguration {
   unsigned publishers = 1;
   std::size_t longest_payload = 1 << 26;    // bytes, in either direction
   std::size_t queue_depth = 100;            // frames, for each subscriber
-  std::map<unsigned, std::size_t> queue_depths{};  // frames, for subscribers whose queues differ
+  // Frames, for subscribers whose queues differ; kUnlimitedDepth: none is dropped.
+  std::map<unsigned, std::size_t> queue_depths{};
   // The subscribers whose frames wait in the queue of another one, so that they are sent in the order of both.
   std::map<unsigned, unsigned> shared_queues{};
   Overflow overflow = Overflow::kDropOldest;
@@ -86,7 +87,9 @@ class Node {
         queues_(depths(configuration_),
                 configuration_.policy ? configuration_.policy() : nullptr, configuration_.overflow),
         trace_(configuration_.trace),
-        status_([this](const Bytes& request) { put_request(request); }) {}
+        status_([this](const Bytes& request) { put_request(request); }) {
+    for (const auto& [subscriber, other] : configuration_.shared_queues) queues_.share(subscriber, other);
+  }
 
   // Create the transport from its address (firm/open_transport.hpp).
   Node(NodeConfiguration configuration, const std::string& address, Publish publish)
@@ -113,7 +116,7 @@ class Node {
     trace_.write("received", subscriber, number, size);
     try {
       const bool is_kept =
-          queues_.put(queue_of(subscriber), {number, pack_frame(static_cast<std::uint8_t>(subscriber), payload, size)});
+          queues_.put(subscriber, {number, pack_frame(static_cast<std::uint8_t>(subscriber), payload, size)});
       if (is_kept) trace_.write("queued", subscriber, number, size);
       return is_kept;
     } catch (const ClosedError&) {
@@ -204,11 +207,6 @@ class Node {
     }
     BurstJoiner(configuration.publishers, configuration.width);
     return configuration;
-  }
-
-  unsigned queue_of(unsigned subscriber) const {
-    const auto found = configuration_.shared_queues.find(subscriber);
-    return found == configuration_.shared_queues.end() ? subscriber : found->second;
   }
 
   // Return the capacities of all queues.

@@ -17,6 +17,8 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -107,6 +109,9 @@ class LeastSlackTime : public Policy {
 // wait for space.
 enum class Overflow { kDropOldest, kDropNewest, kBlock };
 
+// The capacity of a subscriber whose frames are never dropped.
+constexpr std::size_t kUnlimitedDepth = std::numeric_limits<std::size_t>::max();
+
 // The queues are closed.
 class ClosedError : public std::runtime_error {
  public:
@@ -135,7 +140,7 @@ class SubscriberQueues {
       : SubscriberQueues(std::vector<std::size_t>(subscribers, capacity), std::move(policy), overflow,
                          std::move(clock)) {}
 
-  // Queues with a capacity each.
+  // Each subscriber has a capacity; kUnlimitedDepth: no limit.
   explicit SubscriberQueues(std::vector<std::size_t> capacities, std::unique_ptr<Policy> policy = nullptr,
                             Overflow overflow = Overflow::kDropOldest, Clock clock = steady_nanoseconds)
       : policy_(policy ? std::move(policy) : std::make_unique<LeastRecentlyUsed>(capacities.size())),
@@ -143,6 +148,7 @@ class SubscriberQueues {
         overflow_(overflow),
         clock_(std::move(clock)),
         queues_(capacities_.size()),
+        waiting_(capacities_.size(), 0),
         dropped_(capacities_.size(), 0) {
     const auto least = std::min_element(capacities_.begin(), capacities_.end());
     if (least == capacities_.end() || *least < 1) {
@@ -151,21 +157,28 @@ class SubscriberQueues {
     }
   }
 
+  // Let a subscriber's items wait in the queue of another one, so that they are read in the order of both. Each of them
+  // keeps its own capacity. This is called before the first item.
+  void share(std::size_t subscriber, std::size_t other) { shared_[subscriber] = other; }
+
   // Add an item; return whether it is queued. The item is not queued if a full queue drops the newest item, or stays
   // full until the timeout. Throws ClosedError, even during the wait, and std::out_of_range for an unknown subscriber.
   bool put(std::size_t subscriber, Item item, Timeout timeout = std::nullopt) {
-    auto& queue = queues_.at(subscriber);
+    auto& queue = queues_.at(queue_of(subscriber));
     std::unique_lock<std::mutex> lock(mutex_);
     if (overflow_ == Overflow::kBlock) {
-      wait_for(lock, timeout, [&] { return closed_ || queue.size() < capacities_[subscriber]; });
+      wait_for(lock, timeout, [&] { return closed_ || waiting_[subscriber] < capacities_[subscriber]; });
     }
     if (closed_) throw ClosedError("the queues are closed");
-    if (queue.size() == capacities_[subscriber]) {
+    if (waiting_[subscriber] == capacities_[subscriber]) {
       if (overflow_ != Overflow::kBlock) ++dropped_[subscriber];
       if (overflow_ != Overflow::kDropOldest) return false;
-      queue.pop_front();
+      queue.erase(std::find_if(queue.begin(), queue.end(),
+                               [&](const Waiting& waiting) { return waiting.subscriber == subscriber; }));
+      --waiting_[subscriber];
     }
-    queue.push_back({clock_(), std::move(item)});
+    queue.push_back({clock_(), subscriber, std::move(item)});
+    ++waiting_[subscriber];
     changed_.notify_all();
     return true;
   }
@@ -175,12 +188,13 @@ class SubscriberQueues {
   std::optional<Next> get(Timeout timeout = std::nullopt) {
     std::unique_lock<std::mutex> lock(mutex_);
     wait_for(lock, timeout, [&] { return closed_ || first_waiting().has_value(); });
-    const auto subscriber = first_waiting();
-    if (!subscriber) return std::nullopt;
-    auto& queue = queues_[*subscriber];
-    std::optional<Next> next(Next{*subscriber, std::move(queue.front().item)});
+    const auto served = first_waiting();
+    if (!served) return std::nullopt;
+    auto& queue = queues_[*served];
+    std::optional<Next> next(Next{queue.front().subscriber, std::move(queue.front().item)});
     queue.pop_front();
-    policy_->served(*subscriber);
+    --waiting_[next->subscriber];
+    policy_->served(*served);
     changed_.notify_all();
     return next;
   }
@@ -198,7 +212,7 @@ class SubscriberQueues {
     return closed_ && !first_waiting();
   }
 
-  // Return the number of items that a subscriber's queue has dropped.
+  // Return the number of a subscriber's items that were dropped.
   std::uint64_t dropped(std::size_t subscriber) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return dropped_.at(subscriber);
@@ -207,8 +221,14 @@ class SubscriberQueues {
  private:
   struct Waiting {
     std::int64_t arrival;
+    std::size_t subscriber;
     Item item;
   };
+
+  std::size_t queue_of(std::size_t subscriber) const {
+    const auto found = shared_.find(subscriber);
+    return found == shared_.end() ? subscriber : found->second;
+  }
 
   template <typename Condition>
   void wait_for(std::unique_lock<std::mutex>& lock, Timeout timeout, Condition condition) {
@@ -237,7 +257,9 @@ class SubscriberQueues {
   std::vector<std::size_t> capacities_;
   Overflow overflow_;
   Clock clock_;
+  std::map<std::size_t, std::size_t> shared_;  // the queues of those that share one
   std::vector<std::deque<Waiting>> queues_;
+  std::vector<std::size_t> waiting_;  // items of each subscriber
   std::vector<std::uint64_t> dropped_;
   bool closed_ = false;
   mutable std::mutex mutex_;

@@ -10,6 +10,7 @@
 #include <rmw/rmw.h>
 
 #include <iostream>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -161,9 +162,12 @@ class RawServer {
   rcl_service_t rcl_ = rcl_get_zero_initialized_service();
 };
 
-// A client of the hardware, with one call under way. take() is called by the thread that spins.
+// A client of the hardware, with the latest calls: goals may be accepted late. take() is called by the thread that spins.
 class RawClient {
  public:
+  // The calls that may be answered late.
+  static constexpr std::size_t kMostPending = 100;
+
   // Throws MiddlewareError.
   RawClient(rcl_node_t& node, const Service& service) : node_(node), service_(service) {
     rcl_client_options_t options = rcl_client_get_default_options();
@@ -179,7 +183,7 @@ class RawClient {
 
   const rcl_client_t* rcl() const { return &rcl_; }
 
-  // Call the service; the line no longer waits for an earlier call. Any thread may call this function.
+  // Call the service. Any thread may call this function.
   void call(const Bytes& payload, AnswerHandler answer) {
     try {
       bool is_there = false;
@@ -189,8 +193,10 @@ class RawClient {
       request.deserialise(payload);
       // The response may arrive before rcl_send_request() returns.
       const std::lock_guard<std::mutex> lock(mutex_);
-      check_rcl(rcl_send_request(&rcl_, request.structure(), &number_), "call " + service_.name);
-      answer_ = std::move(answer);
+      std::int64_t number = 0;
+      check_rcl(rcl_send_request(&rcl_, request.structure(), &number), "call " + service_.name);
+      answers_[number] = std::move(answer);
+      if (answers_.size() > kMostPending) answers_.erase(answers_.begin());
     } catch (const MiddlewareError& error) {
       answer({std::nullopt, error.what()});
     }
@@ -199,7 +205,7 @@ class RawClient {
   // Give no more answers.
   void stop() {
     const std::lock_guard<std::mutex> lock(mutex_);
-    answer_ = nullptr;
+    answers_.clear();
   }
 
   // Take a response. Throws MiddlewareError.
@@ -212,7 +218,7 @@ class RawClient {
     AnswerHandler answer;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (header.sequence_number == number_) answer = std::exchange(answer_, nullptr);
+      if (auto found = answers_.extract(header.sequence_number)) answer = std::move(found.mapped());
     }
     if (answer) answer({response.serialised()});
   }
@@ -222,8 +228,7 @@ class RawClient {
   const Service service_;
   rcl_client_t rcl_ = rcl_get_zero_initialized_client();
   std::mutex mutex_;  // protects the members below
-  std::int64_t number_ = 0;
-  AnswerHandler answer_;
+  std::map<std::int64_t, AnswerHandler> answers_;  // by the numbers of the calls
 };
 
 }  // namespace firm

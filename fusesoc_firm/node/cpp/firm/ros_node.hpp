@@ -281,8 +281,8 @@ class Engines {
       : system_(system),
         publish_(std::move(publish)),
         from_hardware_(system.publisher_count),
-        calls_(system.services, is_first, putter()),
-        actions_(system.actions, is_first, putter()) {
+        calls_(system.services, is_first, putter(), fault_taker()),
+        actions_(system.actions, is_first, putter(), fault_taker()) {
     NodeConfiguration configuration;
     configuration.width = system.width;
     configuration.subscribers = system.subscriber_count;
@@ -296,6 +296,9 @@ class Engines {
       const auto [first, second] = action.is_server ? std::pair(action.goal, action.cancel)
                                                     : std::pair(action.feedback, action.result);
       configuration.shared_queues[second] = first;
+      // Only feedback may be lost.
+      configuration.queue_depths[second] = kUnlimitedDepth;
+      if (action.is_server) configuration.queue_depths[first] = kUnlimitedDepth;
     }
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
@@ -376,6 +379,8 @@ class Engines {
   }
 
   NodeActions& actions() { return actions_; }
+  // Return whether a thread of the services or actions has failed, after which the node has to end.
+  bool has_fault() const { return has_fault_; }
   Node& hardware() { return *hardware_; }
   Node* software() { return software_.get(); }
 
@@ -434,6 +439,14 @@ class Engines {
     };
   }
 
+  // Return a function that notes an error of a thread, and reports it.
+  FaultHandler fault_taker() {
+    return [this](const std::string& reason) {
+      std::cerr << reason << std::endl;
+      has_fault_ = true;
+    };
+  }
+
   // Return a function that opens the hardware, and refuses that of another system.
   Node::Open opener(const std::string& address) {
     return [this, address](const TransportOptions& options) {
@@ -468,6 +481,7 @@ class Engines {
   std::vector<MessageHandler> from_software_;
   std::unique_ptr<Node> hardware_;
   std::unique_ptr<Node> software_;
+  std::atomic<bool> has_fault_{false};
   NodeCalls calls_;  // after the nodes, as its threads use them
   NodeActions actions_;
 };
@@ -555,7 +569,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
     watch.emplace([&](std::uint32_t address) { return word_at(engines, address); }, system.channels);
   }
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
-  while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
+  while (!is_interrupted && is_running() && !engines.has_fault() && ros.spin(std::chrono::milliseconds(50))) {
     engines.actions().tick();
     diagnosis.tell([&] {
       std::vector<Report> reports{report_of(system.name + ": node", engines.hardware(), ros.lost())};
@@ -572,7 +586,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   ros.spin_during([&] { engines.drain(arguments.drain); });
   if (software && is_running()) engines.settle(arguments.drain);
   int status = software ? software->stop() : 0;
-  status = std::max(status, hardware.stop());
+  status = std::max({status, hardware.stop(), engines.has_fault() ? 1 : 0});
   ros.flush();
   print_statistics(system.name + "_node", engines.hardware(), ros.lost());
   if (software) print_statistics("its software", *engines.software());

@@ -56,11 +56,17 @@ using AnswerHandler = std::function<void(const Answer&)>;
 // Takes a call; it answers each call once.
 using CallHandler = std::function<void(Bytes payload, AnswerHandler answer)>;
 
+// Takes an unexpected error of a thread, after which the node has to end; any thread may call it.
+using FaultHandler = std::function<void(const std::string& reason)>;
+
 // The calls of one service. Any thread may call the functions; a thread of the line's own hands calls over.
 //
 // An answer that does not tell its call and comes late would be taken for that of the next call. Therefore, if a call is
 // not answered in time, or if more may follow its answer, the next call waits until something follows or until rest(),
 // but for another `limit` at most, or for `kLeastWait` if this is longer.
+//
+// The hardware receives the answers to its calls in their order, and from the line's thread: the thread that receives calls
+// from the hardware must not wait until the hardware takes an answer.
 class CallLine {
  public:
   using HandOver = std::function<void(const Bytes& payload, std::uint64_t number)>;
@@ -68,9 +74,14 @@ class CallLine {
   static constexpr std::size_t kMostWaiting = 1000;
   static constexpr std::chrono::seconds kLeastWait{2};
 
-  // With `has_numbers`, each answer tells its call.
-  CallLine(std::chrono::nanoseconds limit, bool has_numbers, HandOver hand_over)
-      : limit_(limit), has_numbers_(has_numbers), hand_over_(std::move(hand_over)), thread_([this] { run(); }) {}
+  // Calls of the hardware (`from_hardware`) have answers that tell their call. An exception in the line's thread is passed
+  // to `on_fault`.
+  CallLine(std::chrono::nanoseconds limit, bool from_hardware, HandOver hand_over, FaultHandler on_fault)
+      : limit_(limit),
+        from_hardware_(from_hardware),
+        hand_over_(std::move(hand_over)),
+        on_fault_(std::move(on_fault)),
+        thread_([this] { run_guarded(); }) {}
 
   ~CallLine() {
     close();
@@ -82,15 +93,18 @@ class CallLine {
 
   // Add a call; it fails if too many calls wait, or if the node ends.
   void put(Bytes payload, AnswerHandler answer) {
+    const Answer refusal{std::nullopt, "too many calls wait, or the node ends"};
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (!is_ending_ && waiting_.size() < kMostWaiting) {
-        waiting_.push_back({std::move(payload), std::move(answer)});
+      const bool is_refused = is_ending_ || waiting_.size() >= kMostWaiting;
+      // A call of the hardware that is refused keeps its turn.
+      if (!is_refused || (from_hardware_ && !has_ended_)) {
+        waiting_.push_back({std::move(payload), std::move(answer), is_refused ? std::optional(refusal) : std::nullopt});
         changed_.notify_all();
         return;
       }
     }
-    answer({std::nullopt, "too many calls wait, or the node ends"});
+    answer(refusal);
   }
 
   // Answer the call that is under way, if it has this number; return whether there is such a call. Unless `is_final`,
@@ -137,27 +151,50 @@ class CallLine {
   struct Call {
     Bytes payload;
     AnswerHandler answer;
+    std::optional<Answer> refusal;
   };
+
+  void run_guarded() {
+    try {
+      run();
+    } catch (const std::exception& error) {
+      {
+        // Nobody waits for this thread any more.
+        const std::lock_guard<std::mutex> lock(mutex_);
+        is_ending_ = is_closed_ = has_ended_ = true;
+        is_held_ = false;
+        waiting_.clear();
+        changed_.notify_all();
+      }
+      on_fault_(error.what());
+    }
+  }
 
   void run() {
     const Answer ended{std::nullopt, "the node ends"};
     while (const auto call = next()) {
+      if (call->refusal || is_closed()) {
+        call->answer(call->refusal.value_or(ended));
+        continue;
+      }
       hand_over_(call->payload, number_);
       const auto answer = wait();
       call->answer(answer ? *answer : is_closed() ? ended : Answer{std::nullopt, no_answer()});
       wait_for_late();
     }
-    for (const auto& call : rest_of_calls()) call.answer(ended);
   }
 
-  // Return the next call, or nothing if the line is closed.
+  // Return the next call, or nothing if the line is closed and empty.
   std::optional<Call> next() {
     std::unique_lock<std::mutex> lock(mutex_);
     answer_.reset();
     is_held_ = is_late_ = false;
     changed_.notify_all();
     changed_.wait(lock, [this] { return is_closed_ || !waiting_.empty(); });
-    if (is_closed_) return std::nullopt;
+    if (waiting_.empty()) {
+      has_ended_ = true;
+      return std::nullopt;
+    }
     std::optional<Call> call(std::move(waiting_.front()));
     waiting_.pop_front();
     is_held_ = true;
@@ -179,7 +216,7 @@ class CallLine {
   // Wait for what may follow from the hardware for the call under way.
   void wait_for_late() {
     std::unique_lock<std::mutex> lock(mutex_);
-    if (has_numbers_ || (answer_ && is_final_)) return;
+    if (from_hardware_ || (answer_ && is_final_)) return;
     answer_.reset();
     is_late_ = true;
     changed_.wait_for(lock, std::max<std::chrono::nanoseconds>(limit_, kLeastWait),
@@ -196,14 +233,10 @@ class CallLine {
     return "no answer within " + std::to_string(milliseconds) + " ms";
   }
 
-  std::deque<Call> rest_of_calls() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return std::exchange(waiting_, {});
-  }
-
   const std::chrono::nanoseconds limit_;
-  const bool has_numbers_;
+  const bool from_hardware_;
   const HandOver hand_over_;
+  const FaultHandler on_fault_;
   mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
   std::deque<Call> waiting_;
@@ -215,6 +248,7 @@ class CallLine {
   bool is_extended_ = false;
   bool is_ending_ = false;
   bool is_closed_ = false;
+  bool has_ended_ = false;
   std::thread thread_;  // the last member, as it uses the others
 };
 
@@ -232,7 +266,7 @@ class NodeCalls {
   using Put = std::function<bool(unsigned subscriber, const std::uint8_t* payload, std::size_t size)>;
 
   // `tells_failures`: the middleware has an answer for a call that fails.
-  NodeCalls(std::vector<Service> services, bool tells_failures, Put put)
+  NodeCalls(std::vector<Service> services, bool tells_failures, Put put, const FaultHandler& on_fault)
       : services_(std::move(services)),
         tells_failures_(tells_failures),
         put_(std::move(put)),
@@ -242,7 +276,8 @@ class NodeCalls {
           lines_.size();
       lines_.push_back(std::make_unique<CallLine>(
           service.limit, !service.is_server,
-          [this, index = lines_.size()](const Bytes& payload, std::uint64_t number) { hand_over(index, payload, number); }));
+          [this, index = lines_.size()](const Bytes& payload, std::uint64_t number) { hand_over(index, payload, number); },
+          on_fault));
     }
     callers_.resize(services_.size());
   }
