@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -25,7 +26,7 @@ from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, Stream, open_ba
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.node.transport.simulator import Simulator, Waits
+from fusesoc_firm.node.transport.simulator import WAITS_SECONDS, Simulator, Waits
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Latency, Watch
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
@@ -159,6 +160,8 @@ class _Replay:
     # The stamp of the last message that was played, and whether it was the last one of the selected time.
     last: int = 0
     is_whole: bool = False
+    # When waits were requested last, by the monotonic clock.
+    counted_at: float = 0.0
     refused: int = 0
     errors: int = 0
     is_over: bool = False
@@ -291,16 +294,20 @@ class _Replay:
         return watch.saw(subscriber.block, payload, stamp - self.bag.start) if watch else None
 
     def _count_waits(self) -> None:
-        """Record where messages have waited since the last call, if somebody watches."""
-        watch, simulator = self.settings.watch, self.run.simulator
-        if not watch or not watch.is_watched():
+        """Record where messages have waited since the last count, if somebody watches."""
+        watch, simulator, now = self.settings.watch, self.run.simulator, time.monotonic()
+        if not watch or now < self.counted_at + WAITS_SECONDS:
             return
+        self.counted_at = now
         # The end of a simulator is reported where a message needs it.
         with suppress(TransportError):
+            if not watch.is_watched():
+                simulator.end_waits()
+                return
             simulator.request_waits()
             for event in simulator.run(0):
                 if isinstance(event, Waits):
-                    watch.waited(event.cycle, event.counts)
+                    watch.waited(event.first, event.cycle, event.counts)
 
     def _end(self) -> None:
         """End the simulation, and report its errors."""
