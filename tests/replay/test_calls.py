@@ -343,7 +343,7 @@ def rewritten(source: Path, target: Path, **options: Any) -> Path:
                 number = writer.register_schema(schema.name, schema.encoding, schema.data)
                 channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
             writer.add_message(channels[channel.topic], message.log_time, message.data, message.log_time)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return target
 
 
