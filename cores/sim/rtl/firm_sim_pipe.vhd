@@ -604,7 +604,7 @@ begin
       report_stand;
     end procedure run;
 
-    variable request : character := 'R';
+    variable kind : character := 'R';  -- of the request
 
   begin
     random_1 := SEED;
@@ -620,9 +620,9 @@ begin
     rst_n <= '1' after HOLD;
 
     -- The end of the requests has the same effect as Q.
-    while request /= 'Q' and not endfile(requests) loop
-      read(requests, request);
-      case request is
+    while kind /= 'Q' and not endfile(requests) loop
+      read(requests, kind);
+      case kind is
         when 'F'    => read_frame(false, false);
         when 'A'    => read_frame(true, false);
         when 'H'    => read_frame(false, true);
@@ -630,7 +630,7 @@ begin
         when 'W'    => report_waits;
         when 'N'    => forget_waits;
         when 'Q'    => report_stand;
-        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, A, H, R, W, N, Q");
+        when others => fail("unknown request " & integer'image(character'pos(kind)) & "; legal: F, A, H, R, W, N, Q");
       end case;
     end loop;
     wait;
