@@ -6,16 +6,16 @@ The two ends number their calls differently, so only the events of one end are u
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from fusesoc_firm.frame.codec import CodecError, decode, encode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.message.bag_reader import Bag, Recorded, Stream
+from fusesoc_firm.message.bag_reader import Bag, Recorded, Stream, open_bag
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import InterfaceKind
@@ -29,6 +29,16 @@ EVENTS = "_service_event"
 _ENDS = ((1, 2), (0, 3))
 # What tells a call from others: the writer of the request and its number.
 _Key = tuple[Any, ...]
+# The number of requests that wait for responses of earlier ones; so many later, no response is expected any more.
+_MOST_WAITING = 100
+
+
+class Exchange(NamedTuple):
+    """A recorded request, its stamp in ns, and its response if there is one."""
+
+    stamp: int
+    request: bytes
+    response: bytes | None
 
 
 @dataclass(frozen=True)
@@ -133,28 +143,32 @@ class BagOfCalls(Bag):
                 else:
                     yield Recorded(calls.stream, number, recorded.stamp, response)
 
-    def exchanges(self, block: str) -> Iterator[tuple[bytes, bytes | None]]:
-        """Yield each recorded request to a service that the hardware calls, and its response if there is one.
+    def exchanges(self, block: str, first: int, stop: int | None) -> Iterator[Exchange]:
+        """Yield each exchange with a service that the hardware calls, in the order of the requests.
 
-        `block` is that of the requests. Raise `InputError` if the bag is damaged.
+        `block` is that of the requests. They are recorded from `first` on, and both messages before `stop` (in ns).
+        Only the events before a damage count, which the replay reports.
         """
         stream, calls = self.asked[block]
-        waiting: deque[tuple[_Key, bytes]] = deque()
-        responses: dict[_Key, bytes] = {}
-        for recorded in Bag.messages(self, [stream.topic]):
-            part = calls.part_of(recorded) if recorded.stream == stream else None
-            if part is None:
-                continue
-            key, request, response = part
-            if request is not None:
-                waiting.append((key, request))
-            elif response is not None:
-                responses[key] = response
-            while waiting and waiting[0][0] in responses:
-                key, request = waiting.popleft()
-                yield request, responses.pop(key)
-        for key, request in waiting:
-            yield request, responses.get(key)
+        waiting: dict[_Key, Exchange] = {}
+        # With one reader for both, this reading would move the place of the replay in some bags.
+        with suppress(InputError), open_bag(self.path) as bag:
+            for recorded in bag.messages([stream.topic], stop):
+                part = calls.part_of(recorded) if recorded.stream == stream else None
+                if part is None:
+                    continue
+                key, request, response = part
+                if request is not None and recorded.stamp >= first:
+                    waiting[key] = Exchange(recorded.stamp, request, None)
+                elif key in waiting:
+                    waiting[key] = waiting[key]._replace(response=response)
+                while waiting and (_first(waiting).response is not None or len(waiting) > _MOST_WAITING):
+                    yield waiting.pop(next(iter(waiting)))
+        yield from waiting.values()
+
+
+def _first(exchanges: Mapping[_Key, Exchange]) -> Exchange:
+    return next(iter(exchanges.values()))
 
 
 def with_calls(

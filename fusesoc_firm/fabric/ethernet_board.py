@@ -24,8 +24,11 @@ _SIOCGIFFLAGS, _IFF_UP = 0x8913, 1
 # Of linux/if_tun.h: the request, and the flags for frames without a header of their own.
 _TUNSETIFF, _IFF_TAP, _IFF_NO_PI = 0x400454CA, 0x0002, 0x1000
 _LONGEST_NAME = 15
+_NO_ROOM = (errno.EAGAIN, errno.ENOBUFS, errno.ENOMEM)
 _PREAMBLE = b"\x55" * 7 + b"\xd5"
-_SHORTEST, _FCS_BYTES, _MOST_BYTES = 60, 4, 2048
+_SHORTEST, _FCS_BYTES = 60, 4
+# Frames at a device with a larger MTU than Ethernet's are longer.
+_MOST_BYTES = 2048
 _CYCLES_BYTES, _SIZE_BYTES = 4, 2
 
 
@@ -49,25 +52,34 @@ class Tap:
             fail(f"cannot open the network device '{name}': {reason}", hint=_how_to_make(name))
 
     def read(self, seconds: float) -> bytes:
-        """Return a frame that arrives within a time, or no bytes."""
+        """Return a frame that arrives within a time, or no bytes. Raise `InputError` if the device has failed.
+
+        A frame that is too long is dropped, as by a network interface.
+        """
         if not select.select([self._file], [], [], seconds)[0]:
             return b""
         try:
-            return os.read(self._file, _MOST_BYTES)
+            frame = os.read(self._file, _MOST_BYTES + 1)
         except BlockingIOError:
             return b""
+        except OSError as error:
+            fail(f"the network device '{self.name}' does not give a frame: {error.strerror}")
+        return frame if len(frame) <= _MOST_BYTES else b""
 
     def write(self, frame: bytes) -> None:
-        """Send a frame. Raise `InputError` if the device is down."""
+        """Send a frame; it is lost if the device has no room. Raise `InputError` if the device has failed."""
         try:
             os.write(self._file, frame)
         except OSError as error:
+            if error.errno in _NO_ROOM:
+                return
             fail(f"the network device '{self.name}' does not take a frame: {error.strerror}")
 
     def close(self) -> None:
-        """Close the device."""
+        """Close the device. A second call does nothing."""
         if self._file >= 0:
             os.close(self._file)
+            self._file = -1
 
 
 def _is_up(name: str) -> bool:

@@ -71,8 +71,11 @@ class HardwareListener(Protocol):
     def wants_waits(self) -> bool:
         """Return whether simulated hardware should count the cycles in which its wires wait."""
 
-    def waited(self, cycle: int, counts: Sequence[int]) -> None:
-        """Handle these counts, which end before a cycle; see `Waits` of `node/transport/simulator.py`."""
+    def waited(self, first: int, cycle: int, counts: Sequence[int]) -> None:
+        """Handle these counts, from the cycle `first` to the one before `cycle`.
+
+        See `Waits` of `node/transport/simulator.py`.
+        """
 
 
 OpenTransport = Callable[[HardwareListener], Transport]
@@ -577,10 +580,10 @@ class Node:
         """Return whether somebody watches the run; any thread may call this method."""
         return self._watch is not None and self._watch.is_watched()
 
-    def waited(self, cycle: int, counts: Sequence[int]) -> None:
+    def waited(self, first: int, cycle: int, counts: Sequence[int]) -> None:
         """Record the cycles in which wires waited; any thread may call this method."""
         if self._watch:
-            self._watch.waited(cycle, counts)
+            self._watch.waited(first, cycle, counts)
 
     def _begin_anew(self, hardware: _Hardware, error: TransportError) -> bool:
         """Reopen the transport if the settings allow it; return False if they do not, or if reopening fails."""
@@ -608,6 +611,8 @@ class Node:
         self.statistics.restarts += 1
         if self._trace:
             self._trace.forget()
+        if self._watch:
+            self._watch.begin_cycles()
         self._hardware = _Hardware(transport, self._description)
         self._calls.forget("the hardware was restarted")
         self._actions.forget("the hardware was restarted")

@@ -112,8 +112,8 @@ class _LateListener:
     def wants_waits(self) -> bool:
         return self.listens and self._listener.wants_waits()
 
-    def waited(self, cycle: int, counts: Sequence[int]) -> None:
-        self._listener.waited(cycle, counts)
+    def waited(self, first: int, cycle: int, counts: Sequence[int]) -> None:
+        self._listener.waited(first, cycle, counts)
 
 
 def _tell(listener: HardwareListener, event: Event) -> None:
@@ -122,4 +122,4 @@ def _tell(listener: HardwareListener, event: Event) -> None:
     elif isinstance(event, ErrorPulse):
         listener.refused(event.converter)
     elif isinstance(event, Waits):
-        listener.waited(event.cycle, event.counts)
+        listener.waited(event.first, event.cycle, event.counts)

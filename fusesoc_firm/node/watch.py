@@ -150,7 +150,7 @@ class Watch:
         self._grants: deque[Grant] = deque(maxlen=_MOST_GRANTS)
         self._waits: deque[Waits] = deque(maxlen=_MOST_WAITS)
         self._waits_of_all: Waits | None = None
-        self._counted_to: int | None = None
+        self._first_of_cycles = 0
         self.is_watched: Callable[[], bool] = lambda: False
         """Returns whether somebody watches; what costs the run time is counted only then."""
         self.status: Mapping[str, int] = {}
@@ -205,16 +205,20 @@ class Watch:
         with self._lock:
             return [*islice(self._grants, max(0, len(self._grants) - most), None)]
 
-    def waited(self, cycle: int, counts: Sequence[int]) -> None:
-        """Record the cycles in which each wire has waited since the last call, up to the one before `cycle`.
-
-        The first call begins the count, and so does one of a simulator that has begun again.
-        """
+    def begin_cycles(self) -> None:
+        """Begin a new simulator, whose cycles count from 0: forget what belongs to cycles of the one before."""
         with self._lock:
-            first, self._counted_to = self._counted_to, cycle
-            if first is None or cycle <= first or (self._waits and len(counts) != len(self._waits[-1].counts)):
+            self._first_of_cycles = self._next
+            self._grants.clear()
+            self._waits.clear()
+            self._waits_of_all = None
+
+    def waited(self, first: int, end: int, counts: Sequence[int]) -> None:
+        """Record the cycles in which each wire has waited, from the cycle `first` to the one before `end`."""
+        with self._lock:
+            if first == end:
                 return
-            found = Waits(first, cycle, cycle - first, tuple(counts))
+            found = Waits(first, end, end - first, tuple(counts))
             self._waits.append(found)
             self._waits_of_all = Waits.of([self._waits_of_all, found] if self._waits_of_all else [found])
 
@@ -234,6 +238,18 @@ class Watch:
                 *islice((item for item in latest if item.end > first and (last is None or item.first <= last)), most)
             ]
         return found[::-1]
+
+    def waits_during(self, seen: Seen, most: int) -> Waits | None:
+        """Return the waits in the cycles from a response's cause to the response, as far as they are known.
+
+        At most `most` counts are summed.
+        """
+        if seen.cycles is None or seen.number < self._first_of_cycles:
+            return None
+        first, last = seen.cycles
+        if seen.latency.cycles is not None:
+            first = last - seen.latency.cycles
+        return Waits.of(self.waits(most, first, last))
 
     def since(self, number: int, most: int) -> News:
         """Return the newest messages after the one with this number, at most `most`; -1 is before the first."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -16,7 +17,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from fusesoc_firm.bags.calls import BagOfCalls, with_calls
+from fusesoc_firm.bags.calls import BagOfCalls, Exchange, with_calls
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
 from fusesoc_firm.frame.codec import CodecError, decode
@@ -25,7 +26,7 @@ from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, Stream, open_ba
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.node.transport.simulator import Simulator, Waits
+from fusesoc_firm.node.transport.simulator import WAITS_SECONDS, Simulator, Waits
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Latency, Watch
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
@@ -55,9 +56,13 @@ class Source:
 
     def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
         """Return the selected messages of some topics."""
-        first = bag.start + round(self.start * 10**9)
-        stop = None if self.duration is None else first + round(self.duration * 10**9)
+        first, stop = self.window(bag)
         return islice((item for item in bag.messages(topics, stop) if item.stamp >= first), self.limit)
+
+    def window(self, bag: Bag) -> tuple[int, int | None]:
+        """Return the stamps in ns from which on and before which messages are selected."""
+        first = bag.start + round(self.start * 10**9)
+        return first, None if self.duration is None else first + round(self.duration * 10**9)
 
 
 @dataclass(frozen=True)
@@ -119,10 +124,10 @@ def replay(
             write_bag(target.path, form, list(topics.values())) as written,
         ):
             run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
-            going = _Replay(bag, routes, run, topics, written, clock, settings)
+            going = _Replay(bag, source, routes, run, topics, written, clock, settings)
             if settings.watch:
                 settings.watch.epoch_ns = bag.start
-            going.play(source)
+            going.play()
         if settings.is_json:
             print(json.dumps(going.summary(target.path), indent=2, ensure_ascii=False))
         else:
@@ -137,6 +142,7 @@ class _Replay:
     """A replay in progress: the numbers of messages played from each stream and sent by each block."""
 
     bag: BagOfCalls
+    source: Source
     routes: Mapping[Stream, Route]
     run: SystemRun
     topics: Mapping[str, RecordedTopic]
@@ -151,14 +157,20 @@ class _Replay:
     compared: Counter[tuple[Stream, str]] = field(default_factory=Counter)
     # The numbers of the hardware's requests by their blocks and by how they compare with the recorded ones.
     asked: Counter[tuple[str, str]] = field(default_factory=Counter)
+    # The stamp of the last message that was played, and whether it was the last one of the selected time.
+    last: int = 0
+    is_whole: bool = False
+    # When waits were requested last, by the monotonic clock.
+    counted_at: float = 0.0
     refused: int = 0
     errors: int = 0
     is_over: bool = False
     # The first errors, each in one line.
     shown: list[str] = field(default_factory=list)
 
-    def play(self, source: Source) -> None:
+    def play(self) -> None:
         """Replay all messages, and report an early end."""
+        source = self.source
         expected = sum(count for stream, count in self.bag.streams.items() if stream in self.routes)
         total = expected if source.limit is None else min(expected, source.limit)
         topics = {stream.topic for stream in self.routes}
@@ -172,6 +184,8 @@ class _Replay:
                     bar.update()
                     if self.is_over:
                         break
+                else:
+                    self.is_whole = self.played.total() != source.limit
             except InputError as error:
                 self._report(str(error).removeprefix("error: "))
             if left := self.run.unfinished:
@@ -182,6 +196,7 @@ class _Replay:
     def _play(self, recorded: Recorded) -> None:
         """Send a message to the system, record the responses, and report faults."""
         self.played[recorded.stream] += 1
+        self.last = recorded.stamp
         route, faults = self.routes[recorded.stream], self.run.faults
         if route.misfit:
             faults.append(route.misfit)
@@ -218,19 +233,20 @@ class _Replay:
             exchanges = self._asked.get(sent.topic.block)
             if exchanges is None:
                 continue
-            request, response = next(exchanges, (None, None))
-            if request is None:
+            exchange = next(exchanges, None)
+            if exchange is None:
                 self.asked[sent.topic.block, _NOT_RECORDED] += 1
                 continue
-            self.asked[sent.topic.block, _verdict(sent, request)] += 1
-            if response is not None:
+            self.asked[sent.topic.block, _verdict(sent, exchange.request)] += 1
+            if (response := exchange.response) is not None:
                 taker = self._takers[sent.topic.block]
                 self.run.take(taker, response, sent.cause.stamp, self._seen_at(taker, response, sent.cause.stamp))
 
     @cached_property
-    def _asked(self) -> Mapping[str, Iterator[tuple[bytes, bytes | None]]]:
+    def _asked(self) -> Mapping[str, Iterator[Exchange]]:
         """The recorded calls of services that the hardware calls, in their order, by the blocks of requests."""
-        return {block: self.bag.exchanges(block) for block in self.bag.asked}
+        window = self.source.window(self.bag)
+        return {block: self.bag.exchanges(block, *window) for block in self.bag.asked}
 
     @cached_property
     def _takers(self) -> Mapping[str, Topic]:
@@ -260,13 +276,12 @@ class _Replay:
         return {"topic": stream.topic, "type": stream.type} | counts | rest
 
     def _requests(self, block: str) -> dict[str, Any]:
-        """Return how many of the hardware's requests are as recorded, different, missing, and not recorded."""
+        """Return how many of the hardware's requests are as recorded, different, missing, and not recorded.
+
+        A recorded request after the last message that was played is not missing, except after a whole replay.
+        """
         counts = {kind: self.asked[block, kind] for kind in (_EQUAL, _DIFFERENT)}
-        missing = 0
-        # A damaged bag is already reported.
-        with suppress(InputError):
-            for _ in self._asked[block]:
-                missing += 1
+        missing = sum(self.is_whole or item.stamp <= self.last for item in self._asked[block])
         counts |= {_MISSING: missing, _NOT_RECORDED: self.asked[block, _NOT_RECORDED]}
         _, calls = self.bag.asked[block]
         return {"topic": self.topics[block].name, "type": calls.type.request_name} | counts
@@ -279,16 +294,20 @@ class _Replay:
         return watch.saw(subscriber.block, payload, stamp - self.bag.start) if watch else None
 
     def _count_waits(self) -> None:
-        """Record where messages have waited since the last call, if somebody watches."""
-        watch, simulator = self.settings.watch, self.run.simulator
-        if not watch or not watch.is_watched():
+        """Record where messages have waited since the last count, if somebody watches."""
+        watch, simulator, now = self.settings.watch, self.run.simulator, time.monotonic()
+        if not watch or now < self.counted_at + WAITS_SECONDS:
             return
+        self.counted_at = now
         # The end of a simulator is reported where a message needs it.
         with suppress(TransportError):
+            if not watch.is_watched():
+                simulator.end_waits()
+                return
             simulator.request_waits()
             for event in simulator.run(0):
                 if isinstance(event, Waits):
-                    watch.waited(event.cycle, event.counts)
+                    watch.waited(event.first, event.cycle, event.counts)
 
     def _end(self) -> None:
         """End the simulation, and report its errors."""

@@ -16,7 +16,7 @@ from aiohttp import WSMsgType, web
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.node.watch import Seen, Waits, Watch
+from fusesoc_firm.node.watch import Seen
 from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, has_pose, numbers_of, picture_of, pose_of
@@ -149,7 +149,7 @@ class Live:
         frame = run.topics[seen.block].frame
         found = await asyncio.to_thread(fields_of, frame, seen.payload)
         kinds = {"hasPicture": has_picture(frame), "hasPose": has_pose(frame)}
-        waits = waits_during(run.watch, seen)
+        waits = run.watch.waits_during(seen, _MOST_WAITS)
         return in_json({"row": row(seen), "type": str(frame.message), **kinds, **found, "waits": waits and vars(waits)})
 
     async def _picture(self, request: web.Request) -> web.Response:
@@ -235,16 +235,6 @@ class Live:
         if not seen:
             raise web.HTTPNotFound(reason="this message is not in the record any more")
         return run, seen
-
-
-def waits_during(watch: Watch, seen: Seen) -> Waits | None:
-    """Return the waits in the cycles from a response's cause to the response, as far as they are known."""
-    if seen.cycles is None:
-        return None
-    first, last = seen.cycles
-    if seen.latency.cycles is not None:
-        first = last - seen.latency.cycles
-    return Waits.of(watch.waits(_MOST_WAITS, first, last))
 
 
 def wave(system: DerivedSystem, topic: Topic, seen: Seen) -> dict[str, Any]:

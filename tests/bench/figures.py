@@ -34,7 +34,7 @@ from tests.bench import (
     use,
     yosys,
 )
-from tests.bench.tables import Table, filled
+from tests.bench.tables import NOT_MEASURED, Table, filled
 from tests.hdl.ghdl import REPOSITORY
 
 FOLDER = REPOSITORY / "docs" / "figures"
@@ -145,6 +145,7 @@ After reading it, you can look up {subject}.
 `make bench BENCH='{parts}'` writes this page.
 [Figures](index.md) explains the terms in the tables.
 """
+_UNMEASURED = "None of these figures has been measured yet."
 
 
 def parts() -> tuple[str, ...]:
@@ -182,8 +183,9 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
 def section(part: str, tables: Sequence[Table]) -> str:
     """The text of a part: heading, method, versions, tables."""
     body = "\n".join(str(table) for table in tables)
-    versions = filled(f"These figures were measured with {_versions(part)}.")
-    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{versions}\n\n{body}"
+    is_measured = any(row[-1] != NOT_MEASURED for table in tables for row in table.rows)
+    measured = f"These figures were measured with {_versions(part)}." if is_measured else _UNMEASURED
+    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{filled(measured)}\n\n{body}"
 
 
 def write(sections: Mapping[str, str]) -> None:

@@ -76,6 +76,15 @@ def test_every_row_is_in_the_document() -> None:
             )
 
 
+def test_a_part_without_figures_says_so() -> None:
+    rows = (("a", NOT_MEASURED), ("b", NOT_MEASURED))
+    said, tools = "None of these figures has been measured yet.", "These figures were measured with Python "
+    text = figures.section("use", [Table("T", ("what", "result"), rows)])
+    assert (said in text, tools in text) == (True, False)
+    text = figures.section("use", [Table("T", ("what", "result"), (*rows, ("c", MET)))])
+    assert (said in text, tools in text) == (False, True)
+
+
 @pytest.mark.check
 @needs_yosys
 def test_luts_and_flip_flops_of_a_tiny_entity(tmp_path: Path) -> None:

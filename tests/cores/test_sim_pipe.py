@@ -20,7 +20,7 @@ from tests.hdl.frames import random_frames
 
 SEED = 20240611
 EVERY_BYTE = bytes(range(256))
-VERSION = b"V\3"
+VERSION = b"V\4"
 FRAME = b"\x07\x04\x00\x00\x00\x00\x0a\xff\x0d"
 
 
@@ -117,12 +117,37 @@ def test_waits_are_counted_from_the_first_request_on(bench: PipeBench) -> None:
         assert isinstance(before, Waits)
         assert isinstance(waits, Waits)
         assert before.counts == (0, 0, 0, 0)
-        assert waits.cycle == simulator.cycle
+        assert (before.first, waits.first, waits.cycle) == (before.cycle, before.cycle, simulator.cycle)
         # A stalled host takes 256 beats in some 427 cycles.
         assert waits.counts == waits.counts[:1] * 4
         assert 100 < waits.counts[0] < 250
         simulator.request_waits()
-        assert simulator.run(0) == [Waits(simulator.cycle, (0, 0, 0, 0))]
+        assert simulator.run(0) == [Waits(waits.cycle, simulator.cycle, (0, 0, 0, 0))]
+
+
+def test_waits_are_not_counted_after_the_end_of_their_count(bench: PipeBench) -> None:
+    """The next request begins a count; neither the cycles before the end nor those after it belong to it."""
+    print(f"seed {SEED}")
+    with bench.start(8, SEED=SEED, STALL_PERCENT=40) as simulator:
+        simulator.request_waits()
+        simulator.request(EVERY_BYTE)
+        run_to_burst(simulator)
+        for is_counted in (False, True):
+            simulator.end_waits()
+            if not is_counted:
+                simulator.request(EVERY_BYTE)
+                run_to_burst(simulator)
+            begun = simulator.cycle
+            simulator.request_waits()
+            assert simulator.run(0) == [Waits(begun, begun, (0, 0, 0, 0))]
+            simulator.request(EVERY_BYTE)
+            run_to_burst(simulator)
+            simulator.request_waits()
+            (waits,) = simulator.run(0)
+            assert isinstance(waits, Waits)
+            assert (waits.first, waits.cycle) == (begun, simulator.cycle)
+            assert waits.counts == waits.counts[:1] * 4
+            assert 100 < waits.counts[0] < 250
 
 
 def test_all_simulators_count_the_same_waits(tmp_path: Path) -> None:
@@ -254,8 +279,8 @@ def test_what_happened_in_the_cycle_of_a_fault_is_reported(bench: PipeBench) -> 
 @pytest.mark.parametrize(
     ("requests", "message"),
     [
-        (b"X", "unknown request 88; legal: F, A, H, R, W, Q"),
-        (b"\x00", "unknown request 0; legal: F, A, H, R, W, Q"),
+        (b"X", "unknown request 88; legal: F, A, H, R, W, N, Q"),
+        (b"\x00", "unknown request 0; legal: F, A, H, R, W, N, Q"),
         (b"R\x01\x00", "the requests end within a request"),
         (b"F\x04\x00\x00\x00abc", "the requests end within a request"),
         (b"F\x00\x00\x00\x00", "the requested frame has no bytes"),

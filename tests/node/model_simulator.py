@@ -164,10 +164,12 @@ def main() -> None:
     options = arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at
     simulator = Simulator(*options, words, arguments.waits)
     with open(3, "rb") as requests, open(4, "wb") as reports:
-        reports.write(b"V\3")
+        reports.write(b"V\4")
         while (letter := requests.read(1)) not in (b"", b"Q"):
             if letter == b"W":
                 reports.write(simulator.waits())
+                continue
+            if letter == b"N":
                 continue
             number = int.from_bytes(requests.read(4), "little")
             if letter == b"F":

@@ -206,8 +206,9 @@ def test_hardware_that_is_gone_ends_the_node(tmp_path: Path) -> None:
 
 
 def test_hardware_that_is_gone_is_started_anew(tmp_path: Path) -> None:
-    bench = Bench()
-    run = Run(describe(pairs(tmp_path)), bench.open, NodeSettings(restarts=True))
+    bench, watch = Bench(), Watch()
+    run = Run(describe(pairs(tmp_path)), bench.open, NodeSettings(restarts=True, watch=watch))
+    run.node.waited(0, 1000, [5])
     run.carrier.give(0, POINTS[0])
     until(lambda: run.carrier.published)
     bench.hardware.error = TransportError("the simulator was killed")
@@ -218,6 +219,8 @@ def test_hardware_that_is_gone_is_started_anew(tmp_path: Path) -> None:
     assert [payload for _, payload in run.carrier.published] == POINTS[:2]
     assert run.reports == ["the simulator was killed; the hardware is restarted, and the messages in it are lost"]
     assert run.node.statistics.restarts == 1
+    # The cycles of the record are those of the hardware that runs.
+    assert watch.waits(10) == []
 
 
 def test_hardware_that_never_works_is_given_up(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ import os, struct, sys, time
 requests, reports = open(3, "rb"), open(4, "wb")
 cycle = quiet = counted = 0
 frames = []
-reports.write(b"V\\3")
+reports.write(b"V\\4")
 def say(*parts):
     reports.write(b"".join(parts))
 while kind := requests.read(1):
@@ -343,6 +343,7 @@ class _TimedSimulator:
         self.now = 0.0
         self.cycle = self.quiet = self.begun = 0
         self.runs: list[tuple[float, float]] = []
+        self.counts: list[tuple[float, bool]] = []
         self._cycle_seconds = cycle_seconds
         self._left = self._frame_cycles = frame_cycles
         self._cycles = 0
@@ -354,6 +355,12 @@ class _TimedSimulator:
 
     def begin(self, cycles: int, runs: int = 1) -> None:
         self._cycles, self.begun = cycles, self.begun + runs
+
+    def request_waits(self) -> None:
+        self.counts.append((self.now, True))
+
+    def end_waits(self) -> None:
+        self.counts.append((self.now, False))
 
     def has_report(self, seconds: float) -> bool:
         return True
@@ -371,6 +378,23 @@ class _TimedSimulator:
         """Nothing is left to do."""
 
     close = kill
+
+
+def test_waits_are_counted_while_they_are_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The counts are at least 10 ms apart."""
+    simulator, wanted = _TimedSimulator(1e-6, 50_000), [False]
+    monkeypatch.setattr("fusesoc_firm.node.transport.simulator.time.monotonic", lambda: simulator.now)
+    transport = SimulatorTransport(lambda: simulator, wants_waits=lambda: wanted[0])  # type: ignore[arg-type, return-value]
+    for is_wanted in (False, True, False, True):
+        wanted[0] = is_wanted
+        simulator.now += 10.0
+        simulator.counts.clear()
+        transport.send(b"frame")
+        assert transport.receive(10.0)
+        assert {wants for _, wants in simulator.counts} == {is_wanted}
+        assert 2 <= len(simulator.counts) <= 6
+        assert all(after - before >= 0.01 for (before, _), (after, _) in pairwise(simulator.counts))
+    transport.close()
 
 
 def test_a_long_frame_takes_few_runs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -115,7 +115,7 @@ class Listener:
     def wants_waits(self) -> bool:
         return False
 
-    def waited(self, cycle: int, counts: Sequence[int]) -> None:
+    def waited(self, first: int, cycle: int, counts: Sequence[int]) -> None:
         raise AssertionError
 
 

@@ -86,7 +86,7 @@ class Listener:
     def wants_waits(self) -> bool:
         return False
 
-    def waited(self, cycle: int, counts: Sequence[int]) -> None: ...
+    def waited(self, first: int, cycle: int, counts: Sequence[int]) -> None: ...
 
 
 def test_a_simulator_has_no_registers() -> None:

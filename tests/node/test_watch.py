@@ -43,26 +43,39 @@ def test_the_record_is_bounded_and_tells_what_is_missing() -> None:
 def test_waits_are_kept_and_summed_over_the_counted_cycles() -> None:
     watch = Watch()
     assert (watch.waits_of_all, watch.waits(10)) == (None, [])
-    # The first call begins the count.
-    watch.waited(1000, [7, 7])
+    # A count that begins has no cycles.
+    watch.waited(1000, 1000, [0, 0])
     assert watch.waits_of_all is None
-    watch.waited(1100, [10, 90])
-    watch.waited(1100, [0, 0])
-    watch.waited(1400, [0, 150])
+    watch.waited(1000, 1100, [10, 90])
+    watch.waited(1100, 1400, [0, 150])
     parts = [Waits(1000, 1100, 100, (10, 90)), Waits(1100, 1400, 300, (0, 150))]
     assert watch.waits(10) == parts
     assert watch.waits_of_all == Waits.of(parts) == Waits(1000, 1400, 400, (10, 240))
     assert watch.waits(10, 1099, 1099) == parts[:1]
     assert watch.waits(10, 1100) == watch.waits(1) == parts[1:]
-    # A simulator that took the place of another one begins at cycle 0.
-    watch.waited(50, [5, 5])
-    watch.waited(60, [1, 2])
-    assert watch.waits(1) == [Waits(50, 60, 10, (1, 2))]
-    assert watch.waits_of_all == Waits(1000, 60, 410, (11, 242))
-    for cycle in range(100, 10_000):
-        watch.waited(cycle, [0, 1])
+    # Nobody watched before cycle 2000.
+    watch.waited(2000, 2000, [0, 0])
+    for cycle in range(2000, 10_000):
+        watch.waited(cycle, cycle + 1, [0, 1])
     assert len(watch.waits(10_000)) == 5000
-    assert watch.waits_of_all == Waits(1000, 9999, 410 + 9939, (11, 242 + 9900))
+    assert watch.waits_of_all == Waits(1000, 10_000, 400 + 8000, (10, 240 + 8000))
+
+
+def test_what_belongs_to_cycles_of_an_earlier_simulator_is_forgotten() -> None:
+    """The cycles of another simulator begin at 0 again; messages of the record keep theirs."""
+    watch = Watch()
+    watch.granted("a", 1100, 1110)
+    watch.waited(1000, 1400, [10, 90])
+    old = watch.find(watch.saw("a", b"", 0, Latency(cycles=60), (1100, 1110)))
+    assert old
+    assert watch.waits_during(old, 10) == Waits(1000, 1400, 400, (10, 90))
+    watch.begin_cycles()
+    assert (watch.grants(10), watch.waits(10), watch.waits_of_all) == ([], [], None)
+    watch.waited(1000, 1200, [1, 2])
+    new = watch.find(watch.saw("a", b"", 0, Latency(cycles=60), (1100, 1110)))
+    assert new
+    assert watch.waits_during(new, 10) == watch.waits_of_all == Waits(1000, 1200, 200, (1, 2))
+    assert watch.waits_during(old, 10) is None
 
 
 def test_a_long_run_needs_no_more_memory() -> None:

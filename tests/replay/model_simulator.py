@@ -117,10 +117,12 @@ class Model:
 
 def main(requests: BinaryIO, reports: BinaryIO) -> None:
     model = Model(int(sys.argv[1]), sys.argv[2:])
-    reports.write(b"V\3")
+    reports.write(b"V\4")
     while letter := requests.read(1):
         if letter == b"F":
             model.frames.append(requests.read(int.from_bytes(requests.read(4), "little")))
+            continue
+        if letter == b"N":
             continue
         if letter == b"W":
             reports.write(b"W" + le(model.cycle, 8) + le(1, 2) + le(model.cycle, 4))

@@ -11,11 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import get_types_from_idl
 from rosbags.typesys.store import Typestore
 
+from fusesoc_firm.bags import calls
+from fusesoc_firm.message.bag_reader import open_bag
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.simulation.software_run import system_stimuli
@@ -112,12 +117,18 @@ def system(folder: Path, name: str) -> LoadedSystem:
 
 
 def replay_calls(
-    folder: Path, source: Path, names: Mapping[str, str] | None = None, name: str = "camera", *, is_json: bool = True
+    folder: Path,
+    source: Path | Source,
+    names: Mapping[str, str] | None = None,
+    name: str = "camera",
+    *,
+    is_json: bool = True,
 ) -> Path:
     """Replay a bag through the model of a service in hardware, or of hardware that calls one; what is written."""
+    source = source if isinstance(source, Source) else Source(source)
     command = [sys.executable, str(HERE / "service_simulator.py"), name, "2", str(folder / "gate"), "--width", "32"]
     target, settings = folder / "out.mcap", Settings(names or {}, 1000, is_json=is_json)
-    replay(system(folder, name), Source(source), Target(target), settings, lambda: Simulator(command))
+    replay(system(folder, name), source, Target(target), settings, lambda: Simulator(command))
     return target
 
 
@@ -219,13 +230,13 @@ class Asked(Recorder):
         info = types["sensor_msgs/msg/CameraInfo"](header, 0, 0, text, np.zeros(0), k, r, p, 0, 0, region)
         return types[REQUEST](info)
 
-    def written_with_names(self, path: Path, names: Iterable[str]) -> Path:
-        """Write a bag with the events, all of them after the names that lead to the calls."""
+    def written_with_names(self, path: Path, names: Iterable[str], apart_ns: int = 1) -> Path:
+        """Write a bag with the names that lead to the calls, and with an event in each ms from the first one on."""
         with Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
             connection = writer.add_connection("/name_in", STRING, typestore=self.store)
             for number, name in enumerate(names):
                 message = self.store.types[STRING](name)
-                writer.write(connection, 10**18 + number, bytes(self.store.serialize_cdr(message, STRING)))
+                writer.write(connection, 10**18 + number * apart_ns, bytes(self.store.serialize_cdr(message, STRING)))
             connection = writer.add_connection(self.topic, EVENT, msgdef="", rihs01=HASH)
             for number, payload in enumerate(self.events):
                 writer.write(connection, 10**18 + 10**6 * (number + 1), payload)
@@ -273,6 +284,129 @@ def test_recorded_requests_that_the_hardware_does_not_make_are_missing(
     replay_calls(tmp_path, source, {}, "asking", is_json=False)
     text = "requests on /set_camera_info_request: 1 as recorded, 0 different, 2 missing, 0 not recorded"
     assert text in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("part", "told", "counts"),
+    [
+        # Each name precedes its request and response by 1 ms and 2 ms; the last call has no name.
+        ({}, ["eno", "owt", "eerht"], [3, 0, 1, 0]),
+        ({"start": 0.0025}, ["owt", "eerht"], [2, 0, 1, 0]),
+        ({"start": 0.0025, "duration": 0.003}, ["owt"], [1, 0, 0, 0]),
+        ({"limit": 2}, ["eno", "owt"], [2, 0, 0, 0]),
+        ({"start": 0.0025, "limit": 1}, ["owt"], [1, 0, 0, 0]),
+        ({"limit": 1, "start": 0.001}, ["eno"], [0, 1, 0, 0]),
+    ],
+)
+def test_calls_of_hardware_in_a_part_of_a_bag(
+    tmp_path: Path,
+    store: Typestore,
+    part: Mapping[str, Any],
+    told: Sequence[str],
+    counts: Sequence[int],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The hardware's first request is compared with the first one of the part, and none after it is missing."""
+    recorder = Asked(store)
+    for call, name in enumerate(["one", "two", "three", "four"]):
+        recorder.add(SENT, call, name, CLIENT)
+        recorder.add(TAKEN, call, name[::-1], CLIENT)
+        recorder.events.append(b"")
+    source = recorder.written_with_names(tmp_path / "in", ["one", "two", "three"], 3 * 10**6)
+    assert recorder.told(replay_calls(tmp_path, Source(source, **part), name="asking")) == told
+    (row,) = json.loads(capsys.readouterr().out)["requests"]
+    assert [row[kind] for kind in ("as_recorded", "different", "missing", "not_recorded")] == counts
+
+
+def test_requests_that_are_missing_before_the_last_message(
+    tmp_path: Path, store: Typestore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Three requests were recorded between the messages, and one after them."""
+    recorder = Asked(store)
+    for call, name in enumerate(["one", "two", "three", "four", "five"]):
+        recorder.add(SENT, call, name, CLIENT)
+    source = recorder.written_with_names(tmp_path / "in", ["one", "two", "end"], 4_500_000)
+    replay_calls(tmp_path, Source(source, limit=2), name="asking")
+    (row,) = json.loads(capsys.readouterr().out)["requests"]
+    assert [row[kind] for kind in ("as_recorded", "different", "missing", "not_recorded")] == [2, 0, 2, 0]
+
+
+def rewritten(source: Path, target: Path, **options: Any) -> Path:
+    """Write the messages of an MCAP bag again, with options of another writer."""
+    with source.open("rb") as old, target.open("wb") as new:
+        writer = McapWriter(new, compression=CompressionType.NONE, **options)
+        writer.start("ros2")
+        channels: dict[str, int] = {}
+        for schema, channel, message in make_reader(old).iter_messages():
+            if channel.topic not in channels:
+                assert schema
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            writer.add_message(channels[channel.topic], message.log_time, message.data, message.log_time)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return target
+
+
+def test_a_request_without_a_response_does_not_hold_up_others(
+    tmp_path: Path, store: Typestore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bounded part of the bag is read ahead; two requests are answered in the other order."""
+    recorder = Asked(store)
+    for call in range(300):
+        recorder.add(SENT, call, f"call {call}", CLIENT)
+        if call % 10 != 1 and call > 0:
+            recorder.add(TAKEN, call, str(call), CLIENT)
+        if call % 10 == 2:
+            recorder.add(TAKEN, call - 1, str(call - 1), CLIENT)
+    source = recorder.written_with_names(tmp_path / "in", ["one"])
+    loaded = system(tmp_path, "asking")
+    names = {item.block: item.name for item in loaded.system.subscribers}
+    read_ahead: list[Any] = []
+    part_of = calls._Calls.part_of
+
+    def counted(*given: Any) -> Any:
+        read_ahead.append(given)
+        return part_of(*given)
+
+    monkeypatch.setattr(calls._Calls, "part_of", counted)
+    with open_bag(source) as opened:
+        bag = calls.with_calls(opened, loaded.system.services, loaded.libraries, names, plays_responses=False)
+        exchanges = bag.exchanges("set_camera_info_request", 0, None)
+        first = next(exchanges)
+        assert len(read_ahead) < 250
+        found = [exchange.response for exchange in (first, *exchanges)]
+    responses = [store.types[RESPONSE](call % 2 == 1, str(call)) for call in range(1, 300)]
+    expected = [bytes(store.serialize_cdr(response, RESPONSE)) for response in responses]
+    assert found == [None, *expected]
+
+
+def test_the_exchanges_are_read_beside_the_messages(tmp_path: Path, store: Typestore) -> None:
+    """A reader of rosbags has one place in an MCAP file without chunks."""
+    recorder = Asked(store)
+    texts = [f"name {number}" for number in range(20)]
+    for call, name in enumerate(texts):
+        recorder.add(SENT, call, name, CLIENT)
+        recorder.add(TAKEN, call, name[::-1], CLIENT)
+    recorder.written_with_names(tmp_path / "in", texts, 2 * 10**6)
+    source = rewritten(tmp_path / "in" / "in.mcap", tmp_path / "plain.mcap", use_chunking=False)
+    assert recorder.told(replay_calls(tmp_path, source, name="asking")) == [text[::-1] for text in texts]
+
+
+def test_a_damage_after_the_end_does_not_matter(
+    tmp_path: Path, store: Typestore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """While a response is looked for, the reading of exchanges comes to the damage."""
+    recorder = Asked(store)
+    for call in range(20):
+        recorder.add(SENT, call, "one", CLIENT)
+    recorder.written_with_names(tmp_path / "in", ["one", "two", "three"], 10**7)
+    source = rewritten(tmp_path / "in" / "in.mcap", tmp_path / "damaged.mcap", chunk_size=500)
+    content = bytearray(source.read_bytes())
+    content[content.rindex(b"three")] ^= 1
+    source.write_bytes(content)
+    replay_calls(tmp_path, Source(source, limit=2), name="asking")
+    (row,) = json.loads(capsys.readouterr().out)["requests"]
+    assert [row[kind] for kind in ("as_recorded", "different", "missing", "not_recorded")] == [1, 1, 8, 0]
 
 
 def test_calls_are_stimuli_of_a_simulation(tmp_path: Path, store: Typestore) -> None:

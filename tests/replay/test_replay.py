@@ -6,7 +6,9 @@ import json
 import threading
 import time
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from rosbags.rosbag1 import Writer as Rosbag1Writer
@@ -15,6 +17,7 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.message.bag_reader import Form
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.watch import Control, Watch
+from fusesoc_firm.replay import command
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
@@ -538,7 +541,8 @@ def test_software_elsewhere_takes_and_gives_topics(tmp_path: Path) -> None:
         assert [item for item in found if item[0] == topic] == renamed(points("ros1", 3), topic)
 
 
-def test_a_watch_records_the_replay_and_pauses_it(tmp_path: Path) -> None:
+def test_a_watch_records_the_replay_and_pauses_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command, "WAITS_SECONDS", 0.0)
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point")))
     items, watch, control = points("ros1", 20), Watch(), Control()
     # A page is open only while the replay is paused after two messages.
@@ -573,6 +577,30 @@ def test_a_watch_records_the_replay_and_pauses_it(tmp_path: Path) -> None:
             assert item.latency.cycles == 3 + 20 + 3
     assert watch.waits(10) == [first, second]
     assert read(tmp_path / "out.bag") == renamed(items, "/p_out")
+
+
+def test_a_count_of_waits_is_not_too_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clock goes on by 4 ms from message to message, so each third one ends a count."""
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point")))
+    watch, ticks = Watch(), count(1000)
+    watch.is_watched = lambda: True
+    monkeypatch.setattr(command, "time", SimpleNamespace(monotonic=lambda: 0.004 * next(ticks)))
+    run(loaded, bag(tmp_path, "ros1", points("ros1", 12)), tmp_path / "out.bag", "echo", watch=watch)
+    assert len(watch.waits(100)) == 4
+
+
+def test_waits_are_counted_anew_when_somebody_watches_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cycles between do not count."""
+    monkeypatch.setattr(command, "WAITS_SECONDS", 0.0)
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point")))
+    watch, looks = Watch(), iter([True, True, False, False, True, True])
+    watch.is_watched = lambda: next(looks, False)
+    run(loaded, bag(tmp_path, "ros1", points("ros1", 12)), tmp_path / "out.bag", "echo", watch=watch)
+    first, second = watch.waits(10)
+    assert first.first == 0
+    assert second.first == 4 * first.end
+    assert watch.waits_of_all
+    assert watch.waits_of_all.cycles == first.cycles + second.cycles
 
 
 def test_a_replay_that_is_ended_in_the_page_has_recorded_what_came(tmp_path: Path) -> None:

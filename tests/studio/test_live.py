@@ -20,7 +20,6 @@ from matplotlib import image as pictures
 
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.node.watch import Control, Latency, Load, Seen, Waits, Watch
-from fusesoc_firm.studio.live import waits_during
 from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
 from fusesoc_firm.studio.reports import Reports
 from fusesoc_firm.studio.run import Run
@@ -265,15 +264,15 @@ def test_waits_are_counted_only_while_a_page_watches(studio: Studio) -> None:
 
 def test_waits_of_a_message_are_those_of_its_cycles() -> None:
     watch = Watch()
-    for cycle in (100, 200, 300, 400):
-        watch.waited(cycle, [cycle, 1])
+    for cycle in (200, 300, 400):
+        watch.waited(cycle - 100, cycle, [cycle, 1])
     response = Seen(5, "b", 0, b"", Latency(cycles=60), (240, 250))
     # Its cause began to come in at cycle 190.
-    assert waits_during(watch, response) == Waits(100, 300, 200, (500, 2))
+    assert watch.waits_during(response, 10) == Waits(100, 300, 200, (500, 2))
     alone = replace(response, latency=Latency())
-    assert waits_during(watch, replace(alone, cycles=(300, 310))) == Waits(300, 400, 100, (400, 1))
-    assert waits_during(watch, replace(alone, cycles=(900, 990))) is None
-    assert waits_during(watch, replace(alone, cycles=None)) is None
+    assert watch.waits_during(replace(alone, cycles=(300, 310)), 10) == Waits(300, 400, 100, (400, 1))
+    assert watch.waits_during(replace(alone, cycles=(900, 990)), 10) is None
+    assert watch.waits_during(replace(alone, cycles=None), 10) is None
 
 
 def test_the_record_goes_back(studio: Studio) -> None:

@@ -52,7 +52,7 @@ module firm_sim_pipe #(
   localparam MOST_ERRORS  = 65534;
   localparam MOST_WIRES   = 65533;
   localparam MOST_WAITED  = 2147483647;
-  localparam VERSION      = 3;           // of requests and reports
+  localparam VERSION      = 4;           // of requests and reports
   localparam MOST_QUIET   = 2147483647;
   // Bytes that are read at once, and written at once: a call for each byte takes more time than the simulation.
   localparam PIECE_BYTES  = 4096;
@@ -88,7 +88,7 @@ module firm_sim_pipe #(
 
   // Cycles in which a beat waited: into the system, out of it, and on the wires within it.
   integer    waited [0:WIRES+1];
-  reg        is_counting;                // the host has asked for them
+  reg        is_counting;                // the host wants to know them
 
   // The inputs as sampled before the rising edge.
   reg               tready, tvalid, tlast;
@@ -277,6 +277,15 @@ module firm_sim_pipe #(
         waited[place] = 0;
       end
       is_counting = 1;
+    end
+  endtask
+
+  task forget_waits;
+    integer place;
+    begin
+      for (place = 0; place < WIRES + 2; place = place + 1)
+        waited[place] = 0;
+      is_counting = 0;
     end
   endtask
 
@@ -615,10 +624,12 @@ module firm_sim_pipe #(
         run;
       else if (request == "W")
         report_waits;
+      else if (request == "N")
+        forget_waits;
       else if (request == "Q")
         report_stand;
       else begin
-        $display("firm_sim_pipe: unknown request %0d; legal: F, A, H, R, W, Q", request);
+        $display("firm_sim_pipe: unknown request %0d; legal: F, A, H, R, W, N, Q", request);
         fail;
       end
       request = request == "Q" ? -1 : $fgetc(requests);

@@ -68,7 +68,7 @@ architecture simulation of firm_sim_pipe is
   constant NO_WAITS     : std_logic_vector(WIRES-1 downto 0) := (others => '0');
   constant MOST_WIRES   : natural  := 2**16 - 3;
   -- Of requests and reports.
-  constant VERSION      : natural  := 3;
+  constant VERSION      : natural  := 4;
 
   type level_t is array (boolean) of std_logic;
   constant LEVEL_OF : level_t := (false => '0', true => '1');
@@ -167,7 +167,7 @@ begin
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
 
-    variable is_counting : boolean := false;    -- the host has asked for waits
+    variable is_counting : boolean := false;    -- the host wants to know the waits
     variable waited      : counts_t(0 to WIRES+1) := (others => 0);
 
     -- Reports must be read before the simulation ends.
@@ -334,6 +334,12 @@ begin
       waited      := (others => 0);
       is_counting := true;
     end procedure report_waits;
+
+    procedure forget_waits is
+    begin
+      waited      := (others => 0);
+      is_counting := false;
+    end procedure forget_waits;
 
     procedure report_stand is
     begin
@@ -598,7 +604,7 @@ begin
       report_stand;
     end procedure run;
 
-    variable request : character := 'R';
+    variable kind : character := 'R';  -- of the request
 
   begin
     random_1 := SEED;
@@ -614,16 +620,17 @@ begin
     rst_n <= '1' after HOLD;
 
     -- The end of the requests has the same effect as Q.
-    while request /= 'Q' and not endfile(requests) loop
-      read(requests, request);
-      case request is
+    while kind /= 'Q' and not endfile(requests) loop
+      read(requests, kind);
+      case kind is
         when 'F'    => read_frame(false, false);
         when 'A'    => read_frame(true, false);
         when 'H'    => read_frame(false, true);
         when 'R'    => run;
         when 'W'    => report_waits;
+        when 'N'    => forget_waits;
         when 'Q'    => report_stand;
-        when others => fail("unknown request " & integer'image(character'pos(request)) & "; legal: F, A, H, R, W, Q");
+        when others => fail("unknown request " & integer'image(character'pos(kind)) & "; legal: F, A, H, R, W, N, Q");
       end case;
     end loop;
     wait;

@@ -40,8 +40,10 @@ MOST_CYCLES = 2**31 - 1
 # Connect the pipes to the descriptors that a simulator expects. A shell cannot copy two-digit descriptors, but it can
 # open them by name.
 _SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
-PIPE_VERSION = 3
+PIPE_VERSION = 4
 """The version of requests and reports."""
+WAITS_SECONDS = 0.01
+"""The least time between two requests of waits, and before the end of their count."""
 
 _SHOWN_LINES = 20
 # A simulator normally ends immediately on request, or when its pipes close.
@@ -52,8 +54,6 @@ _END_SECONDS = 10.0
 _STEP_SECONDS = 0.001
 _STEP_SHARE = 1 / 8
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
-# The least time between two requests of waits.
-_WAITS_SECONDS = 0.01
 _PIECE_BYTES = 2**16
 # The most that Linux grants every user. In a small pipe, a large frame needs a change of processes for each 64 KiB.
 _PIPE_BYTES = 2**20
@@ -79,11 +79,13 @@ class ErrorPulse:
 
 @dataclass(frozen=True)
 class Waits:
-    """The cycles in which beats have waited since the last such event: before `cycle`, on each wire.
+    """The cycles in which beats have waited on each wire, from the cycle `first` to the one before `cycle`.
 
-    The first two wires are those from and to the host, the others are within the system (`system/hardware/waits.py`).
+    `first` is `cycle` if the count begins. The first two wires are those from and to the host, the others are within
+    the system (`system/hardware/waits.py`).
     """
 
+    first: int
     cycle: int
     counts: tuple[int, ...]
 
@@ -140,6 +142,8 @@ class Simulator:
         self.quiet = 0
         self.begun = 0
         self._has_version = False
+        self._is_counting = False
+        self._counted_to: int | None = None  # by the last `Waits`
         self._printed = tempfile.TemporaryFile()  # noqa: SIM115
         from_us, to_simulator = _pipe()
         from_simulator, to_us = _pipe()
@@ -184,7 +188,14 @@ class Simulator:
 
         May raise `TransportError`.
         """
+        self._is_counting = True
         self._write(b"W")
+
+    def end_waits(self) -> None:
+        """End the count of waits if there is one; it takes time in each cycle. May raise `TransportError`."""
+        if self._is_counting:
+            self._is_counting, self._counted_to = False, None
+            self._write(b"N")
 
     def run(self, cycles: int) -> list[Event]:
         """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""
@@ -305,9 +316,13 @@ class Simulator:
         if kind == b"I":
             return ErrorPulse(None, self._number(8))
         if kind == b"W":
-            cycle, wires = self._number(8), self._number(2)
-            return Waits(cycle, struct.unpack(f"<{wires}I", self._read(4 * wires)))
+            return self._waits(self._number(8), self._number(2))
         return self._fail(f"the simulator sent 0x{kind.hex()} instead of the start of a report")
+
+    def _waits(self, cycle: int, wires: int) -> Waits:
+        counts = struct.unpack(f"<{wires}I", self._read(4 * wires))
+        first, self._counted_to = cycle if self._counted_to is None else self._counted_to, cycle
+        return Waits(first, cycle, counts)
 
     def _wait(self) -> int | None:
         """Return the simulator's exit status, or None if the simulator does not end."""
@@ -363,8 +378,8 @@ class SimulatorTransport:
     ) -> None:
         """Start the simulator with `start`; `observe` is called with every event, and must not raise or call this.
 
-        `Waits` are requested while `wants_waits` returns True. Raise `TransportError` if the simulator cannot be
-        started.
+        `Waits` are requested while `wants_waits` returns True, and not counted otherwise. Raise `TransportError` if the
+        simulator cannot be started.
         """
         self._start = start
         self._pace = pace or Pace()
@@ -497,9 +512,12 @@ class SimulatorTransport:
             self._simulator.request(self._sent.popleft())
             frames += 1
         self._began = time.monotonic()
-        if self._began >= self._counted_at + _WAITS_SECONDS and self._wants_waits():
-            self._simulator.request_waits()
+        if self._began >= self._counted_at + WAITS_SECONDS:
             self._counted_at = self._began
+            if self._wants_waits():
+                self._simulator.request_waits()
+            else:
+                self._simulator.end_waits()
         self._passes_frames = frames > 0
         if frames:
             self._changed_at = self._began

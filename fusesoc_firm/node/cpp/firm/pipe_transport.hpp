@@ -94,7 +94,7 @@ class PipeTransport : public Transport {
   static constexpr int kRequests = 3;
   static constexpr int kReports = 4;
   static constexpr std::size_t kBufferBytes = 1 << 16;
-  static constexpr unsigned kVersion = 3;  // of requests and reports
+  static constexpr unsigned kVersion = 4;  // of requests and reports
   // How often a simulator at rest is looked at, which may have ended.
   static constexpr std::chrono::nanoseconds kLook = std::chrono::milliseconds(250);
 
