@@ -269,7 +269,7 @@ class _Replay:
                 missing += 1
         counts |= {_MISSING: missing, _NOT_RECORDED: self.asked[block, _NOT_RECORDED]}
         _, calls = self.bag.asked[block]
-        return {"topic": self.topics[block].name, "type": calls.type.request_name} | counts
+        return {"topic": self.topics[block].name, "type": calls.events.type.request_name} | counts
 
     def _seen(self, subscriber: Topic, recorded: Recorded) -> int | None:
         return self._seen_at(subscriber, recorded.payload, recorded.stamp)
