@@ -107,14 +107,14 @@ class Goals:
         message = self._made(f"{_FIBONACCI}_Feedback", np.array([value], np.int32))
         self._add("_action/feedback", f"{_FIBONACCI}_FeedbackMessage", self._id(goal), message)
 
-    def result(self, goal: int, state: int, value: int) -> None:
-        """Record a result."""
+    def result(self, goal: int, state: int, value: int | None) -> None:
+        """Record a result, or one without contents."""
         if self.version == 1:
-            message = self._made("actionlib/msg/TestResult", value)
+            message = self._made("actionlib/msg/TestResult", value or 0)
             self._add("result", "actionlib/msg/TestActionResult", self._header(), self._status(goal, state), message)
             return
         request = self._made(f"{_FIBONACCI}_GetResult_Request", self._id(goal))
-        message = self._made(f"{_FIBONACCI}_Result", np.array([value], np.int32))
+        message = self._made(f"{_FIBONACCI}_Result", np.array([] if value is None else [value], np.int32))
         response = self._made(f"{_FIBONACCI}_GetResult_Response", state, message)
         self._call("get_result", f"{_FIBONACCI}_GetResult", request, response)
 

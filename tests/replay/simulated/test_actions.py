@@ -23,17 +23,20 @@ def recorded(goals: Goals, count: int) -> tuple[list[tuple[str, int]], int, int]
     """
     choice = random.Random(SEED)
     told: list[tuple[str, int]] = []
-    feedback = number = 0
+    feedback = number = canceled = 0
     while number < count:
-        group = [(number + place, choice.choice([HELD, 4, 5, 6, 7])) for place in range(choice.randint(1, 4))]
+        group = [
+            (number + place, choice.choice([HELD, HELD, HELD, 4, 5, 6, 7])) for place in range(choice.randint(1, 4))
+        ]
         number += len(group)
         for goal, value in group:
             goals.goal(goal + 1, value)
         # A goal in the hardware that is held would keep the others waiting.
-        lost = {goal for goal, _ in group[1:] if choice.random() < 0.3} if group[0][1] == HELD else set()
+        lost = {goal for goal, _ in group[1:] if choice.random() < 0.5} if group[0][1] == HELD else set()
+        canceled += len(lost)
         for goal in lost:
             goals.cancel(goal + 1)
-            goals.result(goal + 1, RECALLED[goals.version], 0)
+            goals.result(goal + 1, RECALLED[goals.version], None)
         for goal, value in group:
             if goal in lost:
                 continue
@@ -45,6 +48,7 @@ def recorded(goals: Goals, count: int) -> tuple[list[tuple[str, int]], int, int]
             goals.result(goal + 1, CANCELED[goals.version] if value == HELD else SUCCEEDED[goals.version], value)
             told += [("feedback", item) for item in values] + [("result", value)]
             feedback += len(values)
+    assert canceled, "the seed leads to goals that are canceled while they wait"
     return told, feedback, number
 
 
