@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from fusesoc_firm.bags.calls import with_calls
+from fusesoc_firm.bags.goals import with_goals
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.message.bag_reader import BAGS, Bag, Stream, open_bag
 from fusesoc_firm.message.joint import signature_of_text
@@ -16,7 +17,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived.model import Service, Topic, absolute_name
+from fusesoc_firm.system.derived.model import DerivedSystem, Topic, absolute_name
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
 AnyTopic = TypeVar("AnyTopic", bound=Topic)
@@ -166,16 +167,19 @@ def read_bag(
     path: Path,
     subscribers: Sequence[Topic],
     hint: str = BAGS,
-    services: Sequence[Service] = (),
+    system: DerivedSystem | None = None,
     libraries: Mapping[Middleware, MessageLibrary] | None = None,
 ) -> Iterator[tuple[Topic, bytes, dict[str, Any]]]:
     """Yield the subscriber, payload and decoded value of each routed message in chronological order.
 
-    The calls of `services` are messages, too. May raise `InputError`.
+    The calls of services of `system`, and the goals and cancellations of its actions, are messages, too. May raise
+    `InputError`.
     """
     with open_bag(path, hint) as opened:
         names = {item.block: item.name for item in subscribers}
-        bag = with_calls(opened, services, libraries or {}, names, plays_responses=True)
+        services, actions = (system.services, system.actions) if system else ((), ())
+        calls = with_calls(opened, services, libraries or {}, names, plays_responses=True)
+        bag = with_goals(calls, actions, libraries or {}, names, compares=False)
         routes = routes_of(bag, subscribers)
         for stream, route in routes.items():
             if route.misfit:

@@ -17,7 +17,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from fusesoc_firm.bags.calls import BagOfCalls, Exchange, with_calls
+from fusesoc_firm.bags.calls import Exchange, with_calls
+from fusesoc_firm.bags.goals import BagOfGoals, with_goals
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
 from fusesoc_firm.frame.codec import CodecError, decode
@@ -29,17 +30,19 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.node.transport.simulator import WAITS_SECONDS, Simulator, Waits
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Latency, Watch
+from fusesoc_firm.replay.goals import GoalLine, Verdict
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
 from fusesoc_firm.simulation.functions import Functions, importable_sources
 from fusesoc_firm.simulation.software_run import stimulated
-from fusesoc_firm.system.derived.model import ServiceEnd, Topic, absolute_name
+from fusesoc_firm.system.derived.model import Action, ServiceEnd, Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 
 # The maximum number of lines about rejected messages; further messages are only counted.
 _SHOWN = 100
 # What became of a response of the system to a recorded call, in the summary's words.
-_EQUAL, _DIFFERENT, _MISSING, _NOT_RECORDED = "as_recorded", "different", "missing", "not_recorded"
+_EQUAL, _DIFFERENT = Verdict.EQUAL.value, Verdict.DIFFERENT.value
+_MISSING, _NOT_RECORDED = Verdict.MISSING.value, Verdict.NOT_RECORDED.value
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ def replay(
     publishers = renamed(published(system), settings.names)
     topics = {item.block: _recorded(item, loaded) for item in publishers}
     with open_bag(source.path) as opened:
-        bag = _with_calls(opened, loaded, subscribers)
+        bag = _with_exchanges(opened, loaded, subscribers)
         form = _form(target, bag.form)
         _check_speaks(publishers, target.path, form)
         routes = _routes(bag, loaded, subscribers, settings.names)
@@ -141,7 +144,7 @@ def replay(
 class _Replay:
     """A replay in progress: the numbers of messages played from each stream and sent by each block."""
 
-    bag: BagOfCalls
+    bag: BagOfGoals
     source: Source
     routes: Mapping[Stream, Route]
     run: SystemRun
@@ -180,16 +183,21 @@ class _Replay:
                 for recorded in source.messages(self.bag, topics):
                     if self.settings.control and not self.settings.control.passes():
                         break
-                    self._play(recorded)
-                    bar.update()
+                    self._hear()
+                    if not self.is_over:
+                        self._play(recorded)
+                        bar.update()
                     if self.is_over:
                         break
                 else:
                     self.is_whole = self.played.total() != source.limit
+                if not self.is_over:
+                    self._hear()
             except InputError as error:
                 self._report(str(error).removeprefix("error: "))
-            if left := self.run.unfinished:
-                self._report(left)
+            for left in (self.run.unfinished, *(line.unfinished for line in self._lines.values())):
+                if left:
+                    self._report(left)
             if not self.is_over:
                 self._end()
 
@@ -202,11 +210,12 @@ class _Replay:
             faults.append(route.misfit)
         try:
             for subscriber in () if route.misfit else route.subscribers:
-                self.run.take(subscriber, recorded.payload, recorded.stamp, self._seen(subscriber, recorded))
+                self._give(subscriber, recorded)
             self._answer_calls()
+            for line in self._lines.values():
+                line.advance(recorded.stamp)
         except (StuckError, TransportError) as error:
-            faults.append(f"the rest of the bag was not replayed: {error}")
-            self.is_over = True
+            self._stop(error)
         self._count_waits()
         if recorded.stream in self._calls:
             self._compare()
@@ -214,13 +223,68 @@ class _Replay:
                 self.answers[recorded.stream, recorded.number] = answer
             else:
                 self.compared[recorded.stream, _MISSING] += 1
+        self.refused += bool(faults)
+        self._conclude(recorded)
+
+    def _hear(self) -> None:
+        """Take note of recorded feedback and results of goals."""
+        while self.bag.told and not self.is_over:
+            told = self.bag.told.popleft()
+            try:
+                self._lines[told.action.block].tell(told.block, told.owner, told.payload, told.recorded.stamp)
+            except (StuckError, TransportError) as error:
+                self._stop(error)
+            except (CodecError, ValueError) as error:
+                self.run.faults.append(str(error))
+            self._conclude(told.recorded)
+
+    def _stop(self, error: Exception) -> None:
+        self.run.faults.append(f"the rest of the bag was not replayed: {error}")
+        self.is_over = True
+
+    def _conclude(self, recorded: Recorded) -> None:
+        """Record what the system has sent at a recorded message, and report faults."""
         for sent in self.run.sent:
             self._record(sent)
         self.run.sent.clear()
-        self.refused += bool(faults)
-        for fault in faults:
+        for fault in self.run.faults:
             self._report(f"{recorded.stream.topic}, message {recorded.number}, at {seconds(recorded.stamp)}: {fault}")
-        faults.clear()
+        self.run.faults.clear()
+
+    def _give(self, subscriber: Topic, recorded: Recorded) -> None:
+        """Give a message to a subscriber; goals and cancellations of actions may have to wait."""
+        if line := self._to_lines.get(subscriber.block):
+            line.give(subscriber.block, recorded.payload, recorded.stamp)
+        else:
+            self._take(subscriber, recorded.payload, recorded.stamp)
+
+    def _send(self, block: str, payload: bytes, stamp: int) -> bool:
+        """Send a message of an action to the hardware; return whether there was no fault."""
+        known = len(self.run.faults)
+        self._take(self._entering[block], payload, stamp)
+        return len(self.run.faults) == known
+
+    def _take(self, subscriber: Topic, payload: bytes, stamp: int) -> None:
+        known = len(self.run.sent)
+        self.run.take(subscriber, payload, stamp, self._seen(subscriber, payload, stamp))
+        for line in self._lines.values():
+            line.take(self.run.sent[known:])
+
+    @cached_property
+    def _served(self) -> list[Action]:
+        """The actions that the hardware serves."""
+        return [action for action in self.run.system.actions if action.end is ServiceEnd.SERVER]
+
+    @cached_property
+    def _lines(self) -> Mapping[str, GoalLine]:
+        """The goals of the actions by their blocks."""
+        topics = {item.block: item for item in (*self.run.system.subscribers, *self.run.system.publishers)}
+        return {action.block: GoalLine(action, topics, self._send) for action in self._served}
+
+    @cached_property
+    def _to_lines(self) -> Mapping[str, GoalLine]:
+        """The same by the blocks of goals and of cancellations."""
+        return {block: self._lines[item.block] for item in self._served for block in (item.goal, item.cancel)}
 
     @cached_property
     def _calls(self) -> set[Stream]:
@@ -238,9 +302,8 @@ class _Replay:
                 self.asked[sent.topic.block, _NOT_RECORDED] += 1
                 continue
             self.asked[sent.topic.block, _verdict(sent, exchange.request)] += 1
-            if (response := exchange.response) is not None:
-                taker = self._takers[sent.topic.block]
-                self.run.take(taker, response, sent.cause.stamp, self._seen_at(taker, response, sent.cause.stamp))
+            if exchange.response is not None:
+                self._take(self._takers[sent.topic.block], exchange.response, sent.cause.stamp)
 
     @cached_property
     def _asked(self) -> Mapping[str, Iterator[Exchange]]:
@@ -251,9 +314,13 @@ class _Replay:
     @cached_property
     def _takers(self) -> Mapping[str, Topic]:
         """The topics of responses to the hardware, by the blocks of requests."""
-        topics = {item.block: item for item in self.run.system.subscribers}
         services = [item for item in self.run.system.services if item.end is ServiceEnd.CLIENT]
-        return {item.request: topics[item.response] for item in services}
+        return {item.request: self._entering[item.response] for item in services}
+
+    @cached_property
+    def _entering(self) -> Mapping[str, Topic]:
+        """The topics to the hardware by block."""
+        return {item.block: item for item in self.run.system.subscribers}
 
     def _answer(self, route: Route) -> Sent | None:
         """Return the response to the call that was sent last."""
@@ -284,12 +351,20 @@ class _Replay:
         missing = sum(self.is_whole or item.stamp <= self.last for item in self._asked[block])
         counts |= {_MISSING: missing, _NOT_RECORDED: self.asked[block, _NOT_RECORDED]}
         _, calls = self.bag.asked[block]
-        return {"topic": self.topics[block].name, "type": calls.type.request_name} | counts
+        return {"topic": self.topics[block].name, "type": calls.events.type.request_name} | counts
 
-    def _seen(self, subscriber: Topic, recorded: Recorded) -> int | None:
-        return self._seen_at(subscriber, recorded.payload, recorded.stamp)
+    def _of_goals(self) -> dict[str, list[dict[str, Any]]]:
+        """Return how much of the hardware's feedback and of its results is as recorded, for each action."""
+        rows: dict[str, list[dict[str, Any]]] = {"feedback": [], "results": []}
+        used = {item.block for route in self.routes.values() for item in route.subscribers}
+        for action in self._served:
+            if action.goal in used:
+                names = {"topic": absolute_name(action.ros_name), "type": str(action.type)}
+                for title, counts in self._lines[action.block].counts():
+                    rows[title].append(names | {verdict.value: counts[verdict] for verdict in Verdict})
+        return rows
 
-    def _seen_at(self, subscriber: Topic, payload: bytes, stamp: int) -> int | None:
+    def _seen(self, subscriber: Topic, payload: bytes, stamp: int) -> int | None:
         watch = self.settings.watch
         return watch.saw(subscriber.block, payload, stamp - self.bag.start) if watch else None
 
@@ -353,6 +428,7 @@ class _Replay:
             ],
             "responses": [self._compared(stream) for stream in self.routes if stream in self._calls],
             "requests": [self._requests(block) for block in self.bag.asked],
+            **self._of_goals(),
             "errors": self.errors,
             "messages_with_errors": self.refused,
             "first_errors": self.shown,
@@ -373,8 +449,10 @@ class _Replay:
             print(f"no subscriber for {row['topic']} ({row['type']}): {row['count']}")
         verdicts = [(f"responses to {row['topic']}", row) for row in found["responses"]]
         verdicts += [(f"requests on {row['topic']}", row) for row in found["requests"]]
+        verdicts += [(f"{kind} of {row['topic']}", row) for kind in ("feedback", "results") for row in found[kind]]
         for title, row in verdicts:
-            counts = (f"{row[kind]} {kind.replace('_', ' ')}" for kind in (_EQUAL, _DIFFERENT, _MISSING, _NOT_RECORDED))
+            kinds = (verdict.value for verdict in Verdict if verdict.value in row)
+            counts = (f"{row[kind]} {kind.replace('_', ' ')}" for kind in kinds)
             print(f"{title}: {', '.join(counts)}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out,"
@@ -395,10 +473,12 @@ def _value(topic: Topic, payload: bytes) -> bytes:
         return payload
 
 
-def _with_calls(bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic]) -> BagOfCalls:
-    """Return a bag with the calls of the system's services. May raise `InputError`."""
+def _with_exchanges(bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic]) -> BagOfGoals:
+    """Return a bag with the calls of the system's services and the goals of its actions. May raise `InputError`."""
     names = {item.block: item.name for item in subscribers}
-    return with_calls(bag, loaded.system.services, loaded.libraries, names, plays_responses=False)
+    system, libraries = loaded.system, loaded.libraries
+    calls = with_calls(bag, system.services, libraries, names, plays_responses=False)
+    return with_goals(calls, system.actions, libraries, names, compares=True)
 
 
 def _count(topic: str, type_: str, count: int) -> dict[str, Any]:
@@ -448,7 +528,7 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
 
 
 def _routes(
-    bag: BagOfCalls, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
+    bag: BagOfGoals, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
 ) -> dict[Stream, Route]:
     """Return the route of each stream. Raise `InputError` if there is no route, or if a requested topic is missing."""
     faults = Diagnostics()

@@ -44,7 +44,7 @@ def stimulated(system: DerivedSystem) -> list[Topic]:
 
 def system_stimuli(path: Path, loaded: LoadedSystem) -> list[Stimulus]:
     """Return the stimuli of a system in a file or bag. May raise `InputError`."""
-    return read_stimuli(path, stimulated(loaded.system), loaded.system.services, loaded.libraries)
+    return read_stimuli(path, stimulated(loaded.system), loaded.system, loaded.libraries)
 
 
 def answered(system: DerivedSystem) -> list[Topic]:

@@ -21,7 +21,7 @@ from fusesoc_firm.frame.defaults import completed
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.simulation.yaml_message import read_message
-from fusesoc_firm.system.derived.model import Service, Topic
+from fusesoc_firm.system.derived.model import DerivedSystem, Topic
 from fusesoc_firm.text.diagnostics import Diagnostics, fail, nearest
 from fusesoc_firm.text.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
 
@@ -42,12 +42,12 @@ class Stimulus:
 def read_stimuli(
     path: Path,
     subscribers: Sequence[Topic],
-    services: Sequence[Service] = (),
+    system: DerivedSystem | None = None,
     libraries: Mapping[Middleware, MessageLibrary] | None = None,
 ) -> list[Stimulus]:
     """Return all messages in a file or bag, in order. May raise `InputError`, also for a file without messages.
 
-    The calls of `services` in a bag are messages, too.
+    In a bag, the calls of services of `system`, and the goals and cancellations of its actions, are messages, too.
     """
     if not path.exists():
         fields = "{<field>: <value>, ...}"
@@ -64,7 +64,8 @@ def read_stimuli(
         from fusesoc_firm.message.bag_reader import BAGS
 
         hint = f"stimuli are a YAML file (.yaml, .yml) or a bag; {BAGS}"
-        stimuli = [_recorded(path, *message) for message in read_bag(path, subscribers, hint, services, libraries)]
+        found = read_bag(path, subscribers, hint, system, libraries)
+        stimuli = [_recorded(path, *message) for message in found]
     if not stimuli:
         names = ", ".join(subscriber.block for subscriber in subscribers)
         fail(f"{path} contains no message for {names}")

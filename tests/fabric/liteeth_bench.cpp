@@ -58,7 +58,7 @@ class Bench {
     top_.clk = 0;
     top_.eval();
     const bool is_taken = top_.sink_valid && top_.sink_ready;
-    if (top_.frame_tvalid) frames_.take(top_.frame_tdata, top_.frame_tlast);
+    if (top_.frame_tvalid && top_.frame_tready) frames_.take(top_.frame_tdata, top_.frame_tlast);
     if (top_.discovery_valid) {
       check(top_.discovery_ip_address, discovery_, top_.discovery_last, top_.discovery_length);
       discovery_.take(top_.discovery_data, top_.discovery_last);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The node of tests/cores/net_node.vhd, and a host of LiteEth at the other end of its GMII.
+// The node of tests/cores/net_node.vhd, to which its frames return, and a host of LiteEth at the other end of its GMII.
 module liteeth_bench (
     input         clk,
     input         rst_n,
     input         tick,
 
-    // The frames of the node, to whom the host is always ready.
+    // The frames of the node.
     output [7:0]  frame_tdata,
     output        frame_tvalid,
+    output        frame_tready,
     output        frame_tlast,
 
     // A payload to a port of the node.
@@ -45,9 +46,14 @@ net_node node (
     .m_axis_tdata(frame_tdata),
     .m_axis_tvalid(frame_tvalid),
     .m_axis_tlast(frame_tlast),
-    .m_axis_tready(1'b1),
-    .peers_known(),
-    .sources_known()
+    .m_axis_tready(frame_tready),
+    .s_axis_tdata(frame_tdata),
+    .s_axis_tvalid(frame_tvalid),
+    .s_axis_tlast(frame_tlast),
+    .s_axis_tready(frame_tready),
+    .peer_count(),
+    .source_count(),
+    .sink_count()
 );
 
 liteeth_host host (

@@ -20,6 +20,7 @@ from rosbags.typesys import get_types_from_idl
 from rosbags.typesys.store import Typestore
 
 from fusesoc_firm.bags import calls
+from fusesoc_firm.bags.events import Events
 from fusesoc_firm.message.bag_reader import open_bag
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
@@ -362,13 +363,13 @@ def test_a_request_without_a_response_does_not_hold_up_others(
     loaded = system(tmp_path, "asking")
     names = {item.block: item.name for item in loaded.system.subscribers}
     read_ahead: list[Any] = []
-    part_of = calls._Calls.part_of
+    part_of = Events.part_of
 
     def counted(*given: Any) -> Any:
         read_ahead.append(given)
         return part_of(*given)
 
-    monkeypatch.setattr(calls._Calls, "part_of", counted)
+    monkeypatch.setattr(Events, "part_of", counted)
     with open_bag(source) as opened:
         bag = calls.with_calls(opened, loaded.system.services, loaded.libraries, names, plays_responses=False)
         exchanges = bag.exchanges("set_camera_info_request", 0, None)

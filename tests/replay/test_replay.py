@@ -321,6 +321,8 @@ def test_the_summary_as_json(tmp_path: Path, capsys: Captured) -> None:
         "dropped": [{"topic": "/s", "type": STRING, "count": 1}],
         "responses": [],
         "requests": [],
+        "feedback": [],
+        "results": [],
         "errors": 1,
         "messages_with_errors": 1,
         "first_errors": [

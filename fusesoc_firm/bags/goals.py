@@ -1,0 +1,249 @@
+"""The goals of actions in bags: topics of actionlib in ROS 1; in ROS 2 the events of three services, and feedback.
+
+What ROS 2 sends as calls becomes the messages of the action's converters.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+from fusesoc_firm.bags.calls import BagOfCalls
+from fusesoc_firm.bags.events import EVENTS, Events, EventType, Key, events_in
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.bag_reader import Bag, Recorded, Stream
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.message.services import EVENT_INFO, Interface
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.system.derived.actions import action_messages
+from fusesoc_firm.system.derived.model import Action, ServiceEnd, absolute_name
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
+
+_SEND_GOAL, _CANCEL_GOAL, _GET_RESULT = "send_goal", "cancel_goal", "get_result"
+# rosbags does not have this service.
+_CANCELING = MessageName("action_msgs", "CancelGoal")
+_CANCELING_TEXT = "GoalInfo goal_info\n---\nint8 return_code\nGoalInfo[] goals_canceling\n"
+
+
+class Told(NamedTuple):
+    """Feedback or a result of a goal of an action in the hardware, at a recorded message.
+
+    `block` is that of the converter. `owner` is a message that begins with the goal's id, or in ROS 1 with a header
+    before that. A goal without `payload` was rejected, which has no result in ROS 2.
+    """
+
+    action: Action
+    block: str
+    recorded: Recorded
+    owner: bytes
+    payload: bytes | None
+
+
+@dataclass(frozen=True)
+class _Source:
+    """The messages of an action in a stream: its converter, and in ROS 2 the events that contain them, if any.
+
+    `stream` takes the place of a stream with messages to the hardware.
+    """
+
+    action: Action
+    block: str
+    stream: Stream | None = None
+    events: Events | None = None
+
+
+@dataclass(frozen=True)
+class BagOfGoals(BagOfCalls):
+    """A bag with the goals of actions that the hardware serves: `goals` are the streams that contain them.
+
+    Goals and cancellations are messages to the hardware. While these are read, `told` gets the recorded feedback and
+    results.
+    """
+
+    goals: Mapping[Stream, _Source] = field(default_factory=dict)
+    told: deque[Told] = field(default_factory=deque)
+
+    def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
+        """Yield messages like `BagOfCalls`. Raise `InputError` if the bag is damaged."""
+        own = {
+            stream.topic
+            for stream, source in self.goals.items()
+            if source.stream is None or source.stream.topic in topics
+        }
+        owners: dict[tuple[Stream, Key], bytes] = {}
+        numbers: dict[Stream, int] = {}
+        for recorded in super().messages({*topics, *own}, stop):
+            source = self.goals.get(recorded.stream)
+            if source is None:
+                yield recorded
+            elif source.events is None:
+                self.told.append(Told(source.action, source.block, recorded, recorded.payload, recorded.payload))
+            elif payload := self._taken(source, source.events, recorded, owners):
+                assert source.stream is not None, "only requests to the hardware are taken"
+                number = numbers[source.stream] = numbers.get(source.stream, -1) + 1
+                yield Recorded(source.stream, number, recorded.stamp, payload)
+
+    def _taken(
+        self, source: _Source, events: Events, recorded: Recorded, owners: dict[tuple[Stream, Key], bytes]
+    ) -> bytes | None:
+        """Return the message to the hardware in an event, if any; otherwise take note of what it tells."""
+        part = events.part_of(recorded)
+        if part is None:
+            return None
+        (key, request, response), action = part, source.action
+        if request is not None:
+            owners[recorded.stream, key] = request
+            return request if source.stream else None
+        owner = owners.pop((recorded.stream, key), None)
+        if owner is None or response is None:
+            return None
+        if source.block == action.result:
+            self.told.append(Told(action, action.result, recorded, owner, response))
+        elif source.block == action.goal and not _is_accepted(response):
+            self.told.append(Told(action, action.result, recorded, owner, None))
+        return None
+
+
+def with_goals(
+    bag: BagOfCalls,
+    actions: Iterable[Action],
+    libraries: Mapping[Middleware, MessageLibrary],
+    names: Mapping[str, str],
+    *,
+    compares: bool,
+) -> BagOfGoals:
+    """Return the bag with the goals of the actions that the hardware serves; `names` are the topics of the blocks.
+
+    If the topic of the goals is renamed to that of another action, or if the only goals of the type are those of
+    another action, all are read from that action. Without `compares`, and without goals, feedback and results remain as
+    they are. Raise `InputError` if a definition differs from the system's.
+    """
+    goals: dict[Stream, _Source] = {}
+    served = [item for item in actions if item.ros is bag.form.ros and item.end is ServiceEnd.SERVER]
+    for action in served:
+        is_only = [item.type for item in served].count(action.type) == 1
+        found = _ActionInBag(bag, action, libraries[action.ros], names, is_only).sources()
+        goals |= {stream: source for stream, source in found.items() if compares or source.stream}
+    streams: dict[Stream, int] = {}
+    for stream, count in bag.streams.items():
+        source = goals.get(stream)
+        if source is None:
+            streams[stream] = count
+        elif source.events is not None:
+            if source.stream:
+                streams[source.stream] = source.events.count
+            if source.events.invalid:
+                streams[stream] = source.events.invalid
+    return BagOfGoals(**{**vars(bag), "streams": streams}, goals=goals)
+
+
+@dataclass(frozen=True)
+class _ActionInBag:
+    """The search for the streams of an action in a bag."""
+
+    bag: Bag
+    action: Action
+    library: MessageLibrary
+    names: Mapping[str, str]
+    is_only: bool
+
+    def sources(self) -> dict[Stream, _Source]:
+        """Return the streams of which the replay makes messages, or compares them; none without goals."""
+        if self.action.ros is ROS1:
+            goals = absolute_name(f"{self._base}/goal")
+            has_goals = any(absolute_name(stream.topic) == goals for stream in self.bag.streams)
+            found = [self._told("feedback", "feedback"), self._told("result", "result")] if has_goals else []
+        else:
+            found = self._events()
+        return {stream: source for streams in found for stream, source in streams.items()}
+
+    def _events(self) -> list[dict[Stream, _Source]]:
+        action = self.action
+        interface = self.library.interface(action.type, InterfaceKind.ACTION)
+        assert interface is not None, "the system could be derived"
+        if len(interface.messages) == len(interface.exchanged):
+            return []
+        definitions = self.library.joint_closure(interface.messages)
+        send, get = (
+            EventType.of(MessageName(action.type.package, f"{action.type.name}_{end}"), interface.kind, definitions)
+            for end in ("SendGoal", "GetResult")
+        )
+        goals = self._of(_SEND_GOAL, send, action.goal, send.request_name)
+        if not goals:
+            return []
+        cancel = EventType.of(_CANCELING, InterfaceKind.SERVICE, _canceling(self.library))
+        return [
+            goals,
+            self._of(_CANCEL_GOAL, cancel, action.cancel, "action_msgs/msg/GoalInfo"),
+            self._of(_GET_RESULT, get, action.result),
+            self._told("_action/feedback", "feedback"),
+        ]
+
+    def _of(self, service: str, type_: EventType, block: str, entering: str = "") -> dict[Stream, _Source]:
+        """Return the stream of a service's events, if it contains requests.
+
+        `entering` is the type of the messages to the hardware in them, if any.
+        """
+        topic = absolute_name(f"{self._base}/_action/{service}/{EVENTS}")
+        for stream in self.bag.streams:
+            if absolute_name(stream.topic) == topic and stream.type == type_.name:
+                type_.check(self.bag, stream)
+                if events := events_in(self.bag, stream, type_):
+                    given = Stream(self.names[block], entering, "", "") if entering else None
+                    return {stream: _Source(self.action, block, given, events)}
+        return {}
+
+    def _told(self, ending: str, end: str) -> dict[Stream, _Source]:
+        """Return the streams of feedback or results on a topic of the action."""
+        topic = absolute_name(f"{self._base}/{ending}")
+        name = action_messages(self.action.type, self.action.ros)[end]
+        block = self.action.feedback if end == "feedback" else self.action.result
+        ours = signature(name, self.library.closure(name))
+        found = {}
+        for stream in self.bag.streams:
+            if absolute_name(stream.topic) != topic or _name_of(stream) != name:
+                continue
+            if stream.signature not in ("", "*", ours):
+                text = f"its definition of {name} differs from the system's"
+                fail(f"topic {stream.topic} in {self.bag.path}: {text}: {stream.signature}, not {ours}")
+            found[stream] = _Source(self.action, block)
+        return found
+
+    @cached_property
+    def _base(self) -> str:
+        """The name of the action in the bag."""
+        is_first = self.action.ros is ROS1
+        ending = "/goal" if is_first else f"/_action/{_SEND_GOAL}/{EVENTS}"
+        given, own = self.names.get(self.action.goal, ""), absolute_name(self.action.ros_name)
+        if given.endswith(ending) and given != f"{own}{ending}":
+            return given.removesuffix(ending)
+        goal = action_messages(self.action.type, self.action.ros)["goal"]
+        name = goal if is_first else MessageName(goal.package, f"{self.action.type.name}_SendGoal_Event")
+        topics = {absolute_name(stream.topic) for stream in self.bag.streams if _name_of(stream) == name}
+        found = {topic.removesuffix(ending) for topic in topics if topic.endswith(ending)}
+        return found.pop() if self.is_only and own not in found and len(found) == 1 else own
+
+
+def _canceling(library: MessageLibrary) -> dict[MessageName, MessageDefinition]:
+    """Return the definitions of the service that cancels goals, and of what it contains."""
+    interface = Interface(_CANCELING, InterfaceKind.SERVICE, ROS2, has_events=True)
+    contained = library.joint_closure((parse_name("action_msgs/GoalInfo"), EVENT_INFO))
+    return contained | interface.parse(_CANCELING_TEXT, "", Diagnostics())
+
+
+def _name_of(stream: Stream) -> MessageName | None:
+    try:
+        return parse_name(stream.type)
+    except InputError:
+        return None
+
+
+def _is_accepted(response: bytes) -> bool:
+    """Return whether a response to a goal accepts it, which is the first byte after the header of CDR."""
+    return bool(response[4])

@@ -1,0 +1,254 @@
+"""The goals of an action in a replay: they reach the hardware as from a node, one at a time.
+
+What the hardware sends for a goal is compared with what the bag contains for it. What a node sets itself is left out:
+ids, headers, and the state in feedback. States of results count as a node understands them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from itertools import count
+from typing import Any
+
+from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.frame.defaults import completed, encode_used
+from fusesoc_firm.message import ROS1
+from fusesoc_firm.node.action_messages import (
+    NO_STAMP,
+    Messages,
+    Reference,
+    Ros1Messages,
+    Ros2Messages,
+    Stamp,
+    State,
+)
+from fusesoc_firm.replay.run import Sent
+from fusesoc_firm.system.derived.model import Action, Topic
+
+# Sends a payload to a block at a stamp in ns, and returns whether the hardware took it without a fault. What the
+# hardware sends meanwhile is handed to `GoalLine.take` first.
+Send = Callable[[str, bytes, int], bool]
+# Fields of feedback and results: the header and the state in ROS 1, the id and the state in ROS 2.
+_SET_BY_NODE = ("header", "status", "goal_id")
+
+
+class Verdict(Enum):
+    """What became of a message for a goal; the values are the summary's words."""
+
+    EQUAL = "as_recorded"
+    DIFFERENT = "different"
+    MISSING = "missing"
+    NOT_RECORDED = "not_recorded"
+    NO_GOAL = "without_goal"
+
+
+# The state of a result, and its other fields as bytes.
+_Content = tuple[State | None, bytes]
+
+
+@dataclass
+class _Pairs:
+    """The n-th message of the hardware for a goal belongs to the n-th one in the bag."""
+
+    sent: deque[_Content] = field(default_factory=deque)
+    recorded: deque[_Content] = field(default_factory=deque)
+    counts: Counter[Verdict] = field(default_factory=Counter)
+
+    def compare(self) -> None:
+        """Compare the messages of which both are known."""
+        while self.sent and self.recorded:
+            is_equal = self.sent.popleft() == self.recorded.popleft()
+            self.counts[Verdict.EQUAL if is_equal else Verdict.DIFFERENT] += 1
+
+    def total(self, *, has_goal: bool) -> Counter[Verdict]:
+        """Return the counts; messages that are left in the bag are missing, unless it does not contain the goal."""
+        left = Verdict.MISSING if has_goal else Verdict.NO_GOAL
+        return self.counts + Counter({left: len(self.recorded), Verdict.NOT_RECORDED: len(self.sent)})
+
+
+@dataclass
+class _Goal:
+    """A goal of the bag, unless it is only known from its feedback or result; its payload until it is sent."""
+
+    reference: Reference
+    is_in_bag: bool = False
+    payload: bytes = b""
+    is_canceled: bool = False
+    # Whether a node would have accepted it: there was feedback or a cancellation.
+    is_accepted: bool = False
+    has_recorded_result: bool = False
+    feedback: _Pairs = field(default_factory=_Pairs)
+    result: _Pairs = field(default_factory=_Pairs)
+
+
+class GoalLine:
+    """The goals of one action that the hardware serves.
+
+    Simulated hardware has all the time that it needs. A goal without a result when its recorded result comes therefore
+    has none: it is canceled as one whose time limit is over, and the next one follows.
+    """
+
+    def __init__(self, action: Action, topics: Mapping[str, Topic], send: Send) -> None:
+        """Prepare an action; `topics` are those of the system by their blocks."""
+        self.action = action
+        self._topics = topics
+        self._send = send
+        self._messages: Messages = Ros1Messages() if action.ros is ROS1 else Ros2Messages()
+        self._goals: dict[bytes, _Goal] = {}
+        self._waiting: deque[_Goal] = deque()
+        self._current: _Goal | None = None
+        self._nameless = count()
+        # ROS 1 has separate topics for goals and cancellations, so a cancellation may be recorded first.
+        self._early: set[bytes] = set()
+        self._canceled_until: Stamp = NO_STAMP
+        self._unasked: Counter[str] = Counter()
+
+    # --- from the bag ----------------------------------------------------------------------------------------------
+
+    def give(self, block: str, payload: bytes, stamp: int) -> None:
+        """Give a goal or a cancellation to the hardware, or note it for later. `stamp` is in ns."""
+        try:
+            decode(self._topics[block].frame, payload)
+        except CodecError:
+            # The error is reported as that of another message.
+            self._send(block, payload, stamp)
+            return
+        if block == self.action.goal:
+            self._add(payload, stamp)
+        else:
+            self._cancel(payload, stamp)
+        self.advance(stamp)
+
+    def _add(self, payload: bytes, stamp: int) -> None:
+        found = self._messages.goal(payload)
+        when = found.stamp if any(found.stamp) else divmod(stamp, 10**9)
+        # A node gives a goal without an id one of its own.
+        reference = Reference(found.id or f"\0{next(self._nameless)}".encode(), when)
+        goal = self._goals.setdefault(reference.id, _Goal(reference))
+        if goal.is_in_bag:
+            # Servers ignore a goal that they have, and clients may send it again.
+            return
+        goal.reference, goal.payload, goal.is_in_bag = reference, payload, True
+        if self.action.ros is ROS1 and (reference.id in self._early or reference.stamp <= self._canceled_until):
+            self._end_unsent(goal)
+        else:
+            self._waiting.append(goal)
+
+    def _cancel(self, payload: bytes, stamp: int) -> None:
+        wanted = self._messages.cancellation(payload)
+        for goal in [item for item in self._waiting if wanted.means(item.reference)]:
+            self._waiting.remove(goal)
+            self._end_unsent(goal)
+        if self._current and wanted.means(self._current.reference):
+            self._cancel_current(self._current, stamp)
+        self._canceled_until = max(self._canceled_until, wanted.stamp)
+        if wanted.id not in self._goals:
+            self._early.add(wanted.id)
+
+    def _cancel_current(self, goal: _Goal, stamp: int) -> None:
+        if not goal.is_canceled:
+            goal.is_canceled = goal.is_accepted = True
+            self._send(self.action.cancel, self._messages.cancel(goal.reference), stamp)
+
+    def _end_unsent(self, goal: _Goal) -> None:
+        """End a goal that was canceled before the hardware had it, with a result without contents."""
+        frame = self._topics[self.action.result].frame
+        goal.result.sent.append((State.CANCELED, encode_used(frame, completed(frame, {}))))
+        goal.result.compare()
+
+    def tell(self, block: str, owner: bytes, payload: bytes | None, stamp: int) -> None:
+        """Take note of recorded feedback, or of a recorded result; without `payload`, the goal was rejected.
+
+        Raise `ValueError` or `CodecError` if the message is invalid.
+        """
+        reference = self._messages.goal(owner)
+        content = (State.REJECTED, b"") if payload is None else self._content(block, payload)
+        goal = self._goals.setdefault(reference.id, _Goal(reference))
+        if block == self.action.feedback:
+            goal.feedback.recorded.append(content)
+            goal.feedback.compare()
+            return
+        # Each client of ROS 2 that asks for a result receives it.
+        if not goal.has_recorded_result:
+            goal.has_recorded_result = True
+            goal.result.recorded.append(content)
+            goal.result.compare()
+        if goal is self._current:
+            self._give_up(goal, stamp)
+            self.advance(stamp)
+
+    # --- to and from the hardware ----------------------------------------------------------------------------------
+
+    def advance(self, stamp: int) -> None:
+        """Give the next goals to the hardware if it has none."""
+        while self._current is None and self._waiting:
+            goal = self._current = self._waiting.popleft()
+            payload, goal.payload = goal.payload, b""
+            if not self._send(self.action.goal, payload, stamp) and goal is self._current:
+                self._give_up(goal, stamp)
+
+    def _give_up(self, goal: _Goal, stamp: int) -> None:
+        """Cancel a goal that has no result, as the hardware may still work."""
+        self._cancel_current(goal, stamp)
+        if goal is self._current:
+            self._current = None
+
+    def take(self, messages: Sequence[Sent]) -> None:
+        """Take what the hardware has sent."""
+        for sent in messages:
+            block = sent.topic.block
+            if block not in (self.action.feedback, self.action.result):
+                continue
+            goal = self._current
+            if goal is None:
+                self._unasked[block] += 1
+                continue
+            pairs = goal.feedback if block == self.action.feedback else goal.result
+            pairs.sent.append(self._sent_content(goal, sent))
+            pairs.compare()
+            goal.is_accepted = True
+            if block == self.action.result:
+                self._current = None
+
+    def _sent_content(self, goal: _Goal, sent: Sent) -> _Content:
+        try:
+            state, rest = self._content(sent.topic.block, sent.payload)
+        except (CodecError, ValueError):
+            return None, sent.payload
+        if state is State.REJECTED:
+            # A node aborts a goal that it has accepted, and ROS 2 has no result of a rejected one.
+            return (State.ABORTED, rest) if goal.is_accepted else (state, b"" if self.action.ros is not ROS1 else rest)
+        return state, rest
+
+    # --- the comparison --------------------------------------------------------------------------------------------
+
+    def _content(self, block: str, payload: bytes) -> _Content:
+        """Return what is compared of feedback or a result: the fields that the hardware sends and a node keeps."""
+        frame = self._topics[block].frame
+        message = decode(frame, payload)
+        is_result = block == self.action.result
+        state = self._messages.state(payload) if is_result else None
+        kept: dict[str, Any] = {name: value for name, value in message.items() if name not in _SET_BY_NODE}
+        if is_result and self.action.ros is ROS1:
+            kept["status"] = {"text": message["status"]["text"]}
+        return state, encode_used(frame, completed(frame, kept))
+
+    def counts(self) -> Iterator[tuple[str, Counter[Verdict]]]:
+        """Yield the words for feedback and for results, and what became of them."""
+        for title, block in (("feedback", self.action.feedback), ("results", self.action.result)):
+            total = Counter({Verdict.NO_GOAL: self._unasked[block]})
+            for goal in self._goals.values():
+                pairs = goal.feedback if block == self.action.feedback else goal.result
+                total += pairs.total(has_goal=goal.is_in_bag)
+            yield title, total
+
+    @property
+    def unfinished(self) -> str:
+        """The fault of a goal without a result from the hardware for which further goals wait, or an empty text."""
+        if self._current is None or not self._waiting:
+            return ""
+        name = self.action.block
+        return f"the hardware has no result of a goal of '{name}', so {len(self._waiting)} more were not replayed"
