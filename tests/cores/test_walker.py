@@ -13,7 +13,7 @@ from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
 SEED = 20261127
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/rtps")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/builder", "net/rtps")
 
 
 @pytest.fixture(scope="module")

@@ -264,9 +264,9 @@ begin
   pad : process (matches)
   begin
     padded <= (others => '0');
-    for index in padded'range loop
-      if index < ENDPOINTS then
-        padded(index) <= matches(index);
+    for place in padded'range loop
+      if place < ENDPOINTS then
+        padded(place) <= matches(place);
       end if;
     end loop;
   end process pad;
