@@ -2,8 +2,9 @@
 -- Sine and cosine of an angle: CORDIC in rotation mode, one rotation a cycle, no multiplier.
 --
 -- The unit vector is shortened by the factor by which the rotations lengthen it. It is turned by atan(2**-i), i = 0, 1,
--- ..., towards the angle. All rotations together reach 1.74, so angles of 13/8 and more, or below -13/8, are first folded
--- by half a turn, which negates the vector. A few bits decide about that, since the fold follows in the same cycle.
+-- ..., towards the angle. All rotations together reach 1.74, so angles of 13/8 and more, or below -13/8, are first
+-- folded by half a turn, which negates the vector. A few bits decide about that, since the fold follows in the same
+-- cycle.
 -- All numbers have a few bits more than the result, so that truncation in every rotation leaves the result accurate to
 -- about a unit. An angle takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
 
