@@ -102,6 +102,9 @@ def _is_taken(application: str, parameters: Mapping[str, object]) -> bool:
     # GHDL cannot simulate Verilog.
     if application == "multi_type_verilog" and "product" in parameters:
         return parameters.get("simulator") == "icarus"
+    # A node in fabric is simulated with another interconnect, which each target gives.
+    if application in ("obstacle_node", "quat2euler_ethernet") and parameters.get("product") == "simulation":
+        return "interconnect" in parameters and "simulator" not in parameters
     return application == "quat2euler" or not {"board", "simulator"} & parameters.keys()
 
 
