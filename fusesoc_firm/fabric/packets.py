@@ -157,7 +157,7 @@ def program(node: Node, packet: Packet) -> Words:
     """Return the words of a packet's program: the prelude, which is not sent, the headers, and the packet's parts."""
     target: Part = IPv4Address(rtps.MULTICAST).packed if packet.to_group else Field.ADDRESS
     header = struct.pack(">BBH", _IPV4, 0, 0), struct.pack(">HHBB", 0, _DO_NOT_FRAGMENT, _TIME_TO_LIVE, _UDP)
-    sum_ = _sum(b"".join(header) + node.network.address.packed)
+    sum_ = sum_of_words(b"".join(header) + node.network.address.packed)
     length = _IP_BYTES + _UDP_BYTES + sum(map(_size, packet.parts))
     prelude = struct.pack(">HHB", sum_, length, _before_payload(packet)), target
     ethernet = _GROUP_MAC if packet.to_group else Field.MAC, node.network.mac, _TYPE_IPV4
@@ -203,9 +203,9 @@ def _before_payload(packet: Packet) -> int:
     return sum(map(_size, packet.parts[start + 1 : packet.parts.index(Payload.SAMPLE)]))
 
 
-def _sum(header: bytes) -> int:
-    """The sum of words as in a checksum of the Internet (RFC 1071), before it is inverted."""
-    total: int = sum(struct.unpack(f">{len(header) // 2}H", header))
+def sum_of_words(data: bytes) -> int:
+    """Return the sum for a checksum of the Internet (RFC 1071) over an even number of bytes; carries are added once."""
+    total: int = sum(struct.unpack(f">{len(data) // 2}H", data))
     return (total & 0xFFFF) + (total >> 16)
 
 

@@ -6,6 +6,7 @@ import struct
 from ipaddress import IPv4Address
 
 from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.packets import sum_of_words
 from fusesoc_firm.system.derived.model import Network
 
 REPORT, PROBE = "report", "probe"
@@ -47,6 +48,5 @@ def _probe(network: Network) -> bytes:
 
 def _checksum(data: bytes) -> int:
     """The checksum of an even number of bytes (RFC 1071)."""
-    total: int = sum(struct.unpack(f">{len(data) // 2}H", data))
-    total = (total & 0xFFFF) + (total >> 16)
+    total = sum_of_words(data)
     return ~(total + (total >> 16)) & 0xFFFF

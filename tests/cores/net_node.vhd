@@ -89,9 +89,6 @@ architecture rtl of net_node is
   signal sources_tvalid : std_logic_vector(1 downto 0);
   signal sources_tlast  : std_logic_vector(1 downto 0);
   signal sources_tready : std_logic_vector(1 downto 0);
-  signal inside_r       : std_logic;
-  signal second_r       : std_logic;
-  signal second         : std_logic;
   signal sent_tdata     : std_logic_vector(7 downto 0);
   signal sent_tvalid    : std_logic;
   signal sent_tlast     : std_logic;
@@ -266,27 +263,22 @@ begin
 
   -- ------------------------------------------------------------------ frames of two sources
 
-  second <= second_r when inside_r = '1' else not sources_tvalid(0);
-
-  sent_tdata  <= sources_tdata(15 downto 8) when second = '1' else sources_tdata(7 downto 0);
-  sent_tvalid <= sources_tvalid(1) when second = '1' else sources_tvalid(0);
-  sent_tlast  <= sources_tlast(1) when second = '1' else sources_tlast(0);
-
-  sources_tready(0) <= sent_tready and not second;
-  sources_tready(1) <= sent_tready and second;
-
-  choose : process (clk)
-  begin
-    if rising_edge(clk) then
-      second_r <= second;
-      if sent_tvalid = '1' then
-        inside_r <= not (sent_tlast and sent_tready);
-      end if;
-      if rst_n = '0' then
-        inside_r <= '0';
-      end if;
-    end if;
-  end process choose;
+  u_merge : entity firm.firm_net_merge
+    generic map (
+      SOURCES => 2
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => sources_tdata,
+      s_axis_tvalid => sources_tvalid,
+      s_axis_tlast  => sources_tlast,
+      s_axis_tready => sources_tready,
+      m_axis_tdata  => sent_tdata,
+      m_axis_tvalid => sent_tvalid,
+      m_axis_tlast  => sent_tlast,
+      m_axis_tready => sent_tready
+    );
 
   u_transmitter : entity firm.firm_mac_transmitter
     port map (

@@ -19,13 +19,13 @@ from tests.fabric.echo_node import node_in
 from tests.fabric.hosts import Host, switched
 from tests.fabric.memories import bits, memories
 from tests.fabric.test_peers import HERE, Peer, Process, _why_not
-from tests.hdl.ghdl import core_files
+from tests.hdl.ghdl import REPOSITORY, core_files
 from tests.hdl.verilog import netlist
 from tests.ros.cpp_nodes import ros2
 
 CORES = HERE.parent / "cores"
 PARTS = ("axis/package", "axis/axis", "net/mac", "net/responder", "net/udp", "net/rtps", "net/builder")
-HARDWARE = core_files(*PARTS)
+HARDWARE = [*core_files(*PARTS), REPOSITORY / "cores/net/rtl/firm_net_merge.vhd"]
 SAMPLES = 200
 # Samples that a peer sends at once. The TAP device drops frames after 500, and nobody sends them again at best effort.
 LOT = 50
