@@ -210,6 +210,9 @@ class Node:
         is_whole = self._fault is None or isinstance(self._fault, TransportError | CarrierError)
         latest = time.monotonic() + (self._settings.drain if is_whole else 0.0)
         self._actions.give_up(_left(latest))
+        if isinstance(self._fault, TransportError):
+            # Nobody sends any more, so what waits for room in a queue would wait until the limit.
+            self._queues.close()
         for carrier in carriers.values():
             carrier.stop()
         for carrier in carriers.values():

@@ -29,19 +29,23 @@ class Player:
         self._stopped = threading.Event()
 
     def receive(self) -> Iterator[Event]:
-        """Yield the messages."""
+        """Yield the messages; a reader that takes no more of them ends the player, too."""
+        try:
+            yield from self._play()
+        finally:
+            self._stopped.set()
+
+    def _play(self) -> Iterator[Event]:
         due = time.monotonic()
         for _ in islice(count(), self._rounds):
             for topic, payload in self._messages:
                 self._control.wait(due - time.monotonic())
                 if not self._control.passes():
-                    self._stopped.set()
                     return
                 now = time.monotonic()
                 # After a pause or on a busy machine, what is late is not made up for.
                 due = max(due, now - self._seconds) + self._seconds
                 yield Taken(topic, payload, time.monotonic_ns())
-        self._stopped.set()
 
     def publish(self, topic: int, payload: bytes) -> None:
         """Do nothing: nobody subscribes."""

@@ -28,8 +28,11 @@ from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError, fail
 
 BUILDING, RUNNING, ENDED, FAILED = "building", "running", "ended", "failed"
-# The time limits for messages that are in the system when a run ends.
-_SETTLE_SECONDS, _DRAIN_SECONDS = 0.2, 2.0
+# The limits of the silence and of the whole time in which the last messages leave the system: simulated hardware may
+# take minutes for a large one, and who does not want to wait stops the run.
+_SETTLE_SECONDS, _DRAIN_SECONDS = 0.2, 600.0
+# The seconds that messages get to leave the system when the user stops a run.
+_STOP_SECONDS = 4.0
 # The seconds that a run gets to end when the server ends; its simulator ends with it in any case.
 _END_SECONDS = 5.0
 
@@ -107,8 +110,11 @@ class SimulatedRun(Run):
         self._is_over.set()
         if self.control:
             self.control.end()
-        if self._node:
-            self._node.stop()
+        if node := self._node:
+            node.stop()
+            limit = threading.Timer(_STOP_SECONDS, node.close)
+            limit.daemon = True
+            limit.start()
 
     def wait(self) -> None:
         """Wait until the simulation has ended."""

@@ -43,25 +43,28 @@ def write_system(folder: Path, stimuli: Sequence[object] = STIMULI, types: Mappi
     spec = folder / "robot.yaml"
     project = {"name": "robot", "width": 64, "clock": "100 MHz"}
     spec.write_text(yaml.safe_dump({"project": project, "blocks": blocks}, sort_keys=False), encoding="utf-8")
-    generate = {
-        "system": {"generator": "far", "parameters": {"spec": spec.name}},
-        "simulation": {"generator": "far", "parameters": {"spec": spec.name, "stimuli": "stimuli.yaml"}},
-    }
-    core = {"name": "robot:sys:robot:0", "generate": generate}
-    (folder / "robot.core").write_text(f"CAPI=2:\n{yaml.safe_dump(core)}", encoding="utf-8")
+    write_core(spec)
     (folder / "stimuli.yaml").write_text(yaml.safe_dump([*stimuli], sort_keys=False), encoding="utf-8")
     return spec
 
 
-def modelled(*options: str) -> Callable[[Path, str], BuiltSimulator]:
-    """What builds the model in the place of a simulator."""
+def write_core(spec: Path) -> None:
+    """Write the core of a specification that has `stimuli.yaml` beside it."""
+    generate = {
+        "system": {"generator": "far", "parameters": {"spec": spec.name}},
+        "simulation": {"generator": "far", "parameters": {"spec": spec.name, "stimuli": "stimuli.yaml"}},
+    }
+    core = {"name": f"robot:sys:{spec.stem}:0", "generate": generate}
+    spec.with_suffix(".core").write_text(f"CAPI=2:\n{yaml.safe_dump(core)}", encoding="utf-8")
+
+
+def modelled(*options: str, width: int = 64, waits: Sequence[int] = WAITS) -> Callable[[Path, str], BuiltSimulator]:
+    """What builds the model in the place of a simulator; `waits` are percentages of the cycles for each wire."""
 
     def build(spec: Path, tool: str) -> BuiltSimulator:
         if tool == "verilator":
             fail(f"cannot build the simulator for {spec}", hint=HOSTILE)
-        waits = ("--waits", *map(str, WAITS))
-        return BuiltSimulator(
-            tool, spec.parent, (sys.executable, model_simulator.__file__, "--width=64", *waits, *options)
-        )
+        settings = (f"--width={width}", "--waits", *map(str, waits), *options)
+        return BuiltSimulator(tool, spec.parent, (sys.executable, model_simulator.__file__, *settings))
 
     return build

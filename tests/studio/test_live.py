@@ -20,6 +20,7 @@ from matplotlib import image as pictures
 
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.node.watch import Control, Latency, Load, Seen, Waits, Watch
+from fusesoc_firm.studio import run
 from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
 from fusesoc_firm.studio.reports import Reports
 from fusesoc_firm.studio.run import Run
@@ -313,6 +314,18 @@ def test_a_run_that_cannot_begin_says_why(studio: Studio, spec: Path) -> None:
     (spec.parent / "robot.core").unlink()
     status, _, found = ask(studio, "POST", "api/run", {"file": "robot.yaml"})
     assert (status, "no core beside robot.yaml" in found["reason"]) == (409, True)
+
+
+def test_a_run_waits_for_slow_hardware_until_it_is_stopped(spec: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "_STOP_SECONDS", 0.1)
+    with served(spec, modelled("--fault=hang", "--at=2")) as studio:
+        begin(studio)
+        until(studio, lambda now: now["last"] >= 3)
+        # Longer than the silence after which other systems are at rest.
+        time.sleep(3)
+        assert until(studio, lambda _: True)["run"]["state"] == "running"
+        control(studio, "stop")
+        until(studio, lambda now: now["run"]["state"] == "ended")
 
 
 @pytest.mark.parametrize("fault", ["exit", "kill", "garbage"])

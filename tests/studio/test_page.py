@@ -437,26 +437,33 @@ def test_resources_are_shown_as_they_come(
     assert all(ended.acquire(timeout=60) for _ in range(3))
 
 
+async def saved(page: Page, place: Path, name: str) -> tuple[ET.Element, Path]:
+    """Save the picture in both forms: the root of the SVG, and the PNG."""
+    await page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(place))
+    for form in "SVG", "PNG":
+        found = f"[...document.querySelectorAll('header button')].find(button => button.textContent === '{form}')"
+        await page.evaluate(f"{found}.click()")
+    svg, png = (place / f"{name}.{form}" for form in ("svg", "png"))
+    for _ in range(300):
+        # A file that the browser still writes has another ending.
+        if svg.exists() and png.exists() and {*place.iterdir()} == {svg, png}:
+            break
+        await asyncio.sleep(0.1)
+    return ET.fromstring(svg.read_text(encoding="utf-8")), png
+
+
+def texts_of(svg: ET.Element) -> list[str]:
+    return [item.text or "" for item in svg.iter("{http://www.w3.org/2000/svg}text")]
+
+
 def test_the_picture_is_saved_as_svg_and_png(robot: Path, tmp_path: Path) -> None:
     """What is saved is well-formed, with every name as text, also a hostile one."""
     hostile = "<script>window.broken=1</script>&"
     robot.write_text(TEXT.replace("name: b\n", f"name: {json.dumps(hostile)}\n"), encoding="utf-8")
 
     async def steps(page: Page) -> None:
-        place = tmp_path / "saved"
-        await page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(place))
-        for form in "SVG", "PNG":
-            found = f"[...document.querySelectorAll('header button')].find(button => button.textContent === '{form}')"
-            await page.evaluate(f"{found}.click()")
-        svg, png = (place / f"robot.{form}" for form in ("svg", "png"))
-        for _ in range(300):
-            # A file that the browser still writes has another ending.
-            if svg.exists() and png.exists() and {*place.iterdir()} == {svg, png}:
-                break
-            await asyncio.sleep(0.1)
-        root = ET.fromstring(svg.read_text(encoding="utf-8"))
-        texts = [item.text for item in root.iter("{http://www.w3.org/2000/svg}text")]
-        assert {"a", "f", hostile, "filter (VHDL)", "from the host", "to the host"} <= {*texts}
+        root, png = await saved(page, tmp_path / "saved", "robot")
+        assert {"a", "f", hostile, "filter (VHDL)", "from the host", "to the host"} <= {*texts_of(root)}
         assert not [*root.iter("{http://www.w3.org/2000/svg}script")]
         size = pictures.imread(png).shape
         assert (size[1], size[0]) == tuple(round(2 * float(root.get(name) or 0)) for name in ("width", "height"))

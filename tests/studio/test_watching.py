@@ -5,21 +5,24 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.studio.run import Build
 from tests.studio.browser import PROGRAM, Page, opened
-from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_system
+from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_core, write_system
 from tests.studio.served import served
-from tests.studio.test_page import AXE, ROOM
+from tests.studio.test_page import AXE, ROOM, saved, texts_of
 
 pytestmark = [
     pytest.mark.check,
     pytest.mark.skipif(not PROGRAM, reason="Chromium is missing"),
     pytest.mark.skipif(not (ROOM / "static" / "index.html").exists(), reason="make studio builds the page"),
 ]
+ARM = Path(__file__).resolve().parents[1] / "ros" / "arm"
 ROWS = "document.querySelectorAll('.messages tbody tr')"
 VIEW_BUTTONS = ".text > [role=group]"
 # Each view, and what it shows while a run is watched.
@@ -46,8 +49,14 @@ async def press(page: Page, text: str, inside: str = ".run") -> None:
     await page.press("Enter")
 
 
-def watching(folder: Path, steps: Callable[[Page], Awaitable[None]], *options: str, spec: Path | None = None) -> None:
-    """Open the page of a system whose hardware is a model."""
+def watching(
+    folder: Path,
+    steps: Callable[[Page], Awaitable[None]],
+    *options: str,
+    spec: Path | None = None,
+    hardware: Build | None = None,
+) -> None:
+    """Open the page of a system whose hardware is a model, with `options` unless it is another `hardware`."""
 
     async def all_steps(address: str) -> None:
         async with opened(address, folder / "profile") as page:
@@ -59,7 +68,7 @@ def watching(folder: Path, steps: Callable[[Page], Awaitable[None]], *options: s
                 print(f"the page at the end: {folder / 'page.png'}")
             assert page.trouble == []
 
-    with served(spec or write_system(folder), modelled(*options)) as studio:
+    with served(spec or write_system(folder), hardware or modelled(*options)) as studio:
         asyncio.run(all_steps(studio.address))
 
 
@@ -157,6 +166,31 @@ def test_a_picture_is_shown_and_no_content_runs(tmp_path: Path) -> None:
     watching(tmp_path, steps)
 
 
+def test_the_streams_of_an_action_have_their_rates_and_waits(tmp_path: Path) -> None:
+    """An action has two streams each way, which are one line of the picture each way."""
+    folder = tmp_path / "arm"
+    shutil.copytree(ARM, folder)
+    spec = folder / "arm.yaml"
+    write_core(spec)
+    # On the wires of the host, to goals and cancellations, to and from the accelerator, and from feedback and results.
+    hardware = modelled(width=32, waits=(0, 0, 10, 30, 20, 0, 0, 0, 0, 60))
+
+    async def steps(page: Page) -> None:
+        await page.until("document.querySelector('.block.service').innerText.includes('server of actionlib/Test')")
+        await page.until("document.querySelector('.block.service').innerText.includes('ids 0, 1, 0, 1')")
+        await press(page, "run")
+        taken, given = (
+            f"""document.querySelector('[data-wire^="{begin}"]')?.textContent"""
+            for begin in ("from the host>count_goal ", "count_feedback>to the host ")
+        )
+        await page.until(f"/goal: [\\d.]+\\/s\\ncancel: [\\d.]+\\/s\\nwaits (29|30) %\\nbegins here/.test({taken})")
+        await page.until(f"/feedback: .*\\nresult: .*\\nwaits (59|60) %\\nbegins here/.test({given})")
+        within = """[...document.querySelectorAll('[data-wire*="counting"]')].map(wire => wire.textContent.trim())"""
+        await page.until(f"JSON.stringify({within}) === JSON.stringify(['waits 20 %\\nbegins here'])")
+
+    watching(tmp_path, steps, spec=spec, hardware=hardware)
+
+
 @pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_poses_are_drawn(tmp_path: Path, scheme: str) -> None:
@@ -232,6 +266,9 @@ def test_wires_show_where_messages_wait_and_where_that_begins(tmp_path: Path) ->
         assert "begins" not in await page.evaluate(words_at("point", "point_out"))
         assert await page.evaluate("document.querySelectorAll('path.waits.first').length") == 2
         await page.picture(tmp_path / "waits.png")
+        svg, _ = await saved(page, tmp_path / "saved", "robot")
+        assert texts_of(svg).count("begins here") == 2
+        assert {"waits 50 %", "waits 60 %"} <= {*texts_of(svg)}
         # An opened response shows the counts of its cycles.
         await open_message(page, "point_out")
         await page.until("document.querySelector('.message').innerText.includes('where messages waited in the cycles')")

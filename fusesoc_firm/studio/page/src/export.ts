@@ -1,21 +1,25 @@
 // The picture as a file: SVG, drawn from the blocks and wires themselves, or PNG.
 
 import { getBezierPath, Position, type Edge } from "@xyflow/svelte";
-import type { BlockNode } from "./graph";
+import { labelPlace, type BlockNode, type WireData } from "./graph";
+import type { Live } from "./live.svelte";
 
 const MARGIN = 20;
 const LINE = 17;
+const SMALL_LINE = 14;
 // Pixels of PNG for each unit of the picture.
 const SCALE = 2;
 
 const escaped = (text: string) =>
   text.replace(/[<>&"']/g, (found) => `&#${found.charCodeAt(0)};`).replace(/[^\t\n\r\u0020-\ud7ff\ue000-\ufffd]/g, "\ufffd");
 
+type Colour = (name: string) => string;
+
 /** The colours of the style in the present scheme. */
-function colours(): (name: string) => string {
+function colours(): Colour {
   const probe = document.body.appendChild(document.createElement("i"));
   const found = new Map<string, string>();
-  for (const name of ["ink", "faint", "paper", "converter", "accelerator", "software", "service", "manager", "bad"]) {
+  for (const name of ["ink", "faint", "paper", "converter", "accelerator", "software", "service", "manager", "warn", "bad"]) {
     probe.style.color = `var(--${name})`;
     found.set(name, getComputedStyle(probe).color);
   }
@@ -23,8 +27,8 @@ function colours(): (name: string) => string {
   return (name) => found.get(name)!;
 }
 
-/** Return the picture in SVG. */
-export function svgOf(nodes: BlockNode[], edges: Edge[]): string {
+/** Return the picture in SVG, with what is known of a run at the wires. */
+export function svgOf(nodes: BlockNode[], edges: Edge[], live: Live): string {
   const colour = colours();
   const right = Math.max(...nodes.map((node) => node.position.x + node.width!));
   const bottom = Math.max(...nodes.map((node) => node.position.y + node.height!));
@@ -34,9 +38,9 @@ export function svgOf(nodes: BlockNode[], edges: Edge[]): string {
   const places = new Map(nodes.map((node) => [node.id, node]));
   const wires = edges.flatMap((edge) => {
     const [source, target] = [places.get(edge.source), places.get(edge.target)];
-    return source && target ? [wire(edge, source, target, colour)] : [];
+    return source && target ? [wire(edge, source, target, colour, live)] : [];
   });
-  const blocks = nodes.map((node) => block(node, colour));
+  const blocks = nodes.map((node) => block(node, colour, live));
   const size = `width="${box[2]}" height="${box[3]}"`;
   return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="${box.join(" ")}" ${size} font-family="sans-serif" font-size="12">
 <rect x="${box[0]}" y="${box[1]}" ${size} fill="${colour("paper")}"/>
@@ -45,28 +49,43 @@ ${[...wires, ...blocks].join("\n")}
 `;
 }
 
-function wire(edge: Edge, source: BlockNode, target: BlockNode, colour: (name: string) => string): string {
-  const [path, x, y] = getBezierPath({
-    sourceX: source.position.x + source.width!,
-    sourceY: source.position.y + source.height! / 2,
+function wire(edge: Edge, source: BlockNode, target: BlockNode, colour: Colour, live: Live): string {
+  const from: [number, number] = [source.position.x + source.width!, source.position.y + source.height! / 2];
+  const to: [number, number] = [target.position.x, target.position.y + target.height! / 2];
+  const [path, ...middle] = getBezierPath({
+    sourceX: from[0],
+    sourceY: from[1],
     sourcePosition: Position.Right,
-    targetX: target.position.x,
-    targetY: target.position.y + target.height! / 2,
+    targetX: to[0],
+    targetY: to[1],
     targetPosition: Position.Left,
   });
-  const line = `<path d="${path}" fill="none" stroke="${colour("faint")}" stroke-width="${edge.class === "stream" ? 3 : 1}"/>`;
-  return edge.label ? `${line}<text x="${x}" y="${y}" text-anchor="middle" fill="${colour("ink")}">${escaped(edge.label)}</text>` : line;
+  const { words, waiting } = live.shown(edge.data as WireData);
+  const stroke = colour(waiting ? (waiting === "waits" ? "warn" : "bad") : "faint");
+  const line = `<path d="${path}" fill="none" stroke="${stroke}" stroke-width="${edge.class === "stream" ? 3 : 1}"/>`;
+  const [x, y] = labelPlace(edge.id, from, to, [middle[0], middle[1]]);
+  return line + linesAt([edge.label, words].filter(Boolean).join("\n"), x, y, colour);
+}
+
+/** Lines of text around a place. */
+function linesAt(words: string, x: number, y: number, colour: Colour): string {
+  const lines = words ? words.split("\n") : [];
+  return lines
+    .map((line, index) => `<text x="${x}" y="${y + SMALL_LINE * (index - (lines.length - 1) / 2) + 4}" text-anchor="middle" font-size="11" fill="${colour("ink")}">${escaped(line)}</text>`)
+    .join("");
 }
 
 const fills: Record<string, string> = { subscriber: "converter", publisher: "converter" };
 
-function block({ position: { x, y }, width, height, data }: BlockNode, colour: (name: string) => string): string {
+function block({ position: { x, y }, width, height, data }: BlockNode, colour: Colour, live: Live): string {
   const rim = colour(data.errors ? "bad" : "faint");
   const round = ["accelerator", "software", "service"].includes(data.kind) ? 10 : 3;
   const lines = [data.name, ...data.lines].map(
     (line, index) => `<text x="${x + 10}" y="${y + 17 + LINE * index}"${index ? "" : ' font-weight="bold"'} fill="${colour("ink")}">${escaped(line)}</text>`,
   );
-  return `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="${round}" fill="${colour(fills[data.kind] ?? data.kind)}" stroke="${rim}"/>${lines.join("")}`;
+  const waits = data.wire ? live.shown(data.wire).words : "";
+  const below = linesAt(waits.replace("\n", ", "), x + width! / 2, y + height! + SMALL_LINE / 2, colour);
+  return `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="${round}" fill="${colour(fills[data.kind] ?? data.kind)}" stroke="${rim}"/>${lines.join("")}${below}`;
 }
 
 /** Return an SVG as PNG. */

@@ -7,20 +7,26 @@ import { FROM_HOST, HOST, TO_HOST, wireKey } from "./waits";
 
 export type Kind = "subscriber" | "publisher" | "service" | "accelerator" | "software" | "manager";
 
-/** What a block shows; the sides of the Manager have a `wire` to the host, which is that of a `file`'s run. */
-export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path; wire?: string; file?: string };
+/** What a block shows; the sides of the Manager also show the waits on their wire to the host. */
+export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path; wire?: WireData };
 export type BlockData = BlockWords & { errors: number; warnings: number };
+
+/** A stream or a connection of hardware: its wire, and on a stream the converter, with the name of its end if it has one. */
+export type End = { wire: string; block?: string; title?: string };
+
+/** What is drawn as one wire, which shows those of a `file`'s run. */
+export type WireData = { file: string; ends: End[] };
 
 export type BlockNode = Node<BlockData, "block">;
 
 const LINE = 17;
 // The space between the Manager and the blocks beside it.
-const GAP = 110;
+const GAP = 140;
 // The width that the derived facts of a converter need, so that the picture stays when they arrive.
 const FACTS_WIDTH = 260;
 const FACTS = "...";
-// The two converters of a service; the first one's messages come to a server and go from a client.
-const SIDES = ["request", "response"] as const;
+// The converters of a service and of an action by their ends: what a server takes from the Manager, and what it gives.
+const ENDS = { service: [["request"], ["response"]], action: [["goal", "cancel"], ["feedback", "result"]] } as const;
 
 const list = (value: unknown): any[] => (Array.isArray(value) ? value : []);
 const isAt = (path: Path | null | undefined, place: Path) =>
@@ -40,21 +46,24 @@ export function kindOf(specification: Section, block: Section): Kind {
   return typeOf(specification, block)?.[0].type === "ROS-SW" ? "software" : "accelerator";
 }
 
-/** The facts of a block's converters: one, or for a service those of its requests and its responses. */
+/** The facts of a block's converters: one, or those of all ends of a service or an action. */
 function factsOf(block: Section, derived: Section | null): string {
   const converters = Object.values(derived?.Converters ?? {}).flat() as Section[];
-  const names = isService(block) ? SIDES.map((side) => `${block.name}_${side}`) : [block.name];
-  const own = names.flatMap((name) => converters.filter((item) => item.block === name));
+  const { taken, given } = convertersOf(block);
+  const own = [...taken, ...given].flatMap((name) => converters.filter((item) => item.block === name));
   if (!own.length) return FACTS;
-  return isService(block) ? `ids ${own.map((item) => item.id).join(", ")}` : `id ${own[0].id}, payload ${own[0].payloadBytes} bytes`;
+  return isCalled(block) ? `ids ${own.map((item) => item.id).join(", ")}` : `id ${own[0].id}, payload ${own[0].payloadBytes} bytes`;
 }
 
-const isService = (block: Section) => block.mode === "server" || block.mode === "client";
+/** Whether a block is the server or the client of a service or an action. */
+const isCalled = (block: Section) => block.mode === "server" || block.mode === "client";
+const interfaceOf = (block: Section) => (block.action ? "action" : "service");
 
 function linesOf(block: Section, specification: Section, derived: Section | null): string[] {
   const found: string[] = [];
-  if (isService(block)) {
-    found.push(`${block.mode} of ${block.service ?? ""}`, `service ${block.topic ?? block.name}`, factsOf(block, derived));
+  if (isCalled(block)) {
+    const called = interfaceOf(block);
+    found.push(`${block.mode} of ${block[called] ?? ""}`, `${called} ${block.topic ?? block.name}`, factsOf(block, derived));
   } else if (block.mode) {
     found.push(String(block.message ?? ""), `topic ${block.topic ?? block.name}`);
     if (block.period) found.push(`period ${block.period}`);
@@ -104,20 +113,25 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
     return nodeOf(`block:${index}`, { ...data, lines: linesOf(block ?? {}, specification, derived), path }, faultsAt(scene.faults, path));
   });
   const manager = (id: string, name: string, wire: string, lines: string[], faults: Fault[]) =>
-    nodeOf(id, { kind: "manager", name, lines, path: ["project"], wire, file: scene.file }, faults);
+    nodeOf(id, { kind: "manager", name, lines, path: ["project"], wire: { file: scene.file, ends: [{ wire }] } }, faults);
   const faults = faultsAt(scene.faults, ["project"]);
   const link = `${project.interconnect ?? "axi_stream"}, ${project.width ?? 8} bits`;
   nodes.unshift(manager("manager:in", FROM_HOST, wireKey(HOST, FROM_HOST), [link], []));
   nodes.push(manager("manager:out", TO_HOST, wireKey(TO_HOST, HOST), [`scheduler ${project.scheduler ?? "fixed_priority"}`], faults));
   const edges: Edge[] = [];
   blocks.forEach((block, index) => {
-    const [taken, given] = streamsOf(block ?? {});
-    if (taken) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, { file: scene.file, block: taken, wire: wireKey(FROM_HOST, taken) }));
-    if (given) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", { file: scene.file, block: given, wire: wireKey(given, TO_HOST) }));
+    const { taken, given } = convertersOf(block ?? {});
+    const streams = (names: string[], wire: (name: string) => string) => {
+      const title = (name: string) => (names.length > 1 ? name.slice(block.name.length + 1) : undefined);
+      return { file: scene.file, ends: names.map((name) => ({ wire: wire(name), block: name, title: title(name) })) };
+    };
+    if (taken.length) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, streams(taken, (name) => wireKey(FROM_HOST, name))));
+    if (given.length) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", streams(given, (name) => wireKey(name, TO_HOST))));
     list(block?.outgoing).forEach((way, number) => {
       const sink = blocks.findIndex((other) => other?.name === way?.name);
       if (sink < 0) return;
       const fields = [...list(way.include), ...list(way.exclude).map((field) => `without ${field}`)];
+      const sinks = endsOr(convertersOf(blocks[sink]).given, way.name);
       edges.push({
         type: "wire",
         id: `way:${index}:${number}`,
@@ -125,26 +139,44 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
         target: `block:${sink}`,
         label: fields.join(", "),
         ariaLabel: `connection from ${block.name} to ${way.name}`,
-        data: { path: ["blocks", index, "outgoing", number], file: scene.file, wire: wireKey(taken ?? block.name, streamsOf(blocks[sink])[1] ?? way.name) },
+        data: {
+          path: ["blocks", index, "outgoing", number],
+          file: scene.file,
+          ends: endsOr(taken, block.name).flatMap((source) => sinks.map((name) => ({ wire: wireKey(source, name) }))),
+        },
       });
     });
   });
   return { nodes, edges };
 }
 
-/** The converters of a block that take from the Manager and give to it. */
-function streamsOf(block: Section): [string | null, string | null] {
-  const [request, response] = SIDES.map((side) => `${block.name}_${side}`);
-  if (block.mode === "server") return [request, response];
-  if (block.mode === "client") return [response, request];
-  return [block.mode === "subscriber" ? block.name : null, block.mode === "publisher" ? block.name : null];
+/** The converters of a block that take from the Manager, and those that give to it. */
+function convertersOf(block: Section): { taken: string[]; given: string[] } {
+  if (!isCalled(block)) {
+    const own = (mode: string) => (block.mode === mode ? [block.name] : []);
+    return { taken: own("subscriber"), given: own("publisher") };
+  }
+  const [taken, given] = ENDS[interfaceOf(block)].map((ends) => ends.map((end) => `${block.name}_${end}`));
+  return block.mode === "server" ? { taken, given } : { taken: given, given: taken };
 }
 
-/** The stream between the Manager and a converter, whose wire shows the live words of its block. */
-function fixed(id: string, source: string, target: string, data: { file: string; block: string; wire: string }): Edge {
+/** A block's converters on one side, or the block itself if it has none there. */
+const endsOr = (converters: string[], name: string) => (converters.length ? converters : [name]);
+
+/** The streams between the Manager and a block's converters, whose wire shows their live words. */
+function fixed(id: string, source: string, target: string, data: WireData): Edge {
   const type = "wire";
   const still = { selectable: false, deletable: false, focusable: false };
   return { id, source, target, type, ...still, class: "stream", data };
+}
+
+type Place = [number, number];
+
+/** The place of a wire's words: its middle, or beside its block, as all streams come together at the Manager. */
+export function labelPlace(id: string, source: Place, target: Place, middle: Place): Place {
+  if (id.startsWith("in:")) return [target[0] - GAP / 2, target[1]];
+  if (id.startsWith("out:")) return [source[0] + GAP / 2, source[1]];
+  return middle;
 }
 
 /**

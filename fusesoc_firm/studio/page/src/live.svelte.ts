@@ -1,7 +1,8 @@
 // What the page knows of the current run: counts and rates of each block, and the latest messages.
 
 import { address } from "./api";
-import { since, waitsOf, type Wait, type Waits, type Way } from "./waits";
+import type { WireData } from "./graph";
+import { since, waitsOf, waitWords, type Wait, type Waits, type Way } from "./waits";
 
 /** A message without its content: number, block, seconds, bytes, and of a response: cause, cycles, ns of the wall clock. */
 export type Row = [number, string, number, number, number | null, number | null, number | null];
@@ -56,6 +57,15 @@ interface Report {
   figures?: Figures;
 }
 
+/** What a drawn wire shows of a run; `waiting` is the class of its style. */
+export interface Shown {
+  words: string;
+  waiting: "" | "waits" | "waits first";
+  isCrowded: boolean;
+}
+
+const NOTHING: Shown = { words: "", waiting: "", isCrowded: false };
+
 // Each further row costs time in each picture; older ones are in the record.
 const MOST_ROWS = 100;
 // The server sends up to 20 reports that are not confirmed.
@@ -100,6 +110,23 @@ export class Live {
   /** What is known of the waits on a wire. */
   waits(key: string): Wait | undefined {
     return this.#waits.get(key);
+  }
+
+  /** What a drawn wire shows; of several streams that wait, the waits of the one that waits most. */
+  shown({ file, ends }: WireData): Shown {
+    if (this.run?.file !== file) return NOTHING;
+    const words = ends.flatMap(({ block, title }) => {
+      const own = this.words[block ?? ""];
+      return own && title ? [`${title}: ${own.replaceAll("\n", ", ")}`] : (own ?? []);
+    });
+    const waits = ends.flatMap(({ wire }) => this.waits(wire) ?? []);
+    const wait = waits.reduce<Wait | undefined>((most, item) => (item.share > (most?.share ?? 0) ? item : most), undefined);
+    const waiting = waitWords(wait);
+    return {
+      words: [...words, waiting].filter(Boolean).join("\n"),
+      waiting: waiting && (wait!.isFirst ? "waits first" : "waits"),
+      isCrowded: ends.some(({ block }) => this.crowded.has(block ?? "")),
+    };
   }
 
   /** Follow the run until the returned function is called; connects again if the server was restarted. */
