@@ -126,7 +126,8 @@ def replay(
             _started(start_simulator) as simulator,
             write_bag(target.path, form, list(topics.values())) as written,
         ):
-            run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
+            functions = Functions.of(system.software, loaded.folder)
+            run = SystemRun(system, simulator, functions, settings.quiet, settings.watch)
             going = _Replay(bag, source, routes, run, topics, written, clock, settings)
             if settings.watch:
                 settings.watch.epoch_ns = bag.start
@@ -397,7 +398,7 @@ class _Replay:
         self.sent[sent.topic.block] += 1
         if watch := self.settings.watch:
             since = sent.cause.stamp + latency - self.bag.start
-            watch.saw(sent.topic.block, sent.payload, since, Latency(sent.cause.seen, sent.cycles))
+            watch.saw(sent.topic.block, sent.payload, since, Latency(sent.cause.seen, sent.cycles), sent.beats)
 
     def _report(self, fault: str) -> None:
         self.errors += 1

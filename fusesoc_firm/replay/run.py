@@ -17,6 +17,7 @@ from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.node.bursts import BurstError, BurstJoiner
 from fusesoc_firm.node.transport.simulator import MOST_CYCLES, ErrorPulse, Simulator, Taken
 from fusesoc_firm.node.transport.transport import Burst
+from fusesoc_firm.node.watch import Watch
 from fusesoc_firm.simulation.functions import Functions, Message
 from fusesoc_firm.simulation.software_run import sent_elsewhere
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, End, Topic
@@ -44,20 +45,20 @@ class Cause:
 class Sent:
     """A message that left the system, with its cause: the last earlier message on a route to this message.
 
-    `last_cycle` is the cycle of the message's last beat, or None if software sent the message.
+    `beats` are the cycles of the message's first and last beat, or None if software sent the message.
     """
 
     topic: Topic
     payload: bytes
     cause: Cause
-    last_cycle: int | None
+    beats: tuple[int, int] | None
 
     @property
     def cycles(self) -> int | None:
         """The cycles from the cause's first to the response's last beat; None if one bypassed the hardware."""
-        if self.last_cycle is None or self.cause.first_cycle is None:
+        if self.beats is None or self.cause.first_cycle is None:
             return None
-        return self.last_cycle - self.cause.first_cycle
+        return self.beats[1] - self.cause.first_cycle
 
     def latency(self, clock_hz: Fraction) -> int:
         """Return the time in ns of `cycles`, or 0."""
@@ -72,17 +73,20 @@ class StuckError(Exception):
 class SystemRun:
     """A system in simulation; the hardware is at rest after `quiet` cycles without a beat in either direction.
 
-    `sent` and `faults` accumulate until the caller empties them.
+    `sent` and `faults` accumulate until the caller empties them. `watch` records the bursts.
     """
 
     system: DerivedSystem
     simulator: Simulator
     functions: Functions
     quiet: int
+    watch: Watch | None = None
     sent: list[Sent] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     _waiting: deque[Converter] = field(default_factory=deque)
     _causes: dict[str, Cause] = field(default_factory=dict)
+    # The cycle of the first beat of each incomplete frame, by the byte of its id.
+    _first_cycles: dict[bytes, int | None] = field(default_factory=dict)
     _deadline: int = 0
 
     @cached_property
@@ -196,20 +200,29 @@ class SystemRun:
         return min(max(1, wanted), MOST_CYCLES)
 
     def _receive(self, burst: Burst, cause: Cause) -> None:
+        first = self._first_cycles.pop(burst.data[:1], burst.first_cycle)
+        beats = None if first is None or burst.last_cycle is None else (first, burst.last_cycle)
         try:
             frame = self._joiner.push(burst.data, burst.tid, is_aborted=burst.is_aborted)
+            self._note_grant(burst)
             if frame is None:
+                self._first_cycles[burst.data[:1]] = first
                 return
             publisher = self.system.publishers[frame.id]
             if publisher.software and publisher.software.block in self._here:
                 self._give(End(publisher.block), decode(publisher.frame, frame.payload), cause)
             else:
-                self._send(publisher, frame.payload, cause, burst.last_cycle)
+                self._send(publisher, frame.payload, cause, beats)
         except (BurstError, CodecError) as error:
             self.faults.append(f"the hardware sent invalid data: {error}")
 
-    def _send(self, topic: Topic, payload: bytes, cause: Cause, last_cycle: int | None) -> None:
-        self.sent.append(Sent(topic, payload, self._causes.get(topic.block, cause), last_cycle))
+    def _note_grant(self, burst: Burst) -> None:
+        if self.watch and burst.first_cycle is not None and burst.last_cycle is not None:
+            block = self.system.publishers[burst.data[0]].block
+            self.watch.granted(block, burst.first_cycle, burst.last_cycle)
+
+    def _send(self, topic: Topic, payload: bytes, cause: Cause, beats: tuple[int, int] | None) -> None:
+        self.sent.append(Sent(topic, payload, self._causes.get(topic.block, cause), beats))
 
     def _error(self, converter: int | None) -> str:
         if converter is None:

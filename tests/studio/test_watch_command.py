@@ -58,6 +58,14 @@ def test_a_replay_is_watched(tmp_path: Path) -> None:
             for place, block in enumerate(["p", "p_out"])
         ]
         assert len({row[5] for row in rows["messages"][3::2]}) == 1
+        timeline = ask("timeline")
+        assert isinstance(timeline, dict)
+        assert [block for block, _, _ in timeline["grants"]] == ["p_out"] * 5
+        # Each response is one burst.
+        for number, (_, *cycles) in enumerate(timeline["grants"]):
+            wave = ask(f"wave?number={2 * number + 1}")
+            assert isinstance(wave, dict)
+            assert wave["cycles"] == cycles
         process.send_signal(signal.SIGINT)
         printed = process.communicate(timeout=60)[0]
         assert process.returncode == 0
