@@ -130,7 +130,10 @@ architecture rtl of firm_rtps_control is
   signal ends_tick : std_logic;
   signal locked_r  : std_logic;
   signal payload_r : std_logic;
+  signal start_r   : std_logic;
+  signal packet_r  : std_logic_vector(7 downto 0) := (others => '0');
   signal starts    : std_logic;
+  signal waits     : std_logic;  -- a packet leaves, or is about to
   signal writer_r  : std_logic_vector(2 downto 0) := (others => '0');
   signal peers_r   : std_logic_vector(7 downto 0);
   signal sources_r : std_logic_vector(7 downto 0);
@@ -179,8 +182,9 @@ begin
 
   -- The builder's fields and the payload stay until its packet has left, and no slot is given to a new sample before;
   -- numbers of samples stay while one is judged.
+  waits  <= is_busy or start_r;
   hold   <= '0' when write = '0' else
-            is_busy when write_address(7) = '0' or write_address = AT_SLOT or write_address = AT_NEXT_SLOT
+            waits when write_address(7) = '0' or write_address = AT_SLOT or write_address = AT_NEXT_SLOT
                          or write_address = AT_START else
             is_judging when write_address = AT_LOCK and data(0) = '1' else
             '0';
@@ -212,8 +216,14 @@ begin
       end if;
       if is_at(writes, write_address, AT_SLOT) = '1' then
         payload_r <= '1';
-      elsif starts = '1' then
+      elsif start_r = '1' and is_busy = '0' then
         payload_r <= '0';
+      end if;
+      if starts = '1' then
+        start_r  <= '1';
+        packet_r <= data;
+      elsif is_busy = '0' then
+        start_r <= '0';
       end if;
       if tick = '1' and ends_tick = '0' and ticks_r /= MOST_TICKS then
         ticks_r <= ticks_r + 1;
@@ -224,6 +234,7 @@ begin
         ticks_r   <= (others => '0');
         locked_r  <= '0';
         payload_r <= '0';
+        start_r   <= '0';
         peers_r   <= (others => '0');
         sources_r <= (others => '0');
         sinks_r   <= (others => '0');
@@ -246,8 +257,9 @@ begin
   slot_writer <= writer_r;
   shows       <= is_at(writes, write_address, AT_SLOT);
 
-  start               <= starts;
-  packet              <= data;
+  -- Another packet may have begun meanwhile: then this one begins after it.
+  start               <= start_r;
+  packet              <= packet_r;
   has_payload         <= payload_r;
   build_field_valid   <= writes and not write_address(7);
   build_field_address <= write_address(6 downto 0);

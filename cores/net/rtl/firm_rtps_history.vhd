@@ -37,7 +37,7 @@ entity firm_rtps_history is
     writer     : out std_logic_vector(2 downto 0);
     is_done    : in  std_logic;
 
-    -- Shows the payload of a slot, from two cycles after `shows` on.
+    -- Shows the payload of a slot, from two cycles after `shows` on, and its size one cycle later.
     shows         : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
     payload_bytes : out std_logic_vector(15 downto 0);
@@ -178,6 +178,7 @@ begin
     if rising_edge(clk) then
       byte_r  <= bytes(to_integer(slot_r & next_read));
       place_r <= next_read;
+      payload_bytes <= std_logic_vector(resize(sizes(to_integer(slot_r)), 16));
       if shows = '1' then
         slot_r  <= unsigned(slot(SLOT_BITS-1 downto 0));
         place_r <= (others => '0');
@@ -185,7 +186,6 @@ begin
     end if;
   end process read_payload;
 
-  payload_bytes <= std_logic_vector(resize(sizes(to_integer(slot_r)), 16));
-  m_axis_tdata  <= byte_r;
+  m_axis_tdata <= byte_r;
 
 end architecture rtl;

@@ -24,8 +24,9 @@ entity firm_rtps_locators is
     is_little : in std_logic;
     is_last   : in std_logic;
 
-    record_valid   : out std_logic;
+    record_valid   : out std_logic;  -- one cycle later
     record_address : out std_logic_vector(RECORD_BITS-1 downto 0);
+    record_data    : out std_logic_vector(7 downto 0);
 
     -- What the payload told.
     has_metatraffic : out std_logic;
@@ -97,45 +98,47 @@ begin
   end process note;
 
   -- Ports are high byte first in the record, as on the line, and the lease is little-endian.
-  choose_place : process (s_valid, comes, has_field, address, at, is_little, udp_r, is_metatraffic, is_default,
-                          is_unicast, is_lease)
+  write_record : process (clk)
     variable ip_place    : natural range 0 to 2**RECORD_BITS-1;
     variable port_place  : natural range 0 to 2**RECORD_BITS-1;
     variable is_locator  : std_logic;
     variable lease_place : unsigned(1 downto 0);
   begin
-    ip_place   := RECORD_METATRAFFIC_IP;
-    port_place := RECORD_METATRAFFIC_PORT;
-    if is_default = '1' then
-      ip_place   := RECORD_DEFAULT_IP;
-      port_place := RECORD_DEFAULT_PORT;
-    elsif is_unicast = '1' then
-      ip_place   := RECORD_UNICAST_IP;
-      port_place := RECORD_UNICAST_PORT;
-    end if;
-    is_locator  := is_metatraffic or is_default or is_unicast;
-    lease_place := at(1 downto 0);
-    if is_little = '0' then
-      lease_place := not at(1 downto 0);
-    end if;
-    record_valid   <= '0';
-    record_address <= address;
-    if has_field = '1' then
-      record_valid <= s_valid;
-    elsif is_lease = '1' and at < 4 then
-      record_valid   <= comes;
-      record_address <= std_logic_vector(to_unsigned(RECORD_LEASE, RECORD_BITS) + lease_place);
-    elsif is_locator = '1' and udp_r = '1' and at >= 20 and at < 24 then
-      record_valid   <= comes;
-      record_address <= std_logic_vector(to_unsigned(ip_place, RECORD_BITS) + at(1 downto 0));
-    elsif is_locator = '1' and udp_r = '1' and at >= 4 and at < 8 and at(1) /= is_little then
-      record_valid   <= comes;
-      record_address <= std_logic_vector(to_unsigned(port_place, RECORD_BITS));
-      if at(0) /= is_little then
-        record_address <= std_logic_vector(to_unsigned(port_place+1, RECORD_BITS));
+    if rising_edge(clk) then
+      ip_place   := RECORD_METATRAFFIC_IP;
+      port_place := RECORD_METATRAFFIC_PORT;
+      if is_default = '1' then
+        ip_place   := RECORD_DEFAULT_IP;
+        port_place := RECORD_DEFAULT_PORT;
+      elsif is_unicast = '1' then
+        ip_place   := RECORD_UNICAST_IP;
+        port_place := RECORD_UNICAST_PORT;
+      end if;
+      is_locator  := is_metatraffic or is_default or is_unicast;
+      lease_place := at(1 downto 0);
+      if is_little = '0' then
+        lease_place := not at(1 downto 0);
+      end if;
+      record_valid   <= '0';
+      record_address <= address;
+      record_data    <= data;
+      if has_field = '1' then
+        record_valid <= s_valid;
+      elsif is_lease = '1' and at < 4 then
+        record_valid   <= comes;
+        record_address <= std_logic_vector(to_unsigned(RECORD_LEASE, RECORD_BITS) + lease_place);
+      elsif is_locator = '1' and udp_r = '1' and at >= 20 and at < 24 then
+        record_valid   <= comes;
+        record_address <= std_logic_vector(to_unsigned(ip_place, RECORD_BITS) + at(1 downto 0));
+      elsif is_locator = '1' and udp_r = '1' and at >= 4 and at < 8 and at(1) /= is_little then
+        record_valid   <= comes;
+        record_address <= std_logic_vector(to_unsigned(port_place, RECORD_BITS));
+        if at(0) /= is_little then
+          record_address <= std_logic_vector(to_unsigned(port_place+1, RECORD_BITS));
+        end if;
       end if;
     end if;
-  end process choose_place;
+  end process write_record;
 
   has_metatraffic <= metatraffic_r;
   has_default     <= default_r;
