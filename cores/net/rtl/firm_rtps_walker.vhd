@@ -58,7 +58,6 @@ architecture rtl of firm_rtps_walker is
     PAYLOAD, REST, FOREIGN, FAULTY
   );
 
-  constant SET_WORDS      : positive := MOST_SET_BITS/32;
   constant PROTOCOL_BYTES : positive := 8;
   constant MAC_BYTES      : positive := 6;
   constant PREFIX_BYTES   : positive := 12;
@@ -79,6 +78,28 @@ architecture rtl of firm_rtps_walker is
   constant RTPS_2        : protocol_t := (x"52", x"54", x"50", x"53", x"02", others => x"00");
   constant CHECKED_BYTES : positive   := 5;  -- the minor version and the vendor are any
 
+  -- ------------------------------------------------------------------ the byte, and what it would mean at the end of a step
+  signal byte_r     : std_logic_vector(7 downto 0) := (others => '0');
+  signal valid_r    : std_logic;
+  signal end_r      : std_logic;
+  signal abort_r    : std_logic;
+  signal recent_r   : std_logic_vector(15 downto 0) := (others => '0');  -- the bytes before it, the last one lowest
+  signal half       : std_logic_vector(15 downto 0);  -- the byte that comes and the one before
+  signal word       : std_logic_vector(31 downto 0);  -- the byte that comes and the three before
+  signal id         : std_logic_vector(15 downto 0);  -- of a parameter, whose head ends with the byte that comes
+  signal half_r     : size_t := (others => '0');
+  signal less_r     : size_t := (others => '0');      -- half_r - 1
+  signal zero_r     : std_logic;                      -- half_r is zero, or one
+  signal one_r      : std_logic;
+  signal short_r    : std_logic;                      -- too few bytes in DATA, or in DATA_FRAG
+  signal shorter_r  : std_logic;
+  signal none_r     : std_logic;                      -- the set is empty, or too large
+  signal much_r     : std_logic;
+  signal set_r      : unsigned(3 downto 0) := (others => '0');  -- its words, less one
+  signal sentinel_r : std_logic;
+  signal hash_id_r  : std_logic;                      -- a key hash, or a status, with enough bytes
+  signal state_id_r : std_logic;
+
   signal step_r  : step_t;
   signal place_r : unsigned(4 downto 0) := (others => '0');  -- in the step; it stays at 31
   signal left_r  : size_t := (others => '0');                -- bytes of the step after this one
@@ -91,24 +112,29 @@ architecture rtl of firm_rtps_walker is
   signal final_r      : std_logic;                  -- this byte is its last one
   signal open_r       : std_logic;                  -- it ends with the packet
   signal known_r      : std_logic;                  -- its kind is one of those that are read
+  signal free_r       : std_logic;                  -- a length of 0 is one, of its kind
+  signal double_r     : std_logic;                  -- it has both a payload and a key
   signal further_r    : size_t := (others => '0');  -- bytes before the inline parameters
-  signal few_r        : std_logic;                  -- further_r is zero
+  signal before_r     : size_t := (others => '0');  -- further_r - 1
+  signal few_r        : std_logic;                  -- further_r is zero, or one
+  signal single_r     : std_logic;
   signal has_key_r    : std_logic;
   signal has_status_r : std_logic;
   signal hash_r       : std_logic;  -- the parameter is the first key hash
   signal status_r     : std_logic;  -- the parameter is the first status
 
-  -- The bytes before this one, the last one lowest.
-  signal recent_r : std_logic_vector(23 downto 0) := (others => '0');
+  -- What follows a step of two bytes and more, as far as no byte of it tells; and its size, less one.
+  signal plan        : step_t;
+  signal planned_r   : step_t;
+  signal plan_less_r : unsigned(3 downto 0) := (others => '0');
+  -- What follows SKIP, and the inline parameters.
+  signal after_skip_r : step_t;
+  signal after_list_r : step_t;
 
-  signal is_little        : std_logic;
-  signal half             : std_logic_vector(15 downto 0);  -- this byte and the one before
-  signal word             : std_logic_vector(31 downto 0);  -- this byte and the three before
-  signal id               : std_logic_vector(15 downto 0);  -- of a parameter, if this byte is the last one of its step
-  signal after_parameters : step_t;
-
+  signal is_little  : std_logic;
   signal next_step  : step_t;                         -- if this byte is the last one of its step
-  signal next_bytes : size_t;                         -- of a step of variable size
+  signal next_less  : size_t;                         -- its bytes, less one
+  signal next_one   : std_logic;                      -- it has one byte
   signal wrong      : std_logic;                      -- if this byte is the last one of its step
   signal in_body    : std_logic;
   signal ends_body  : std_logic;
@@ -179,75 +205,152 @@ architecture rtl of firm_rtps_walker is
     return found;
   end function selected;
 
-  -- Of a step with a fixed size.
-  function bytes_of(step : step_t) return size_t is
+  -- The bytes of a step with a fixed size, less one; of those without an end, any.
+  function less_of(step : step_t) return unsigned is
   begin
     if step = ENDS or step = NUMBER or step = SECOND then
-      return to_unsigned(NUMBER_BYTES, 16);
+      return to_unsigned(NUMBER_BYTES-1, 4);
     elsif step = SOURCE or step = DESTINATION or step = FRAGMENTS then
-      return to_unsigned(PREFIX_BYTES, 16);
+      return to_unsigned(PREFIX_BYTES-1, 4);
     end if;
-    return to_unsigned(WORD_BYTES, 16);
-  end function bytes_of;
+    return to_unsigned(WORD_BYTES-1, 4);
+  end function less_of;
 
 begin
 
   is_little <= flags_r(RTPS_LITTLE);
-  half      <= s_axis_tdata & recent_r(7 downto 0) when is_little = '1' else recent_r(7 downto 0) & s_axis_tdata;
-  word      <= s_axis_tdata & recent_r(7 downto 0) & recent_r(15 downto 8) & recent_r(23 downto 16)
-               when is_little = '1' else
-               recent_r & s_axis_tdata;
+  half      <= s_axis_tdata & byte_r when is_little = '1' else byte_r & s_axis_tdata;
+  word      <= s_axis_tdata & byte_r & recent_r(7 downto 0) & recent_r(15 downto 8) when is_little = '1' else
+               recent_r & byte_r & s_axis_tdata;
+  id        <= recent_r(7 downto 0) & recent_r(15 downto 8) when is_little = '1' else recent_r;
 
-  id        <= recent_r(15 downto 8) & recent_r(23 downto 16) when is_little = '1' else recent_r(23 downto 8);
+  take_byte : process (clk)
+  begin
+    if rising_edge(clk) then
+      valid_r <= s_axis_tvalid;
+      if s_axis_tvalid = '1' then
+        byte_r     <= s_axis_tdata;
+        end_r      <= s_axis_tlast;
+        abort_r    <= s_axis_tuser(0);
+        recent_r   <= recent_r(7 downto 0) & byte_r;
+        half_r     <= unsigned(half);
+        less_r     <= unsigned(half) - 1;
+        zero_r     <= '0';
+        one_r      <= '0';
+        short_r    <= '0';
+        shorter_r  <= '0';
+        none_r     <= '0';
+        much_r     <= '0';
+        sentinel_r <= '0';
+        hash_id_r  <= '0';
+        state_id_r <= '0';
+        set_r      <= unsigned(word(8 downto 5));
+        if word(4 downto 0) = "00000" then
+          set_r <= unsigned(word(8 downto 5)) - 1;
+        end if;
+        if unsigned(half) = 0 then
+          zero_r <= '1';
+        end if;
+        if unsigned(half) = 1 then
+          one_r <= '1';
+        end if;
+        if unsigned(half) < DATA_BYTES then
+          short_r <= '1';
+        end if;
+        if unsigned(half) < DATA_FRAG_BYTES then
+          shorter_r <= '1';
+        end if;
+        if unsigned(word) = 0 then
+          none_r <= '1';
+        end if;
+        if unsigned(word) > MOST_SET_BITS then
+          much_r <= '1';
+        end if;
+        if id = RTPS_SENTINEL then
+          sentinel_r <= '1';
+        end if;
+        if id = RTPS_KEY_HASH and unsigned(half) >= HASH_BYTES then
+          hash_id_r <= '1';
+        end if;
+        if id = RTPS_STATUS_INFO and unsigned(half) >= STATUS_BYTES then
+          state_id_r <= '1';
+        end if;
+      end if;
+      if rst_n = '0' then
+        valid_r <= '0';
+      end if;
+    end if;
+  end process take_byte;
 
   -- ------------------------------------------------------------------ the order of the steps
 
-  after_parameters <= REST when kind_r = RTPS_DATA and flags_r(RTPS_PAYLOAD) = '0' and flags_r(RTPS_KEY) = '0' else
-                      PAYLOAD;
+  plan <= after_skip_r when (step_r = FRAGMENTS or (step_r = NUMBER and kind_r = RTPS_DATA)) and few_r = '1' else
+          SKIP when step_r = FRAGMENTS or (step_r = NUMBER and kind_r = RTPS_DATA) else
+          next_of(step_r, kind_r);
 
-  choose : process (step_r, kind_r, flags_r, half, word, id, after_parameters, further_r, few_r)
-    variable words : size_t;
+  make_plan : process (clk)
   begin
-    next_step  <= next_of(step_r, kind_r);
-    next_bytes <= further_r;
-    wrong      <= '0';
-    words      := resize(unsigned(word(8 downto 5)), 16);
-    if word(4 downto 0) /= "00000" then
-      words := words + 1;
+    if rising_edge(clk) then
+      after_list_r <= PAYLOAD;
+      if kind_r = RTPS_DATA and flags_r(RTPS_PAYLOAD) = '0' and flags_r(RTPS_KEY) = '0' then
+        after_list_r <= REST;
+      end if;
+      after_skip_r <= after_list_r;
+      if flags_r(RTPS_INLINE) = '1' then
+        after_skip_r <= ITEM;
+      end if;
+      planned_r   <= plan;
+      plan_less_r <= less_of(plan);
+    end if;
+  end process make_plan;
+
+  choose : process (step_r, kind_r, planned_r, plan_less_r, after_skip_r, after_list_r, before_r, single_r, less_r, set_r,
+                    zero_r, one_r, short_r, shorter_r, none_r, much_r, sentinel_r, free_r, double_r)
+  begin
+    next_step <= planned_r;
+    next_less <= resize(plan_less_r, 16);
+    next_one  <= '0';
+    wrong     <= '0';
+    if planned_r = SKIP then
+      next_less <= before_r;
+      next_one  <= single_r;
     end if;
     if step_r = HEAD then
-      if half = x"0000" and (kind_r = RTPS_PAD or kind_r = RTPS_INFO_TIMESTAMP) then
+      if free_r = '1' and zero_r = '1' then
         next_step <= HEAD;
-      elsif kind_r = RTPS_DATA and flags_r(RTPS_PAYLOAD) = '1' and flags_r(RTPS_KEY) = '1' then
-        wrong <= '1';
+        next_less <= resize(less_of(HEAD), 16);
+      else
+        wrong <= double_r;
       end if;
     elsif step_r = EXTRA then
-      if unsigned(half) < DATA_BYTES or (kind_r = RTPS_DATA_FRAG and unsigned(half) < DATA_FRAG_BYTES) then
-        wrong <= '1';
+      wrong <= short_r;
+      if kind_r = RTPS_DATA_FRAG then
+        wrong <= shorter_r;
       end if;
-    elsif step_r = SKIP or step_r = FRAGMENTS or (step_r = NUMBER and kind_r = RTPS_DATA) then
-      next_step <= after_parameters;
-      if step_r /= SKIP and few_r = '0' then
-        next_step <= SKIP;
-      elsif flags_r(RTPS_INLINE) = '1' then
-        next_step <= ITEM;
-      end if;
+    elsif step_r = SKIP then
+      next_step <= after_skip_r;
+      next_less <= resize(less_of(ITEM), 16);
+      next_one  <= '0';
+    elsif step_r = VALUE then
+      next_step <= ITEM;
+      next_less <= resize(less_of(ITEM), 16);
+      next_one  <= '0';
     elsif step_r = SET_SIZE then
-      next_bytes <= words(13 downto 0) & "00";
-      if words /= 0 then
+      wrong <= much_r;
+      if none_r = '0' then
         next_step <= SET;
-      end if;
-      if unsigned(word) > MOST_SET_BITS then
-        wrong <= '1';
+        next_less <= "0000000000" & set_r & "11";
       end if;
     elsif step_r = ITEM then
-      next_bytes <= unsigned(half);
-      if id = RTPS_SENTINEL then
-        next_step <= after_parameters;
-      elsif half = x"0000" then
+      next_less <= resize(less_of(ITEM), 16);
+      if sentinel_r = '1' then
+        next_step <= after_list_r;
+      elsif zero_r = '1' then
         next_step <= ITEM;
       else
         next_step <= VALUE;
+        next_less <= less_r;
+        next_one  <= one_r;
       end if;
     end if;
   end process choose;
@@ -255,30 +358,36 @@ begin
   in_body   <= '0' when step_r = PROTOCOL or step_r = SOURCE or step_r = HEAD else
                '0' when step_r = FOREIGN or step_r = FAULTY else
                '1';
-  ends_body <= final_r or (open_r and s_axis_tlast);
+  ends_body <= final_r or (open_r and end_r);
   is_done   <= '1' when step_r = PAYLOAD or step_r = REST else
                last_r and not wrong when next_step = PAYLOAD or next_step = REST else
                '0';
 
   walk : process (clk)
 
-    procedure enter(step : step_t; bytes : size_t) is
+    procedure enter(step : step_t; less : size_t; is_one : std_logic) is
     begin
       step_r  <= step;
       place_r <= (others => '0');
-      left_r  <= bytes - 1;
-      last_r  <= '0';
-      if bytes = 1 then
-        last_r <= '1';
-      end if;
+      left_r  <= less;
+      last_r  <= is_one;
     end procedure enter;
+
+    procedure begin_head is
+    begin
+      enter(HEAD, to_unsigned(HEAD_BYTES-1, 16), '0');
+    end procedure begin_head;
+
+    procedure begin_packet is
+    begin
+      enter(PROTOCOL, to_unsigned(PROTOCOL_BYTES-1, 16), '0');
+    end procedure begin_packet;
 
     procedure enter_next is
     begin
-      if next_step = SKIP or next_step = SET or next_step = VALUE then
-        enter(next_step, next_bytes);
-      else
-        enter(next_step, bytes_of(next_step));
+      enter(next_step, next_less, next_one);
+      if wrong = '1' then
+        step_r <= FAULTY;
       end if;
     end procedure enter_next;
 
@@ -291,24 +400,20 @@ begin
       end if;
       if ends_body = '1' then
         if is_done = '1' then
-          enter(HEAD, to_unsigned(HEAD_BYTES, 16));
+          begin_head;
         else
           step_r <= FAULTY;
         end if;
       elsif last_r = '1' then
         enter_next;
-        if wrong = '1' then
-          step_r <= FAULTY;
-        end if;
       end if;
     end procedure take_body;
 
   begin
     if rising_edge(clk) then
-      if s_axis_tvalid = '1' then
-        recent_r <= recent_r(15 downto 0) & s_axis_tdata;
-        left_r   <= left_r - 1;
-        last_r   <= '0';
+      if valid_r = '1' then
+        left_r <= left_r - 1;
+        last_r <= '0';
         if left_r = 1 then
           last_r <= '1';
         end if;
@@ -319,31 +424,22 @@ begin
           take_body;
         elsif last_r = '1' and step_r /= FOREIGN and step_r /= FAULTY then
           enter_next;
-          if wrong = '1' then
-            step_r <= FAULTY;
-          end if;
         end if;
-        if step_r = PROTOCOL and s_axis_tdata /= RTPS_2(to_integer(place_r(2 downto 0)))
+        if step_r = PROTOCOL and byte_r /= RTPS_2(to_integer(place_r(2 downto 0)))
            and place_r < CHECKED_BYTES then
           step_r <= FOREIGN;
         end if;
         if step_r = HEAD then
-          body_r  <= unsigned(half);
-          final_r <= '0';
-          if unsigned(half) = 1 then
-            final_r <= '1';
-          end if;
-          open_r <= '0';
-          if half = x"0000" then
-            open_r <= '1';
-          end if;
+          body_r  <= half_r;
+          final_r <= one_r;
+          open_r  <= zero_r;
         end if;
-        if s_axis_tlast = '1' then
-          enter(PROTOCOL, to_unsigned(PROTOCOL_BYTES, 16));
+        if end_r = '1' then
+          begin_packet;
         end if;
       end if;
       if rst_n = '0' then
-        enter(PROTOCOL, to_unsigned(PROTOCOL_BYTES, 16));
+        begin_packet;
       end if;
     end if;
   end process walk;
@@ -353,44 +449,50 @@ begin
   read_head : process (clk)
     constant LEAST_FURTHER : size_t := to_unsigned(DATA_BYTES, 16);
     constant LEAST_OF_FRAG : size_t := to_unsigned(DATA_FRAG_BYTES, 16);
-    variable further       : size_t;
   begin
-    if rising_edge(clk) and s_axis_tvalid = '1' then
-      if step_r = HEAD then
-        has_key_r    <= '0';
-        has_status_r <= '0';
-        if place_r = 0 then
-          kind_r <= s_axis_tdata;
-        elsif place_r = 1 then
-          flags_r <= s_axis_tdata;
+    if rising_edge(clk) then
+      known_r <= '1';
+      if first_of(kind_r) = REST then
+        known_r <= '0';
+      end if;
+      free_r <= '0';
+      if kind_r = RTPS_PAD or kind_r = RTPS_INFO_TIMESTAMP then
+        free_r <= '1';
+      end if;
+      double_r <= '0';
+      if kind_r = RTPS_DATA then
+        double_r <= flags_r(RTPS_PAYLOAD) and flags_r(RTPS_KEY);
+      end if;
+      before_r <= further_r - 1;
+      few_r    <= '0';
+      single_r <= '0';
+      if further_r = 0 then
+        few_r <= '1';
+      end if;
+      if further_r = 1 then
+        single_r <= '1';
+      end if;
+      if valid_r = '1' then
+        if step_r = HEAD then
+          has_key_r    <= '0';
+          has_status_r <= '0';
+          if place_r = 0 then
+            kind_r <= byte_r;
+          elsif place_r = 1 then
+            flags_r <= byte_r;
+          end if;
+        elsif step_r = EXTRA then
+          further_r <= half_r - LEAST_FURTHER;
+          if kind_r = RTPS_DATA_FRAG then
+            further_r <= half_r - LEAST_OF_FRAG;
+          end if;
+        elsif step_r = ITEM then
+          hash_r   <= hash_id_r and not has_key_r;
+          status_r <= state_id_r and not has_status_r;
+        elsif step_r = VALUE and last_r = '1' then
+          has_key_r    <= has_key_r or hash_r;
+          has_status_r <= has_status_r or status_r;
         end if;
-        known_r <= '1';
-        if first_of(kind_r) = REST then
-          known_r <= '0';
-        end if;
-      elsif step_r = EXTRA then
-        further := unsigned(half) - LEAST_FURTHER;
-        if kind_r = RTPS_DATA_FRAG then
-          further := unsigned(half) - LEAST_OF_FRAG;
-        end if;
-        further_r <= further;
-      elsif step_r = ENDS then
-        few_r <= '0';
-        if further_r = 0 then
-          few_r <= '1';
-        end if;
-      elsif step_r = ITEM then
-        hash_r   <= '0';
-        status_r <= '0';
-        if id = RTPS_KEY_HASH and unsigned(half) >= HASH_BYTES then
-          hash_r <= not has_key_r;
-        end if;
-        if id = RTPS_STATUS_INFO and unsigned(half) >= STATUS_BYTES then
-          status_r <= not has_status_r;
-        end if;
-      elsif step_r = VALUE and last_r = '1' then
-        has_key_r    <= has_key_r or hash_r;
-        has_status_r <= has_status_r or status_r;
       end if;
     end if;
   end process read_head;
@@ -409,7 +511,7 @@ begin
     if rising_edge(clk) then
       written := '1';
       base    := 0;
-      data    := s_axis_tdata;
+      data    := byte_r;
       big     := to_unsigned(WORD_BYTES-1, RECORD_BITS);
       little  := (others => '0');
       if step_r = PROTOCOL then
@@ -470,7 +572,7 @@ begin
       if is_little = '1' and step_r /= PROTOCOL and step_r /= SOURCE and step_r /= HEAD then
         big := little;
       end if;
-      field_valid   <= written and s_axis_tvalid and rst_n;
+      field_valid   <= written and valid_r and rst_n;
       field_address <= std_logic_vector(to_unsigned(base, RECORD_BITS) or (resize(place_r, RECORD_BITS) xor big));
       field_data    <= data;
     end if;
@@ -480,13 +582,13 @@ begin
   begin
     if rising_edge(clk) then
       payload_valid <= '0';
-      payload_data  <= s_axis_tdata;
+      payload_data  <= byte_r;
       is_submessage <= '0';
       if step_r = PAYLOAD then
-        payload_valid <= s_axis_tvalid and rst_n;
+        payload_valid <= valid_r and rst_n;
       end if;
       if in_body = '1' then
-        is_submessage <= s_axis_tvalid and ends_body and is_done and known_r and rst_n;
+        is_submessage <= valid_r and ends_body and is_done and known_r and rst_n;
       end if;
     end if;
   end process forward;
@@ -510,18 +612,18 @@ begin
         strange := not last_r;
       elsif step_r = PROTOCOL or step_r = FOREIGN then
         strange := '1';
-      elsif step_r = HEAD and half = x"0000" and (next_step = HEAD or next_step = REST) then
+      elsif step_r = HEAD and zero_r = '1' and (next_step = HEAD or next_step = REST) then
         whole := last_r;
       end if;
       is_whole   <= '0';
       is_faulty  <= '0';
       is_foreign <= '0';
       is_aborted <= '0';
-      if s_axis_tvalid = '1' and s_axis_tlast = '1' and rst_n = '1' then
-        is_aborted <= s_axis_tuser(0);
-        is_whole   <= whole and not s_axis_tuser(0);
-        is_foreign <= strange and not s_axis_tuser(0);
-        is_faulty  <= not (whole or strange or s_axis_tuser(0));
+      if valid_r = '1' and end_r = '1' and rst_n = '1' then
+        is_aborted <= abort_r;
+        is_whole   <= whole and not abort_r;
+        is_foreign <= strange and not abort_r;
+        is_faulty  <= not (whole or strange or abort_r);
       end if;
     end if;
   end process judge;
