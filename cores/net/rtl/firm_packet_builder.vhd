@@ -98,8 +98,8 @@ architecture rtl of firm_packet_builder is
   signal field_r   : std_logic_vector(7 downto 0);
   signal value_r   : std_logic_vector(7 downto 0);
   signal byte      : std_logic_vector(7 downto 0);
-  signal prelude_r : natural range 0 to PRELUDE_WORDS;
-  signal is_sent   : std_logic;  -- the prelude is over
+  signal prelude_r : natural range 0 to PRELUDE_WORDS-1;
+  signal sent_r    : std_logic;  -- the prelude is over
   signal advance   : std_logic;
 
   -- Numbers of the packet.
@@ -135,7 +135,7 @@ begin
   payload  <= '1' when source = FROM_PAYLOAD else '0';
   has_byte <= s_axis_tvalid or spent_r or not payload;
   is_final <= '1' when payload = '0' or (single_r = '1' and phase_r = 3) else '0';
-  advance  <= m_axis_tready or not (valid_r and is_sent);
+  advance  <= m_axis_tready or not (valid_r and sent_r);
   moves    <= advance and fetched_r and has_byte;
   fetches  <= '1' when shown_r = '1' and (fetched_r = '0' or (moves = '1' and is_final = '1')) else '0';
 
@@ -170,7 +170,7 @@ begin
   count_payload : process (clk)
   begin
     if rising_edge(clk) then
-      if is_sent = '0' then
+      if sent_r = '0' then
         real_r   <= bytes_r;
         spent_r  <= '0';
         single_r <= '0';
@@ -247,11 +247,10 @@ begin
     end if;
   end process choose;
 
-  byte    <= field_r when chosen_r = '1' else value_r;
-  is_sent <= '1' when prelude_r = PRELUDE_WORDS else '0';
+  byte <= field_r when chosen_r = '1' else value_r;
 
   m_axis_tdata  <= byte;
-  m_axis_tvalid <= valid_r and is_sent;
+  m_axis_tvalid <= valid_r and sent_r;
   m_axis_tlast  <= final_r;
 
   -- ------------------------------------------------------------------ the numbers
@@ -262,8 +261,12 @@ begin
   begin
     if rising_edge(clk) then
       word := (others => '0');
-      if valid_r = '1' and is_sent = '0' then
-        prelude_r <= prelude_r + 1;
+      if valid_r = '1' and sent_r = '0' then
+        if prelude_r = PRELUDE_WORDS-1 then
+          sent_r <= '1';
+        else
+          prelude_r <= prelude_r + 1;
+        end if;
         if prelude_r = 0 or prelude_r = 2 or prelude_r = 5 or prelude_r = 7 then
           word(15 downto 8) := unsigned(byte);
         elsif prelude_r = DATA_WORD then
@@ -284,6 +287,7 @@ begin
       sum_r               <= resize(sum_r(15 downto 0), 17) + word + carry;
       if begins = '1' then
         prelude_r <= 0;
+        sent_r    <= '0';
         sum_r     <= (others => '0');
       end if;
     end if;

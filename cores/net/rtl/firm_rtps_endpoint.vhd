@@ -96,6 +96,7 @@ architecture rtl of firm_rtps_endpoint is
   constant OF_CODING   : natural := 6;
   constant OF_GUID     : natural := 7;
   subtype ids_t is std_logic_vector(OF_GUID downto 0);
+  signal of_r : ids_t;
 
   -- ------------------------------------------------------------------ one cycle later, while its names are read
   signal read_value_r  : std_logic_vector(7 downto 0) := (others => '0');
@@ -196,15 +197,15 @@ begin
   byte_place <= at(1 downto 0) when is_little = '1' else not at(1 downto 0);
   is_over    <= '1' when past_r > number_r and beyond_r = '0' else '0';
   inside     <= '1' when at >= WORD_BYTES and is_over = '0' else '0';
-  is_hash    <= '1' when id = RTPS_USER_DATA else '0';
+  is_hash    <= of_r(OF_USER);
 
-  choose_name : process (id, at, byte_place, part_r)
+  choose_name : process (of_r, at, byte_place, part_r)
   begin
-    if id = RTPS_USER_DATA then
+    if of_r(OF_USER) = '1' then
       names_address <= HASHES & std_logic_vector(part_r);
     else
       names_address <= TYPES & std_logic_vector(at(7 downto 0));
-      if id = RTPS_TOPIC_NAME then
+      if of_r(OF_TOPIC) = '1' then
         names_address(9 downto 8) <= TOPICS;
       end if;
       if at < WORD_BYTES then
@@ -225,7 +226,9 @@ begin
       read_hash_r   <= '0';
       read_stop_r   <= '0';
       read_before_r <= part_r;
-      read_ids_r    <= ids_of(id);
+      -- The id is there before the first byte of the value.
+      of_r          <= ids_of(id);
+      read_ids_r    <= of_r;
       read_begins_r <= begins;
       if comes = '1' then
         past_r <= at - (WORD_BYTES-2);
@@ -454,7 +457,7 @@ begin
           guid_r <= s_valid;
         end if;
       else
-        if id = RTPS_ENDPOINT_GUID and seen_r(OF_GUID) = '0' then
+        if of_r(OF_GUID) = '1' and seen_r(OF_GUID) = '0' then
           guid_r <= comes;
         end if;
         if unsigned(size) /= GUID_BYTES then

@@ -43,6 +43,10 @@ architecture rtl of firm_rtps_locators is
 
   signal at             : unsigned(15 downto 0);  -- the place in a parameter
   signal comes          : std_logic;
+  signal of_metatraffic_r : std_logic;
+  signal of_default_r     : std_logic;
+  signal of_unicast_r     : std_logic;
+  signal of_lease_r       : std_logic;
   signal udp_r          : std_logic;              -- the locator is one for UDP over IPv4, so far
   signal metatraffic_r  : std_logic := '0';
   signal default_r      : std_logic := '0';
@@ -58,10 +62,33 @@ begin
   at    <= unsigned(place);
   comes <= s_valid and is_value;
 
-  is_metatraffic <= not metatraffic_r when id = RTPS_METATRAFFIC_LOCATOR and unsigned(size) = LOCATOR_BYTES else '0';
-  is_default     <= not default_r when id = RTPS_DEFAULT_LOCATOR and unsigned(size) = LOCATOR_BYTES else '0';
-  is_unicast     <= not unicast_r when id = RTPS_UNICAST_LOCATOR and unsigned(size) = LOCATOR_BYTES else '0';
-  is_lease       <= not lease_r when id = RTPS_LEASE and unsigned(size) >= LEASE_BYTES else '0';
+  -- Id and size are there before the first byte of the value.
+  note_parameter : process (clk)
+  begin
+    if rising_edge(clk) then
+      of_metatraffic_r <= '0';
+      of_default_r     <= '0';
+      of_unicast_r     <= '0';
+      of_lease_r       <= '0';
+      if unsigned(size) = LOCATOR_BYTES then
+        if id = RTPS_METATRAFFIC_LOCATOR then
+          of_metatraffic_r <= '1';
+        elsif id = RTPS_DEFAULT_LOCATOR then
+          of_default_r <= '1';
+        elsif id = RTPS_UNICAST_LOCATOR then
+          of_unicast_r <= '1';
+        end if;
+      end if;
+      if id = RTPS_LEASE and unsigned(size) >= LEASE_BYTES then
+        of_lease_r <= '1';
+      end if;
+    end if;
+  end process note_parameter;
+
+  is_metatraffic <= of_metatraffic_r and not metatraffic_r;
+  is_default     <= of_default_r and not default_r;
+  is_unicast     <= of_unicast_r and not unicast_r;
+  is_lease       <= of_lease_r and not lease_r;
 
   note : process (clk)
     variable expected : std_logic_vector(7 downto 0);

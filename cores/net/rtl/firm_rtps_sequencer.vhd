@@ -32,8 +32,10 @@ entity firm_rtps_sequencer is
 
     -- Addresses 256 to 511 of the memory are outside. A read's data follow its address at once. While `hold` is high,
     -- everything waits.
+    -- What is written is known one cycle before.
     port_index         : out std_logic_vector(5 downto 0);  -- register E
-    port_write         : out std_logic;
+    port_next          : out std_logic;
+    port_next_address  : out std_logic_vector(7 downto 0);
     port_write_address : out std_logic_vector(7 downto 0);
     port_write_data    : out std_logic_vector(7 downto 0);
     port_read_address  : out std_logic_vector(7 downto 0);
@@ -79,9 +81,9 @@ architecture rtl of firm_rtps_sequencer is
   signal memory : memory_t := (others => (others => '0'));
   signal stack  : stack_t;
 
-  -- DECODE reads the first byte of the destination, SOURCE one of the source, DESTINATION the next one of the
+  -- BEGIN_READ reads the first byte of the destination, SOURCE one of the source, DESTINATION the next one of the
   -- destination. Each byte is computed in the cycle after DESTINATION, and written in the one after that.
-  type state_t is (FETCH, LATCH, DECODE, SOURCE, DESTINATION, COMPUTE, WRITE, TAKING);
+  type state_t is (FETCH, LATCH, DECODE, BEGIN_READ, SOURCE, DESTINATION, COMPUTE, WRITE, TAKING);
   signal state_r : state_t;
   signal depth_r : unsigned(STACK_BITS-1 downto 0) := (others => '0');
   signal zero_r  : std_logic;
@@ -112,7 +114,6 @@ architecture rtl of firm_rtps_sequencer is
   signal is_true   : std_logic;
 
   -- ------------------------------------------------------------------ bytes that are read
-  signal target     : address_t;                          -- the first one of the destination
   signal to_r       : address_t := (others => '0');
   signal from_r     : address_t := (others => '0');
   signal place_r    : unsigned(4 downto 0) := (others => '0');
@@ -135,11 +136,11 @@ architecture rtl of firm_rtps_sequencer is
   signal carry_in   : std_logic;
   signal sum        : unsigned(8 downto 0);
   signal result     : byte_t;
+  signal has_result : std_logic;
 
   -- ------------------------------------------------------------------ the byte that is written
   signal ends_r      : std_logic;
   signal writes_r    : std_logic;
-  signal outer_r     : std_logic;  -- outside
   signal begins_r    : std_logic;  -- it is the first one
   signal place_2_r   : address_t := (others => '0');
   signal result_r    : byte_t := (others => '0');
@@ -260,10 +261,12 @@ begin
         elsif state_r = FETCH or turns = '1' then
           state_r <= LATCH;
         elsif state_r = DECODE then
-          state_r <= SOURCE;
+          state_r <= BEGIN_READ;
           if kind = OP_TAKE then
             state_r <= TAKING;
           end if;
+        elsif state_r = BEGIN_READ then
+          state_r <= SOURCE;
         elsif state_r = SOURCE then
           state_r <= DESTINATION;
         elsif state_r = DESTINATION then
@@ -337,12 +340,7 @@ begin
 
   -- ------------------------------------------------------------------ bytes that are read
 
-  target <= to_unsigned(RECORD_SET/32, 7) & index_r(7 downto 3) when kind = OP_BIT else
-            address_of(word_r(27 downto 14), peer_r, entry_r, table_r);
-
-  read_place <= target when state_r = DECODE else
-                from_r when state_r = SOURCE else
-                to_r;
+  read_place <= from_r when state_r = SOURCE else to_r;
 
   port_read_address <= port_r;
   is_held           <= '1' when is_number = '1' or kind = OP_BIT or kind = OP_STORE else '0';
@@ -359,7 +357,10 @@ begin
         end if;
         if state_r = DECODE then
           place_r <= (others => '0');
-          to_r    <= target;
+          to_r    <= address_of(word_r(27 downto 14), peer_r, entry_r, table_r);
+          if kind = OP_BIT then
+            to_r <= to_unsigned(RECORD_SET/32, 7) & index_r(7 downto 3);
+          end if;
           from_r  <= address_of(word_r(13 downto 0), peer_r, entry_r, table_r);
         elsif state_r = SOURCE then
           left_r <= memory_r;
@@ -442,6 +443,11 @@ begin
             set_byte(unsigned(right_r), count_r(1 downto 0)) when kind = OP_MASK else
             right_r;
 
+  has_result <= '0' when kind = OP_CMP or kind = OP_TEST or kind = OP_BIT or kind = OP_LOAD else computes_r;
+
+  port_next         <= has_result when at_r(11 downto 8) = 1 else '0';
+  port_next_address <= std_logic_vector(at_r(7 downto 0));
+
   compute_byte : process (clk)
   begin
     if rising_edge(clk) then
@@ -451,14 +457,7 @@ begin
           computes_r <= '1';
         end if;
         ends_r   <= computes_r;
-        writes_r <= computes_r;
-        if kind = OP_CMP or kind = OP_TEST or kind = OP_BIT or kind = OP_LOAD then
-          writes_r <= '0';
-        end if;
-        outer_r <= '0';
-        if at_r(11 downto 8) = 1 then
-          outer_r <= '1';
-        end if;
+        writes_r <= has_result;
         begins_r  <= is_first;
         place_2_r <= at_r;
         result_r  <= result;
@@ -473,7 +472,6 @@ begin
 
   -- ------------------------------------------------------------------ bytes that are written
 
-  port_write         <= writes_r and outer_r;
   port_write_address <= std_logic_vector(place_2_r(7 downto 0));
   port_write_data    <= result_r;
   port_index         <= std_logic_vector(entry_r);
