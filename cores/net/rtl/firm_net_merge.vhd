@@ -39,8 +39,14 @@ architecture rtl of firm_net_merge is
   signal byte     : std_logic_vector(7 downto 0);
   signal valid    : std_logic;
   signal last     : std_logic;
-  signal ready    : std_logic;
+  signal takes    : std_logic;  -- a byte comes
   signal valid_r  : std_logic;
+  signal byte_r   : std_logic_vector(7 downto 0) := (others => '0');
+  signal last_r   : std_logic;
+  -- A byte that came when the one before could not leave.
+  signal full_r   : std_logic;
+  signal spare_r  : std_logic_vector(7 downto 0) := (others => '0');
+  signal final_r  : std_logic;
 
 begin
 
@@ -75,22 +81,33 @@ begin
 
   valid         <= '0' when (chosen_r and s_axis_tvalid) = NO_SOURCE else '1';
   last          <= '0' when (chosen_r and s_axis_tlast) = NO_SOURCE else '1';
-  ready         <= m_axis_tready or not valid_r;
-  s_axis_tready <= chosen_r when ready = '1' else NO_SOURCE;
+  takes         <= valid and not full_r;
+  s_axis_tready <= chosen_r when full_r = '0' else NO_SOURCE;
+  m_axis_tdata  <= byte_r;
   m_axis_tvalid <= valid_r;
+  m_axis_tlast  <= last_r;
 
   follow : process (clk)
     variable found : std_logic;
   begin
     if rising_edge(clk) then
-      if ready = '1' then
-        m_axis_tdata <= byte;
-        m_axis_tlast <= last;
-        valid_r      <= valid;
+      if m_axis_tready = '1' or valid_r = '0' then
+        byte_r  <= byte;
+        last_r  <= last;
+        valid_r <= takes or full_r;
+        full_r  <= '0';
+        if full_r = '1' then
+          byte_r <= spare_r;
+          last_r <= final_r;
+        end if;
+      elsif full_r = '0' then
+        full_r  <= takes;
+        spare_r <= byte;
+        final_r <= last;
       end if;
       if chosen_r = NO_SOURCE then
         chosen_r <= first;
-      elsif valid = '1' and ready = '1' and last = '1' then
+      elsif takes = '1' and last = '1' then
         chosen_r <= NO_SOURCE;
         found    := '0';
         for index in 0 to SOURCES-1 loop
@@ -102,6 +119,7 @@ begin
         chosen_r <= NO_SOURCE;
         after_r  <= NO_SOURCE;
         valid_r  <= '0';
+        full_r   <= '0';
       end if;
     end if;
   end process follow;

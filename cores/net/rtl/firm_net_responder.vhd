@@ -106,6 +106,10 @@ architecture rtl of firm_net_responder is
   signal reply_tuser   : std_logic_vector(0 downto 0);
   signal reply_tvalid  : std_logic;
   signal reply_tlast   : std_logic;
+  signal chosen_tdata  : byte_t;
+  signal chosen_tuser  : std_logic_vector(0 downto 0);
+  signal chosen_tvalid : std_logic;
+  signal chosen_tlast  : std_logic;
 
   -- Byte `index` of a word, counted as on the line.
   function byte_of(word : std_logic_vector; index : natural) return byte_t is
@@ -339,6 +343,20 @@ begin
 
   reply_tuser(0) <= aborted_r or not (arp_r or (echo_r and summed_r and holds_r));
 
+  -- A cycle of its own for the choice.
+  hold_reply : process (clk)
+  begin
+    if rising_edge(clk) then
+      chosen_tdata  <= reply_tdata;
+      chosen_tuser  <= reply_tuser;
+      chosen_tvalid <= reply_tvalid;
+      chosen_tlast  <= reply_tlast;
+      if rst_n = '0' then
+        chosen_tvalid <= '0';
+      end if;
+    end if;
+  end process hold_reply;
+
   u_store : entity firm.firm_mac_store
     generic map (
       DEPTH => DEPTH
@@ -346,10 +364,10 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      s_axis_tdata  => reply_tdata,
-      s_axis_tuser  => reply_tuser,
-      s_axis_tvalid => reply_tvalid,
-      s_axis_tlast  => reply_tlast,
+      s_axis_tdata  => chosen_tdata,
+      s_axis_tuser  => chosen_tuser,
+      s_axis_tvalid => chosen_tvalid,
+      s_axis_tlast  => chosen_tlast,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,

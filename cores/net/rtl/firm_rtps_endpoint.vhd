@@ -40,7 +40,7 @@ entity firm_rtps_endpoint is
     names_address : out std_logic_vector(9 downto 0);
     names_data    : in  std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
 
-    -- From six cycles after the last word on.
+    -- From seven cycles after the last word on.
     matches      : out std_logic_vector(READERS+WRITERS-1 downto 0);
     is_known     : out std_logic;  -- the GUID was told, and is one of the sender
     is_reliable  : out std_logic;  -- the peer's endpoint
@@ -77,14 +77,8 @@ architecture rtl of firm_rtps_endpoint is
   signal at         : unsigned(15 downto 0);
   signal byte_place : unsigned(1 downto 0);           -- in a word, if it were little-endian
   signal past_r     : unsigned(15 downto 0) := (others => '0');  -- bytes of it up to this one, without the first word
-  signal is_over    : std_logic;                      -- the byte is after those that the first word counts
-  signal inside     : std_logic;                      -- it is one of them
   signal number_r   : unsigned(15 downto 0) := (others => '0');  -- the first word: a length or a number
   signal beyond_r   : std_logic;                      -- it is larger
-  signal part_r     : unsigned(7 downto 0) := (others => '0');   -- the place in a part of the user data
-  signal is_hash    : std_logic;
-  signal zero_r     : std_logic;                      -- the byte before this one was zero
-  signal found_r    : std_logic;                      -- one of the encodings is XCDR version 1
 
   -- Parameters that are looked at.
   constant OF_TOPIC    : natural := 0;
@@ -98,7 +92,23 @@ architecture rtl of firm_rtps_endpoint is
   subtype ids_t is std_logic_vector(OF_GUID downto 0);
   signal of_r : ids_t;
 
-  -- ------------------------------------------------------------------ one cycle later, while its names are read
+  -- ------------------------------------------------------------------ one cycle later
+  signal comes_r  : std_logic;
+  signal data_r   : std_logic_vector(7 downto 0) := (others => '0');
+  signal at_r     : unsigned(15 downto 0) := (others => '0');
+  signal last_r   : std_logic;
+  signal place_r  : unsigned(1 downto 0) := (others => '0');
+  signal of_2_r   : ids_t;
+  signal over_r   : std_logic;  -- the byte is after those that the first word counts
+  signal final_r  : std_logic;  -- it is the last one of them
+  signal inside   : std_logic;  -- it is one of them
+  signal coding_r : std_logic;  -- it is one of the encodings that are looked at
+  signal part_r   : unsigned(7 downto 0) := (others => '0');  -- the place in a part of the user data
+  signal is_hash  : std_logic;
+  signal zero_r   : std_logic;  -- the byte before this one was zero
+  signal found_r  : std_logic;  -- one of the encodings is XCDR version 1
+
+  -- ------------------------------------------------------------------ two cycles later, while its names are read
   signal read_value_r  : std_logic_vector(7 downto 0) := (others => '0');
   signal read_checks_r : std_logic;  -- it is compared with names
   signal read_first_r  : std_logic;  -- it is the first one of what is compared
@@ -108,12 +118,11 @@ architecture rtl of firm_rtps_endpoint is
   signal read_stop_r   : std_logic;  -- a part of the user data ends with it
   signal read_before_r : unsigned(7 downto 0) := (others => '0');  -- bytes of that part before it
   signal read_ids_r    : ids_t;      -- of which parameter it is
-  signal read_begins_r : std_logic;
 
-  -- ------------------------------------------------------------------ two cycles later
+  -- ------------------------------------------------------------------ three cycles later
   signal value_r    : std_logic_vector(7 downto 0) := (others => '0');
   signal names_r    : std_logic_vector(8*ENDPOINTS-1 downto 0) := (others => '0');
-  signal begins_r   : std_logic;
+  signal begins_r   : std_logic_vector(2 downto 0);  -- before it; the youngest one lowest
   signal checks_r   : std_logic;
   signal first_r    : std_logic;
   signal ends_r     : std_logic;
@@ -165,19 +174,26 @@ architecture rtl of firm_rtps_endpoint is
   begin
     if name = RTPS_TOPIC_NAME then
       found(OF_TOPIC) := '1';
-    elsif name = RTPS_TYPE_NAME then
+    end if;
+    if name = RTPS_TYPE_NAME then
       found(OF_TYPE) := '1';
-    elsif name = RTPS_USER_DATA then
+    end if;
+    if name = RTPS_USER_DATA then
       found(OF_USER) := '1';
-    elsif name = RTPS_RELIABILITY then
+    end if;
+    if name = RTPS_RELIABILITY then
       found(OF_RELIABLE) := '1';
-    elsif name = RTPS_DURABILITY then
+    end if;
+    if name = RTPS_DURABILITY then
       found(OF_DURABLE) := '1';
-    elsif name = RTPS_PARTITION then
+    end if;
+    if name = RTPS_PARTITION then
       found(OF_PARTS) := '1';
-    elsif name = RTPS_REPRESENTATION then
+    end if;
+    if name = RTPS_REPRESENTATION then
       found(OF_CODING) := '1';
-    elsif name = RTPS_ENDPOINT_GUID then
+    end if;
+    if name = RTPS_ENDPOINT_GUID then
       found(OF_GUID) := '1';
     end if;
     return found;
@@ -195,45 +211,81 @@ begin
   comes      <= s_valid and is_value;
   at         <= unsigned(place);
   byte_place <= at(1 downto 0) when is_little = '1' else not at(1 downto 0);
-  is_over    <= '1' when past_r > number_r and beyond_r = '0' else '0';
-  inside     <= '1' when at >= WORD_BYTES and is_over = '0' else '0';
-  is_hash    <= of_r(OF_USER);
-
-  choose_name : process (of_r, at, byte_place, part_r)
+  take_byte : process (clk)
   begin
-    if of_r(OF_USER) = '1' then
+    if rising_edge(clk) then
+      comes_r  <= comes;
+      data_r   <= data;
+      at_r     <= at;
+      last_r   <= is_last;
+      place_r  <= byte_place;
+      over_r   <= '0';
+      final_r  <= '0';
+      coding_r <= '0';
+      if past_r > number_r and beyond_r = '0' then
+        over_r <= '1';
+      end if;
+      if past_r = number_r then
+        final_r <= '1';
+      end if;
+      if (past_r(15 downto 1) <= number_r or beyond_r = '1') and past_r(15 downto 1) <= MOST_ENCODINGS then
+        coding_r <= '1';
+      end if;
+      -- The id is there before the first byte of the value.
+      of_r   <= ids_of(id);
+      of_2_r <= of_r;
+      if comes = '1' then
+        past_r <= at - (WORD_BYTES-2);
+        if at < WORD_BYTES then
+          if byte_place = 0 then
+            number_r(7 downto 0) <= unsigned(data);
+          elsif byte_place = 1 then
+            number_r(15 downto 8) <= unsigned(data);
+          elsif data /= x"00" then
+            beyond_r <= '1';
+          end if;
+          if at = 0 and (data = x"00" or is_little = '1') then
+            beyond_r <= '0';
+          end if;
+        end if;
+      end if;
+    end if;
+  end process take_byte;
+
+  inside  <= '1' when at_r >= WORD_BYTES and over_r = '0' else '0';
+  is_hash <= of_2_r(OF_USER);
+
+  choose_name : process (of_2_r, at_r, place_r, part_r)
+  begin
+    if of_2_r(OF_USER) = '1' then
       names_address <= HASHES & std_logic_vector(part_r);
     else
-      names_address <= TYPES & std_logic_vector(at(7 downto 0));
-      if of_r(OF_TOPIC) = '1' then
+      names_address <= TYPES & std_logic_vector(at_r(7 downto 0));
+      if of_2_r(OF_TOPIC) = '1' then
         names_address(9 downto 8) <= TOPICS;
       end if;
-      if at < WORD_BYTES then
-        names_address(1 downto 0) <= std_logic_vector(byte_place);
+      if at_r < WORD_BYTES then
+        names_address(1 downto 0) <= std_logic_vector(place_r);
       end if;
     end if;
   end process choose_name;
 
-  part_ends <= '1' when data = SEMICOLON or past_r = number_r else '0';
+  part_ends <= '1' when data_r = SEMICOLON or final_r = '1' else '0';
 
   read_value : process (clk)
   begin
     if rising_edge(clk) then
-      read_value_r  <= data;
-      read_ends_r   <= comes and is_last;
+      read_value_r  <= data_r;
+      read_ends_r   <= comes_r and last_r;
       read_first_r  <= '0';
       read_checks_r <= '0';
       read_hash_r   <= '0';
       read_stop_r   <= '0';
       read_before_r <= part_r;
-      -- The id is there before the first byte of the value.
-      of_r          <= ids_of(id);
-      read_ids_r    <= of_r;
-      read_begins_r <= begins;
-      if comes = '1' then
-        past_r <= at - (WORD_BYTES-2);
+      read_ids_r    <= of_2_r;
+      if comes_r = '1' then
         if is_hash = '1' then
-          if at = 0 then
+          if at_r = 0 then
             part_r <= (others => '0');
           elsif inside = '1' then
             read_hash_r   <= '1';
@@ -248,32 +300,19 @@ begin
               part_r <= part_r + 1;
             end if;
           end if;
-        elsif at < WORD_BYTES or inside = '1' then
+        elsif at_r < WORD_BYTES or inside = '1' then
           read_checks_r <= '1';
-          if at = 0 then
+          if at_r = 0 then
             read_first_r <= '1';
           end if;
         end if;
-        if at < WORD_BYTES then
-          if byte_place = 0 then
-            number_r(7 downto 0) <= unsigned(data);
-          elsif byte_place = 1 then
-            number_r(15 downto 8) <= unsigned(data);
-          elsif data /= x"00" then
-            beyond_r <= '1';
-          end if;
-          if at = 0 and (data = x"00" or is_little = '1') then
-            beyond_r <= '0';
-          end if;
-        end if;
         zero_r <= '0';
-        if data = x"00" then
+        if data_r = x"00" then
           zero_r <= '1';
         end if;
-        if at = 0 then
+        if at_r = 0 then
           found_r <= '0';
-        elsif at(0) = '1' and (past_r(15 downto 1) <= number_r or beyond_r = '1')
-              and past_r(15 downto 1) <= MOST_ENCODINGS and at > WORD_BYTES and zero_r = '1' and data = x"00" then
+        elsif at_r(0) = '1' and at_r > WORD_BYTES and coding_r = '1' and zero_r = '1' and data_r = x"00" then
           found_r <= '1';
         end if;
       end if;
@@ -292,7 +331,7 @@ begin
     if rising_edge(clk) then
       value_r    <= read_value_r;
       names_r    <= names_data;
-      begins_r   <= read_begins_r;
+      begins_r   <= begins_r(1 downto 0) & begins;
       checks_r   <= read_checks_r;
       first_r    <= read_first_r;
       ends_r     <= read_ends_r;
@@ -394,7 +433,7 @@ begin
           encodes_r <= coded_r;
         end if;
       end if;
-      if begins_r = '1' then
+      if begins_r(2) = '1' then
         seen_r      <= (others => '0');
         topics_r    <= (others => '0');
         types_r     <= (others => '0');
@@ -484,11 +523,11 @@ begin
           whole_r <= '1';
         end if;
         if guid_at_r < PREFIX_BYTES then
-          if source_byte /= read_value_r then
+          if source_byte /= data_r then
             same_r <= '0';
           end if;
         else
-          entity_r <= entity_r(23 downto 0) & read_value_r;
+          entity_r <= entity_r(23 downto 0) & data_r;
         end if;
         if guid_wrong_r = '1' then
           same_r <= '0';

@@ -119,7 +119,7 @@ architecture rtl of firm_rtps_node is
   signal is_little : std_logic;
   signal is_last   : std_logic;
 
-  signal is_reader       : std_logic;
+  signal is_reader_r     : std_logic;
   signal matches         : std_logic_vector(ENDPOINTS-1 downto 0);
   signal is_known        : std_logic;
   signal is_reliable     : std_logic;
@@ -223,7 +223,15 @@ begin
       is_lost       => is_discovery_lost
     );
 
-  is_reader <= '1' when writer = RTPS_SUBSCRIPTIONS_WRITER else '0';
+  note_kind : process (clk)
+  begin
+    if rising_edge(clk) then
+      is_reader_r <= '0';
+      if writer = RTPS_SUBSCRIPTIONS_WRITER then
+        is_reader_r <= '1';
+      end if;
+    end if;
+  end process note_kind;
 
   u_locators : entity firm.firm_rtps_locators
     port map (
@@ -266,7 +274,7 @@ begin
       place         => place,
       is_little     => is_little,
       is_last       => is_last,
-      is_reader     => is_reader,
+      is_reader     => is_reader_r,
       are_reliable  => are_reliable,
       are_transient => are_transient,
       names_address => names_address,

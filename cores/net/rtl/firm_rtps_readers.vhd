@@ -151,15 +151,16 @@ architecture rtl of firm_rtps_readers is
   signal misses_r  : std_logic;  -- a sample of the packet found no room
   signal pushes    : std_logic;
   signal size      : size_t;
-  signal spare     : std_logic;
+  signal spare_r   : std_logic;
   signal first_r   : count_t := (others => '0');  -- of the packet's samples
   signal last_r    : count_t := (others => '0');  -- after those that arrived
   signal oldest_r  : count_t := (others => '0');
 
   -- ------------------------------------------------------------------ the sample that is judged
-  type judge_t is (WAITING, READING, COMPARING, JUDGING);
+  type judge_t is (WAITING, COMPARING, JUDGING, LOADING);
   signal judge_r     : judge_t;
   signal judged_r    : count_t := (others => '0');
+  signal queued_r    : std_logic;  -- a sample is to be judged; one cycle late
   signal candidate_r : std_logic_vector(SAMPLE_BITS-1 downto 0) := (others => '0');
   signal from        : source_t;
   signal new_number  : number_t;
@@ -273,6 +274,11 @@ begin
   find_sender : process (clk)
   begin
     if rising_edge(clk) then
+      spare_r <= '1';
+      if last_r(QUEUE_BITS) /= oldest_r(QUEUE_BITS)
+         and last_r(QUEUE_BITS-1 downto 0) = oldest_r(QUEUE_BITS-1 downto 0) then
+        spare_r <= '0';
+      end if;
       found_r  <= found;
       known_r  <= any(found_r);
       sender_r <= lowest(found_r, SOURCE_BITS);
@@ -331,13 +337,10 @@ begin
   has_room  <= '0' when write_r(PLACE_BITS) /= read_r(PLACE_BITS)
                         and write_r(PLACE_BITS-1 downto 0) = read_r(PLACE_BITS-1 downto 0) else
                '1';
-  spare     <= '0' when last_r(QUEUE_BITS) /= oldest_r(QUEUE_BITS)
-                        and last_r(QUEUE_BITS-1 downto 0) = oldest_r(QUEUE_BITS-1 downto 0) else
-               '1';
   is_sample <= data_r and known_r and for_it_r and not large_r;
   -- The payload's last byte came before: the next submessage has a head first.
   size      <= resize(write_r - sample_r, SIZE_BITS) when filled_r = '1' else (others => '0');
-  pushes    <= is_sample and spare and not (full_r and filled_r);
+  pushes    <= is_sample and spare_r and not (full_r and filled_r);
 
   write_payload : process (clk)
   begin
@@ -420,23 +423,27 @@ begin
   shows       <= candidate_r(SAMPLE_BITS-1);
   judge_place <= chosen when is_locked = '1' else from;
   is_taken    <= same_r and (equal_r or (later_r and not strict_r)) when judge_r = JUDGING else '0';
-  is_judging  <= '0' when judge_r = WAITING and judged_r = first_r else '1';
+  is_judging  <= queued_r when judge_r = WAITING else '1';
 
   judge : process (clk)
   begin
     if rising_edge(clk) then
-      next_r <= number;
-      if judge_r = WAITING then
+      next_r   <= number;
+      queued_r <= '1';
+      if judged_r = first_r then
+        queued_r <= '0';
+      end if;
+      if judge_r = WAITING or judge_r = LOADING then
         candidate_r <= entries(to_integer(judged_r(QUEUE_BITS-1 downto 0)));
-        if is_locked = '0' and judged_r /= first_r then
-          judge_r <= READING;
-        end if;
-      elsif judge_r = READING then
-        judge_r  <= COMPARING;
+      end if;
+      if judge_r = WAITING then
         strict_r <= reliable_r(to_integer(from));
         same_r   <= '0';
         if unsigned(candidate_r(AT_SOURCE-1 downto AT_MARK)) = marks(to_integer(from)) then
           same_r <= '1';
+        end if;
+        if is_locked = '0' and queued_r = '1' then
+          judge_r <= COMPARING;
         end if;
       elsif judge_r = COMPARING then
         judge_r <= JUDGING;
@@ -449,13 +456,16 @@ begin
         if new_number > next_r then
           later_r <= '1';
         end if;
-      else
-        judge_r  <= WAITING;
+      elsif judge_r = JUDGING then
+        judge_r  <= LOADING;
         judged_r <= judged_r + 1;
+      else
+        judge_r <= WAITING;
       end if;
       if rst_n = '0' then
         judge_r  <= WAITING;
         judged_r <= (others => '0');
+        queued_r <= '0';
       end if;
     end if;
   end process judge;

@@ -127,6 +127,7 @@ architecture rtl of firm_rtps_walker is
   signal plan        : step_t;
   signal planned_r   : step_t;
   signal plan_less_r : unsigned(3 downto 0) := (others => '0');
+  signal plan_done_r : std_logic;  -- it needs no byte
   -- What follows SKIP, and the inline parameters.
   signal after_skip_r : step_t;
   signal after_list_r : step_t;
@@ -135,6 +136,7 @@ architecture rtl of firm_rtps_walker is
   signal next_step  : step_t;                         -- if this byte is the last one of its step
   signal next_less  : size_t;                         -- its bytes, less one
   signal next_one   : std_logic;                      -- it has one byte
+  signal next_done  : std_logic;                      -- it needs no byte
   signal wrong      : std_logic;                      -- if this byte is the last one of its step
   signal in_body    : std_logic;
   signal ends_body  : std_logic;
@@ -301,15 +303,20 @@ begin
       end if;
       planned_r   <= plan;
       plan_less_r <= less_of(plan);
+      plan_done_r <= '0';
+      if plan = PAYLOAD or plan = REST then
+        plan_done_r <= '1';
+      end if;
     end if;
   end process make_plan;
 
-  choose : process (step_r, kind_r, planned_r, plan_less_r, after_skip_r, after_list_r, before_r, single_r, less_r, set_r,
+  choose : process (step_r, kind_r, planned_r, plan_less_r, plan_done_r, flags_r, after_skip_r, after_list_r, before_r, single_r, less_r, set_r,
                     zero_r, one_r, short_r, shorter_r, none_r, much_r, sentinel_r, free_r, double_r)
   begin
     next_step <= planned_r;
     next_less <= resize(plan_less_r, 16);
     next_one  <= '0';
+    next_done <= plan_done_r;
     wrong     <= '0';
     if planned_r = SKIP then
       next_less <= before_r;
@@ -318,6 +325,7 @@ begin
     if step_r = HEAD then
       if free_r = '1' and zero_r = '1' then
         next_step <= HEAD;
+        next_done <= '0';
         next_less <= resize(less_of(HEAD), 16);
       else
         wrong <= double_r;
@@ -331,18 +339,22 @@ begin
       next_step <= after_skip_r;
       next_less <= resize(less_of(ITEM), 16);
       next_one  <= '0';
+      next_done <= not flags_r(RTPS_INLINE);
     elsif step_r = VALUE then
       next_step <= ITEM;
       next_less <= resize(less_of(ITEM), 16);
       next_one  <= '0';
+      next_done <= '0';
     elsif step_r = SET_SIZE then
       wrong <= much_r;
       if none_r = '0' then
         next_step <= SET;
+        next_done <= '0';
         next_less <= "0000000000" & set_r & "11";
       end if;
     elsif step_r = ITEM then
       next_less <= resize(less_of(ITEM), 16);
+      next_done <= sentinel_r;
       if sentinel_r = '1' then
         next_step <= after_list_r;
       elsif zero_r = '1' then
@@ -359,69 +371,86 @@ begin
                '0' when step_r = FOREIGN or step_r = FAULTY else
                '1';
   ends_body <= final_r or (open_r and end_r);
-  is_done   <= '1' when step_r = PAYLOAD or step_r = REST else
-               last_r and not wrong when next_step = PAYLOAD or next_step = REST else
-               '0';
+  is_done   <= '1' when step_r = PAYLOAD or step_r = REST else last_r and next_done and not wrong;
 
-  walk : process (clk)
+  -- Where the packet has ended or a fault was found, these numbers have no meaning.
+  count_bytes : process (clk)
 
-    procedure enter(step : step_t; less : size_t; is_one : std_logic) is
+    procedure begin_step(less : size_t; is_one : std_logic) is
     begin
-      step_r  <= step;
       place_r <= (others => '0');
       left_r  <= less;
       last_r  <= is_one;
-    end procedure enter;
+    end procedure begin_step;
 
-    procedure begin_head is
-    begin
-      enter(HEAD, to_unsigned(HEAD_BYTES-1, 16), '0');
-    end procedure begin_head;
+  begin
+    if rising_edge(clk) then
+      if valid_r = '1' then
+        if end_r = '1' then
+          begin_step(to_unsigned(PROTOCOL_BYTES-1, 16), '0');
+        elsif ends_body = '1' then
+          begin_step(to_unsigned(HEAD_BYTES-1, 16), '0');
+        elsif last_r = '1' then
+          begin_step(next_less, next_one);
+        else
+          left_r <= left_r - 1;
+          if left_r = 1 then
+            last_r <= '1';
+          end if;
+          if place_r /= 31 then
+            place_r <= place_r + 1;
+          end if;
+        end if;
+      end if;
+      if rst_n = '0' then
+        begin_step(to_unsigned(PROTOCOL_BYTES-1, 16), '0');
+      end if;
+    end if;
+  end process count_bytes;
 
-    procedure begin_packet is
-    begin
-      enter(PROTOCOL, to_unsigned(PROTOCOL_BYTES-1, 16), '0');
-    end procedure begin_packet;
+  count_body : process (clk)
+  begin
+    if rising_edge(clk) and valid_r = '1' then
+      final_r <= '0';
+      if step_r = HEAD then
+        body_r  <= half_r;
+        final_r <= last_r and one_r;
+        open_r  <= last_r and zero_r;
+      elsif in_body = '1' then
+        body_r <= body_r - 1;
+        if body_r = 2 then
+          final_r <= not open_r;
+        end if;
+      end if;
+      if end_r = '1' then
+        final_r <= '0';
+        open_r  <= '0';
+      end if;
+    end if;
+  end process count_body;
+
+  walk : process (clk)
 
     procedure enter_next is
     begin
-      enter(next_step, next_less, next_one);
+      step_r <= next_step;
       if wrong = '1' then
         step_r <= FAULTY;
       end if;
     end procedure enter_next;
 
-    procedure take_body is
-    begin
-      body_r  <= body_r - 1;
-      final_r <= '0';
-      if body_r = 2 then
-        final_r <= not open_r;
-      end if;
-      if ends_body = '1' then
-        if is_done = '1' then
-          begin_head;
-        else
-          step_r <= FAULTY;
-        end if;
-      elsif last_r = '1' then
-        enter_next;
-      end if;
-    end procedure take_body;
-
   begin
     if rising_edge(clk) then
       if valid_r = '1' then
-        left_r <= left_r - 1;
-        last_r <= '0';
-        if left_r = 1 then
-          last_r <= '1';
-        end if;
-        if place_r /= 31 then
-          place_r <= place_r + 1;
-        end if;
         if in_body = '1' then
-          take_body;
+          if ends_body = '1' then
+            step_r <= FAULTY;
+            if is_done = '1' then
+              step_r <= HEAD;
+            end if;
+          elsif last_r = '1' then
+            enter_next;
+          end if;
         elsif last_r = '1' and step_r /= FOREIGN and step_r /= FAULTY then
           enter_next;
         end if;
@@ -429,17 +458,12 @@ begin
            and place_r < CHECKED_BYTES then
           step_r <= FOREIGN;
         end if;
-        if step_r = HEAD then
-          body_r  <= half_r;
-          final_r <= one_r;
-          open_r  <= zero_r;
-        end if;
         if end_r = '1' then
-          begin_packet;
+          step_r <= PROTOCOL;
         end if;
       end if;
       if rst_n = '0' then
-        begin_packet;
+        step_r <= PROTOCOL;
       end if;
     end if;
   end process walk;
@@ -612,7 +636,7 @@ begin
         strange := not last_r;
       elsif step_r = PROTOCOL or step_r = FOREIGN then
         strange := '1';
-      elsif step_r = HEAD and zero_r = '1' and (next_step = HEAD or next_step = REST) then
+      elsif step_r = HEAD and zero_r = '1' and (free_r = '1' or planned_r = REST) then
         whole := last_r;
       end if;
       is_whole   <= '0';

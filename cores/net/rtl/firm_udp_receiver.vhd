@@ -80,13 +80,13 @@ architecture rtl of firm_udp_receiver is
   signal packet_left_r  : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet to come
   signal room_r         : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet after its header
   signal short_r        : std_logic;  -- the packet has no room for a datagram
-  signal header_sum_r   : unsigned(17 downto 0) := (others => '0');
+  signal header_sum_r   : unsigned(16 downto 0) := (others => '0');
   signal header_right_r : std_logic;
   signal port_r         : std_logic_vector(PORTS-1 downto 0);
   signal length_r       : unsigned(15 downto 0) := (others => '0');  -- bytes of the datagram
   signal misfit_r       : std_logic;  -- the datagram does not fit into the packet
   signal unsummed_r     : std_logic;  -- the datagram has no checksum
-  signal sum_r          : unsigned(17 downto 0) := (others => '0');
+  signal sum_r          : unsigned(16 downto 0) := (others => '0');
   signal data_left_r    : unsigned(15 downto 0) := (others => '0');  -- bytes of the payload to come
   signal accepted_r     : std_logic;
 
@@ -106,10 +106,12 @@ architecture rtl of firm_udp_receiver is
   signal whole_r     : std_logic;  -- it holds the packet
   signal summed_r    : std_logic;  -- the datagram's checksum is right, or there is none
 
-  -- The sum with a further byte, once or twice, and the carries of before.
-  function added(sum : unsigned(17 downto 0); byte : std_logic_vector(7 downto 0); odd : std_logic; twice : boolean)
+  -- The sum with a further byte, once or twice, and the carry of before, which is the highest bit. In ones' complement,
+  -- twice a word is the word rotated by one bit.
+  function added(sum : unsigned(16 downto 0); byte : std_logic_vector(7 downto 0); odd : std_logic; twice : boolean)
     return unsigned is
-    variable word : unsigned(17 downto 0) := (others => '0');
+    variable word  : unsigned(15 downto 0) := (others => '0');
+    variable carry : unsigned(0 downto 0);
   begin
     if odd = '1' then
       word(7 downto 0) := unsigned(byte);
@@ -117,16 +119,17 @@ architecture rtl of firm_udp_receiver is
       word(15 downto 8) := unsigned(byte);
     end if;
     if twice then
-      word := word(16 downto 0) & '0';
+      word := word(14 downto 0) & word(15);
     end if;
-    return resize(sum(15 downto 0), 18) + sum(17 downto 16) + word;
+    carry(0) := sum(16);
+    return resize(sum(15 downto 0), 17) + word + carry;
   end function added;
 
-  -- Whether words and carries add up to all ones.
-  function is_right(sum : unsigned(17 downto 0)) return std_logic is
+  -- Whether words and carry add up to all ones.
+  function is_right(sum : unsigned(16 downto 0)) return std_logic is
   begin
-    if resize(sum(15 downto 0), 17) + sum(17 downto 16) = 16#ffff# then
-      return '1';
+    if sum(15 downto 1) = "111111111111111" then
+      return sum(0) xor sum(16);
     end if;
     return '0';
   end function is_right;
@@ -300,7 +303,7 @@ begin
   begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if section_r = ETHERNET then
-        sum_r <= resize(UDP, 18);
+        sum_r <= resize(UDP, 17);
       elsif section_r = HEADER and place_r >= 12 and place_r <= HEADER_LAST then
         sum_r <= added(sum_r, s_axis_tdata, odd_r, false);
       elsif section_r = DATAGRAM then
