@@ -101,6 +101,7 @@ architecture rtl of firm_rtps_endpoint is
   signal of_2_r   : ids_t;
   signal over_r   : std_logic;  -- the byte is after those that the first word counts
   signal final_r  : std_logic;  -- it is the last one of them
+  signal in_word  : std_logic;  -- it is in the first word
   signal inside   : std_logic;  -- it is one of them
   signal coding_r : std_logic;  -- it is one of the encodings that are looked at
   signal part_r   : unsigned(7 downto 0) := (others => '0');  -- the place in a part of the user data
@@ -228,7 +229,7 @@ begin
       if past_r = number_r then
         final_r <= '1';
       end if;
-      if (past_r(15 downto 1) <= number_r or beyond_r = '1') and past_r(15 downto 1) <= MOST_ENCODINGS then
+      if (past_r(15 downto 1) <= number_r or beyond_r = '1') and (past_r(15 downto 5) = 0 or past_r(15 downto 1) = MOST_ENCODINGS) then
         coding_r <= '1';
       end if;
       -- The id is there before the first byte of the value.
@@ -236,7 +237,7 @@ begin
       of_2_r <= of_r;
       if comes = '1' then
         past_r <= at - (WORD_BYTES-2);
-        if at < WORD_BYTES then
+        if unsigned(place(15 downto 2)) = 0 then
           if byte_place = 0 then
             number_r(7 downto 0) <= unsigned(data);
           elsif byte_place = 1 then
@@ -252,10 +253,11 @@ begin
     end if;
   end process take_byte;
 
-  inside  <= '1' when at_r >= WORD_BYTES and over_r = '0' else '0';
+  inside  <= '1' when in_word = '0' and over_r = '0' else '0';
+  in_word <= '1' when at_r(15 downto 2) = 0 else '0';
   is_hash <= of_2_r(OF_USER);
 
-  choose_name : process (of_2_r, at_r, place_r, part_r)
+  choose_name : process (of_2_r, at_r, in_word, place_r, part_r)
   begin
     if of_2_r(OF_USER) = '1' then
       names_address <= HASHES & std_logic_vector(part_r);
@@ -264,7 +266,7 @@ begin
       if of_2_r(OF_TOPIC) = '1' then
         names_address(9 downto 8) <= TOPICS;
       end if;
-      if at_r < WORD_BYTES then
+      if in_word = '1' then
         names_address(1 downto 0) <= std_logic_vector(place_r);
       end if;
     end if;
@@ -300,7 +302,7 @@ begin
               part_r <= part_r + 1;
             end if;
           end if;
-        elsif at_r < WORD_BYTES or inside = '1' then
+        elsif in_word = '1' or inside = '1' then
           read_checks_r <= '1';
           if at_r = 0 then
             read_first_r <= '1';
@@ -312,7 +314,7 @@ begin
         end if;
         if at_r = 0 then
           found_r <= '0';
-        elsif at_r(0) = '1' and at_r > WORD_BYTES and coding_r = '1' and zero_r = '1' and data_r = x"00" then
+        elsif at_r(0) = '1' and in_word = '0' and coding_r = '1' and zero_r = '1' and data_r = x"00" then
           found_r <= '1';
         end if;
       end if;
@@ -321,7 +323,7 @@ begin
 
   -- ------------------------------------------------------------------ what it was
 
-  count <= to_unsigned(MOST_ENCODINGS, 5) when beyond_r = '1' or number_r > MOST_ENCODINGS else number_r(4 downto 0);
+  count <= to_unsigned(MOST_ENCODINGS, 5) when beyond_r = '1' or number_r(15 downto 4) /= 0 else number_r(4 downto 0);
 
   part_bytes <= read_before_r when read_value_r = SEMICOLON else read_before_r + 1;
 
@@ -353,7 +355,7 @@ begin
       after_word := unsigned(size) - WORD_BYTES;
       coded_r    <= found_r;
       some_r     <= '0';
-      if unsigned(size) >= WORD_BYTES then
+      if unsigned(size(15 downto 2)) /= 0 then
         some_r <= '1';
       end if;
       counts_r <= beyond_r;
@@ -492,7 +494,7 @@ begin
       guid_wrong_r <= '0';
       if has_field = '1' then
         guid_at_r <= unsigned(address(3 downto 0));
-        if unsigned(address) >= RECORD_KEY_HASH and unsigned(address) < RECORD_KEY_HASH+GUID_BYTES then
+        if is_in(address, RECORD_KEY_HASH, GUID_BYTES) = '1' then
           guid_r <= s_valid;
         end if;
       else
@@ -511,8 +513,7 @@ begin
   read_guid : process (clk)
   begin
     if rising_edge(clk) then
-      if s_valid = '1' and has_field = '1' and unsigned(address) >= RECORD_SOURCE
-         and unsigned(address) < RECORD_SOURCE+PREFIX_BYTES then
+      if s_valid = '1' and has_field = '1' and is_in(address, RECORD_SOURCE, PREFIX_BYTES) = '1' then
         source_memory(to_integer(unsigned(address(3 downto 0)))) <= data;
       end if;
       if guid_r = '1' then

@@ -130,7 +130,7 @@ begin
           mine_r <= '1';
         elsif unsigned(field_address) = RECORD_KIND then
           own_r <= prefix;
-        elsif unsigned(field_address) >= RECORD_DESTINATION and unsigned(field_address) < RECORD_DESTINATION+12 then
+        elsif is_in(field_address, RECORD_DESTINATION, 12) = '1' then
           own_r  <= own_r(87 downto 0) & own_r(95 downto 88);
           ours_r <= ours;
           all_r  <= all_zero;
@@ -149,8 +149,7 @@ begin
   write_word : process (clk)
   begin
     if rising_edge(clk) then
-      if field_valid = '1' and unsigned(field_address) >= RECORD_WRITER
-         and unsigned(field_address) < RECORD_WRITER+4 then
+      if field_valid = '1' and is_in(field_address, RECORD_WRITER, 4) = '1' then
         writer_r <= writer_r(23 downto 0) & field_data;
       end if;
       listens_r <= '0';
@@ -246,9 +245,9 @@ begin
         if at = RECORD_KIND then
           gone_r  <= '0';
           large_r <= '0';
-        elsif at >= RECORD_WRITER and at < RECORD_WRITER+4 then
+        elsif is_in(shown, RECORD_WRITER, 4) = '1' then
           from_r <= from_r(23 downto 0) & value;
-        elsif at >= RECORD_NUMBER and at < RECORD_SECOND+8 and at(2) = '1' then
+        elsif is_in(shown, RECORD_NUMBER, 16) = '1' and at(2) = '1' then
           large_r <= large_r or not is_zero(value);
         elsif at = RECORD_STATUS+3 then
           gone_r <= value(0) or value(1);

@@ -39,9 +39,9 @@ end entity firm_rtps_locators;
 architecture rtl of firm_rtps_locators is
 
   constant LOCATOR_BYTES : natural := 24;
-  constant LEASE_BYTES   : natural := 8;
 
   signal at             : unsigned(15 downto 0);  -- the place in a parameter
+  signal word           : unsigned(13 downto 0);  -- of four bytes in it
   signal comes          : std_logic;
   signal of_metatraffic_r : std_logic;
   signal of_default_r     : std_logic;
@@ -60,6 +60,7 @@ architecture rtl of firm_rtps_locators is
 begin
 
   at    <= unsigned(place);
+  word  <= unsigned(place(15 downto 2));
   comes <= s_valid and is_value;
 
   -- Id and size are there before the first byte of the value.
@@ -79,7 +80,7 @@ begin
           of_unicast_r <= '1';
         end if;
       end if;
-      if id = RTPS_LEASE and unsigned(size) >= LEASE_BYTES then
+      if id = RTPS_LEASE and unsigned(size(15 downto 3)) /= 0 then
         of_lease_r <= '1';
       end if;
     end if;
@@ -100,12 +101,12 @@ begin
         if (at = 0 and is_little = '1') or (at = 3 and is_little = '0') then
           expected := x"01";
         end if;
-        if at < 4 then
+        if word = 0 then
           udp_r <= '0';
           if data = expected and (at = 0 or udp_r = '1') then
             udp_r <= '1';
           end if;
-        elsif at < 8 and at(1) = is_little and data /= x"00" then
+        elsif word = 1 and at(1) = is_little and data /= x"00" then
           udp_r <= '0';
         end if;
         if is_last = '1' then
@@ -151,13 +152,13 @@ begin
       record_data    <= data;
       if has_field = '1' then
         record_valid <= s_valid;
-      elsif is_lease = '1' and at < 4 then
+      elsif is_lease = '1' and word = 0 then
         record_valid   <= comes;
         record_address <= std_logic_vector(to_unsigned(RECORD_LEASE, RECORD_BITS) + lease_place);
-      elsif is_locator = '1' and udp_r = '1' and at >= 20 and at < 24 then
+      elsif is_locator = '1' and udp_r = '1' and word = 5 then
         record_valid   <= comes;
         record_address <= std_logic_vector(to_unsigned(ip_place, RECORD_BITS) + at(1 downto 0));
-      elsif is_locator = '1' and udp_r = '1' and at >= 4 and at < 8 and at(1) /= is_little then
+      elsif is_locator = '1' and udp_r = '1' and word = 1 and at(1) /= is_little then
         record_valid   <= comes;
         record_address <= std_logic_vector(to_unsigned(port_place, RECORD_BITS));
         if at(0) /= is_little then

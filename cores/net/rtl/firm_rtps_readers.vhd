@@ -245,9 +245,9 @@ begin
   begin
     key_valid <= '0';
     key_place <= field_address(3 downto 0);
-    if unsigned(field_address) >= RECORD_SOURCE and unsigned(field_address) < RECORD_SOURCE+TAIL then
+    if is_in(field_address, RECORD_SOURCE, TAIL) = '1' then
       key_valid <= field_valid;
-    elsif unsigned(field_address) >= RECORD_WRITER and unsigned(field_address) < RECORD_WRITER+4 then
+    elsif is_in(field_address, RECORD_WRITER, 4) = '1' then
       key_valid <= field_valid;
       key_place <= "11" & field_address(1 downto 0);
     end if;
@@ -296,7 +296,7 @@ begin
     if rising_edge(clk) and field_valid = '1' then
       if unsigned(field_address) = RECORD_KIND then
         large_r <= '0';
-      elsif unsigned(field_address) >= RECORD_READER and unsigned(field_address) < RECORD_READER+4 then
+      elsif is_in(field_address, RECORD_READER, 4) = '1' then
         reader_r <= reader_r(23 downto 0) & field_data;
       end if;
       for index in 0 to 7 loop

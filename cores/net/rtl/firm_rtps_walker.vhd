@@ -57,6 +57,8 @@ architecture rtl of firm_rtps_walker is
     SKIP, ITEM, VALUE,
     PAYLOAD, REST, FOREIGN, FAULTY
   );
+  -- The current one is '1'.
+  type steps_t is array (step_t) of std_logic;
 
   constant PROTOCOL_BYTES : positive := 8;
   constant MAC_BYTES      : positive := 6;
@@ -100,7 +102,7 @@ architecture rtl of firm_rtps_walker is
   signal hash_id_r  : std_logic;                      -- a key hash, or a status, with enough bytes
   signal state_id_r : std_logic;
 
-  signal step_r  : step_t;
+  signal step_r  : steps_t;
   signal place_r : unsigned(4 downto 0) := (others => '0');  -- in the step; it stays at 31
   signal left_r  : size_t := (others => '0');                -- bytes of the step after this one
   signal last_r  : std_logic;                                -- this byte is the last one of its step
@@ -124,16 +126,15 @@ architecture rtl of firm_rtps_walker is
   signal status_r     : std_logic;  -- the parameter is the first status
 
   -- What follows a step of two bytes and more, as far as no byte of it tells; and its size, less one.
-  signal plan        : step_t;
-  signal planned_r   : step_t;
+  signal plan        : steps_t;
+  signal planned_r   : steps_t;
   signal plan_less_r : unsigned(3 downto 0) := (others => '0');
   signal plan_done_r : std_logic;  -- it needs no byte
-  -- What follows SKIP, and the inline parameters.
-  signal after_skip_r : step_t;
-  signal after_list_r : step_t;
+  signal has_payload_r : std_logic;  -- a payload or a key is after the inline parameters
+  signal few_ends      : std_logic;  -- the last field of DATA or DATA_FRAG ends, and the inline parameters are next
 
   signal is_little  : std_logic;
-  signal next_step  : step_t;                         -- if this byte is the last one of its step
+  signal next_step  : steps_t;                        -- if this byte is the last one of its step
   signal next_less  : size_t;                         -- its bytes, less one
   signal next_one   : std_logic;                      -- it has one byte
   signal next_done  : std_logic;                      -- it needs no byte
@@ -142,61 +143,66 @@ architecture rtl of firm_rtps_walker is
   signal ends_body  : std_logic;
   signal is_done    : std_logic;                      -- the submessage needs no byte after this one
 
-  -- The first step of a submessage.
-  function first_of(name : std_logic_vector(7 downto 0)) return step_t is
+  function only(step : step_t) return steps_t is
+    variable found : steps_t := (others => '0');
   begin
-    if name = RTPS_DATA or name = RTPS_DATA_FRAG then
-      return EXTRA;
-    elsif name = RTPS_ACKNACK or name = RTPS_NACK_FRAG or name = RTPS_HEARTBEAT or name = RTPS_HEARTBEAT_FRAG
-          or name = RTPS_GAP then
-      return ENDS;
-    elsif name = RTPS_INFO_DESTINATION then
-      return DESTINATION;
-    end if;
-    return REST;
-  end function first_of;
+    found(step) := '1';
+    return found;
+  end function only;
 
-  function after_number(name : std_logic_vector(7 downto 0)) return step_t is
+  function equals(name, wanted : std_logic_vector(7 downto 0)) return std_logic is
   begin
-    if name = RTPS_DATA_FRAG then
-      return FRAGMENTS;
-    elsif name = RTPS_HEARTBEAT or name = RTPS_GAP then
-      return SECOND;
-    elsif name = RTPS_ACKNACK then
-      return SET_SIZE;
+    if name = wanted then
+      return '1';
     end if;
-    return FRAGMENT;
-  end function after_number;
+    return '0';
+  end function equals;
 
   -- What follows a step whose successor depends on the kind alone.
-  function next_of(step : step_t; name : std_logic_vector(7 downto 0)) return step_t is
+  function next_of(step : steps_t; name : std_logic_vector(7 downto 0)) return steps_t is
+    variable found       : steps_t := (others => '0');
+    variable data        : std_logic;
+    variable frag        : std_logic;
+    variable gap         : std_logic;
+    variable heartbeat   : std_logic;
+    variable acknack     : std_logic;
+    variable nack_frag   : std_logic;
+    variable beat_frag   : std_logic;
+    variable target      : std_logic;
   begin
-    if step = PROTOCOL then
-      return SOURCE;
-    elsif step = SOURCE then
-      return HEAD;
-    elsif step = HEAD then
-      return first_of(name);
-    elsif step = EXTRA then
-      return ENDS;
-    elsif step = ENDS then
-      return NUMBER;
-    elsif step = NUMBER then
-      return after_number(name);
-    elsif (step = SECOND and name = RTPS_GAP) or (step = FRAGMENT and name = RTPS_NACK_FRAG) then
-      return SET_SIZE;
-    elsif step = SECOND or step = FRAGMENT or ((step = SET_SIZE or step = SET) and name /= RTPS_GAP) then
-      return COUNT;
-    elsif step = VALUE then
-      return ITEM;
-    elsif step = PAYLOAD then
-      return PAYLOAD;
-    end if;
-    return REST;
+    data        := equals(name, RTPS_DATA);
+    frag        := equals(name, RTPS_DATA_FRAG);
+    gap         := equals(name, RTPS_GAP);
+    heartbeat   := equals(name, RTPS_HEARTBEAT);
+    acknack     := equals(name, RTPS_ACKNACK);
+    nack_frag   := equals(name, RTPS_NACK_FRAG);
+    beat_frag   := equals(name, RTPS_HEARTBEAT_FRAG);
+    target      := equals(name, RTPS_INFO_DESTINATION);
+
+    found(SOURCE)           := step(PROTOCOL);
+    found(HEAD)             := step(SOURCE);
+    found(EXTRA)            := step(HEAD) and (data or frag);
+    found(ENDS)             := step(EXTRA)
+                               or (step(HEAD) and (gap or heartbeat or acknack or nack_frag or beat_frag));
+    found(DESTINATION)      := step(HEAD) and target;
+    found(NUMBER)           := step(ENDS);
+    found(FRAGMENTS)        := step(NUMBER) and frag;
+    found(SECOND)           := step(NUMBER) and (heartbeat or gap);
+    found(FRAGMENT)         := step(NUMBER) and (nack_frag or beat_frag);
+    found(SET_SIZE)         := (step(NUMBER) and acknack) or (step(SECOND) and gap) or (step(FRAGMENT) and nack_frag);
+    found(COUNT)            := (step(SECOND) and heartbeat) or (step(FRAGMENT) and beat_frag)
+                               or ((step(SET_SIZE) or step(SET)) and not gap);
+    found(ITEM)             := step(VALUE);
+    found(PAYLOAD)          := step(PAYLOAD);
+    found(REST)             := (step(HEAD) and not (data or frag or gap or heartbeat or acknack or nack_frag or beat_frag
+                                                    or target))
+                               or ((step(SET_SIZE) or step(SET)) and gap)
+                               or step(COUNT) or step(DESTINATION) or step(REST);
+    return found;
   end function next_of;
 
   -- A byte of a MAC address.
-  function selected(mac : std_logic_vector(47 downto 0); place : unsigned(4 downto 0)) return std_logic_vector is
+  function selected(mac : std_logic_vector(47 downto 0); place : unsigned(2 downto 0)) return std_logic_vector is
     variable found : std_logic_vector(7 downto 0) := mac(7 downto 0);
   begin
     for index in 0 to MAC_BYTES-2 loop
@@ -208,14 +214,12 @@ architecture rtl of firm_rtps_walker is
   end function selected;
 
   -- The bytes of a step with a fixed size, less one; of those without an end, any.
-  function less_of(step : step_t) return unsigned is
+  function less_of(step : steps_t) return unsigned is
+    variable less : unsigned(3 downto 0) := to_unsigned(WORD_BYTES-1, 4);
   begin
-    if step = ENDS or step = NUMBER or step = SECOND then
-      return to_unsigned(NUMBER_BYTES-1, 4);
-    elsif step = SOURCE or step = DESTINATION or step = FRAGMENTS then
-      return to_unsigned(PREFIX_BYTES-1, 4);
-    end if;
-    return to_unsigned(WORD_BYTES-1, 4);
+    less(2) := step(ENDS) or step(NUMBER) or step(SECOND);
+    less(3) := step(SOURCE) or step(DESTINATION) or step(FRAGMENTS);
+    return less;
   end function less_of;
 
 begin
@@ -256,25 +260,26 @@ begin
         if unsigned(half) = 1 then
           one_r <= '1';
         end if;
-        if unsigned(half) < DATA_BYTES then
+        -- Fewer than 16 bytes, or than 28 ones; more than 256 numbers. Comparisons of parts need no adders.
+        if unsigned(half(15 downto 4)) = 0 then
           short_r <= '1';
         end if;
-        if unsigned(half) < DATA_FRAG_BYTES then
+        if unsigned(half(15 downto 5)) = 0 and half(4 downto 2) /= "111" then
           shorter_r <= '1';
         end if;
         if unsigned(word) = 0 then
           none_r <= '1';
         end if;
-        if unsigned(word) > MOST_SET_BITS then
+        if unsigned(word(31 downto 9)) /= 0 or (word(8) = '1' and word(7 downto 0) /= x"00") then
           much_r <= '1';
         end if;
         if id = RTPS_SENTINEL then
           sentinel_r <= '1';
         end if;
-        if id = RTPS_KEY_HASH and unsigned(half) >= HASH_BYTES then
+        if id = RTPS_KEY_HASH and unsigned(half(15 downto 4)) /= 0 then
           hash_id_r <= '1';
         end if;
-        if id = RTPS_STATUS_INFO and unsigned(half) >= STATUS_BYTES then
+        if id = RTPS_STATUS_INFO and unsigned(half(15 downto 2)) /= 0 then
           state_id_r <= '1';
         end if;
       end if;
@@ -286,92 +291,88 @@ begin
 
   -- ------------------------------------------------------------------ the order of the steps
 
-  plan <= after_skip_r when (step_r = FRAGMENTS or (step_r = NUMBER and kind_r = RTPS_DATA)) and few_r = '1' else
-          SKIP when step_r = FRAGMENTS or (step_r = NUMBER and kind_r = RTPS_DATA) else
-          next_of(step_r, kind_r);
+  few_ends <= step_r(FRAGMENTS) when kind_r = RTPS_DATA_FRAG else
+              step_r(NUMBER) when kind_r = RTPS_DATA else
+              '0';
+
+  choose_plan : process (step_r, kind_r, flags_r, few_r, few_ends, has_payload_r)
+  begin
+    plan <= next_of(step_r, kind_r);
+    if few_ends = '1' then
+      plan          <= (others => '0');
+      plan(SKIP)    <= not few_r;
+      plan(ITEM)    <= few_r and flags_r(RTPS_INLINE);
+      plan(PAYLOAD) <= few_r and not flags_r(RTPS_INLINE) and has_payload_r;
+      plan(REST)    <= few_r and not (flags_r(RTPS_INLINE) or has_payload_r);
+    end if;
+  end process choose_plan;
 
   make_plan : process (clk)
   begin
     if rising_edge(clk) then
-      after_list_r <= PAYLOAD;
-      if kind_r = RTPS_DATA and flags_r(RTPS_PAYLOAD) = '0' and flags_r(RTPS_KEY) = '0' then
-        after_list_r <= REST;
-      end if;
-      after_skip_r <= after_list_r;
-      if flags_r(RTPS_INLINE) = '1' then
-        after_skip_r <= ITEM;
+      has_payload_r <= '1';
+      if kind_r = RTPS_DATA then
+        has_payload_r <= flags_r(RTPS_PAYLOAD) or flags_r(RTPS_KEY);
       end if;
       planned_r   <= plan;
       plan_less_r <= less_of(plan);
-      plan_done_r <= '0';
-      if plan = PAYLOAD or plan = REST then
-        plan_done_r <= '1';
-      end if;
+      plan_done_r <= plan(PAYLOAD) or plan(REST);
     end if;
   end process make_plan;
 
-  choose : process (step_r, kind_r, planned_r, plan_less_r, plan_done_r, flags_r, after_skip_r, after_list_r, before_r, single_r, less_r, set_r,
-                    zero_r, one_r, short_r, shorter_r, none_r, much_r, sentinel_r, free_r, double_r)
+  -- Of VALUE and SKIP, which may have one byte, there is no plan.
+  choose : process (step_r, kind_r, flags_r, planned_r, plan_less_r, plan_done_r, has_payload_r, before_r, single_r,
+                    less_r, set_r, zero_r, one_r, short_r, shorter_r, none_r, much_r, sentinel_r, free_r, double_r)
+    variable has_value : std_logic;
+    variable has_set   : std_logic;
+    variable leaves    : std_logic;  -- the inline parameters are over
+    variable repeats   : std_logic;  -- another head is next
+    variable unplanned : std_logic;
+    variable found     : steps_t;
   begin
-    next_step <= planned_r;
-    next_less <= resize(plan_less_r, 16);
+    has_value := step_r(ITEM) and not (sentinel_r or zero_r);
+    has_set   := step_r(SET_SIZE) and not none_r;
+    leaves    := (step_r(ITEM) and sentinel_r) or (step_r(SKIP) and not flags_r(RTPS_INLINE));
+    repeats   := step_r(HEAD) and free_r and zero_r;
+    unplanned := step_r(ITEM) or step_r(VALUE) or step_r(SKIP) or has_set or repeats;
+
+    found := (others => '0');
+    for step in steps_t'range loop
+      found(step) := planned_r(step) and not unplanned;
+    end loop;
+    found(ITEM)    := found(ITEM) or step_r(VALUE) or (step_r(ITEM) and zero_r and not sentinel_r)
+                      or (step_r(SKIP) and flags_r(RTPS_INLINE));
+    found(VALUE)   := has_value;
+    found(SET)     := has_set;
+    found(PAYLOAD) := found(PAYLOAD) or (leaves and has_payload_r);
+    found(REST)    := found(REST) or (leaves and not has_payload_r);
+    found(HEAD)    := found(HEAD) or repeats;
+    next_step      <= found;
+
+    next_less <= to_unsigned(WORD_BYTES-1, 16);
     next_one  <= '0';
-    next_done <= plan_done_r;
-    wrong     <= '0';
-    if planned_r = SKIP then
+    if has_value = '1' then
+      next_less <= less_r;
+      next_one  <= one_r;
+    elsif has_set = '1' then
+      next_less <= "0000000000" & set_r & "11";
+    elsif unplanned = '0' and planned_r(SKIP) = '1' then
       next_less <= before_r;
       next_one  <= single_r;
+    elsif unplanned = '0' then
+      next_less <= resize(plan_less_r, 16);
     end if;
-    if step_r = HEAD then
-      if free_r = '1' and zero_r = '1' then
-        next_step <= HEAD;
-        next_done <= '0';
-        next_less <= resize(less_of(HEAD), 16);
-      else
-        wrong <= double_r;
-      end if;
-    elsif step_r = EXTRA then
-      wrong <= short_r;
-      if kind_r = RTPS_DATA_FRAG then
-        wrong <= shorter_r;
-      end if;
-    elsif step_r = SKIP then
-      next_step <= after_skip_r;
-      next_less <= resize(less_of(ITEM), 16);
-      next_one  <= '0';
-      next_done <= not flags_r(RTPS_INLINE);
-    elsif step_r = VALUE then
-      next_step <= ITEM;
-      next_less <= resize(less_of(ITEM), 16);
-      next_one  <= '0';
-      next_done <= '0';
-    elsif step_r = SET_SIZE then
-      wrong <= much_r;
-      if none_r = '0' then
-        next_step <= SET;
-        next_done <= '0';
-        next_less <= "0000000000" & set_r & "11";
-      end if;
-    elsif step_r = ITEM then
-      next_less <= resize(less_of(ITEM), 16);
-      next_done <= sentinel_r;
-      if sentinel_r = '1' then
-        next_step <= after_list_r;
-      elsif zero_r = '1' then
-        next_step <= ITEM;
-      else
-        next_step <= VALUE;
-        next_less <= less_r;
-        next_one  <= one_r;
-      end if;
+
+    next_done <= leaves or (plan_done_r and not unplanned);
+    wrong     <= (step_r(HEAD) and double_r) or (step_r(EXTRA) and short_r) or (step_r(SET_SIZE) and much_r);
+    if kind_r = RTPS_DATA_FRAG then
+      wrong <= step_r(EXTRA) and shorter_r;
     end if;
   end process choose;
 
-  in_body   <= '0' when step_r = PROTOCOL or step_r = SOURCE or step_r = HEAD else
-               '0' when step_r = FOREIGN or step_r = FAULTY else
-               '1';
+  in_body   <= not (step_r(PROTOCOL) or step_r(SOURCE) or step_r(HEAD) or step_r(FOREIGN) or step_r(FAULTY));
   ends_body <= final_r or (open_r and end_r);
-  is_done   <= '1' when step_r = PAYLOAD or step_r = REST else last_r and next_done and not wrong;
+  is_done   <= step_r(PAYLOAD) or step_r(REST) or (last_r and next_done and not wrong);
 
   -- Where the packet has ended or a fault was found, these numbers have no meaning.
   count_bytes : process (clk)
@@ -412,7 +413,7 @@ begin
   begin
     if rising_edge(clk) and valid_r = '1' then
       final_r <= '0';
-      if step_r = HEAD then
+      if step_r(HEAD) = '1' then
         body_r  <= half_r;
         final_r <= last_r and one_r;
         open_r  <= last_r and zero_r;
@@ -430,40 +431,32 @@ begin
   end process count_body;
 
   walk : process (clk)
-
-    procedure enter_next is
-    begin
-      step_r <= next_step;
-      if wrong = '1' then
-        step_r <= FAULTY;
-      end if;
-    end procedure enter_next;
-
   begin
     if rising_edge(clk) then
       if valid_r = '1' then
-        if in_body = '1' then
-          if ends_body = '1' then
-            step_r <= FAULTY;
-            if is_done = '1' then
-              step_r <= HEAD;
-            end if;
-          elsif last_r = '1' then
-            enter_next;
+        if step_r(FOREIGN) = '1' or step_r(FAULTY) = '1' then
+          null;
+        elsif ends_body = '1' then
+          step_r <= only(FAULTY);
+          if is_done = '1' then
+            step_r <= only(HEAD);
           end if;
-        elsif last_r = '1' and step_r /= FOREIGN and step_r /= FAULTY then
-          enter_next;
+        elsif last_r = '1' then
+          step_r <= next_step;
+          if wrong = '1' then
+            step_r <= only(FAULTY);
+          end if;
         end if;
-        if step_r = PROTOCOL and byte_r /= RTPS_2(to_integer(place_r(2 downto 0)))
+        if step_r(PROTOCOL) = '1' and byte_r /= RTPS_2(to_integer(place_r(2 downto 0)))
            and place_r < CHECKED_BYTES then
-          step_r <= FOREIGN;
+          step_r <= only(FOREIGN);
         end if;
         if end_r = '1' then
-          step_r <= PROTOCOL;
+          step_r <= only(PROTOCOL);
         end if;
       end if;
       if rst_n = '0' then
-        step_r <= PROTOCOL;
+        step_r <= only(PROTOCOL);
       end if;
     end if;
   end process walk;
@@ -471,13 +464,14 @@ begin
   -- ------------------------------------------------------------------ the submessage
 
   read_head : process (clk)
-    constant LEAST_FURTHER : size_t := to_unsigned(DATA_BYTES, 16);
-    constant LEAST_OF_FRAG : size_t := to_unsigned(DATA_FRAG_BYTES, 16);
+    variable least : size_t;
   begin
     if rising_edge(clk) then
-      known_r <= '1';
-      if first_of(kind_r) = REST then
-        known_r <= '0';
+      known_r <= '0';
+      if kind_r = RTPS_DATA or kind_r = RTPS_DATA_FRAG or kind_r = RTPS_ACKNACK or kind_r = RTPS_NACK_FRAG
+         or kind_r = RTPS_HEARTBEAT or kind_r = RTPS_HEARTBEAT_FRAG or kind_r = RTPS_GAP
+         or kind_r = RTPS_INFO_DESTINATION then
+        known_r <= '1';
       end if;
       free_r <= '0';
       if kind_r = RTPS_PAD or kind_r = RTPS_INFO_TIMESTAMP then
@@ -497,7 +491,7 @@ begin
         single_r <= '1';
       end if;
       if valid_r = '1' then
-        if step_r = HEAD then
+        if step_r(HEAD) = '1' then
           has_key_r    <= '0';
           has_status_r <= '0';
           if place_r = 0 then
@@ -505,15 +499,16 @@ begin
           elsif place_r = 1 then
             flags_r <= byte_r;
           end if;
-        elsif step_r = EXTRA then
-          further_r <= half_r - LEAST_FURTHER;
+        elsif step_r(EXTRA) = '1' then
+          least := to_unsigned(DATA_BYTES, 16);
           if kind_r = RTPS_DATA_FRAG then
-            further_r <= half_r - LEAST_OF_FRAG;
+            least := to_unsigned(DATA_FRAG_BYTES, 16);
           end if;
-        elsif step_r = ITEM then
+          further_r <= half_r - least;
+        elsif step_r(ITEM) = '1' then
           hash_r   <= hash_id_r and not has_key_r;
           status_r <= state_id_r and not has_status_r;
-        elsif step_r = VALUE and last_r = '1' then
+        elsif step_r(VALUE) = '1' and last_r = '1' then
           has_key_r    <= has_key_r or hash_r;
           has_status_r <= has_status_r or status_r;
         end if;
@@ -538,62 +533,62 @@ begin
       data    := byte_r;
       big     := to_unsigned(WORD_BYTES-1, RECORD_BITS);
       little  := (others => '0');
-      if step_r = PROTOCOL then
+      if step_r(PROTOCOL) = '1' then
         -- Nothing of the packet is noted here, so that there is time for its sender.
         base := RECORD_SOURCE_MAC;
         big  := (others => '0');
-        data := selected(source_mac, place_r);
+        data := selected(source_mac, place_r(2 downto 0));
         if place_r >= MAC_BYTES then
           written := '0';
         end if;
-      elsif step_r = SOURCE then
+      elsif step_r(SOURCE) = '1' then
         base := RECORD_SOURCE;
         big  := (others => '0');
-      elsif step_r = HEAD then
+      elsif step_r(HEAD) = '1' then
         base := RECORD_KIND;
         big  := (others => '0');
         if place_r >= 2 then
           written := '0';
         end if;
-      elsif step_r = ENDS then
+      elsif step_r(ENDS) = '1' then
         base := RECORD_READER;
         big  := (others => '0');
-      elsif step_r = DESTINATION then
+      elsif step_r(DESTINATION) = '1' then
         base := RECORD_DESTINATION;
         big  := (others => '0');
-      elsif step_r = NUMBER or step_r = SECOND then
+      elsif step_r(NUMBER) = '1' or step_r(SECOND) = '1' then
         base := RECORD_NUMBER;
-        if step_r = SECOND then
+        if step_r(SECOND) = '1' then
           base := RECORD_SECOND;
         end if;
         big    := to_unsigned(NUMBER_BYTES-1, RECORD_BITS);
         little := to_unsigned(WORD_BYTES, RECORD_BITS);
-      elsif step_r = FRAGMENT then
+      elsif step_r(FRAGMENT) = '1' then
         base := RECORD_FRAGMENT;
-      elsif step_r = COUNT then
+      elsif step_r(COUNT) = '1' then
         base := RECORD_COUNT;
-      elsif step_r = FRAGMENTS then
+      elsif step_r(FRAGMENTS) = '1' then
         base := RECORD_FRAGMENTS;
         if place_r(2) = '1' then
           -- Two numbers of two bytes.
           big := to_unsigned(1, RECORD_BITS);
         end if;
-      elsif step_r = SET_SIZE then
+      elsif step_r(SET_SIZE) = '1' then
         base := RECORD_SET_SIZE;
-      elsif step_r = SET then
+      elsif step_r(SET) = '1' then
         base   := RECORD_SET;
         big    := (others => '0');
         little := to_unsigned(WORD_BYTES-1, RECORD_BITS);
-      elsif step_r = VALUE and hash_r = '1' and place_r < HASH_BYTES then
+      elsif step_r(VALUE) = '1' and hash_r = '1' and place_r < HASH_BYTES then
         base := RECORD_KEY_HASH;
         big  := (others => '0');
-      elsif step_r = VALUE and status_r = '1' and place_r < STATUS_BYTES then
+      elsif step_r(VALUE) = '1' and status_r = '1' and place_r < STATUS_BYTES then
         base := RECORD_STATUS;
         big  := (others => '0');
       else
         written := '0';
       end if;
-      if is_little = '1' and step_r /= PROTOCOL and step_r /= SOURCE and step_r /= HEAD then
+      if is_little = '1' and step_r(PROTOCOL) = '0' and step_r(SOURCE) = '0' and step_r(HEAD) = '0' then
         big := little;
       end if;
       field_valid   <= written and valid_r and rst_n;
@@ -608,7 +603,7 @@ begin
       payload_valid <= '0';
       payload_data  <= byte_r;
       is_submessage <= '0';
-      if step_r = PAYLOAD then
+      if step_r(PAYLOAD) = '1' then
         payload_valid <= valid_r and rst_n;
       end if;
       if in_body = '1' then
@@ -631,12 +626,12 @@ begin
     if rising_edge(clk) then
       whole   := in_body and ends_body and is_done;
       strange := '0';
-      if step_r = SOURCE then
+      if step_r(SOURCE) = '1' then
         whole   := last_r;
         strange := not last_r;
-      elsif step_r = PROTOCOL or step_r = FOREIGN then
+      elsif step_r(PROTOCOL) = '1' or step_r(FOREIGN) = '1' then
         strange := '1';
-      elsif step_r = HEAD and zero_r = '1' and (free_r = '1' or planned_r = REST) then
+      elsif step_r(HEAD) = '1' and zero_r = '1' and (free_r = '1' or planned_r(REST) = '1') then
         whole := last_r;
       end if;
       is_whole   <= '0';

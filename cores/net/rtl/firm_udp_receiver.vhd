@@ -275,7 +275,7 @@ begin
           length_r <= unsigned(recent);
         elsif place_r = 6 then
           misfit_r <= '0';
-          if length_r < DATAGRAM_BYTES or length_r > room_r then
+          if length_r(15 downto 3) = 0 or length_r > room_r then
             misfit_r <= '1';
           end if;
         elsif place_r = 7 then
