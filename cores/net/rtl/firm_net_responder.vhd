@@ -59,7 +59,6 @@ architecture rtl of firm_net_responder is
   constant ADDRESS_BYTES     : natural := 4;
   constant ETHERNET_BYTES    : natural := 14;
   constant IPV4_BYTES        : natural := 20;
-  constant SHORTEST          : natural := IPV4_BYTES + 8;  -- IPv4 packet with an echo request
   -- The place from which nothing more is decided; counts of places stop there.
   constant END_PLACE         : natural := 63;
 
@@ -95,8 +94,10 @@ architecture rtl of firm_net_responder is
   signal broadcast_r : std_logic;
   signal arp_r       : std_logic;                       -- it is an ARP request for this host
   signal echo_r      : std_logic;                       -- it is an echo request for this host
-  signal sum_r       : unsigned(19 downto 0) := (others => '0');  -- of the IPv4 header's words
+  -- Of the IPv4 header's words; the highest bit is a carry, which is added with the next word.
+  signal sum_r       : unsigned(16 downto 0) := (others => '0');
   signal length_r    : unsigned(15 downto 0) := (others => '0');  -- of the IPv4 packet
+  signal needed_r    : unsigned(16 downto 0) := (others => '0');  -- bytes of its frame before the last one
   signal summed_r    : std_logic;                       -- the IPv4 header's checksum is right
   signal holds_r     : std_logic;                       -- the frame holds the IPv4 packet
   signal aborted_r   : std_logic;
@@ -244,19 +245,23 @@ begin
   end process match;
 
   check_header : process (clk)
+    variable carry : unsigned(0 downto 0);
   begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if place_r = 0 then
         sum_r <= (others => '0');
       elsif place_r >= ETHERNET_BYTES and place_r < ETHERNET_BYTES+IPV4_BYTES and place_r mod 2 = 1 then
-        sum_r <= sum_r + (unsigned(delay_r(0)) & unsigned(s_axis_tdata));
+        carry(0) := sum_r(16);
+        sum_r    <= resize(sum_r(15 downto 0), 17) + (unsigned(delay_r(0)) & unsigned(s_axis_tdata)) + carry;
       end if;
+      needed_r <= ('0' & length_r) + (ETHERNET_BYTES-1);
       if place_r = LENGTH_PLACE or place_r = LENGTH_PLACE+1 then
         length_r <= length_r(7 downto 0) & unsigned(s_axis_tdata);
       end if;
       if s_axis_tlast = '1' then
         holds_r <= '0';
-        if length_r >= SHORTEST and ('0' & count_r) + 1 >= ('0' & length_r) + ETHERNET_BYTES then
+        -- At least 28 bytes; a comparison of parts needs no adder.
+        if (length_r(15 downto 5) /= 0 or length_r(4 downto 2) = "111") and ('0' & count_r) >= needed_r then
           holds_r <= '1';
         end if;
       end if;
@@ -268,8 +273,8 @@ begin
   begin
     if rising_edge(clk) then
       summed_r <= '0';
-      if ("0000" & sum_r(15 downto 0)) + sum_r(19 downto 16) = x"0ffff" then
-        summed_r <= '1';
+      if sum_r(15 downto 1) = "111111111111111" then
+        summed_r <= sum_r(0) xor sum_r(16);
       end if;
     end if;
   end process compare_sum;

@@ -77,7 +77,7 @@ architecture rtl of firm_udp_receiver is
   signal fragment_r     : std_logic;
   signal header_bytes_r : unsigned(5 downto 0) := (others => '0');
   signal total_r        : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet
-  signal packet_left_r  : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet to come
+  signal packet_left_r  : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet to come, and four
   signal room_r         : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet after its header
   signal short_r        : std_logic;  -- the packet has no room for a datagram
   signal header_sum_r   : unsigned(16 downto 0) := (others => '0');
@@ -229,12 +229,14 @@ begin
   end process match;
 
   check_header : process (clk)
+    variable room : unsigned(16 downto 0);  -- the highest bit is a borrow
   begin
     if rising_edge(clk) then
       header_right_r <= is_right(header_sum_r);
-      room_r         <= total_r - header_bytes_r;
-      short_r        <= '0';
-      if total_r < resize(header_bytes_r, 7) + DATAGRAM_BYTES then
+      room           := resize(total_r, 17) - header_bytes_r;
+      room_r         <= room(15 downto 0);
+      short_r        <= room(16);
+      if room(15 downto 3) = 0 then
         short_r <= '1';
       end if;
       if s_axis_tvalid = '1' then
@@ -244,9 +246,9 @@ begin
         elsif section_r = HEADER then
           header_sum_r <= added(header_sum_r, s_axis_tdata, odd_r, false);
         end if;
-        -- A length below four bytes makes a short packet, whatever is counted here.
+        -- The four bytes up to here are counted at the end.
         if section_r = HEADER and place_r = 3 then
-          packet_left_r <= (unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata)) - 4;
+          packet_left_r <= unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata);
         elsif section_r /= ETHERNET and packet_left_r /= 0 then
           packet_left_r <= packet_left_r - 1;
         end if;
@@ -333,7 +335,7 @@ begin
         end if;
       end if;
       whole_r <= '0';
-      if packet_left_r = 0 then
+      if packet_left_r(15 downto 3) = 0 and (packet_left_r(2) = '0' or packet_left_r(1 downto 0) = 0) then
         whole_r <= '1';
       end if;
       summed_r <= unsummed_r or is_right(sum_r);
