@@ -577,8 +577,12 @@ begin
         left_r    <= unsigned(shown(SIZE_BITS-1 downto 0));
         host_id_r <= unsigned(shown(SAMPLE_BITS-2 downto AT_ID));
         keeps_r   <= kept(to_integer(oldest_r(QUEUE_BITS-1 downto 0)))(0);
+        if oldest_r = judged_r then
+          keeps_r <= is_taken and shows;
+        end if;
         place_r   <= (others => '0');
-        if oldest_r /= judged_r then
+        -- The oldest one was judged, or is judged now.
+        if oldest_r /= judged_r or judge_r = JUDGING then
           state_r <= HEADING;
         end if;
       elsif state_r = HEADING then

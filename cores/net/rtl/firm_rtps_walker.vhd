@@ -57,6 +57,17 @@ architecture rtl of firm_rtps_walker is
     SKIP, ITEM, VALUE,
     PAYLOAD, REST, FOREIGN, FAULTY
   );
+  -- Kinds of submessages that are read.
+  constant OF_DATA      : natural := 0;
+  constant OF_FRAG      : natural := 1;
+  constant OF_GAP       : natural := 2;
+  constant OF_HEARTBEAT : natural := 3;
+  constant OF_ACKNACK   : natural := 4;
+  constant OF_NACK_FRAG : natural := 5;
+  constant OF_BEAT_FRAG : natural := 6;
+  constant OF_TARGET    : natural := 7;  -- INFO_DST
+  subtype kinds_t is std_logic_vector(OF_TARGET downto 0);
+
   -- The current one is '1'.
   type steps_t is array (step_t) of std_logic;
 
@@ -109,6 +120,7 @@ architecture rtl of firm_rtps_walker is
 
   -- Of the submessage.
   signal kind_r       : std_logic_vector(7 downto 0) := (others => '0');
+  signal kinds_r      : kinds_t;                    -- which of those that are read; from its third byte on
   signal flags_r      : std_logic_vector(7 downto 0) := (others => '0');
   signal body_r       : size_t := (others => '0');  -- bytes of it, this one included
   signal final_r      : std_logic;                  -- this byte is its last one
@@ -158,26 +170,40 @@ architecture rtl of firm_rtps_walker is
     return '0';
   end function equals;
 
-  -- What follows a step whose successor depends on the kind alone.
-  function next_of(step : steps_t; name : std_logic_vector(7 downto 0)) return steps_t is
-    variable found       : steps_t := (others => '0');
-    variable data        : std_logic;
-    variable frag        : std_logic;
-    variable gap         : std_logic;
-    variable heartbeat   : std_logic;
-    variable acknack     : std_logic;
-    variable nack_frag   : std_logic;
-    variable beat_frag   : std_logic;
-    variable target      : std_logic;
+  function kinds_of(name : std_logic_vector(7 downto 0)) return kinds_t is
+    variable found : kinds_t;
   begin
-    data        := equals(name, RTPS_DATA);
-    frag        := equals(name, RTPS_DATA_FRAG);
-    gap         := equals(name, RTPS_GAP);
-    heartbeat   := equals(name, RTPS_HEARTBEAT);
-    acknack     := equals(name, RTPS_ACKNACK);
-    nack_frag   := equals(name, RTPS_NACK_FRAG);
-    beat_frag   := equals(name, RTPS_HEARTBEAT_FRAG);
-    target      := equals(name, RTPS_INFO_DESTINATION);
+    found(OF_DATA)      := equals(name, RTPS_DATA);
+    found(OF_FRAG)      := equals(name, RTPS_DATA_FRAG);
+    found(OF_GAP)       := equals(name, RTPS_GAP);
+    found(OF_HEARTBEAT) := equals(name, RTPS_HEARTBEAT);
+    found(OF_ACKNACK)   := equals(name, RTPS_ACKNACK);
+    found(OF_NACK_FRAG) := equals(name, RTPS_NACK_FRAG);
+    found(OF_BEAT_FRAG) := equals(name, RTPS_HEARTBEAT_FRAG);
+    found(OF_TARGET)    := equals(name, RTPS_INFO_DESTINATION);
+    return found;
+  end function kinds_of;
+
+  -- What follows a step whose successor depends on the kind alone.
+  function next_of(step : steps_t; kinds : kinds_t) return steps_t is
+    variable found     : steps_t := (others => '0');
+    variable data      : std_logic;
+    variable frag      : std_logic;
+    variable gap       : std_logic;
+    variable heartbeat : std_logic;
+    variable acknack   : std_logic;
+    variable nack_frag : std_logic;
+    variable beat_frag : std_logic;
+    variable target    : std_logic;
+  begin
+    data      := kinds(OF_DATA);
+    frag      := kinds(OF_FRAG);
+    gap       := kinds(OF_GAP);
+    heartbeat := kinds(OF_HEARTBEAT);
+    acknack   := kinds(OF_ACKNACK);
+    nack_frag := kinds(OF_NACK_FRAG);
+    beat_frag := kinds(OF_BEAT_FRAG);
+    target    := kinds(OF_TARGET);
 
     found(SOURCE)           := step(PROTOCOL);
     found(HEAD)             := step(SOURCE);
@@ -291,13 +317,13 @@ begin
 
   -- ------------------------------------------------------------------ the order of the steps
 
-  few_ends <= step_r(FRAGMENTS) when kind_r = RTPS_DATA_FRAG else
-              step_r(NUMBER) when kind_r = RTPS_DATA else
+  few_ends <= step_r(FRAGMENTS) when kinds_r(OF_FRAG) = '1' else
+              step_r(NUMBER) when kinds_r(OF_DATA) = '1' else
               '0';
 
-  choose_plan : process (step_r, kind_r, flags_r, few_r, few_ends, has_payload_r)
+  choose_plan : process (step_r, kinds_r, flags_r, few_r, few_ends, has_payload_r)
   begin
-    plan <= next_of(step_r, kind_r);
+    plan <= next_of(step_r, kinds_r);
     if few_ends = '1' then
       plan          <= (others => '0');
       plan(SKIP)    <= not few_r;
@@ -311,7 +337,7 @@ begin
   begin
     if rising_edge(clk) then
       has_payload_r <= '1';
-      if kind_r = RTPS_DATA then
+      if kinds_r(OF_DATA) = '1' then
         has_payload_r <= flags_r(RTPS_PAYLOAD) or flags_r(RTPS_KEY);
       end if;
       planned_r   <= plan;
@@ -321,7 +347,7 @@ begin
   end process make_plan;
 
   -- Of VALUE and SKIP, which may have one byte, there is no plan.
-  choose : process (step_r, kind_r, flags_r, planned_r, plan_less_r, plan_done_r, has_payload_r, before_r, single_r,
+  choose : process (step_r, kinds_r, flags_r, planned_r, plan_less_r, plan_done_r, has_payload_r, before_r, single_r,
                     less_r, set_r, zero_r, one_r, short_r, shorter_r, none_r, much_r, sentinel_r, free_r, double_r)
     variable has_value : std_logic;
     variable has_set   : std_logic;
@@ -365,7 +391,7 @@ begin
 
     next_done <= leaves or (plan_done_r and not unplanned);
     wrong     <= (step_r(HEAD) and double_r) or (step_r(EXTRA) and short_r) or (step_r(SET_SIZE) and much_r);
-    if kind_r = RTPS_DATA_FRAG then
+    if kinds_r(OF_FRAG) = '1' then
       wrong <= step_r(EXTRA) and shorter_r;
     end if;
   end process choose;
@@ -467,18 +493,17 @@ begin
     variable least : size_t;
   begin
     if rising_edge(clk) then
-      known_r <= '0';
-      if kind_r = RTPS_DATA or kind_r = RTPS_DATA_FRAG or kind_r = RTPS_ACKNACK or kind_r = RTPS_NACK_FRAG
-         or kind_r = RTPS_HEARTBEAT or kind_r = RTPS_HEARTBEAT_FRAG or kind_r = RTPS_GAP
-         or kind_r = RTPS_INFO_DESTINATION then
-        known_r <= '1';
+      kinds_r <= kinds_of(kind_r);
+      known_r <= '1';
+      if unsigned(kinds_r) = 0 then
+        known_r <= '0';
       end if;
       free_r <= '0';
       if kind_r = RTPS_PAD or kind_r = RTPS_INFO_TIMESTAMP then
         free_r <= '1';
       end if;
       double_r <= '0';
-      if kind_r = RTPS_DATA then
+      if kinds_r(OF_DATA) = '1' then
         double_r <= flags_r(RTPS_PAYLOAD) and flags_r(RTPS_KEY);
       end if;
       before_r <= further_r - 1;
@@ -501,7 +526,7 @@ begin
           end if;
         elsif step_r(EXTRA) = '1' then
           least := to_unsigned(DATA_BYTES, 16);
-          if kind_r = RTPS_DATA_FRAG then
+          if kinds_r(OF_FRAG) = '1' then
             least := to_unsigned(DATA_FRAG_BYTES, 16);
           end if;
           further_r <= half_r - least;

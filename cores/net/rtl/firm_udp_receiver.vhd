@@ -103,8 +103,10 @@ architecture rtl of firm_udp_receiver is
   signal aborted_r   : std_logic;
   signal past_r      : std_logic;  -- it went on after the header
   signal named_r     : std_logic;  -- it reached the end of the addresses
-  signal whole_r     : std_logic;  -- it holds the packet
-  signal summed_r    : std_logic;  -- the datagram's checksum is right, or there is none
+  signal whole       : std_logic;  -- it holds the packet
+  signal whole_r     : std_logic;
+  signal summed      : std_logic;  -- the datagram's checksum is right, or there is none
+  signal summed_r    : std_logic;
 
   -- The sum with a further byte, once or twice, and the carry of before, which is the highest bit. In ones' complement,
   -- twice a word is the word rotated by one bit.
@@ -318,6 +320,10 @@ begin
 
   -- ------------------------------------------------------------------ the end
 
+  whole  <= '1' when packet_left_r(15 downto 3) = 0 and (packet_left_r(2) = '0' or packet_left_r(1 downto 0) = 0) else
+            '0';
+  summed <= unsummed_r or is_right(sum_r);
+
   judge : process (clk)
   begin
     if rising_edge(clk) then
@@ -334,11 +340,8 @@ begin
           named_r <= '1';
         end if;
       end if;
-      whole_r <= '0';
-      if packet_left_r(15 downto 3) = 0 and (packet_left_r(2) = '0' or packet_left_r(1 downto 0) = 0) then
-        whole_r <= '1';
-      end if;
-      summed_r <= unsummed_r or is_right(sum_r);
+      whole_r  <= whole;
+      summed_r <= summed;
       if rst_n = '0' then
         ended_r  <= '0';
         judged_r <= '0';
@@ -381,10 +384,10 @@ begin
         m_axis_tvalid <= has_held_r;
         held_r        <= s_axis_tdata;
         has_held_r    <= '1';
-      elsif judged_r = '1' then
+      elsif ended_r = '1' then
         m_axis_tvalid   <= has_held_r;
         m_axis_tlast    <= has_held_r;
-        m_axis_tuser(0) <= aborted_r or not (whole_r and summed_r);
+        m_axis_tuser(0) <= aborted_r or not (whole and summed);
         has_held_r      <= '0';
       end if;
       if rst_n = '0' then
