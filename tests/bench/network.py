@@ -29,7 +29,7 @@ _CORES = (
     "net/builder",
     "net/net_node",
 )
-_TOPICS: Mapping[str, Generic] = {"WRITERS": 2, "READERS": 2, "SAMPLE": 64}
+_TOPICS: Mapping[str, Generic] = {"WRITERS": 3, "READERS": 2, "SAMPLE": 64}
 _NOTE = """The node has eight peers, eight writers of peers, two topics in and one topic out, with up to 64 bytes. It is
     measured without the memories of its program, packets and names. Block RAMs and distributed memories are not
     counted."""

@@ -10,7 +10,7 @@
 #include "Vrtps_world.h"
 #include "bench.h"
 
-static const unsigned LOOP_CYCLES = 16, IDLE_LOOPS = 6;
+static const unsigned LOOP_CYCLES = 24, IDLE_LOOPS = 6;
 enum Kind { PACKET, ABORTED_PACKET, TICKS, FRAME, ABORTED_FRAME, RUSHED };
 
 class World {

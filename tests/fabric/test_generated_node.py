@@ -30,11 +30,11 @@ blocks:
 """
 
 
-def _hardware(folder: Path) -> list[Path]:
-    """The node with the clock of a simulated board."""
+def hardware(folder: Path, clock: str = "250 kHz") -> list[Path]:
+    """The node; its clock is that of a simulated board."""
     (folder / "turtle.yaml").write_text(SPECIFICATION, encoding="utf-8")
     others = dict.fromkeys(("board", "paths", "distro"))
-    parameters = {"spec": "turtle.yaml", "product": "system", "clock": "250 kHz", **others}
+    parameters = {"spec": "turtle.yaml", "product": "system", "clock": clock, **others}
     files = GENERATORS["far"].load(Request("far", "test:sys:turtle-system:0", folder, parameters)).generate().files
     paths = [folder / f"turtle_system_{part}.vhd" for part in PARTS]
     for path in paths:
@@ -45,7 +45,7 @@ def _hardware(folder: Path) -> list[Path]:
 def test_it_says_farewell_first(tmp_path: Path) -> None:
     """Peers that know the board from before its reset forget it then."""
     library = Library("firm", tmp_path)
-    library.analyse([*core_files(*NODE), *_hardware(tmp_path), HERE / "generated_node.vhd"])
+    library.analyse([*core_files(*NODE), *hardware(tmp_path), HERE / "generated_node.vhd"])
     result = library.run("generated_node", {}, directory=tmp_path)
     assert result.exit_code == 0, result.output
     sent = bytes(map(int, (tmp_path / "sent.txt").read_text(encoding="ascii").split()))

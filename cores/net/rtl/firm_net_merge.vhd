@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends the frames of several sources, one frame at a time. Of sources that wait, the next one after the source of
--- the last frame is sent, so that none keeps the others from sending.
+-- the last frame is sent, so that none keeps the others from sending. A source is chosen one cycle after it has begun
+-- to wait, and each byte leaves one cycle later.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -35,9 +36,17 @@ architecture rtl of firm_net_merge is
   signal waiting  : sources_t;
   signal first    : sources_t;  -- the source to begin with, if one waits
   signal chosen_r : sources_t;  -- the source of the frame that is under way
-  signal chosen   : sources_t;
+  signal byte     : std_logic_vector(7 downto 0);
   signal valid    : std_logic;
   signal last     : std_logic;
+  signal takes    : std_logic;  -- a byte comes
+  signal valid_r  : std_logic;
+  signal byte_r   : std_logic_vector(7 downto 0) := (others => '0');
+  signal last_r   : std_logic;
+  -- A byte that came when the one before could not leave.
+  signal full_r   : std_logic;
+  signal spare_r  : std_logic_vector(7 downto 0) := (others => '0');
+  signal final_r  : std_logic;
 
 begin
 
@@ -58,50 +67,59 @@ begin
     end loop;
   end process find_first;
 
-  chosen <= first when chosen_r = NO_SOURCE else chosen_r;
-
-  show : process (chosen, s_axis_tdata, s_axis_tvalid, s_axis_tlast)
-    variable byte : std_logic_vector(7 downto 0);
+  show : process (chosen_r, s_axis_tdata)
+    variable found : std_logic_vector(7 downto 0);
   begin
-    byte := x"00";
+    found := x"00";
     for index in 0 to SOURCES-1 loop
-      if chosen(index) = '1' then
-        byte := byte or s_axis_tdata(8*index+7 downto 8*index);
+      if chosen_r(index) = '1' then
+        found := found or s_axis_tdata(8*index+7 downto 8*index);
       end if;
     end loop;
-    m_axis_tdata <= byte;
-    valid        <= '0';
-    last         <= '0';
-    if (chosen and s_axis_tvalid) /= NO_SOURCE then
-      valid <= '1';
-    end if;
-    if (chosen and s_axis_tlast) /= NO_SOURCE then
-      last <= '1';
-    end if;
+    byte <= found;
   end process show;
 
-  m_axis_tvalid <= valid;
-  m_axis_tlast  <= last;
-  s_axis_tready <= chosen when m_axis_tready = '1' else NO_SOURCE;
+  valid         <= '0' when (chosen_r and s_axis_tvalid) = NO_SOURCE else '1';
+  last          <= '0' when (chosen_r and s_axis_tlast) = NO_SOURCE else '1';
+  takes         <= valid and not full_r;
+  s_axis_tready <= chosen_r when full_r = '0' else NO_SOURCE;
+  m_axis_tdata  <= byte_r;
+  m_axis_tvalid <= valid_r;
+  m_axis_tlast  <= last_r;
 
   follow : process (clk)
     variable found : std_logic;
   begin
     if rising_edge(clk) then
-      if valid = '1' then
-        chosen_r <= chosen;
-        if m_axis_tready = '1' and last = '1' then
-          chosen_r <= NO_SOURCE;
-          found    := '0';
-          for index in 0 to SOURCES-1 loop
-            after_r(index) <= found;
-            found          := found or chosen(index);
-          end loop;
+      if m_axis_tready = '1' or valid_r = '0' then
+        byte_r  <= byte;
+        last_r  <= last;
+        valid_r <= takes or full_r;
+        full_r  <= '0';
+        if full_r = '1' then
+          byte_r <= spare_r;
+          last_r <= final_r;
         end if;
+      elsif full_r = '0' then
+        full_r  <= takes;
+        spare_r <= byte;
+        final_r <= last;
+      end if;
+      if chosen_r = NO_SOURCE then
+        chosen_r <= first;
+      elsif takes = '1' and last = '1' then
+        chosen_r <= NO_SOURCE;
+        found    := '0';
+        for index in 0 to SOURCES-1 loop
+          after_r(index) <= found;
+          found          := found or chosen_r(index);
+        end loop;
       end if;
       if rst_n = '0' then
         chosen_r <= NO_SOURCE;
         after_r  <= NO_SOURCE;
+        valid_r  <= '0';
+        full_r   <= '0';
       end if;
     end if;
   end process follow;

@@ -59,7 +59,6 @@ architecture rtl of firm_net_responder is
   constant ADDRESS_BYTES     : natural := 4;
   constant ETHERNET_BYTES    : natural := 14;
   constant IPV4_BYTES        : natural := 20;
-  constant SHORTEST          : natural := IPV4_BYTES + 8;  -- IPv4 packet with an echo request
   -- The place from which nothing more is decided; counts of places stop there.
   constant END_PLACE         : natural := 63;
 
@@ -95,8 +94,10 @@ architecture rtl of firm_net_responder is
   signal broadcast_r : std_logic;
   signal arp_r       : std_logic;                       -- it is an ARP request for this host
   signal echo_r      : std_logic;                       -- it is an echo request for this host
-  signal sum_r       : unsigned(19 downto 0) := (others => '0');  -- of the IPv4 header's words
+  -- Of the IPv4 header's words; the highest bit is a carry, which is added with the next word.
+  signal sum_r       : unsigned(16 downto 0) := (others => '0');
   signal length_r    : unsigned(15 downto 0) := (others => '0');  -- of the IPv4 packet
+  signal needed_r    : unsigned(16 downto 0) := (others => '0');  -- bytes of its frame before the last one
   signal summed_r    : std_logic;                       -- the IPv4 header's checksum is right
   signal holds_r     : std_logic;                       -- the frame holds the IPv4 packet
   signal aborted_r   : std_logic;
@@ -106,6 +107,10 @@ architecture rtl of firm_net_responder is
   signal reply_tuser   : std_logic_vector(0 downto 0);
   signal reply_tvalid  : std_logic;
   signal reply_tlast   : std_logic;
+  signal chosen_tdata  : byte_t;
+  signal chosen_tuser  : std_logic_vector(0 downto 0);
+  signal chosen_tvalid : std_logic;
+  signal chosen_tlast  : std_logic;
 
   -- Byte `index` of a word, counted as on the line.
   function byte_of(word : std_logic_vector; index : natural) return byte_t is
@@ -240,19 +245,23 @@ begin
   end process match;
 
   check_header : process (clk)
+    variable carry : unsigned(0 downto 0);
   begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if place_r = 0 then
         sum_r <= (others => '0');
       elsif place_r >= ETHERNET_BYTES and place_r < ETHERNET_BYTES+IPV4_BYTES and place_r mod 2 = 1 then
-        sum_r <= sum_r + (unsigned(delay_r(0)) & unsigned(s_axis_tdata));
+        carry(0) := sum_r(16);
+        sum_r    <= resize(sum_r(15 downto 0), 17) + (unsigned(delay_r(0)) & unsigned(s_axis_tdata)) + carry;
       end if;
+      needed_r <= ('0' & length_r) + (ETHERNET_BYTES-1);
       if place_r = LENGTH_PLACE or place_r = LENGTH_PLACE+1 then
         length_r <= length_r(7 downto 0) & unsigned(s_axis_tdata);
       end if;
       if s_axis_tlast = '1' then
         holds_r <= '0';
-        if length_r >= SHORTEST and ('0' & count_r) + 1 >= ('0' & length_r) + ETHERNET_BYTES then
+        -- At least 28 bytes; a comparison of parts needs no adder.
+        if (length_r(15 downto 5) /= 0 or length_r(4 downto 2) = "111") and ('0' & count_r) >= needed_r then
           holds_r <= '1';
         end if;
       end if;
@@ -264,8 +273,8 @@ begin
   begin
     if rising_edge(clk) then
       summed_r <= '0';
-      if ("0000" & sum_r(15 downto 0)) + sum_r(19 downto 16) = x"0ffff" then
-        summed_r <= '1';
+      if sum_r(15 downto 1) = "111111111111111" then
+        summed_r <= sum_r(0) xor sum_r(16);
       end if;
     end if;
   end process compare_sum;
@@ -339,6 +348,20 @@ begin
 
   reply_tuser(0) <= aborted_r or not (arp_r or (echo_r and summed_r and holds_r));
 
+  -- A cycle of its own for the choice.
+  hold_reply : process (clk)
+  begin
+    if rising_edge(clk) then
+      chosen_tdata  <= reply_tdata;
+      chosen_tuser  <= reply_tuser;
+      chosen_tvalid <= reply_tvalid;
+      chosen_tlast  <= reply_tlast;
+      if rst_n = '0' then
+        chosen_tvalid <= '0';
+      end if;
+    end if;
+  end process hold_reply;
+
   u_store : entity firm.firm_mac_store
     generic map (
       DEPTH => DEPTH
@@ -346,10 +369,10 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      s_axis_tdata  => reply_tdata,
-      s_axis_tuser  => reply_tuser,
-      s_axis_tvalid => reply_tvalid,
-      s_axis_tlast  => reply_tlast,
+      s_axis_tdata  => chosen_tdata,
+      s_axis_tuser  => chosen_tuser,
+      s_axis_tvalid => chosen_tvalid,
+      s_axis_tlast  => chosen_tlast,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,

@@ -62,23 +62,30 @@ architecture rtl of firm_packet_builder is
   constant FROM_PAYLOAD : source_t := "10";
   constant FROM_RESULT  : source_t := "11";  -- bits 2 to 1: which number; bit 0: which byte
 
-  subtype number_t is unsigned(15 downto 0);
+  -- No frame has 2048 bytes.
+  constant NUMBER_BITS : positive := 11;
+  subtype number_t is unsigned(NUMBER_BITS-1 downto 0);
 
   type fields_t is array (natural range 0 to 2**FIELD_BITS-1) of std_logic_vector(7 downto 0);
   signal fields : fields_t;
 
   signal busy_r    : std_logic;
+  signal shown_r   : std_logic;  -- program_word is one of the packet
   signal address_r : unsigned(ADDRESS_BITS-1 downto 0) := (others => '0');
   signal begins    : std_logic;
 
-  -- The first stage: the word of the program.
+  -- The first stage: the word of the program. The word after it is shown by the memory.
+  signal word_r     : std_logic_vector(10 downto 0) := (others => '0');
   signal fetched_r  : std_logic;
+  signal fetches    : std_logic;
   signal source     : source_t;
   signal argument   : std_logic_vector(7 downto 0);
   signal payload    : std_logic;  -- it is the payload
-  signal real_r     : number_t := (others => '0');  -- bytes of the payload to come
-  signal padded_r   : number_t := (others => '0');  -- the same, with its padding
-  signal is_padding : std_logic;
+  signal bytes_r    : number_t := (others => '0');              -- of the payload
+  signal real_r     : number_t := (others => '0');              -- of them that are to come
+  signal spent_r    : std_logic;                                -- none of them
+  signal single_r   : std_logic;                                -- at most one of them
+  signal phase_r    : unsigned(1 downto 0) := (others => '0');  -- of the payload's byte in a group of four
   signal has_byte   : std_logic;
   signal moves      : std_logic;  -- a byte goes to the second stage
   signal is_final   : std_logic;  -- it is the word's last one
@@ -91,8 +98,8 @@ architecture rtl of firm_packet_builder is
   signal field_r   : std_logic_vector(7 downto 0);
   signal value_r   : std_logic_vector(7 downto 0);
   signal byte      : std_logic_vector(7 downto 0);
-  signal prelude_r : natural range 0 to PRELUDE_WORDS;
-  signal is_sent   : std_logic;  -- the prelude is over
+  signal prelude_r : natural range 0 to PRELUDE_WORDS-1;
+  signal sent_r    : std_logic;  -- the prelude is over
   signal advance   : std_logic;
 
   -- Numbers of the packet.
@@ -100,7 +107,13 @@ architecture rtl of firm_packet_builder is
   signal total_r  : number_t := (others => '0');  -- of the packet
   signal udp_r    : number_t := (others => '0');  -- of the datagram
   signal data_r   : number_t := (others => '0');  -- of the submessage
-  signal sum_r    : unsigned(17 downto 0) := (others => '0');
+  -- Its highest bit is a carry, which is added with the next word.
+  signal sum_r    : unsigned(16 downto 0) := (others => '0');
+
+  function high_byte(number : number_t) return std_logic_vector is
+  begin
+    return std_logic_vector(resize(number(NUMBER_BITS-1 downto 8), 8));
+  end function high_byte;
 
 begin
 
@@ -113,63 +126,87 @@ begin
 
   -- ------------------------------------------------------------------ the word
 
-  source   <= program_word(9 downto 8);
-  argument <= program_word(7 downto 0);
+  source   <= word_r(9 downto 8);
+  argument <= word_r(7 downto 0);
 
   program_address <= entry when begins = '1' else std_logic_vector(address_r);
-  program_enable  <= begins or (moves and is_final);
+  program_enable  <= begins or fetches;
 
-  payload    <= fetched_r when source = FROM_PAYLOAD else '0';
-  is_padding <= '1' when real_r = 0 else '0';
-  has_byte   <= s_axis_tvalid or is_padding or not payload;
-  is_final   <= '1' when payload = '0' or padded_r <= 1 else '0';
-  advance    <= m_axis_tready or not (valid_r and is_sent);
-  moves      <= advance and fetched_r and has_byte;
+  payload  <= '1' when source = FROM_PAYLOAD else '0';
+  has_byte <= s_axis_tvalid or spent_r or not payload;
+  is_final <= '1' when payload = '0' or (single_r = '1' and phase_r = 3) else '0';
+  advance  <= m_axis_tready or not (valid_r and sent_r);
+  moves    <= advance and fetched_r and has_byte;
+  fetches  <= '1' when shown_r = '1' and (fetched_r = '0' or (moves = '1' and is_final = '1')) else '0';
 
-  s_axis_tready <= advance and payload and not is_padding;
+  s_axis_tready <= advance and fetched_r and payload and not spent_r;
 
   fetch : process (clk)
   begin
     if rising_edge(clk) then
       if begins = '1' then
         busy_r    <= '1';
-        fetched_r <= '1';
+        shown_r   <= '1';
         address_r <= unsigned(entry) + 1;
-        real_r    <= unsigned(payload_bytes);
-        padded_r  <= unsigned(payload_bytes) + 3;
-        padded_r(1 downto 0) <= "00";
-        extra_r   <= unsigned(payload_bytes) + 3;
-        extra_r(1 downto 0) <= "00";
-      elsif moves = '1' then
-        if is_final = '1' then
-          address_r <= address_r + 1;
-          fetched_r <= not program_word(10);
-        end if;
-        if payload = '1' then
-          padded_r <= padded_r - 1;
-          if is_padding = '0' then
-            real_r <= real_r - 1;
-          end if;
-        end if;
+      elsif fetches = '1' then
+        word_r    <= program_word;
+        fetched_r <= '1';
+        shown_r   <= not program_word(10);
+        address_r <= address_r + 1;
+      elsif moves = '1' and is_final = '1' then
+        fetched_r <= '0';
       end if;
       if valid_r = '1' and final_r = '1' and advance = '1' then
         busy_r <= '0';
       end if;
       if rst_n = '0' then
         busy_r    <= '0';
+        shown_r   <= '0';
         fetched_r <= '0';
       end if;
     end if;
   end process fetch;
 
-  result <= std_logic_vector(total_r(15 downto 8)) when argument(2 downto 0) = "000" else
+  count_payload : process (clk)
+  begin
+    if rising_edge(clk) then
+      if sent_r = '0' then
+        real_r   <= bytes_r;
+        spent_r  <= '0';
+        single_r <= '0';
+        phase_r  <= "00";
+        if bytes_r = 0 then
+          -- One byte is sent.
+          spent_r <= '1';
+          phase_r <= "11";
+        end if;
+        if bytes_r <= 1 then
+          single_r <= '1';
+        end if;
+      elsif moves = '1' and payload = '1' then
+        phase_r <= phase_r + 1;
+        if spent_r = '0' then
+          real_r <= real_r - 1;
+        end if;
+        if real_r = 2 then
+          single_r <= '1';
+        end if;
+        spent_r <= single_r;
+      end if;
+      if begins = '1' then
+        bytes_r <= unsigned(payload_bytes(NUMBER_BITS-1 downto 0));
+      end if;
+    end if;
+  end process count_payload;
+
+  result <= high_byte(total_r) when argument(2 downto 0) = "000" else
             std_logic_vector(total_r(7 downto 0)) when argument(2 downto 0) = "001" else
-            std_logic_vector(udp_r(15 downto 8)) when argument(2 downto 0) = "010" else
+            high_byte(udp_r) when argument(2 downto 0) = "010" else
             std_logic_vector(udp_r(7 downto 0)) when argument(2 downto 0) = "011" else
             not std_logic_vector(sum_r(15 downto 8)) when argument(2 downto 0) = "100" else
             not std_logic_vector(sum_r(7 downto 0)) when argument(2 downto 0) = "101" else
             std_logic_vector(data_r(7 downto 0)) when argument(2 downto 0) = "110" else
-            std_logic_vector(data_r(15 downto 8));
+            high_byte(data_r);
 
   -- ------------------------------------------------------------------ the byte
 
@@ -190,7 +227,7 @@ begin
     if rising_edge(clk) then
       if advance = '1' then
         valid_r  <= moves;
-        final_r  <= program_word(10) and is_final;
+        final_r  <= word_r(10) and is_final;
         chosen_r <= '0';
         value_r  <= argument;
         if source = FROM_FIELD then
@@ -199,7 +236,7 @@ begin
           value_r <= result;
         elsif source = FROM_PAYLOAD then
           value_r <= s_axis_tdata;
-          if is_padding = '1' then
+          if spent_r = '1' then
             value_r <= (others => '0');
           end if;
         end if;
@@ -210,39 +247,47 @@ begin
     end if;
   end process choose;
 
-  byte    <= field_r when chosen_r = '1' else value_r;
-  is_sent <= '1' when prelude_r = PRELUDE_WORDS else '0';
+  byte <= field_r when chosen_r = '1' else value_r;
 
   m_axis_tdata  <= byte;
-  m_axis_tvalid <= valid_r and is_sent;
+  m_axis_tvalid <= valid_r and sent_r;
   m_axis_tlast  <= final_r;
 
   -- ------------------------------------------------------------------ the numbers
 
   compute : process (clk)
-    variable word : number_t;
+    variable word  : unsigned(15 downto 0);
+    variable carry : unsigned(0 downto 0);
   begin
     if rising_edge(clk) then
       word := (others => '0');
-      if valid_r = '1' and is_sent = '0' then
-        prelude_r <= prelude_r + 1;
+      if valid_r = '1' and sent_r = '0' then
+        if prelude_r = PRELUDE_WORDS-1 then
+          sent_r <= '1';
+        else
+          prelude_r <= prelude_r + 1;
+        end if;
         if prelude_r = 0 or prelude_r = 2 or prelude_r = 5 or prelude_r = 7 then
           word(15 downto 8) := unsigned(byte);
         elsif prelude_r = DATA_WORD then
           data_r  <= extra_r + unsigned(byte);
           total_r <= total_r + extra_r;
-          word    := extra_r;
+          word    := resize(extra_r, 16);
         else
           word(7 downto 0) := unsigned(byte);
         end if;
         if prelude_r = 2 or prelude_r = 3 then
-          total_r <= total_r(7 downto 0) & unsigned(byte);
+          total_r <= total_r(NUMBER_BITS-9 downto 0) & unsigned(byte);
         end if;
       end if;
-      udp_r <= total_r - HEADER_BYTES;
-      sum_r <= resize(sum_r(15 downto 0), 18) + sum_r(17 downto 16) + word;
+      extra_r             <= bytes_r + 3;
+      extra_r(1 downto 0) <= "00";
+      udp_r               <= total_r - HEADER_BYTES;
+      carry(0)            := sum_r(16);
+      sum_r               <= resize(sum_r(15 downto 0), 17) + word + carry;
       if begins = '1' then
         prelude_r <= 0;
+        sent_r    <= '0';
         sum_r     <= (others => '0');
       end if;
     end if;

@@ -114,8 +114,8 @@ architecture rtl of firm_rtps_control is
 
   signal conditions    : std_logic_vector(3 downto 0);
   signal index         : std_logic_vector(5 downto 0);
-  signal write         : std_logic;
-  signal writes        : std_logic;
+  signal coming        : std_logic;
+  signal next_address  : std_logic_vector(7 downto 0);
   signal write_address : std_logic_vector(7 downto 0);
   signal data          : std_logic_vector(7 downto 0);
   signal read_address  : std_logic_vector(7 downto 0);
@@ -125,12 +125,33 @@ architecture rtl of firm_rtps_control is
   signal facts         : std_logic_vector(7 downto 0);
   signal word          : std_logic_vector(31 downto 0);
 
+  -- What is written, unless everything waits.
+  signal at_field_r   : std_logic;
+  signal at_key_r     : std_logic;
+  signal at_number_r  : std_logic;
+  signal at_note_r    : std_logic;
+  signal at_slot_r    : std_logic;
+  signal at_writer_r  : std_logic;
+  signal at_next_r    : std_logic;
+  signal at_start_r   : std_logic;
+  signal at_lock_r    : std_logic;
+  signal at_taken_r   : std_logic;
+  signal at_refused_r : std_logic;
+  signal at_peers_r   : std_logic;
+  signal at_sources_r : std_logic;
+  signal at_sinks_r   : std_logic;
+  signal builds_r     : std_logic;  -- one of the builder's, or of the payload's
+
   signal ticks_r   : unsigned(TICK_BITS-1 downto 0);  -- that the program has not taken
   signal has_tick  : std_logic;
   signal ends_tick : std_logic;
   signal locked_r  : std_logic;
   signal payload_r : std_logic;
+  signal start_r   : std_logic;
+  signal packet_r  : std_logic_vector(7 downto 0) := (others => '0');
   signal starts    : std_logic;
+  signal slots     : std_logic;  -- the payload is chosen
+  signal waits     : std_logic;  -- a packet leaves, or is about to
   signal writer_r  : std_logic_vector(2 downto 0) := (others => '0');
   signal peers_r   : std_logic_vector(7 downto 0);
   signal sources_r : std_logic_vector(7 downto 0);
@@ -168,7 +189,8 @@ begin
       record_address     => record_address,
       record_data        => record_data,
       port_index         => index,
-      port_write         => write,
+      port_next          => coming,
+      port_next_address  => next_address,
       port_write_address => write_address,
       port_write_data    => data,
       port_read_address  => read_address,
@@ -179,41 +201,93 @@ begin
 
   -- The builder's fields and the payload stay until its packet has left, and no slot is given to a new sample before;
   -- numbers of samples stay while one is judged.
-  hold   <= '0' when write = '0' else
-            is_busy when write_address(7) = '0' or write_address = AT_SLOT or write_address = AT_NEXT_SLOT
-                         or write_address = AT_START else
-            is_judging when write_address = AT_LOCK and data(0) = '1' else
-            '0';
-  writes <= write and not hold;
+  waits <= is_busy or start_r;
+  hold  <= (builds_r and waits) or (at_lock_r and data(0) and is_judging);
+
+  find_place : process (clk)
+  begin
+    if rising_edge(clk) then
+      if hold = '0' then
+        at_field_r  <= coming and not next_address(7);
+        at_key_r    <= '0';
+        at_number_r <= '0';
+        if next_address(7 downto 4) = AT_KEY then
+          at_key_r <= coming;
+        end if;
+        if next_address(7 downto 3) = AT_NUMBER then
+          at_number_r <= coming;
+        end if;
+        at_note_r    <= is_at(coming, next_address, AT_NOTE);
+        at_slot_r    <= is_at(coming, next_address, AT_SLOT);
+        at_writer_r  <= is_at(coming, next_address, AT_WRITER);
+        at_next_r    <= is_at(coming, next_address, AT_NEXT_SLOT);
+        at_start_r   <= is_at(coming, next_address, AT_START);
+        at_lock_r    <= is_at(coming, next_address, AT_LOCK);
+        at_taken_r   <= is_at(coming, next_address, AT_TAKEN);
+        at_refused_r <= is_at(coming, next_address, AT_REFUSED);
+        at_peers_r   <= is_at(coming, next_address, AT_PEERS);
+        at_sources_r <= is_at(coming, next_address, AT_SOURCES);
+        at_sinks_r   <= is_at(coming, next_address, AT_SINKS);
+        builds_r     <= coming and not next_address(7);
+        if next_address = AT_SLOT or next_address = AT_NEXT_SLOT or next_address = AT_START then
+          builds_r <= coming;
+        end if;
+      end if;
+      if rst_n = '0' then
+        at_field_r   <= '0';
+        at_key_r     <= '0';
+        at_number_r  <= '0';
+        at_note_r    <= '0';
+        at_slot_r    <= '0';
+        at_writer_r  <= '0';
+        at_next_r    <= '0';
+        at_start_r   <= '0';
+        at_lock_r    <= '0';
+        at_taken_r   <= '0';
+        at_refused_r <= '0';
+        at_peers_r   <= '0';
+        at_sources_r <= '0';
+        at_sinks_r   <= '0';
+        builds_r     <= '0';
+      end if;
+    end if;
+  end process find_place;
 
   -- ------------------------------------------------------------------ what is written
 
-  starts    <= is_at(writes, write_address, AT_START);
-  ends_tick <= is_at(writes, write_address, AT_TAKEN) and data(0);
+  starts    <= at_start_r and not waits;
+  slots     <= at_slot_r and not waits;
+  ends_tick <= at_taken_r and data(0);
   has_tick  <= '0' when ticks_r = 0 else '1';
 
   note : process (clk)
   begin
     if rising_edge(clk) then
-      if is_at(writes, write_address, AT_WRITER) = '1' then
+      if at_writer_r = '1' then
         writer_r <= data(2 downto 0);
       end if;
-      if is_at(writes, write_address, AT_PEERS) = '1' then
+      if at_peers_r = '1' then
         peers_r <= data;
       end if;
-      if is_at(writes, write_address, AT_SOURCES) = '1' then
+      if at_sources_r = '1' then
         sources_r <= data;
       end if;
-      if is_at(writes, write_address, AT_SINKS) = '1' then
+      if at_sinks_r = '1' then
         sinks_r <= data;
       end if;
-      if is_at(writes, write_address, AT_LOCK) = '1' then
+      if at_lock_r = '1' and hold = '0' then
         locked_r <= data(0);
       end if;
-      if is_at(writes, write_address, AT_SLOT) = '1' then
+      if slots = '1' then
         payload_r <= '1';
-      elsif starts = '1' then
+      elsif start_r = '1' and is_busy = '0' then
         payload_r <= '0';
+      end if;
+      if starts = '1' then
+        start_r  <= '1';
+        packet_r <= data;
+      elsif is_busy = '0' then
+        start_r <= '0';
       end if;
       if tick = '1' and ends_tick = '0' and ticks_r /= MOST_TICKS then
         ticks_r <= ticks_r + 1;
@@ -224,6 +298,7 @@ begin
         ticks_r   <= (others => '0');
         locked_r  <= '0';
         payload_r <= '0';
+        start_r   <= '0';
         peers_r   <= (others => '0');
         sources_r <= (others => '0');
         sinks_r   <= (others => '0');
@@ -232,32 +307,33 @@ begin
   end process note;
 
   source       <= index(4 downto 0);
-  key_write    <= writes when write_address(7 downto 4) = AT_KEY else '0';
-  number_write <= writes when write_address(7 downto 3) = AT_NUMBER else '0';
-  note_write   <= is_at(writes, write_address, AT_NOTE);
+  key_write    <= at_key_r;
+  number_write <= at_number_r;
+  note_write   <= at_note_r;
   write_place  <= write_address(3 downto 0);
   write_data   <= data;
   read_place   <= read_address(2 downto 0);
   is_locked    <= locked_r;
 
-  takes_early <= is_at(writes, write_address, AT_TAKEN) and data(1);
-  is_done     <= is_at(writes, write_address, AT_TAKEN) and data(2);
-  slot_valid  <= is_at(writes, write_address, AT_NEXT_SLOT);
+  takes_early <= at_taken_r and data(1);
+  is_done     <= at_taken_r and data(2);
+  slot_valid  <= at_next_r and not waits;
   slot_writer <= writer_r;
-  shows       <= is_at(writes, write_address, AT_SLOT);
+  shows       <= slots;
 
-  start               <= starts;
-  packet              <= data;
+  -- Another packet may have begun meanwhile: then this one begins after it.
+  start               <= start_r;
+  packet              <= packet_r;
   has_payload         <= payload_r;
-  build_field_valid   <= writes and not write_address(7);
+  build_field_valid   <= at_field_r and not waits;
   build_field_address <= write_address(6 downto 0);
   build_field_data    <= data;
 
   peer_count          <= peers_r;
   source_count        <= sources_r;
   sink_count          <= sinks_r;
-  is_peer_refused     <= is_at(writes, write_address, AT_REFUSED) and data(0);
-  is_endpoint_refused <= is_at(writes, write_address, AT_REFUSED) and data(1);
+  is_peer_refused     <= at_refused_r and data(0);
+  is_endpoint_refused <= at_refused_r and data(1);
 
   -- ------------------------------------------------------------------ what is read
 

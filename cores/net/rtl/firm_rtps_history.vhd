@@ -37,7 +37,7 @@ entity firm_rtps_history is
     writer     : out std_logic_vector(2 downto 0);
     is_done    : in  std_logic;
 
-    -- Shows the payload of a slot, from two cycles after `shows` on.
+    -- Shows the payload of a slot, from two cycles after `shows` on, and its size one cycle later.
     shows         : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
     payload_bytes : out std_logic_vector(15 downto 0);
@@ -82,8 +82,8 @@ architecture rtl of firm_rtps_history is
 
   -- The payload that leaves.
   signal slot_r    : slot_t := (others => '0');
-  signal place_r   : unsigned(BYTE_BITS-1 downto 0) := (others => '0');
-  signal next_read : unsigned(BYTE_BITS-1 downto 0);
+  signal place_r   : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
+  signal shows_r   : std_logic := '0';
   signal byte_r    : std_logic_vector(7 downto 0) := (others => '0');
 
 begin
@@ -171,13 +171,15 @@ begin
 
   -- ------------------------------------------------------------------ payloads
 
-  next_read <= place_r + 1 when m_axis_tready = '1' else place_r;
-
   read_payload : process (clk)
   begin
     if rising_edge(clk) then
-      byte_r  <= bytes(to_integer(slot_r & next_read));
-      place_r <= next_read;
+      shows_r       <= shows;
+      payload_bytes <= std_logic_vector(resize(sizes(to_integer(slot_r)), 16));
+      if shows_r = '1' or m_axis_tready = '1' then
+        byte_r  <= bytes(to_integer(slot_r & place_r));
+        place_r <= place_r + 1;
+      end if;
       if shows = '1' then
         slot_r  <= unsigned(slot(SLOT_BITS-1 downto 0));
         place_r <= (others => '0');
@@ -185,7 +187,6 @@ begin
     end if;
   end process read_payload;
 
-  payload_bytes <= std_logic_vector(resize(sizes(to_integer(slot_r)), 16));
-  m_axis_tdata  <= byte_r;
+  m_axis_tdata <= byte_r;
 
 end architecture rtl;

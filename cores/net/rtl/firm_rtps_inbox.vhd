@@ -32,13 +32,16 @@ entity firm_rtps_inbox is
     is_foreign    : in std_logic;
     is_aborted    : in std_logic;
 
-    -- A word moves with `take`. It is a byte of a field, a byte of a payload, or none.
-    take        : in  std_logic;
-    has_word    : out std_logic;
-    has_field   : out std_logic;
-    address     : out std_logic_vector(RECORD_BITS-1 downto 0);
-    data        : out std_logic_vector(7 downto 0);
-    is_end      : out std_logic;  -- the word is the last one of its submessage
+    -- A word moves with `take`.
+    take     : in  std_logic;
+    has_word : out std_logic;
+    is_end   : out std_logic;  -- the word is the last one of its submessage
+
+    -- The word that has moved, one cycle later: a byte of a field, a byte of a payload, or none.
+    is_taken  : out std_logic;
+    has_field : out std_logic;
+    address   : out std_logic_vector(RECORD_BITS-1 downto 0);
+    data      : out std_logic_vector(7 downto 0);
 
     -- The submessage that arrives is for this node. Words of other submessages are dropped.
     is_mine : out std_logic;
@@ -48,7 +51,7 @@ entity firm_rtps_inbox is
     is_large : out std_logic;  -- one of its sequence numbers has more than 32 bits
     is_gone  : out std_logic;  -- its status says that the instance ended
 
-    -- Of the byte of a payload: see firm_rtps_parameters.
+    -- Of the byte of a payload, with that word: see firm_rtps_parameters.
     begins    : out std_logic;
     is_value  : out std_logic;
     id        : out std_logic_vector(15 downto 0);
@@ -68,20 +71,23 @@ architecture rtl of firm_rtps_inbox is
   constant AT_NOTHING : std_logic_vector(RECORD_BITS-1 downto 0) := x"fe";
 
   signal writer_r    : std_logic_vector(31 downto 0) := (others => '0');  -- of the submessage that arrives
-  signal listens     : std_logic;                                         -- its payload is read
-  signal word        : std_logic_vector(16 downto 0);
-  signal word_valid  : std_logic;
+  signal listens_r   : std_logic;                                         -- its payload is read
   signal ends_packet : std_logic;
-  signal spoils      : std_logic_vector(0 downto 0);
-  signal taken       : std_logic_vector(16 downto 0);
-  signal valid       : std_logic;
+  signal word_r      : std_logic_vector(16 downto 0) := (others => '0');
+  signal valid_r     : std_logic;
+  signal ends_r      : std_logic;
+  signal spoils_r    : std_logic_vector(0 downto 0);
+  signal stored      : std_logic_vector(16 downto 0);
+  signal has_stored  : std_logic;
+  signal ready       : std_logic;
+  signal taken_r     : std_logic_vector(16 downto 0) := (others => '0');
+  signal has_r       : std_logic;
   signal takes       : std_logic;
   signal shown       : std_logic_vector(RECORD_BITS-1 downto 0);
   signal at          : unsigned(RECORD_BITS-1 downto 0);
   signal value       : std_logic_vector(7 downto 0);
   signal new_kind    : std_logic;
   signal list_valid  : std_logic;
-  signal in_value    : std_logic;
 
   signal from_r  : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
   signal large_r : std_logic := '0';
@@ -124,7 +130,7 @@ begin
           mine_r <= '1';
         elsif unsigned(field_address) = RECORD_KIND then
           own_r <= prefix;
-        elsif unsigned(field_address) >= RECORD_DESTINATION and unsigned(field_address) < RECORD_DESTINATION+12 then
+        elsif is_in(field_address, RECORD_DESTINATION, 12) = '1' then
           own_r  <= own_r(87 downto 0) & own_r(95 downto 88);
           ours_r <= ours;
           all_r  <= all_zero;
@@ -138,31 +144,39 @@ begin
 
   -- ------------------------------------------------------------------ words of packets
 
-  note_writer : process (clk)
+  ends_packet <= is_whole or is_faulty or is_foreign or is_aborted;
+
+  write_word : process (clk)
   begin
     if rising_edge(clk) then
-      if field_valid = '1' and unsigned(field_address) >= RECORD_WRITER
-         and unsigned(field_address) < RECORD_WRITER+4 then
+      if field_valid = '1' and is_in(field_address, RECORD_WRITER, 4) = '1' then
         writer_r <= writer_r(23 downto 0) & field_data;
       end if;
+      listens_r <= '0';
+      if writer_r = RTPS_PARTICIPANT_WRITER or writer_r = RTPS_PUBLICATIONS_WRITER
+         or writer_r = RTPS_SUBSCRIPTIONS_WRITER then
+        listens_r <= '1';
+      end if;
+      word_r(16)          <= is_submessage and mine;
+      word_r(15 downto 8) <= AT_NOTHING;
+      word_r(7 downto 0)  <= payload_data;
+      if field_valid = '1' then
+        word_r(7 downto 0) <= field_data;
+      end if;
+      if field_valid = '1' and mine = '1' then
+        word_r(15 downto 8) <= field_address;
+      elsif payload_valid = '1' and listens_r = '1' and mine = '1' then
+        word_r(15 downto 8) <= AT_PAYLOAD;
+      end if;
+      -- Nothing of a submessage for another node is kept, but each packet needs its end.
+      valid_r     <= ends_packet or (mine and (field_valid or is_submessage or (payload_valid and listens_r)));
+      ends_r      <= ends_packet;
+      spoils_r(0) <= is_foreign or is_aborted;
+      if rst_n = '0' then
+        valid_r <= '0';
+      end if;
     end if;
-  end process note_writer;
-
-  listens <= '1' when writer_r = RTPS_PARTICIPANT_WRITER or writer_r = RTPS_PUBLICATIONS_WRITER
-                      or writer_r = RTPS_SUBSCRIPTIONS_WRITER else
-             '0';
-
-  word(16)          <= is_submessage and mine;
-  word(15 downto 8) <= field_address when field_valid = '1' and mine = '1' else
-                       AT_PAYLOAD when payload_valid = '1' and listens = '1' and mine = '1' else
-                       AT_NOTHING;
-  word(7 downto 0)  <= field_data when field_valid = '1' else payload_data;
-  ends_packet       <= is_whole or is_faulty or is_foreign or is_aborted;
-  spoils(0)         <= is_foreign or is_aborted;
-  -- Nothing of a submessage for another node is kept, but each packet needs its end.
-  word_valid        <= '1' when ends_packet = '1' else
-                       '0' when mine = '0' else
-                       field_valid or is_submessage or (payload_valid and listens);
+  end process write_word;
 
   u_store : entity firm.firm_mac_store
     generic map (
@@ -172,26 +186,55 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      s_axis_tdata  => word,
-      s_axis_tuser  => spoils,
-      s_axis_tvalid => word_valid,
-      s_axis_tlast  => ends_packet,
-      m_axis_tdata  => taken,
-      m_axis_tvalid => valid,
+      s_axis_tdata  => word_r,
+      s_axis_tuser  => spoils_r,
+      s_axis_tvalid => valid_r,
+      s_axis_tlast  => ends_r,
+      m_axis_tdata  => stored,
+      m_axis_tvalid => has_stored,
       m_axis_tlast  => open,
-      m_axis_tready => take,
+      m_axis_tready => ready,
       is_lost       => is_lost
     );
 
-  takes       <= take and valid;
-  shown       <= taken(15 downto 8);
-  at          <= unsigned(shown);
-  value       <= taken(7 downto 0);
-  has_word    <= valid;
-  has_field   <= '0' when shown = AT_PAYLOAD or shown = AT_NOTHING else '1';
-  address     <= shown;
-  data        <= value;
-  is_end      <= taken(16);
+  ready <= take or not has_r;
+
+  hold_word : process (clk)
+  begin
+    if rising_edge(clk) then
+      if ready = '1' then
+        taken_r <= stored;
+        has_r   <= has_stored;
+      end if;
+      if rst_n = '0' then
+        has_r <= '0';
+      end if;
+    end if;
+  end process hold_word;
+
+  takes    <= take and has_r;
+  shown    <= taken_r(15 downto 8);
+  at       <= unsigned(shown);
+  value    <= taken_r(7 downto 0);
+  has_word <= has_r;
+  is_end   <= taken_r(16);
+
+  show_word : process (clk)
+  begin
+    if rising_edge(clk) then
+      is_taken   <= takes;
+      has_field  <= '1';
+      if shown = AT_PAYLOAD or shown = AT_NOTHING then
+        has_field <= '0';
+      end if;
+      address <= shown;
+      data    <= value;
+      begins  <= new_kind;
+      if rst_n = '0' then
+        is_taken <= '0';
+      end if;
+    end if;
+  end process show_word;
 
   -- ------------------------------------------------------------------ the submessage
 
@@ -202,9 +245,9 @@ begin
         if at = RECORD_KIND then
           gone_r  <= '0';
           large_r <= '0';
-        elsif at >= RECORD_WRITER and at < RECORD_WRITER+4 then
+        elsif is_in(shown, RECORD_WRITER, 4) = '1' then
           from_r <= from_r(23 downto 0) & value;
-        elsif at >= RECORD_NUMBER and at < RECORD_SECOND+8 and at(2) = '1' then
+        elsif is_in(shown, RECORD_NUMBER, 16) = '1' and at(2) = '1' then
           large_r <= large_r or not is_zero(value);
         elsif at = RECORD_STATUS+3 then
           gone_r <= value(0) or value(1);
@@ -221,8 +264,6 @@ begin
 
   new_kind   <= '1' when takes = '1' and at = RECORD_KIND else '0';
   list_valid <= '1' when takes = '1' and shown = AT_PAYLOAD else '0';
-  begins     <= new_kind;
-  is_value   <= in_value when shown = AT_PAYLOAD else '0';
 
   u_parameters : entity firm.firm_rtps_parameters
     port map (
@@ -230,7 +271,7 @@ begin
       begins    => new_kind,
       s_valid   => list_valid,
       s_data    => value,
-      is_value  => in_value,
+      is_value  => is_value,
       id        => id,
       size      => size,
       place     => place,

@@ -24,8 +24,9 @@ entity firm_rtps_locators is
     is_little : in std_logic;
     is_last   : in std_logic;
 
-    record_valid   : out std_logic;
+    record_valid   : out std_logic;  -- one cycle later
     record_address : out std_logic_vector(RECORD_BITS-1 downto 0);
+    record_data    : out std_logic_vector(7 downto 0);
 
     -- What the payload told.
     has_metatraffic : out std_logic;
@@ -38,10 +39,14 @@ end entity firm_rtps_locators;
 architecture rtl of firm_rtps_locators is
 
   constant LOCATOR_BYTES : natural := 24;
-  constant LEASE_BYTES   : natural := 8;
 
   signal at             : unsigned(15 downto 0);  -- the place in a parameter
+  signal word           : unsigned(13 downto 0);  -- of four bytes in it
   signal comes          : std_logic;
+  signal of_metatraffic_r : std_logic;
+  signal of_default_r     : std_logic;
+  signal of_unicast_r     : std_logic;
+  signal of_lease_r       : std_logic;
   signal udp_r          : std_logic;              -- the locator is one for UDP over IPv4, so far
   signal metatraffic_r  : std_logic := '0';
   signal default_r      : std_logic := '0';
@@ -55,12 +60,36 @@ architecture rtl of firm_rtps_locators is
 begin
 
   at    <= unsigned(place);
+  word  <= unsigned(place(15 downto 2));
   comes <= s_valid and is_value;
 
-  is_metatraffic <= not metatraffic_r when id = RTPS_METATRAFFIC_LOCATOR and unsigned(size) = LOCATOR_BYTES else '0';
-  is_default     <= not default_r when id = RTPS_DEFAULT_LOCATOR and unsigned(size) = LOCATOR_BYTES else '0';
-  is_unicast     <= not unicast_r when id = RTPS_UNICAST_LOCATOR and unsigned(size) = LOCATOR_BYTES else '0';
-  is_lease       <= not lease_r when id = RTPS_LEASE and unsigned(size) >= LEASE_BYTES else '0';
+  -- Id and size are there before the first byte of the value.
+  note_parameter : process (clk)
+  begin
+    if rising_edge(clk) then
+      of_metatraffic_r <= '0';
+      of_default_r     <= '0';
+      of_unicast_r     <= '0';
+      of_lease_r       <= '0';
+      if unsigned(size) = LOCATOR_BYTES then
+        if id = RTPS_METATRAFFIC_LOCATOR then
+          of_metatraffic_r <= '1';
+        elsif id = RTPS_DEFAULT_LOCATOR then
+          of_default_r <= '1';
+        elsif id = RTPS_UNICAST_LOCATOR then
+          of_unicast_r <= '1';
+        end if;
+      end if;
+      if id = RTPS_LEASE and unsigned(size(15 downto 3)) /= 0 then
+        of_lease_r <= '1';
+      end if;
+    end if;
+  end process note_parameter;
+
+  is_metatraffic <= of_metatraffic_r and not metatraffic_r;
+  is_default     <= of_default_r and not default_r;
+  is_unicast     <= of_unicast_r and not unicast_r;
+  is_lease       <= of_lease_r and not lease_r;
 
   note : process (clk)
     variable expected : std_logic_vector(7 downto 0);
@@ -72,12 +101,12 @@ begin
         if (at = 0 and is_little = '1') or (at = 3 and is_little = '0') then
           expected := x"01";
         end if;
-        if at < 4 then
+        if word = 0 then
           udp_r <= '0';
           if data = expected and (at = 0 or udp_r = '1') then
             udp_r <= '1';
           end if;
-        elsif at < 8 and at(1) = is_little and data /= x"00" then
+        elsif word = 1 and at(1) = is_little and data /= x"00" then
           udp_r <= '0';
         end if;
         if is_last = '1' then
@@ -97,45 +126,47 @@ begin
   end process note;
 
   -- Ports are high byte first in the record, as on the line, and the lease is little-endian.
-  choose_place : process (s_valid, comes, has_field, address, at, is_little, udp_r, is_metatraffic, is_default,
-                          is_unicast, is_lease)
+  write_record : process (clk)
     variable ip_place    : natural range 0 to 2**RECORD_BITS-1;
     variable port_place  : natural range 0 to 2**RECORD_BITS-1;
     variable is_locator  : std_logic;
     variable lease_place : unsigned(1 downto 0);
   begin
-    ip_place   := RECORD_METATRAFFIC_IP;
-    port_place := RECORD_METATRAFFIC_PORT;
-    if is_default = '1' then
-      ip_place   := RECORD_DEFAULT_IP;
-      port_place := RECORD_DEFAULT_PORT;
-    elsif is_unicast = '1' then
-      ip_place   := RECORD_UNICAST_IP;
-      port_place := RECORD_UNICAST_PORT;
-    end if;
-    is_locator  := is_metatraffic or is_default or is_unicast;
-    lease_place := at(1 downto 0);
-    if is_little = '0' then
-      lease_place := not at(1 downto 0);
-    end if;
-    record_valid   <= '0';
-    record_address <= address;
-    if has_field = '1' then
-      record_valid <= s_valid;
-    elsif is_lease = '1' and at < 4 then
-      record_valid   <= comes;
-      record_address <= std_logic_vector(to_unsigned(RECORD_LEASE, RECORD_BITS) + lease_place);
-    elsif is_locator = '1' and udp_r = '1' and at >= 20 and at < 24 then
-      record_valid   <= comes;
-      record_address <= std_logic_vector(to_unsigned(ip_place, RECORD_BITS) + at(1 downto 0));
-    elsif is_locator = '1' and udp_r = '1' and at >= 4 and at < 8 and at(1) /= is_little then
-      record_valid   <= comes;
-      record_address <= std_logic_vector(to_unsigned(port_place, RECORD_BITS));
-      if at(0) /= is_little then
-        record_address <= std_logic_vector(to_unsigned(port_place+1, RECORD_BITS));
+    if rising_edge(clk) then
+      ip_place   := RECORD_METATRAFFIC_IP;
+      port_place := RECORD_METATRAFFIC_PORT;
+      if is_default = '1' then
+        ip_place   := RECORD_DEFAULT_IP;
+        port_place := RECORD_DEFAULT_PORT;
+      elsif is_unicast = '1' then
+        ip_place   := RECORD_UNICAST_IP;
+        port_place := RECORD_UNICAST_PORT;
+      end if;
+      is_locator  := is_metatraffic or is_default or is_unicast;
+      lease_place := at(1 downto 0);
+      if is_little = '0' then
+        lease_place := not at(1 downto 0);
+      end if;
+      record_valid   <= '0';
+      record_address <= address;
+      record_data    <= data;
+      if has_field = '1' then
+        record_valid <= s_valid;
+      elsif is_lease = '1' and word = 0 then
+        record_valid   <= comes;
+        record_address <= std_logic_vector(to_unsigned(RECORD_LEASE, RECORD_BITS) + lease_place);
+      elsif is_locator = '1' and udp_r = '1' and word = 5 then
+        record_valid   <= comes;
+        record_address <= std_logic_vector(to_unsigned(ip_place, RECORD_BITS) + at(1 downto 0));
+      elsif is_locator = '1' and udp_r = '1' and word = 1 and at(1) /= is_little then
+        record_valid   <= comes;
+        record_address <= std_logic_vector(to_unsigned(port_place, RECORD_BITS));
+        if at(0) /= is_little then
+          record_address <= std_logic_vector(to_unsigned(port_place+1, RECORD_BITS));
+        end if;
       end if;
     end if;
-  end process choose_place;
+  end process write_record;
 
   has_metatraffic <= metatraffic_r;
   has_default     <= default_r;

@@ -101,7 +101,7 @@ architecture rtl of firm_rtps_node is
   signal is_aborted    : std_logic;
 
   signal take      : std_logic;
-  signal takes     : std_logic;
+  signal is_taken  : std_logic;
   signal has_word  : std_logic;
   signal has_field : std_logic;
   signal address   : std_logic_vector(RECORD_BITS-1 downto 0);
@@ -119,7 +119,7 @@ architecture rtl of firm_rtps_node is
   signal is_little : std_logic;
   signal is_last   : std_logic;
 
-  signal is_reader       : std_logic;
+  signal is_reader_r     : std_logic;
   signal matches         : std_logic_vector(ENDPOINTS-1 downto 0);
   signal is_known        : std_logic;
   signal is_reliable     : std_logic;
@@ -127,6 +127,7 @@ architecture rtl of firm_rtps_node is
   signal entity_id       : std_logic_vector(31 downto 0);
   signal record_valid    : std_logic;
   signal record_address  : std_logic_vector(RECORD_BITS-1 downto 0);
+  signal record_data     : std_logic_vector(7 downto 0);
   signal has_metatraffic : std_logic;
   signal has_default     : std_logic;
   signal has_unicast     : std_logic;
@@ -203,10 +204,11 @@ begin
       is_aborted    => is_aborted,
       take          => take,
       has_word      => has_word,
+      is_end        => is_end,
+      is_taken      => is_taken,
       has_field     => has_field,
       address       => address,
       data          => data,
-      is_end        => is_end,
       is_mine       => is_mine,
       writer        => writer,
       is_large      => is_large,
@@ -221,13 +223,20 @@ begin
       is_lost       => is_discovery_lost
     );
 
-  takes     <= take and has_word;
-  is_reader <= '1' when writer = RTPS_SUBSCRIPTIONS_WRITER else '0';
+  note_kind : process (clk)
+  begin
+    if rising_edge(clk) then
+      is_reader_r <= '0';
+      if writer = RTPS_SUBSCRIPTIONS_WRITER then
+        is_reader_r <= '1';
+      end if;
+    end if;
+  end process note_kind;
 
   u_locators : entity firm.firm_rtps_locators
     port map (
       clk             => clk,
-      s_valid         => takes,
+      s_valid         => is_taken,
       has_field       => has_field,
       address         => address,
       data            => data,
@@ -240,6 +249,7 @@ begin
       is_last         => is_last,
       record_valid    => record_valid,
       record_address  => record_address,
+      record_data     => record_data,
       has_metatraffic => has_metatraffic,
       has_default     => has_default,
       has_unicast     => has_unicast,
@@ -253,7 +263,7 @@ begin
     )
     port map (
       clk           => clk,
-      s_valid       => takes,
+      s_valid       => is_taken,
       has_field     => has_field,
       address       => address,
       data          => data,
@@ -264,7 +274,7 @@ begin
       place         => place,
       is_little     => is_little,
       is_last       => is_last,
-      is_reader     => is_reader,
+      is_reader     => is_reader_r,
       are_reliable  => are_reliable,
       are_transient => are_transient,
       names_address => names_address,
@@ -368,7 +378,7 @@ begin
       is_end              => is_end,
       record_valid        => record_valid,
       record_address      => record_address,
-      record_data         => data,
+      record_data         => record_data,
       is_large            => is_large,
       is_gone             => is_gone,
       has_metatraffic     => has_metatraffic,

@@ -17,10 +17,10 @@ entity firm_rtps_parameters is
     s_valid : in std_logic;
     s_data  : in std_logic_vector(7 downto 0);
 
-    -- Of the byte that is there, whether s_valid is high or not.
+    -- Of the byte before, one cycle later.
     is_value  : out std_logic;
     id        : out std_logic_vector(15 downto 0);
-    size      : out std_logic_vector(15 downto 0);  -- bytes of the value
+    size      : out std_logic_vector(15 downto 0);  -- bytes of the value; it stays for two further cycles
     place     : out std_logic_vector(15 downto 0);  -- in the value, from 0
     is_little : out std_logic;                      -- the byte order of the list
     is_last   : out std_logic                       -- the byte is the last one of the value
@@ -86,11 +86,24 @@ begin
     end if;
   end process follow;
 
-  is_value  <= '1' when head_r = HEAD_BYTES and place_r >= HEAD_BYTES and over_r = '0' else '0';
+  show : process (clk)
+  begin
+    if rising_edge(clk) then
+      is_value <= '0';
+      if s_valid = '1' and head_r = HEAD_BYTES and place_r >= HEAD_BYTES and over_r = '0' then
+        is_value <= '1';
+      end if;
+      place   <= std_logic_vector(resize(place_r - HEAD_BYTES, 16));
+      is_last <= '0';
+      if place_r = end_r then
+        is_last <= '1';
+      end if;
+    end if;
+  end process show;
+
+  -- A further parameter has other bytes first, so these are still those of the byte before.
   id        <= id_r;
   size      <= std_logic_vector(size_r);
-  place     <= std_logic_vector(resize(place_r - HEAD_BYTES, 16));
   is_little <= little_r;
-  is_last   <= '1' when place_r = end_r else '0';
 
 end architecture rtl;

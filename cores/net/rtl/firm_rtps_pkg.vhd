@@ -3,6 +3,7 @@
 -- submessage's fields in the record that the walker writes.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 
 package firm_rtps_pkg is
 
@@ -81,4 +82,23 @@ package firm_rtps_pkg is
 
   constant MOST_SET_BITS : positive := 256;
 
+  -- Whether an address of the record is one of `bytes` addresses from `first` on; both are multiples of four.
+  function is_in(address : std_logic_vector(RECORD_BITS-1 downto 0); first, bytes : natural) return std_logic;
+
 end package firm_rtps_pkg;
+
+package body firm_rtps_pkg is
+
+  -- A comparison of words becomes smaller than one of ranges, which needs adders.
+  function is_in(address : std_logic_vector(RECORD_BITS-1 downto 0); first, bytes : natural) return std_logic is
+    variable found : std_logic := '0';
+  begin
+    for word in first/4 to (first+bytes)/4-1 loop
+      if unsigned(address(RECORD_BITS-1 downto 2)) = word then
+        found := '1';
+      end if;
+    end loop;
+    return found;
+  end function is_in;
+
+end package body firm_rtps_pkg;

@@ -53,6 +53,7 @@ entity firm_rtps_readers is
     read_place   : in  std_logic_vector(2 downto 0);
     number_byte  : out std_logic_vector(7 downto 0);
     -- While `is_locked` is high, no number changes but by the program. It may rise while `is_judging` is low.
+    -- `number_byte` is right from two cycles later on.
     is_locked  : in  std_logic;
     is_judging : out std_logic;
 
@@ -123,7 +124,12 @@ architecture rtl of firm_rtps_readers is
   signal key_valid : std_logic;
   signal key_place : std_logic_vector(3 downto 0);
   signal found     : sources_t;
-  signal sender    : source_t;
+  -- The writer is known eight bytes before the end of its submessage: there is time for these.
+  signal found_r   : sources_t;
+  signal known_r   : std_logic;
+  signal sender_r  : source_t := (others => '0');
+  signal id_r      : unsigned(ID_BITS-1 downto 0) := (others => '0');
+  signal for_it_r  : std_logic;  -- the submessage names no other reader
   signal number_r  : std_logic_vector(NUMBER_BITS-1 downto 0) := (others => '0');
   signal large_r   : std_logic;
   signal reader_r  : std_logic_vector(31 downto 0) := (others => '0');
@@ -140,34 +146,32 @@ architecture rtl of firm_rtps_readers is
   signal sample_r  : place_t := (others => '0');  -- of the sample's payload
   signal write_r   : place_t := (others => '0');
   signal read_r    : place_t := (others => '0');
-  signal end_place : place_t;                     -- after the byte that comes
-  signal used      : place_t;
   signal has_room  : std_logic;
-  signal is_over   : std_logic;
   signal is_sample : std_logic;
   signal misses_r  : std_logic;  -- a sample of the packet found no room
-  signal is_for_it : std_logic;  -- the submessage names no other reader
   signal pushes    : std_logic;
   signal size      : size_t;
-  signal spare     : std_logic;
+  signal spare_r   : std_logic;
   signal first_r   : count_t := (others => '0');  -- of the packet's samples
   signal last_r    : count_t := (others => '0');  -- after those that arrived
-  signal waiting   : count_t;
   signal oldest_r  : count_t := (others => '0');
 
   -- ------------------------------------------------------------------ the sample that is judged
+  type judge_t is (WAITING, COMPARING, JUDGING, LOADING);
+  signal judge_r     : judge_t;
   signal judged_r    : count_t := (others => '0');
-  signal judges_r    : std_logic;
-  signal candidate   : std_logic_vector(SAMPLE_BITS-1 downto 0);
+  signal queued_r    : std_logic;  -- a sample is to be judged; one cycle late
+  signal candidate_r : std_logic_vector(SAMPLE_BITS-1 downto 0) := (others => '0');
+  signal from        : source_t;
+  signal new_number  : number_t;
   signal judge_place : source_t;
   signal number      : number_t;  -- the next one of that source
-  signal from_r      : source_t := (others => '0');
-  signal new_r       : number_t := (others => '0');
-  signal next_number : number_t;
+  signal next_r      : number_t := (others => '0');
+  signal after_r     : number_t := (others => '0');
   signal same_r      : std_logic;  -- the source is that of the sample
   signal equal_r     : std_logic;
   signal later_r     : std_logic;
-  signal shows_r     : std_logic;
+  signal shows       : std_logic;
   signal strict_r    : std_logic;
   signal is_taken    : std_logic;
   signal writes      : sources_t;
@@ -176,22 +180,23 @@ architecture rtl of firm_rtps_readers is
   signal early       : early_t := (others => (others => '0'));
   signal early_r     : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that came
   signal told_r      : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that were taken
-  signal early_used  : unsigned(EARLY_BITS downto 0);
+  signal early_full  : std_logic;
   signal early_write : std_logic;
-  signal early_entry : std_logic_vector(SOURCE_BITS+MARK_BITS+31 downto 0);  -- source, mark, and number
-  signal early_from  : source_t;
-  signal waits_early : std_logic;
-  signal same_early  : std_logic;                                            -- the source is that of the sample
-  signal drops_early : std_logic;
+  -- The oldest one: source, mark, and number.
+  signal early_entry_r : std_logic_vector(SOURCE_BITS+MARK_BITS+31 downto 0) := (others => '0');
+  signal waits_r       : std_logic;
+  signal has_early_r   : std_logic;
+  signal early_from    : source_t;
+  signal same_early    : std_logic;  -- the source is that of the sample
 
   -- ------------------------------------------------------------------ the sample that leaves
-  type state_t is (IDLE, CHOOSING, HEADING, SENDING);
+  type state_t is (IDLE, HEADING, SENDING);
   signal state_r   : state_t;
   signal shown     : std_logic_vector(SAMPLE_BITS-1 downto 0);
   signal keeps_r   : std_logic;
   signal size_r    : size_t := (others => '0');
   signal left_r    : size_t := (others => '0');
-  signal id_r      : unsigned(ID_BITS-1 downto 0) := (others => '0');
+  signal host_id_r : unsigned(ID_BITS-1 downto 0) := (others => '0');
   signal place_r   : unsigned(2 downto 0) := (others => '0');
   signal read_next : place_t;
   signal payload_r : std_logic_vector(7 downto 0) := (others => '0');
@@ -240,9 +245,9 @@ begin
   begin
     key_valid <= '0';
     key_place <= field_address(3 downto 0);
-    if unsigned(field_address) >= RECORD_SOURCE and unsigned(field_address) < RECORD_SOURCE+TAIL then
+    if is_in(field_address, RECORD_SOURCE, TAIL) = '1' then
       key_valid <= field_valid;
-    elsif unsigned(field_address) >= RECORD_WRITER and unsigned(field_address) < RECORD_WRITER+4 then
+    elsif is_in(field_address, RECORD_WRITER, 4) = '1' then
       key_valid <= field_valid;
       key_place <= "11" & field_address(1 downto 0);
     end if;
@@ -266,14 +271,32 @@ begin
       write_data  => write_data
     );
 
-  sender <= lowest(found, SOURCE_BITS);
+  find_sender : process (clk)
+  begin
+    if rising_edge(clk) then
+      spare_r <= '1';
+      if last_r(QUEUE_BITS) /= oldest_r(QUEUE_BITS)
+         and last_r(QUEUE_BITS-1 downto 0) = oldest_r(QUEUE_BITS-1 downto 0) then
+        spare_r <= '0';
+      end if;
+      found_r  <= found;
+      known_r  <= any(found_r);
+      sender_r <= lowest(found_r, SOURCE_BITS);
+      id_r     <= ids(to_integer(sender_r));
+      for_it_r <= '0';
+      if unsigned(reader_r) = 0
+         or reader_r = x"0000" & std_logic_vector(to_unsigned(FIRST, 8) + id_r) & READER_KIND then
+        for_it_r <= '1';
+      end if;
+    end if;
+  end process find_sender;
 
   note_sample : process (clk)
   begin
     if rising_edge(clk) and field_valid = '1' then
       if unsigned(field_address) = RECORD_KIND then
         large_r <= '0';
-      elsif unsigned(field_address) >= RECORD_READER and unsigned(field_address) < RECORD_READER+4 then
+      elsif is_in(field_address, RECORD_READER, 4) = '1' then
         reader_r <= reader_r(23 downto 0) & field_data;
       end if;
       for index in 0 to 7 loop
@@ -311,19 +334,13 @@ begin
     end if;
   end process delay;
 
-  used      <= write_r - read_r;
-  has_room  <= not used(PLACE_BITS);
-  end_place <= write_r + 1 when payload_valid = '1' and has_room = '1' else write_r;
-  is_over   <= full_r or (payload_valid and not has_room);
-  waiting   <= last_r - oldest_r;
-  spare     <= not waiting(QUEUE_BITS);
-  is_for_it <= '1' when unsigned(reader_r) = 0 else
-               '1' when reader_r = x"0000" & std_logic_vector(to_unsigned(FIRST, 8) + ids(to_integer(sender)))
-                        & READER_KIND else
-               '0';
-  is_sample <= data_r and any(found) and is_for_it and not large_r;
-  size      <= resize(end_place - sample_r, SIZE_BITS) when filled_r = '1' else (others => '0');
-  pushes    <= is_sample and spare and not (is_over and filled_r);
+  has_room  <= '0' when write_r(PLACE_BITS) /= read_r(PLACE_BITS)
+                        and write_r(PLACE_BITS-1 downto 0) = read_r(PLACE_BITS-1 downto 0) else
+               '1';
+  is_sample <= data_r and known_r and for_it_r and not large_r;
+  -- The payload's last byte came before: the next submessage has a head first.
+  size      <= resize(write_r - sample_r, SIZE_BITS) when filled_r = '1' else (others => '0');
+  pushes    <= is_sample and spare_r and not (full_r and filled_r);
 
   write_payload : process (clk)
   begin
@@ -340,8 +357,8 @@ begin
     if rising_edge(clk) then
       if pushes = '1' then
         entries(to_integer(last_r(QUEUE_BITS-1 downto 0)))
-          <= filled_r & std_logic_vector(ids(to_integer(sender))) & std_logic_vector(sender)
-             & std_logic_vector(marks(to_integer(sender))) & number_r & std_logic_vector(size);
+          <= filled_r & std_logic_vector(id_r) & std_logic_vector(sender_r)
+             & std_logic_vector(marks(to_integer(sender_r))) & number_r & std_logic_vector(size);
       end if;
     end if;
   end process write_sample;
@@ -354,12 +371,16 @@ begin
       is_lost <= '0';
       place   := sample_r;
       last    := last_r;
-      write_r <= end_place;
-      full_r  <= is_over;
+      if payload_valid = '1' then
+        full_r <= full_r or not has_room;
+        if has_room = '1' then
+          write_r <= write_r + 1;
+        end if;
+      end if;
       if pushes = '1' then
         last := last_r + 1;
         if filled_r = '1' then
-          place := end_place;
+          place := write_r;
         end if;
       end if;
       if submessage_r = '1' then
@@ -396,45 +417,55 @@ begin
 
   -- ------------------------------------------------------------------ samples that are judged
 
-  candidate   <= entries(to_integer(judged_r(QUEUE_BITS-1 downto 0)));
   chosen      <= unsigned(source(SOURCE_BITS-1 downto 0));
-  judge_place <= chosen when is_locked = '1' else
-                 from_r when judges_r = '1' else
-                 unsigned(candidate(AT_ID-1 downto AT_SOURCE));
-  is_taken    <= judges_r and same_r and (equal_r or (later_r and not strict_r));
-  next_number <= new_r + 1;
-  is_judging  <= '0' when judges_r = '0' and judged_r = first_r else '1';
+  from        <= unsigned(candidate_r(AT_ID-1 downto AT_SOURCE));
+  new_number  <= unsigned(candidate_r(AT_MARK-1 downto AT_NUMBER));
+  shows       <= candidate_r(SAMPLE_BITS-1);
+  judge_place <= chosen when is_locked = '1' else from;
+  is_taken    <= same_r and (equal_r or (later_r and not strict_r)) when judge_r = JUDGING else '0';
+  is_judging  <= queued_r when judge_r = WAITING else '1';
 
   judge : process (clk)
-    variable new_number : number_t;
   begin
     if rising_edge(clk) then
-      judges_r <= '0';
-      if judges_r = '1' then
-        judged_r <= judged_r + 1;
-      elsif is_locked = '0' and judged_r /= first_r then
-        judges_r   <= '1';
-        new_number := unsigned(candidate(AT_MARK-1 downto AT_NUMBER));
-        from_r     <= judge_place;
-        new_r      <= new_number;
-        strict_r   <= reliable_r(to_integer(judge_place));
-        shows_r    <= candidate(SAMPLE_BITS-1);
-        same_r     <= '0';
-        equal_r    <= '0';
-        later_r    <= '0';
-        if unsigned(candidate(AT_SOURCE-1 downto AT_MARK)) = marks(to_integer(judge_place)) then
+      next_r   <= number;
+      queued_r <= '1';
+      if judged_r = first_r then
+        queued_r <= '0';
+      end if;
+      if judge_r = WAITING or judge_r = LOADING then
+        candidate_r <= entries(to_integer(judged_r(QUEUE_BITS-1 downto 0)));
+      end if;
+      if judge_r = WAITING then
+        strict_r <= reliable_r(to_integer(from));
+        same_r   <= '0';
+        if unsigned(candidate_r(AT_SOURCE-1 downto AT_MARK)) = marks(to_integer(from)) then
           same_r <= '1';
         end if;
-        if new_number = number then
+        if is_locked = '0' and queued_r = '1' then
+          judge_r <= COMPARING;
+        end if;
+      elsif judge_r = COMPARING then
+        judge_r <= JUDGING;
+        after_r <= new_number + 1;
+        equal_r <= '0';
+        later_r <= '0';
+        if new_number = next_r then
           equal_r <= '1';
         end if;
-        if new_number > number then
+        if new_number > next_r then
           later_r <= '1';
         end if;
+      elsif judge_r = JUDGING then
+        judge_r  <= LOADING;
+        judged_r <= judged_r + 1;
+      else
+        judge_r <= WAITING;
       end if;
       if rst_n = '0' then
-        judges_r <= '0';
+        judge_r  <= WAITING;
         judged_r <= (others => '0');
+        queued_r <= '0';
       end if;
     end if;
   end process judge;
@@ -442,8 +473,8 @@ begin
   keep_sample : process (clk)
   begin
     if rising_edge(clk) then
-      if judges_r = '1' then
-        kept(to_integer(judged_r(QUEUE_BITS-1 downto 0)))(0) <= is_taken and shows_r;
+      if judge_r = JUDGING then
+        kept(to_integer(judged_r(QUEUE_BITS-1 downto 0)))(0) <= is_taken and shows;
       end if;
     end if;
   end process keep_sample;
@@ -457,7 +488,7 @@ begin
   begin
 
     takes <= '1' when is_taken = '1' or (number_write = '1' and unsigned(write_place(2 downto 0)) = index) else '0';
-    digit <= std_logic_vector(next_number(8*index+7 downto 8*index)) when is_taken = '1' else write_data;
+    digit <= std_logic_vector(after_r(8*index+7 downto 8*index)) when is_taken = '1' else write_data;
 
     write_number : process (clk)
     begin
@@ -472,43 +503,51 @@ begin
 
   end generate all_bytes;
 
-  show_number : process (number, read_place)
+  show_number : process (next_r, read_place)
   begin
     number_byte <= (others => '0');
     for index in 0 to NUMBER_BYTES-1 loop
       if unsigned(read_place) = index then
-        number_byte <= std_logic_vector(number(8*index+7 downto 8*index));
+        number_byte <= std_logic_vector(next_r(8*index+7 downto 8*index));
       end if;
     end loop;
   end process show_number;
 
   -- ------------------------------------------------------------------ samples that come too early
 
-  early_used   <= early_r - told_r;
-  early_write  <= judges_r and same_r and strict_r and later_r and not early_used(EARLY_BITS);
-  early_entry  <= early(to_integer(told_r(EARLY_BITS-1 downto 0)));
-  early_from   <= unsigned(early_entry(SOURCE_BITS+MARK_BITS+31 downto MARK_BITS+32));
-  waits_early  <= '0' when early_used = 0 else '1';
-  same_early   <= '1' when unsigned(early_entry(MARK_BITS+31 downto 32)) = marks(to_integer(early_from)) else '0';
-  drops_early  <= waits_early and not same_early;
-  has_early    <= waits_early and same_early;
+  early_full   <= '1' when early_r(EARLY_BITS) /= told_r(EARLY_BITS)
+                           and early_r(EARLY_BITS-1 downto 0) = told_r(EARLY_BITS-1 downto 0) else
+                  '0';
+  early_write  <= same_r and strict_r and later_r and not early_full when judge_r = JUDGING else '0';
+  early_from   <= unsigned(early_entry_r(SOURCE_BITS+MARK_BITS+31 downto MARK_BITS+32));
+  same_early   <= '1' when unsigned(early_entry_r(MARK_BITS+31 downto 32)) = marks(to_integer(early_from)) else '0';
+  has_early    <= has_early_r;
   early_source <= std_logic_vector(resize(early_from, 5));
-  early_number <= early_entry(31 downto 0);
+  early_number <= early_entry_r(31 downto 0);
 
   note_early : process (clk)
   begin
     if rising_edge(clk) then
       if early_write = '1' then
         early(to_integer(early_r(EARLY_BITS-1 downto 0)))
-          <= std_logic_vector(from_r) & candidate(AT_SOURCE-1 downto AT_MARK) & std_logic_vector(new_r(31 downto 0));
+          <= candidate_r(AT_ID-1 downto AT_MARK) & std_logic_vector(new_number(31 downto 0));
         early_r <= early_r + 1;
       end if;
-      if takes_early = '1' or drops_early = '1' then
-        told_r <= told_r + 1;
+      has_early_r <= waits_r and same_early and not takes_early;
+      if waits_r = '0' then
+        early_entry_r <= early(to_integer(told_r(EARLY_BITS-1 downto 0)));
+        if early_r /= told_r then
+          waits_r <= '1';
+          told_r  <= told_r + 1;
+        end if;
+      elsif takes_early = '1' or same_early = '0' then
+        waits_r <= '0';
       end if;
       if rst_n = '0' then
-        early_r <= (others => '0');
-        told_r  <= (others => '0');
+        early_r     <= (others => '0');
+        told_r      <= (others => '0');
+        waits_r     <= '0';
+        has_early_r <= '0';
       end if;
     end if;
   end process note_early;
@@ -516,8 +555,9 @@ begin
   -- ------------------------------------------------------------------ samples that leave
 
   shown     <= entries(to_integer(oldest_r(QUEUE_BITS-1 downto 0)));
-  moves     <= m_axis_tready when state_r = HEADING or state_r = SENDING else '0';
-  read_next <= read_r + resize(size_r, PLACE_BITS+1) when state_r = CHOOSING and keeps_r = '0' else
+  moves     <= m_axis_tready when state_r /= IDLE else '0';
+  -- One that is not kept is skipped.
+  read_next <= read_r + resize(size_r, PLACE_BITS+1) when state_r = HEADING and keeps_r = '0' else
                read_r + 1 when state_r = SENDING and moves = '1' else
                read_r;
 
@@ -533,21 +573,22 @@ begin
     if rising_edge(clk) then
       read_r <= read_next;
       if state_r = IDLE then
-        size_r  <= unsigned(shown(SIZE_BITS-1 downto 0));
-        left_r  <= unsigned(shown(SIZE_BITS-1 downto 0));
-        id_r    <= unsigned(shown(SAMPLE_BITS-2 downto AT_ID));
-        keeps_r <= kept(to_integer(oldest_r(QUEUE_BITS-1 downto 0)))(0);
-        place_r <= (others => '0');
-        if oldest_r /= judged_r then
-          state_r <= CHOOSING;
+        size_r    <= unsigned(shown(SIZE_BITS-1 downto 0));
+        left_r    <= unsigned(shown(SIZE_BITS-1 downto 0));
+        host_id_r <= unsigned(shown(SAMPLE_BITS-2 downto AT_ID));
+        keeps_r   <= kept(to_integer(oldest_r(QUEUE_BITS-1 downto 0)))(0);
+        if oldest_r = judged_r then
+          keeps_r <= is_taken and shows;
         end if;
-      elsif state_r = CHOOSING then
-        state_r <= HEADING;
-        if keeps_r = '0' then
-          finish;
+        place_r   <= (others => '0');
+        -- The oldest one was judged, or is judged now.
+        if oldest_r /= judged_r or judge_r = JUDGING then
+          state_r <= HEADING;
         end if;
       elsif state_r = HEADING then
-        if moves = '1' then
+        if keeps_r = '0' then
+          finish;
+        elsif moves = '1' then
           place_r <= place_r + 1;
           if place_r = HEAD_BYTES-1 then
             state_r <= SENDING;
@@ -570,12 +611,12 @@ begin
     end if;
   end process leave;
 
-  m_axis_tvalid <= '1' when state_r = HEADING or state_r = SENDING else '0';
+  m_axis_tvalid <= keeps_r when state_r /= IDLE else '0';
   m_axis_tlast  <= '1' when (state_r = SENDING and left_r = 1)
                             or (state_r = HEADING and place_r = HEAD_BYTES-1 and left_r = 0) else
                    '0';
   m_axis_tdata  <= payload_r when state_r = SENDING else
-                   std_logic_vector(resize(id_r, 8)) when place_r = 0 else
+                   std_logic_vector(resize(host_id_r, 8)) when place_r = 0 else
                    std_logic_vector(size_r(7 downto 0)) when place_r = 1 else
                    std_logic_vector(size_r(15 downto 8)) when place_r = 2 else
                    x"00";

@@ -26,14 +26,16 @@ entity firm_rtps_sequencer is
     take           : out std_logic;
     has_word       : in  std_logic;
     is_end         : in  std_logic;
-    record_valid   : in  std_logic;
+    record_valid   : in  std_logic;  -- up to two cycles after its word
     record_address : in  std_logic_vector(RECORD_BITS-1 downto 0);
     record_data    : in  std_logic_vector(7 downto 0);
 
     -- Addresses 256 to 511 of the memory are outside. A read's data follow its address at once. While `hold` is high,
     -- everything waits.
+    -- What is written is known one cycle before.
     port_index         : out std_logic_vector(5 downto 0);  -- register E
-    port_write         : out std_logic;
+    port_next          : out std_logic;
+    port_next_address  : out std_logic_vector(7 downto 0);
     port_write_address : out std_logic_vector(7 downto 0);
     port_write_data    : out std_logic_vector(7 downto 0);
     port_read_address  : out std_logic_vector(7 downto 0);
@@ -79,12 +81,22 @@ architecture rtl of firm_rtps_sequencer is
   signal memory : memory_t := (others => (others => '0'));
   signal stack  : stack_t;
 
-  type state_t is (FETCH, DECODE, DESTINATION, SOURCE, TAKING);
-  signal state_r   : state_t;
-  signal program_r : program_t := (others => '0');
-  signal depth_r   : unsigned(STACK_BITS-1 downto 0) := (others => '0');
-  signal zero_r    : std_logic;
-  signal carry_r   : std_logic;
+  -- BEGIN_READ reads the first byte of the destination, SOURCE one of the source, DESTINATION the next one of the
+  -- destination. Each byte is computed in the cycle after DESTINATION, and written in the one after that.
+  type state_t is (FETCH, LATCH, DECODE, BEGIN_READ, SOURCE, DESTINATION, COMPUTE, WRITE, TAKING);
+  signal state_r : state_t;
+  signal depth_r : unsigned(STACK_BITS-1 downto 0) := (others => '0');
+  signal zero_r  : std_logic;
+  signal carry_r : std_logic;
+
+  -- The instruction after `word_r` is fetched while that one runs.
+  signal word_r    : std_logic_vector(35 downto 0) := (others => '0');
+  signal shown_r   : program_t := (others => '0');  -- the address of `program_word`
+  signal program_r : program_t := (others => '0');  -- the one after it
+  signal address   : program_t;
+  signal fetches   : std_logic;
+  signal turns     : std_logic;                     -- a jump, a call or a return
+  signal is_over   : std_logic;                     -- the next instruction begins
 
   -- Registers. The entries of P have 64 bytes, those of E 32 and those of W 16.
   signal peer_r  : unsigned(2 downto 0) := (others => '0');
@@ -101,32 +113,39 @@ architecture rtl of firm_rtps_sequencer is
   signal flag      : std_logic;
   signal is_true   : std_logic;
 
-  -- ------------------------------------------------------------------ its bytes
+  -- ------------------------------------------------------------------ bytes that are read
   signal to_r       : address_t := (others => '0');
   signal from_r     : address_t := (others => '0');
-  signal place_r    : unsigned(4 downto 0) := (others => '0');  -- of the byte that is read
+  signal place_r    : unsigned(4 downto 0) := (others => '0');
   signal read_place : address_t;
   signal memory_r   : byte_t := (others => '0');
-  signal outside_r  : std_logic;  -- the byte is not in the memory
+  signal outside_r  : std_logic;                          -- the byte is not in the memory
   signal port_r     : byte_t := (others => '0');
-  signal value      : byte_t;
+  signal constant_r : byte_t := (others => '0');          -- the source, if it is neither in the memory nor outside
+  signal is_held    : std_logic;                          -- the source is such a byte
   signal left_r     : byte_t := (others => '0');
-  signal right      : byte_t;
+  signal right_r    : byte_t := (others => '0');
 
-  -- The byte that is written, one step later.
+  -- ------------------------------------------------------------------ the byte that is computed
+  signal computes_r : std_logic;
+  signal last_r     : std_logic;
+  signal at_r       : address_t := (others => '0');
+  signal count_r    : unsigned(4 downto 0) := (others => '0');  -- its place
+  signal is_first   : std_logic;
+  signal is_kept    : std_logic;
+  signal carry_in   : std_logic;
+  signal sum        : unsigned(8 downto 0);
+  signal result     : byte_t;
+  signal has_result : std_logic;
+
+  -- ------------------------------------------------------------------ the byte that is written
+  signal ends_r      : std_logic;
   signal writes_r    : std_logic;
-  signal last_r      : std_logic;
-  signal first_r     : std_logic;
-  signal at_r        : address_t := (others => '0');
-  signal count_r     : unsigned(4 downto 0) := (others => '0');  -- its place
-  signal carry_in    : std_logic;
-  signal sum         : unsigned(8 downto 0);
-  signal result      : byte_t;
-  signal is_kept     : std_logic;
-  signal is_zero     : std_logic;
+  signal begins_r    : std_logic;  -- it is the first one
+  signal place_2_r   : address_t := (others => '0');
+  signal result_r    : byte_t := (others => '0');
   signal write_place : address_t;
   signal write_data  : byte_t;
-  signal write_valid : std_logic;
 
   function address_of(operand : std_logic_vector(13 downto 0); peer : unsigned(2 downto 0);
     entry : unsigned(5 downto 0); table : unsigned(5 downto 0)) return address_t is
@@ -160,26 +179,26 @@ architecture rtl of firm_rtps_sequencer is
 
 begin
 
-  kind      <= program_word(35 downto 32);
-  is_number <= program_word(31);
-  chosen    <= unsigned(program_word(15 downto 14));
+  kind      <= word_r(35 downto 32);
+  is_number <= word_r(31);
+  chosen    <= unsigned(word_r(15 downto 14));
 
-  choose_size : process (program_word)
+  choose_size : process (word_r)
   begin
     size <= to_unsigned(27, 5);
-    if program_word(30 downto 28) = "000" then
+    if word_r(30 downto 28) = "000" then
       size <= to_unsigned(0, 5);
-    elsif program_word(30 downto 28) = "001" then
+    elsif word_r(30 downto 28) = "001" then
       size <= to_unsigned(1, 5);
-    elsif program_word(30 downto 28) = "010" then
+    elsif word_r(30 downto 28) = "010" then
       size <= to_unsigned(3, 5);
-    elsif program_word(30 downto 28) = "011" then
+    elsif word_r(30 downto 28) = "011" then
       size <= to_unsigned(7, 5);
-    elsif program_word(30 downto 28) = "100" then
+    elsif word_r(30 downto 28) = "100" then
       size <= to_unsigned(11, 5);
-    elsif program_word(30 downto 28) = "101" then
+    elsif word_r(30 downto 28) = "101" then
       size <= to_unsigned(15, 5);
-    elsif program_word(30 downto 28) = "110" then
+    elsif word_r(30 downto 28) = "110" then
       size <= to_unsigned(5, 5);
     end if;
   end process choose_size;
@@ -192,42 +211,77 @@ begin
   -- ------------------------------------------------------------------ the order of things
 
   -- Of a jump: bits 17 to 15 say which condition, bit 14 whether it is inverted.
-  choose_condition : process (program_word, zero_r, carry_r, conditions)
+  choose_condition : process (word_r, zero_r, carry_r, conditions)
   begin
     flag <= '1';
-    if program_word(17) = '1' then
-      flag <= conditions(to_integer(unsigned(program_word(16 downto 15))));
-    elsif program_word(16 downto 15) = "01" then
+    if word_r(17) = '1' then
+      flag <= conditions(to_integer(unsigned(word_r(16 downto 15))));
+    elsif word_r(16 downto 15) = "01" then
       flag <= zero_r;
-    elsif program_word(16 downto 15) = "10" then
+    elsif word_r(16 downto 15) = "10" then
       flag <= carry_r;
     end if;
   end process choose_condition;
 
-  is_true         <= flag xor program_word(14);
-  program_enable  <= '1' when state_r = FETCH and hold = '0' else '0';
-  program_address <= std_logic_vector(program_r);
+  is_true <= flag xor word_r(14);
+  turns   <= '0' when state_r /= DECODE else
+             is_true when kind = OP_JUMP else
+             '1' when kind = OP_CALL or kind = OP_RETURN else
+             '0';
+  is_over <= '1' when state_r = LATCH or state_r = WRITE else
+             not has_word or is_end when state_r = TAKING else
+             not is_true when state_r = DECODE and kind = OP_JUMP else
+             '1' when state_r = DECODE and kind = OP_STEP else
+             '0';
+
+  address <= program_r when turns = '0' else
+             stack(to_integer(depth_r - 1)) when kind = OP_RETURN else
+             unsigned(word_r(9 downto 0));
+  fetches <= '0' when hold = '1' else
+             '1' when state_r = FETCH else
+             turns or is_over;
+
+  program_enable  <= fetches;
+  program_address <= std_logic_vector(address);
   take            <= '1' when state_r = TAKING else '0';
 
   run : process (clk)
   begin
     if rising_edge(clk) then
+      if fetches = '1' then
+        shown_r   <= address;
+        program_r <= address + 1;
+      end if;
       if hold = '0' then
-        if state_r = FETCH then
-          state_r   <= DECODE;
-          program_r <= program_r + 1;
+        if is_over = '1' then
+          word_r <= program_word;
+        end if;
+        if is_over = '1' then
+          state_r <= DECODE;
+        elsif state_r = FETCH or turns = '1' then
+          state_r <= LATCH;
         elsif state_r = DECODE then
-          state_r <= FETCH;
-          if kind = OP_JUMP then
-            if is_true = '1' then
-              program_r <= unsigned(program_word(9 downto 0));
-            end if;
-          elsif kind = OP_CALL then
-            program_r <= unsigned(program_word(9 downto 0));
-            depth_r   <= depth_r + 1;
+          state_r <= BEGIN_READ;
+          if kind = OP_TAKE then
+            state_r <= TAKING;
+          end if;
+        elsif state_r = BEGIN_READ then
+          state_r <= SOURCE;
+        elsif state_r = SOURCE then
+          state_r <= DESTINATION;
+        elsif state_r = DESTINATION then
+          state_r <= SOURCE;
+          if last_r = '1' then
+            state_r <= COMPUTE;
+          end if;
+        elsif state_r = COMPUTE then
+          state_r <= WRITE;
+        end if;
+        if state_r = DECODE then
+          if kind = OP_CALL then
+            depth_r <= depth_r + 1;
           elsif kind = OP_RETURN then
-            program_r <= stack(to_integer(depth_r - 1));
-            depth_r   <= depth_r - 1;
+            depth_r <= depth_r - 1;
           elsif kind = OP_STEP then
             if chosen = 0 then
               peer_r <= stepped(2 downto 0);
@@ -239,40 +293,30 @@ begin
               index_r <= stepped;
             end if;
             zero_r <= '0';
-            if stepped = unsigned(program_word(7 downto 0)) then
+            if stepped = unsigned(word_r(7 downto 0)) then
               zero_r <= '1';
             end if;
-          elsif kind = OP_TAKE then
-            state_r <= TAKING;
-          else
-            state_r <= DESTINATION;
           end if;
-        elsif state_r = DESTINATION then
-          state_r <= SOURCE;
-          -- The last byte is being written.
-          if last_r = '1' and writes_r = '1' then
-            state_r <= FETCH;
-          end if;
-        elsif state_r = SOURCE then
-          state_r <= DESTINATION;
         elsif state_r = TAKING then
           carry_r <= has_word and is_end;
-          if has_word = '0' or is_end = '1' then
-            state_r <= FETCH;
-          end if;
         end if;
-        if writes_r = '1' then
+        if computes_r = '1' then
           carry_r <= sum(8) xor is_kept;
-          zero_r  <= is_zero and (zero_r or first_r);
+        end if;
+        if ends_r = '1' then
+          zero_r <= '0';
+          if unsigned(result_r) = 0 then
+            zero_r <= zero_r or begins_r;
+          end if;
           if kind = OP_LOAD then
             if chosen = 0 then
-              peer_r <= unsigned(result(2 downto 0));
+              peer_r <= unsigned(result_r(2 downto 0));
             elsif chosen = 1 then
-              entry_r <= unsigned(result(5 downto 0));
+              entry_r <= unsigned(result_r(5 downto 0));
             elsif chosen = 2 then
-              table_r <= unsigned(result(5 downto 0));
+              table_r <= unsigned(result_r(5 downto 0));
             else
-              index_r <= unsigned(result);
+              index_r <= unsigned(result_r);
             end if;
           end if;
         end if;
@@ -289,7 +333,7 @@ begin
   begin
     if rising_edge(clk) then
       if state_r = DECODE and kind = OP_CALL then
-        stack(to_integer(depth_r)) <= program_r;
+        stack(to_integer(depth_r)) <= shown_r;
       end if;
     end if;
   end process keep_return;
@@ -297,8 +341,9 @@ begin
   -- ------------------------------------------------------------------ bytes that are read
 
   read_place <= from_r when state_r = SOURCE else to_r;
-  value      <= port_read_data when outside_r = '1' else memory_r;
+
   port_read_address <= port_r;
+  is_held           <= '1' when is_number = '1' or kind = OP_BIT or kind = OP_STORE else '0';
 
   read_bytes : process (clk)
   begin
@@ -310,106 +355,135 @@ begin
         if read_place(11 downto 8) = 1 then
           outside_r <= '1';
         end if;
-        writes_r <= '0';
         if state_r = DECODE then
           place_r <= (others => '0');
-          to_r    <= address_of(program_word(27 downto 14), peer_r, entry_r, table_r);
-          from_r  <= address_of(program_word(13 downto 0), peer_r, entry_r, table_r);
+          to_r    <= address_of(word_r(27 downto 14), peer_r, entry_r, table_r);
           if kind = OP_BIT then
             to_r <= to_unsigned(RECORD_SET/32, 7) & index_r(7 downto 3);
           end if;
+          from_r  <= address_of(word_r(13 downto 0), peer_r, entry_r, table_r);
         elsif state_r = SOURCE then
-          left_r   <= value;
-          to_r     <= to_r + 1;
-          place_r  <= place_r + 1;
-          at_r     <= to_r;
-          count_r  <= place_r;
-          writes_r <= '1';
-          first_r  <= '0';
-          if place_r = 0 then
-            first_r <= '1';
+          left_r <= memory_r;
+          if outside_r = '1' then
+            left_r <= port_read_data;
           end if;
-          last_r <= '0';
+          to_r    <= to_r + 1;
+          place_r <= place_r + 1;
+          at_r    <= to_r;
+          count_r <= place_r;
+          last_r  <= '0';
           if place_r = size then
             last_r <= '1';
           end if;
           if kind /= OP_MASK then
             from_r <= from_r + 1;
           end if;
+        elsif state_r = DESTINATION then
+          if is_held = '1' then
+            right_r <= constant_r;
+          elsif outside_r = '1' then
+            right_r <= port_read_data;
+          else
+            right_r <= memory_r;
+          end if;
         end if;
-      end if;
-      if rst_n = '0' then
-        writes_r <= '0';
       end if;
     end if;
   end process read_bytes;
 
-  -- ------------------------------------------------------------------ bytes that are written
-
-  choose_right : process (is_number, program_word, count_r, value, kind, index_r, peer_r, entry_r, table_r)
+  hold_constant : process (clk)
   begin
-    right <= value;
-    if kind = OP_BIT then
-      right <= (others => '0');
-      for index in 0 to 7 loop
-        if index_r(2 downto 0) = 7-index then
-          right(index) <= '1';
+    if rising_edge(clk) and state_r = SOURCE and hold = '0' then
+      constant_r <= (others => '0');
+      if kind = OP_BIT then
+        for index in 0 to 7 loop
+          if index_r(2 downto 0) = 7-index then
+            constant_r(index) <= '1';
+          end if;
+        end loop;
+      elsif kind = OP_STORE then
+        if word_r(1 downto 0) = "00" then
+          constant_r(2 downto 0) <= std_logic_vector(peer_r);
+        elsif word_r(1 downto 0) = "01" then
+          constant_r(5 downto 0) <= std_logic_vector(entry_r);
+        elsif word_r(1 downto 0) = "10" then
+          constant_r(5 downto 0) <= std_logic_vector(table_r);
+        else
+          constant_r <= std_logic_vector(index_r);
         end if;
-      end loop;
-    elsif kind = OP_STORE then
-      right <= std_logic_vector(index_r);
-      if program_word(1 downto 0) = "00" then
-        right <= "00000" & std_logic_vector(peer_r);
-      elsif program_word(1 downto 0) = "01" then
-        right <= "00" & std_logic_vector(entry_r);
-      elsif program_word(1 downto 0) = "10" then
-        right <= "00" & std_logic_vector(table_r);
-      end if;
-    elsif is_number = '1' then
-      right <= (others => '0');
-      if count_r = 0 then
-        right <= program_word(7 downto 0);
-      elsif count_r = 1 then
-        right <= "00" & program_word(13 downto 8);
+      elsif place_r = 0 then
+        constant_r <= word_r(7 downto 0);
+      elsif place_r = 1 then
+        constant_r(5 downto 0) <= word_r(13 downto 8);
       end if;
     end if;
-  end process choose_right;
+  end process hold_constant;
+
+  -- ------------------------------------------------------------------ bytes that are computed
 
   -- A difference is a sum with the inverted number, whose carry is the inverse of a borrow.
+  is_first <= '1' when count_r = 0 else '0';
   is_kept  <= '1' when kind = OP_SUB or kind = OP_CMP else '0';
-  carry_in <= is_kept when first_r = '1' else carry_r xor is_kept;
+  carry_in <= is_kept when is_first = '1' else carry_r xor is_kept;
 
-  compute : process (left_r, right, is_kept, carry_in)
+  add : process (left_r, right_r, is_kept, carry_in)
     variable term  : unsigned(7 downto 0);
     variable carry : unsigned(0 downto 0);
   begin
     carry(0) := carry_in;
-    term     := unsigned(right);
+    term     := unsigned(right_r);
     if is_kept = '1' then
-      term := not unsigned(right);
+      term := not unsigned(right_r);
     end if;
     sum <= resize(unsigned(left_r), 9) + term + carry;
-  end process compute;
+  end process add;
 
   result <= std_logic_vector(sum(7 downto 0)) when kind = OP_ADD or is_kept = '1' else
-            left_r and right when kind = OP_AND or kind = OP_TEST or kind = OP_BIT else
-            set_byte(unsigned(right), count_r(1 downto 0)) when kind = OP_MASK else
-            right;
-  is_zero <= '1' when unsigned(result) = 0 else '0';
+            left_r and right_r when kind = OP_AND or kind = OP_TEST or kind = OP_BIT else
+            set_byte(unsigned(right_r), count_r(1 downto 0)) when kind = OP_MASK else
+            right_r;
 
-  write_valid <= '0' when kind = OP_CMP or kind = OP_TEST or kind = OP_BIT or kind = OP_LOAD else writes_r;
-  port_write  <= write_valid when at_r(11 downto 8) = 1 else '0';
-  port_write_address <= std_logic_vector(at_r(7 downto 0));
-  port_write_data    <= result;
+  has_result <= '0' when kind = OP_CMP or kind = OP_TEST or kind = OP_BIT or kind = OP_LOAD else computes_r;
+
+  port_next         <= has_result when at_r(11 downto 8) = 1 else '0';
+  port_next_address <= std_logic_vector(at_r(7 downto 0));
+
+  compute_byte : process (clk)
+  begin
+    if rising_edge(clk) then
+      if hold = '0' then
+        computes_r <= '0';
+        if state_r = DESTINATION then
+          computes_r <= '1';
+        end if;
+        ends_r   <= computes_r;
+        writes_r <= has_result;
+        begins_r  <= is_first;
+        place_2_r <= at_r;
+        result_r  <= result;
+      end if;
+      if rst_n = '0' then
+        computes_r <= '0';
+        ends_r     <= '0';
+        writes_r   <= '0';
+      end if;
+    end if;
+  end process compute_byte;
+
+  -- ------------------------------------------------------------------ bytes that are written
+
+  port_write_address <= std_logic_vector(place_2_r(7 downto 0));
+  port_write_data    <= result_r;
   port_index         <= std_logic_vector(entry_r);
 
-  write_place <= "0000" & unsigned(record_address) when state_r = TAKING else at_r;
-  write_data  <= record_data when state_r = TAKING else result;
+  -- What TAKE has moved is written before a byte of the next instruction can be.
+  write_place <= "0000" & unsigned(record_address) when record_valid = '1' else place_2_r;
+  write_data  <= record_data when record_valid = '1' else result_r;
 
   write_bytes : process (clk)
   begin
     if rising_edge(clk) then
-      if (state_r = TAKING and record_valid = '1') or (state_r /= TAKING and write_valid = '1') then
+      if record_valid = '1' or writes_r = '1' then
         memory(to_integer(write_place)) <= write_data;
       end if;
     end if;

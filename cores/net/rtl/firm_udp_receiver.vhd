@@ -77,16 +77,16 @@ architecture rtl of firm_udp_receiver is
   signal fragment_r     : std_logic;
   signal header_bytes_r : unsigned(5 downto 0) := (others => '0');
   signal total_r        : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet
-  signal packet_left_r  : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet to come
+  signal packet_left_r  : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet to come, and four
   signal room_r         : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet after its header
   signal short_r        : std_logic;  -- the packet has no room for a datagram
-  signal header_sum_r   : unsigned(17 downto 0) := (others => '0');
+  signal header_sum_r   : unsigned(16 downto 0) := (others => '0');
   signal header_right_r : std_logic;
   signal port_r         : std_logic_vector(PORTS-1 downto 0);
   signal length_r       : unsigned(15 downto 0) := (others => '0');  -- bytes of the datagram
   signal misfit_r       : std_logic;  -- the datagram does not fit into the packet
   signal unsummed_r     : std_logic;  -- the datagram has no checksum
-  signal sum_r          : unsigned(17 downto 0) := (others => '0');
+  signal sum_r          : unsigned(16 downto 0) := (others => '0');
   signal data_left_r    : unsigned(15 downto 0) := (others => '0');  -- bytes of the payload to come
   signal accepted_r     : std_logic;
 
@@ -103,13 +103,17 @@ architecture rtl of firm_udp_receiver is
   signal aborted_r   : std_logic;
   signal past_r      : std_logic;  -- it went on after the header
   signal named_r     : std_logic;  -- it reached the end of the addresses
-  signal whole_r     : std_logic;  -- it holds the packet
-  signal summed_r    : std_logic;  -- the datagram's checksum is right, or there is none
+  signal whole       : std_logic;  -- it holds the packet
+  signal whole_r     : std_logic;
+  signal summed      : std_logic;  -- the datagram's checksum is right, or there is none
+  signal summed_r    : std_logic;
 
-  -- The sum with a further byte, once or twice, and the carries of before.
-  function added(sum : unsigned(17 downto 0); byte : std_logic_vector(7 downto 0); odd : std_logic; twice : boolean)
+  -- The sum with a further byte, once or twice, and the carry of before, which is the highest bit. In ones' complement,
+  -- twice a word is the word rotated by one bit.
+  function added(sum : unsigned(16 downto 0); byte : std_logic_vector(7 downto 0); odd : std_logic; twice : boolean)
     return unsigned is
-    variable word : unsigned(17 downto 0) := (others => '0');
+    variable word  : unsigned(15 downto 0) := (others => '0');
+    variable carry : unsigned(0 downto 0);
   begin
     if odd = '1' then
       word(7 downto 0) := unsigned(byte);
@@ -117,16 +121,17 @@ architecture rtl of firm_udp_receiver is
       word(15 downto 8) := unsigned(byte);
     end if;
     if twice then
-      word := word(16 downto 0) & '0';
+      word := word(14 downto 0) & word(15);
     end if;
-    return resize(sum(15 downto 0), 18) + sum(17 downto 16) + word;
+    carry(0) := sum(16);
+    return resize(sum(15 downto 0), 17) + word + carry;
   end function added;
 
-  -- Whether words and carries add up to all ones.
-  function is_right(sum : unsigned(17 downto 0)) return std_logic is
+  -- Whether words and carry add up to all ones.
+  function is_right(sum : unsigned(16 downto 0)) return std_logic is
   begin
-    if resize(sum(15 downto 0), 17) + sum(17 downto 16) = 16#ffff# then
-      return '1';
+    if sum(15 downto 1) = "111111111111111" then
+      return sum(0) xor sum(16);
     end if;
     return '0';
   end function is_right;
@@ -226,12 +231,14 @@ begin
   end process match;
 
   check_header : process (clk)
+    variable room : unsigned(16 downto 0);  -- the highest bit is a borrow
   begin
     if rising_edge(clk) then
       header_right_r <= is_right(header_sum_r);
-      room_r         <= total_r - header_bytes_r;
-      short_r        <= '0';
-      if total_r < resize(header_bytes_r, 7) + DATAGRAM_BYTES then
+      room           := resize(total_r, 17) - header_bytes_r;
+      room_r         <= room(15 downto 0);
+      short_r        <= room(16);
+      if room(15 downto 3) = 0 then
         short_r <= '1';
       end if;
       if s_axis_tvalid = '1' then
@@ -241,9 +248,9 @@ begin
         elsif section_r = HEADER then
           header_sum_r <= added(header_sum_r, s_axis_tdata, odd_r, false);
         end if;
-        -- A length below four bytes makes a short packet, whatever is counted here.
+        -- The four bytes up to here are counted at the end.
         if section_r = HEADER and place_r = 3 then
-          packet_left_r <= (unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata)) - 4;
+          packet_left_r <= unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata);
         elsif section_r /= ETHERNET and packet_left_r /= 0 then
           packet_left_r <= packet_left_r - 1;
         end if;
@@ -272,7 +279,7 @@ begin
           length_r <= unsigned(recent);
         elsif place_r = 6 then
           misfit_r <= '0';
-          if length_r < DATAGRAM_BYTES or length_r > room_r then
+          if length_r(15 downto 3) = 0 or length_r > room_r then
             misfit_r <= '1';
           end if;
         elsif place_r = 7 then
@@ -300,7 +307,7 @@ begin
   begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if section_r = ETHERNET then
-        sum_r <= resize(UDP, 18);
+        sum_r <= resize(UDP, 17);
       elsif section_r = HEADER and place_r >= 12 and place_r <= HEADER_LAST then
         sum_r <= added(sum_r, s_axis_tdata, odd_r, false);
       elsif section_r = DATAGRAM then
@@ -312,6 +319,10 @@ begin
   end process add_datagram;
 
   -- ------------------------------------------------------------------ the end
+
+  whole  <= '1' when packet_left_r(15 downto 3) = 0 and (packet_left_r(2) = '0' or packet_left_r(1 downto 0) = 0) else
+            '0';
+  summed <= unsummed_r or is_right(sum_r);
 
   judge : process (clk)
   begin
@@ -329,11 +340,8 @@ begin
           named_r <= '1';
         end if;
       end if;
-      whole_r <= '0';
-      if packet_left_r = 0 then
-        whole_r <= '1';
-      end if;
-      summed_r <= unsummed_r or is_right(sum_r);
+      whole_r  <= whole;
+      summed_r <= summed;
       if rst_n = '0' then
         ended_r  <= '0';
         judged_r <= '0';
@@ -376,10 +384,10 @@ begin
         m_axis_tvalid <= has_held_r;
         held_r        <= s_axis_tdata;
         has_held_r    <= '1';
-      elsif judged_r = '1' then
+      elsif ended_r = '1' then
         m_axis_tvalid   <= has_held_r;
         m_axis_tlast    <= has_held_r;
-        m_axis_tuser(0) <= aborted_r or not (whole_r and summed_r);
+        m_axis_tuser(0) <= aborted_r or not (whole and summed);
         has_held_r      <= '0';
       end if;
       if rst_n = '0' then

@@ -27,7 +27,7 @@ end entity firm_packet_builder_tb;
 architecture simulation of firm_packet_builder_tb is
 
   constant FIELD_BYTES : positive := 128;
-  constant MOST_CYCLES : positive := 12;
+  constant MOST_CYCLES : positive := 13;
 
   type memory_t is array (natural range 0 to 2**ADDRESS_BITS-1) of std_logic_vector(10 downto 0);
 

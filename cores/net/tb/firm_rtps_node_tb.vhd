@@ -44,7 +44,7 @@ architecture simulation of firm_rtps_node_tb is
 
   constant ENDPOINTS : positive := READERS+WRITERS;
   -- The loop of the program takes fewer cycles if there is nothing to do, and a packet passes the node in fewer ones.
-  constant LOOP_CYCLES : positive := 16;
+  constant LOOP_CYCLES : positive := 24;
   constant LOOPS       : positive := 6;
   constant LAST_CYCLES : positive := 200;
 
