@@ -10,6 +10,7 @@ from enum import IntEnum
 from ipaddress import IPv4Address
 
 from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.control import Sizes
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.rtps import PUBLICATIONS_WRITER, SUBSCRIPTIONS_WRITER, Durability, Parameter, Reliability
 from fusesoc_firm.system.derived.model import Network, Quality
@@ -43,6 +44,7 @@ WRITTEN = (
     ("rt/kept", "std_msgs::msg::dds_::String_", Quality(is_transient_local=True, depth=2)),
 )
 SURE = 2  # the reader that is reliable
+ROOM = Sizes(sources=8, sinks=8)  # in the tables; less than for eight peers
 SAMPLE = 64  # bytes of the longest payload that the node sends
 _IDLE = -1  # an event that waits until the node has nothing to do
 _GAP = 12  # cycles between two packets, at least
@@ -100,7 +102,7 @@ class Results:
     refused: int = 0
 
 
-def expected(events: Sequence[Event], sources: int = 8, sinks: int = 8) -> Results:
+def expected(events: Sequence[Event]) -> Results:
     """What the reference does."""
     node, results, now = a_node(), Results(), 0
 
@@ -108,16 +110,19 @@ def expected(events: Sequence[Event], sources: int = 8, sinks: int = 8) -> Resul
         results.frames.append(struct.pack("<BI", node.readers.index(endpoint), len(payload)) + payload)
 
     # Fragments are not put together: a sample that needs them is too long.
-    participant = Participant(node, take, Limits(sources=sources, sinks=sinks, longest=1344))
+    participant = Participant(node, take, Limits(sources=ROOM.sources, sinks=ROOM.sinks, longest=1344))
     participant.start(now)
     for event in events:
         match event.kind:
             case Kind.PACKET:
                 participant.receive(event.data, now)
-            case Kind.TICKS | Kind.RUSHED:
+            case Kind.TICKS:
                 for _ in range(event.count):
                     now += 1
                     participant.tick(now)
+            case Kind.RUSHED:
+                now += event.count
+                participant.tick(now)
             case Kind.FRAME:
                 _publish(participant, event.data, results, now)
         results.sent += participant.outbox

@@ -258,11 +258,11 @@ class Participant:
                 self._send_sample(sink, history.number)
 
     def tick(self, now: int) -> None:
-        """Do what is due."""
+        """Do what is due; there may be several milliseconds since the last time."""
         self._now = now
         if now >= self._next_announcement:
             self._announcements += 1
-            self._next_announcement = now + (SOON if self._announcements < FIRST_ANNOUNCEMENTS else LATER)
+            self._next_announcement += SOON if self._announcements < FIRST_ANNOUNCEMENTS else LATER
             self._announce(self._group)
         passed = (now - self._started) // 1000 - self._seconds
         self._seconds += passed
@@ -273,11 +273,11 @@ class Participant:
                 self._forget(peer)
             else:
                 self._tick_peer(peer)
+        for source in self.sources:
+            self._tick_source(source)
         for sink in self.sinks:
             if sink.is_reliable and sink.is_behind and now >= sink.next_heartbeat:
                 self._send_heartbeat(sink)
-        for source in self.sources:
-            self._tick_source(source)
 
     def _tick_peer(self, peer: Peer) -> None:
         if self._now >= peer.next_request:
