@@ -66,16 +66,16 @@ class World:
         found = Results()
         while (row := self._process.stdout.readline()) != "done\n":
             assert row, "the node ended"
-            kind, *numbers = row.split()
-            content = bytes(map(int, numbers))
+            kind, *texts = row.split()
+            numbers = [int(text) for text in texts]
             if kind == "entries":
-                self.entries = list(map(int, numbers))
+                self.entries = numbers
             elif kind == "cycles":
-                self.cycles = int(numbers[0])
+                (self.cycles,) = numbers
             elif kind == "frame":
-                found.frames.append(content)
+                found.frames.append(bytes(numbers))
             elif kind == "sent":
-                found.sent.append(sent(content))
+                found.sent.append(sent(bytes(numbers)))
             else:
                 self.pulses[kind] += 1
         return found

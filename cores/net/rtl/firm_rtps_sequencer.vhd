@@ -144,7 +144,7 @@ architecture rtl of firm_rtps_sequencer is
 
   function address_of(operand : std_logic_vector(13 downto 0); peer : unsigned(2 downto 0);
     entry : unsigned(7 downto 0); table : unsigned(5 downto 0)) return address_t is
-    variable place : address_t := '0' & unsigned(operand(11 downto 0));
+    variable place : address_t := resize(unsigned(operand(11 downto 0)), ADDRESS_BITS);
   begin
     if operand(13 downto 12) = IN_PEER then
       place := "0010" & peer & place(5 downto 0);
