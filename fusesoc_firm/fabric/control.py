@@ -93,7 +93,9 @@ _TIMES = {
 }
 _FACTS = ("KNOWN", "RELIABLE", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
 _OTHERS = {
-    "WINDOW": 32,
+    # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, in fragments.
+    "WINDOW": 2,
+    "BEYOND_WINDOW": 3,
     "MOST_REQUESTED": 8,
     "FINAL": 3,
     "NOT_FINAL": 1,
