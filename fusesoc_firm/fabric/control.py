@@ -19,7 +19,7 @@ byte. An operation may be followed by the number of its bytes, as in `copy.4 a, 
 | `load R, b`; `store a, R` | a register P, E, W or X |
 | `step R, n` | R := R + 1; z if it is n |
 | `bit` | z unless number X is in the set of the record |
-| `jump L`, `jump COND, L` | z, nz, c, nc; tick, early, frame, work (each of these, or a submessage), and `no_` with each |
+| `jump L`, `jump COND, L` | z, nz, c, nc; tick, early, frame, work (one of these, or a submessage); `no_` with each |
 | `call L`, `return` | up to eight levels |
 | `take` | takes what has come of a submessage, with c if it is complete |
 """

@@ -224,7 +224,8 @@ class Peers:
     def succession(self) -> list[Event]:
         """A writer ends, and another one gets its place, in one packet with samples that came too early.
 
-        The samples of the second one come when it is asked for them, after its heartbeat. Then come more writers than find room.
+        The samples of the second one come when it is asked for them, after its heartbeat. Then come more writers than
+        find room.
         """
         peer, (gone, new) = self._peers[0], (bytes([0, 0, number, rtps.USER_WRITER]) for number in (7, 8))
         told = DISCOVERY[PUBLICATIONS_WRITER], PUBLICATIONS_WRITER

@@ -31,7 +31,6 @@ class World {
     top_.tick = 1;
     while (count-- > 0) step();
     top_.tick = 0;
-    wait();
   }
   void packet(const std::vector<int>& bytes, bool is_aborted) {
     for (std::size_t place = 0; place < bytes.size(); ++place) {

@@ -13,6 +13,7 @@ import pytest
 
 from fusesoc_firm.fabric.control import Sizes, main_of
 from fusesoc_firm.fabric.node import Node
+from fusesoc_firm.fabric.packets import programs_of
 from tests.bench.model import compiled
 from tests.cores.announcements import ROOM, Event, Kind, Results, a_node, sent
 from tests.fabric.memories import generics, memories
@@ -35,7 +36,8 @@ def program(node: Node, sizes: Sizes) -> Path:
 def _build(node: Node, sizes: Sizes, folder: Path) -> Path:
     """GHDL's netlist of the hardware, translated by Verilator."""
     files = [*memories(node, "rtps_world", folder, sizes), HERE / "rtps_world.vhd"]
-    verilog = netlist("rtps_world", folder, files, core_files(*HARDWARE), (), **generics(node, sizes))
+    given = {**generics(node, sizes), "PROGRAM_BITS": programs_of(node).address_bits}
+    verilog = netlist("rtps_world", folder, files, core_files(*HARDWARE), (), **given)
     bench = (HERE / "rtps_world.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "rtps_world", bench, folder, [HERE])
 

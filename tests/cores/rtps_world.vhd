@@ -7,13 +7,14 @@ library firm;
 
 entity rtps_world is
   generic (
-    WRITERS   : integer := 4; -- see firm_rtps_node
-    READERS   : integer := 3;
-    SOURCES   : integer := 8;
-    SINKS     : integer := 8;
-    SLOTS     : integer := 16;
-    RELIABLE  : integer := 0; -- a bit for each endpoint
-    TRANSIENT : integer := 0
+    WRITERS      : integer := 4; -- see firm_rtps_node
+    READERS      : integer := 3;
+    SOURCES      : integer := 8;
+    SINKS        : integer := 8;
+    SLOTS        : integer := 16;
+    RELIABLE     : integer := 0; -- a bit for each endpoint
+    TRANSIENT    : integer := 0;
+    PROGRAM_BITS : integer := 13 -- of an address in the memory of packets
   );
   port (
     clk   : in std_logic;
@@ -66,12 +67,12 @@ architecture rtl of rtps_world is
   signal control_address : std_logic_vector(9 downto 0);
   signal control_word    : std_logic_vector(35 downto 0);
   signal packets_enable  : std_logic;
-  signal packets_address : std_logic_vector(12 downto 0);
+  signal packets_address : std_logic_vector(PROGRAM_BITS-1 downto 0);
   signal packets_word    : std_logic_vector(10 downto 0);
 
   signal start          : std_logic;
   signal packet         : std_logic_vector(7 downto 0);
-  signal entry          : std_logic_vector(12 downto 0);
+  signal entry          : std_logic_vector(PROGRAM_BITS-1 downto 0);
   signal busy           : std_logic;
   signal build_valid    : std_logic;
   signal build_address  : std_logic_vector(6 downto 0);
@@ -174,7 +175,7 @@ begin
 
   u_builder : entity firm.firm_packet_builder
     generic map (
-      ADDRESS_BITS => 13
+      ADDRESS_BITS => PROGRAM_BITS
     )
     port map (
       clk             => clk,

@@ -62,7 +62,9 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path.write_text(SPECIFICATION, encoding="utf-8")
     node = node_in(path)
     files = memories(node, "net_node", folder, Sizes.of(node))
-    verilog = netlist("net_node", folder, [*files, CORES / "net_node.vhd"], HARDWARE, (), **generics(node, Sizes.of(node)))
+    verilog = netlist(
+        "net_node", folder, [*files, CORES / "net_node.vhd"], HARDWARE, (), **generics(node, Sizes.of(node))
+    )
     bench = (CORES / "net_node.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "net_node", bench, folder, [CORES])
 

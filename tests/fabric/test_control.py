@@ -21,7 +21,6 @@ from fusesoc_firm.fabric.node import Node
 from fusesoc_firm.system.derived.model import Quality
 from tests.fabric.test_participant import a_node
 
-
 SMALL = Sizes(sources=1, sinks=1)
 
 
