@@ -19,7 +19,7 @@ byte. An operation may be followed by the number of its bytes, as in `copy.4 a, 
 | `load R, b`; `store a, R` | a register P, E, W or X |
 | `step R, n` | R := R + 1; z if it is n |
 | `bit` | z unless number X is in the set of the record |
-| `jump L`, `jump COND, L` | z, nz, c, nc; tick, early, frame, and `no_` with each of these |
+| `jump L`, `jump COND, L` | z, nz, c, nc; tick, early, frame, work (one of these, or a submessage); `no_` with each |
 | `call L`, `return` | up to eight levels |
 | `take` | takes what has come of a submessage, with c if it is complete |
 """
@@ -41,7 +41,6 @@ PROGRAM = Path(__file__).with_name("ros2_node.seq")
 MOST_WORDS = 1024
 WORD_BITS = 36
 MOST_PEERS = 8
-MOST_SOURCES = MOST_SINKS = 32
 
 _OPERATIONS = "copy add sub cmp and test mask load store bit step jump call return take".split()
 _SIZES = {size: code for code, size in enumerate((1, 2, 4, 8, 12, 16, 6, 28))}
@@ -49,8 +48,9 @@ _REGISTERS = "PEWX"
 _SPACES = {"global": 0, "peer": 1, "entry": 2, "table": 3}
 _PREFIXES = {"peer": "P.", "entry": "E.", "table": "W.", "global": ""}
 _CONDITIONS = {"": 0, "z": 2, "nz": 3, "c": 4, "nc": 5}
-_CONDITIONS |= {name: 8 + 2 * number for number, name in enumerate(("tick", "early", "frame"))}
-_CONDITIONS |= {f"no_{name}": 9 + 2 * number for number, name in enumerate(("tick", "early", "frame"))}
+_EVENTS = ("tick", "early", "frame", "work")
+_CONDITIONS |= {name: 8 + 2 * number for number, name in enumerate(_EVENTS)}
+_CONDITIONS |= {f"no_{name}": 9 + 2 * number for number, name in enumerate(_EVENTS)}
 _NUMBER = 1 << 31
 _OUTSIDE = 256
 # What firm_rtps_control has outside the memory.
@@ -78,7 +78,6 @@ _PORTS = {
 }
 # Tables of the node's own writers with frames, of the writer of ros_discovery_info, and of the readers.
 _GRAPH, _FIRST_READER = 15, 16
-_FIRST_SINK = 32
 _TIMES = {
     "AFTER_FAREWELL": 200,
     "SOON": 100,
@@ -94,13 +93,14 @@ _TIMES = {
 }
 _FACTS = ("KNOWN", "RELIABLE", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
 _OTHERS = {
-    "WINDOW": 32,
+    # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, in fragments.
+    "WINDOW": 2,
+    "BEYOND_WINDOW": 3,
     "MOST_REQUESTED": 8,
     "FINAL": 3,
     "NOT_FINAL": 1,
     "FINAL_FLAG": 2,
     "GRAPH": _GRAPH,
-    "FIRST_SINK": _FIRST_SINK,
     "FIRST_READER": _FIRST_READER,
     **{kind.name: int(kind) for kind in Kind},
     **{name: 1 << number for number, name in enumerate(_FACTS)},
@@ -113,11 +113,16 @@ class ProgramError(Exception):
 
 @dataclass(frozen=True)
 class Sizes:
-    """The numbers of entries in the node's tables: peers, matched writers of peers, and matched readers."""
+    """The numbers of entries in the node's tables: matched writers of peers, matched readers of peers, and peers."""
 
+    sources: int
+    sinks: int
     peers: int = MOST_PEERS
-    sources: int = 8
-    sinks: int = 8
+
+    @classmethod
+    def of(cls, node: Node) -> Sizes:
+        """Return room for each topic of the node at each peer."""
+        return cls(max(1, MOST_PEERS * len(node.readers)), MOST_PEERS * len(node.writers))
 
 
 @dataclass(frozen=True)
@@ -151,14 +156,25 @@ def slots_of(node: Node) -> int:
     return max(2, 1 << (sum(ring.size for ring in rings_of(node)) - 1).bit_length())
 
 
-def words_of(node: Node, sizes: Sizes = Sizes()) -> list[int]:
+def generics_of(node: Node, sizes: Sizes) -> dict[str, int]:
+    """Return the generics of `firm_rtps_node` for which the program is made."""
+    return {
+        "WRITERS": len(node.writers),
+        "READERS": len(node.readers),
+        "SOURCES": sizes.sources,
+        "SINKS": sizes.sinks,
+        "SLOTS": slots_of(node),
+    }
+
+
+def words_of(node: Node, sizes: Sizes) -> list[int]:
     """Return the words of a node's program."""
     return _assembled(node, sizes)[0]
 
 
 def main_of(node: Node) -> int:
     """Return the address of the program's loop."""
-    return _assembled(node, Sizes())[1]["main"]
+    return _assembled(node, Sizes.of(node))[1]["main"]
 
 
 def _assembled(node: Node, sizes: Sizes) -> tuple[list[int], dict[str, int]]:
@@ -168,14 +184,15 @@ def _assembled(node: Node, sizes: Sizes) -> tuple[list[int], dict[str, int]]:
     return assembler.words(f"{text}\n{_tables(node)}"), assembler.labels
 
 
-def memory_of_control(node: Node, entity: str, sizes: Sizes = Sizes()) -> Rendering:
-    """Return the memory of a node's program, as an entity for `firm_rtps_node`."""
+def memory_of_control(node: Node, entity: str, sizes: Sizes) -> Rendering:
+    """Return the memory of a node's program, as an entity for `firm_rtps_node`; it has the generics of that one."""
     words = [f'"{word:0{WORD_BITS}b}"' for word in words_of(node, sizes)]
     return Rendering(
         "vhdl/control.vhd",
         {
             "entity": entity,
             "node": node.network.name,
+            "generics": [{"name": name, "value": value} for name, value in generics_of(node, sizes).items()],
             "word_count": len(words),
             "rows": [", ".join(words[at : at + 2]) for at in range(0, len(words), 2)],
         },
@@ -195,7 +212,8 @@ def _constants(node: Node, sizes: Sizes) -> dict[str, int]:
         **firsts,
         "PEERS": sizes.peers,
         "SOURCES": sizes.sources,
-        "END_SINKS": _FIRST_SINK + sizes.sinks,
+        "FIRST_SINK": sizes.sources,
+        "END_SINKS": sizes.sources + sizes.sinks,
         "WRITERS": len(node.writers),
         "READERS": len(node.readers),
         "FRAME_WRITERS": len(node.writers) - 1,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.fabric.control import MOST_PEERS, MOST_SINKS, MOST_SOURCES, Sizes, memory_of_control, slots_of
+from fusesoc_firm.fabric.control import Sizes, generics_of, memory_of_control, slots_of
 from fusesoc_firm.fabric.names import LONGEST_NAME, memory_of_names
 from fusesoc_firm.fabric.node import Node, node_of
 from fusesoc_firm.fabric.packets import memory_of, programs_of
@@ -31,7 +31,7 @@ def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibr
         return {}
     memories = {name: f"{system.entity}_{name}" for name in ("control", "packets", "names")}
     made = [
-        memory_of_control(node, memories["control"], _sizes(node)),
+        memory_of_control(node, memories["control"], Sizes.of(node)),
         memory_of(node, memories["packets"], frames_of(node.network)),
         memory_of_names(node.compared, memories["names"]),
         Rendering(_NODE_TEMPLATE, _configuration(system, node, {"entity": entity, **memories})),
@@ -62,12 +62,6 @@ def history_bytes(system: DerivedSystem, node: Node) -> int:
     return slots_of(node) * slot_bytes(system.publishers)
 
 
-def _sizes(node: Node) -> Sizes:
-    """Return the tables' sizes: room for each topic of each peer, as far as the hardware has it."""
-    sources, sinks = (MOST_PEERS * len(items) for items in (node.readers, node.writers))
-    return Sizes(MOST_PEERS, max(1, min(MOST_SOURCES, sources)), min(MOST_SINKS, sinks))
-
-
 def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:
     """Return the configuration of the node."""
     assert system.clock is not None
@@ -91,17 +85,14 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "dotted": str(network.address),
         "ports": ", ".join(f"{port} ({name})" for name, port in ports.items()),
         "udp_ports": "".join(f"{port:04x}" for port in reversed(ports.values())),
-        "reader_count": len(node.readers),
-        "writer_count": len(node.writers),
+        "generics": [{"name": name, "value": value} for name, value in generics_of(node, Sizes.of(node)).items()],
         "endpoint_count": len(node.compared),
         "name_bits": 8 * len(node.compared),
         "are_reliable": _bits(item.quality.is_reliable for item in node.compared),
         "are_transient": _bits(item.quality.is_transient_local for item in node.compared),
-        "source_count": _sizes(node).sources,
         "program_bits": programs.address_bits,
         "clock_hz": round(system.clock),
         "sample": slot_bytes(system.publishers),
-        "slot_count": slots_of(node),
         "report_packet": numbers[REPORT],
         "probe_packet": numbers[PROBE],
     }

@@ -10,6 +10,8 @@ entity net_node is
   generic (
     WRITERS   : integer := 4;
     READERS   : integer := 3;
+    SOURCES   : integer := 8;
+    SINKS     : integer := 16;
     SAMPLE    : integer := 256; -- see firm_rtps_node
     SLOTS     : integer := 256;
     RELIABLE  : integer := 0;   -- a bit for each endpoint
@@ -163,6 +165,13 @@ begin
     );
 
   u_control : entity work.net_node_control
+    generic map (
+      WRITERS => WRITERS,
+      READERS => READERS,
+      SOURCES => SOURCES,
+      SINKS   => SINKS,
+      SLOTS   => SLOTS
+    )
     port map (
       clk     => clk,
       enable  => control_enable,
@@ -174,7 +183,8 @@ begin
     generic map (
       WRITERS => WRITERS,
       READERS => READERS,
-      SOURCES => 8,
+      SOURCES => SOURCES,
+      SINKS   => SINKS,
       SAMPLE  => SAMPLE,
       SLOTS   => SLOTS,
       DEPTH   => 4096

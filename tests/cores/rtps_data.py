@@ -10,22 +10,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fusesoc_firm.fabric.control import main_of, slots_of, words_of
+from fusesoc_firm.fabric.control import main_of, words_of
 from fusesoc_firm.fabric.names import names
 from fusesoc_firm.fabric.packets import programs_of
-from tests.cores.announcements import Peers, a_node
+from tests.cores.announcements import ROOM, Peers, a_node
+from tests.fabric.memories import generics
 from tests.hdl.ghdl import CORES, Generic
 
 DATA = CORES / "net" / "tb" / "data"
 NODE = a_node()
 SEED, TURNS = 20261127, 15
 SIZES: dict[str, Generic] = {
-    "WRITERS": len(NODE.writers),
-    "READERS": len(NODE.readers),
-    "SOURCES": 8,
+    **generics(NODE, ROOM),
     "DEPTH": 4096,
     "SAMPLES": 16,
-    "SLOTS": slots_of(NODE),
 }
 
 
@@ -34,7 +32,7 @@ def write_memories(folder: Path, prefix: str = "") -> None:
     programs = programs_of(NODE)
     rows = {
         "names": [word.hex() for word in names(NODE.compared)],
-        "program": [f"{word:09x}" for word in words_of(NODE)],
+        "program": [f"{word:09x}" for word in words_of(NODE, ROOM)],
         "packets": [f"{word:03x}" for word in programs.words],
         "entries": list(map(str, programs.entries.values())),
     }

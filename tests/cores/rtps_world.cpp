@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Events from the standard input at a node, and its results on the standard output: see firm_rtps_node_tb. The
-// numbers of peers, sources and sinks, `entries`, and a line `done` follow the results of each event. The arguments are the address of the program's loop, and of 100 cycles those in which
-// the host takes nothing.
+// numbers of peers, sources and sinks, `entries`, the `cycles` until the node had nothing to do after milliseconds, and
+// a line `done` follow the results of each event. The arguments are the address of the program's loop, and of 100 cycles
+// those in which the host takes nothing.
 #include <cstdlib>
 #include <iostream>
 #include <random>
@@ -10,7 +11,7 @@
 #include "Vrtps_world.h"
 #include "bench.h"
 
-static const unsigned LOOP_CYCLES = 24, IDLE_LOOPS = 6;
+static const unsigned LOOP_CYCLES = 24, IDLE_LOOPS = 50;
 enum Kind { PACKET, ABORTED_PACKET, TICKS, FRAME, ABORTED_FRAME, RUSHED };
 
 class World {
@@ -23,13 +24,13 @@ class World {
     top_.tick = 1;
     step();
     top_.tick = 0;
+    cycles_ = 0;
     wait();
   }
   void rush(int count) {
     top_.tick = 1;
     while (count-- > 0) step();
     top_.tick = 0;
-    wait();
   }
   void packet(const std::vector<int>& bytes, bool is_aborted) {
     for (std::size_t place = 0; place < bytes.size(); ++place) {
@@ -66,16 +67,19 @@ class World {
   }
 
   void done() const {
-    std::printf("entries %d %d %d\ndone\n", top_.peer_count, top_.source_count, top_.sink_count);
+    std::printf("entries %d %d %d\n", top_.peer_count, top_.source_count, top_.sink_count);
+    std::printf("cycles %u\ndone\n", busy_);
   }
 
  private:
   void watch() {
     ++since_main_;
+    ++cycles_;
     if (top_.packet_tvalid || top_.tick || top_.sample_tvalid || top_.is_busy || top_.frame_tvalid) {
       idle_ = 0;
     } else if (top_.program_enable && top_.program_address == main_) {
       idle_ = since_main_ > LOOP_CYCLES ? 0 : idle_ + 1;
+      if (idle_ == 0) busy_ = cycles_;
       since_main_ = 0;
     }
     if (top_.frame_tvalid && top_.frame_tready) collect("frame", frame_, top_.frame_tdata, top_.frame_tlast);
@@ -94,7 +98,7 @@ class World {
 
   Vrtps_world top_;
   const unsigned main_, stall_;
-  unsigned since_main_ = 0, idle_ = 0;
+  unsigned since_main_ = 0, idle_ = 0, cycles_ = 0, busy_ = 0;
   std::string frame_, sent_;
   std::mt19937 random_{20261127};
 };

@@ -6,14 +6,17 @@ import shutil
 import subprocess
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.fabric.control import main_of
+from fusesoc_firm.fabric.control import Sizes, main_of
+from fusesoc_firm.fabric.node import Node
+from fusesoc_firm.fabric.packets import programs_of
 from tests.bench.model import compiled
-from tests.cores.announcements import Event, Kind, Results, a_node, sent
-from tests.fabric.memories import memories
+from tests.cores.announcements import ROOM, Event, Kind, Results, a_node, sent
+from tests.fabric.memories import generics, memories
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
 from tests.shared import made_once
@@ -22,17 +25,19 @@ HERE = Path(__file__).parent
 HARDWARE = ("axis/package", "axis/axis", "net/mac", "net/builder", "net/rtps")
 
 
-def program() -> Path:
+def program(node: Node, sizes: Sizes) -> Path:
     """The program, which is compiled once; without Verilator, the test is skipped."""
     if not shutil.which("verilator"):
         pytest.skip("verilator is not installed")
-    return made_once("rtps_world", _build) / "model" / "Vrtps_world"
+    name = f"rtps_world_{len(node.endpoints)}_{sizes.sources}_{sizes.sinks}"
+    return made_once(name, partial(_build, node, sizes)) / "model" / "Vrtps_world"
 
 
-def _build(folder: Path) -> Path:
+def _build(node: Node, sizes: Sizes, folder: Path) -> Path:
     """GHDL's netlist of the hardware, translated by Verilator."""
-    files = memories(a_node(), "rtps_world", folder)
-    verilog = netlist("rtps_world", folder, [*files, HERE / "rtps_world.vhd"], core_files(*HARDWARE))
+    files = [*memories(node, "rtps_world", folder, sizes), HERE / "rtps_world.vhd"]
+    given = {**generics(node, sizes), "PROGRAM_BITS": programs_of(node).address_bits}
+    verilog = netlist("rtps_world", folder, files, core_files(*HARDWARE), (), **given)
     bench = (HERE / "rtps_world.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "rtps_world", bench, folder, [HERE])
 
@@ -40,12 +45,13 @@ def _build(folder: Path) -> Path:
 class World:
     """A node that runs, of whose host's cycles so many of 100 take nothing."""
 
-    def __init__(self, stall: int = 0) -> None:
-        self._process = subprocess.Popen(
-            [program(), str(main_of(a_node())), str(stall)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
+    def __init__(self, stall: int = 0, node: Node | None = None, sizes: Sizes = ROOM) -> None:
+        own = node or a_node()
+        words = [program(own, sizes), str(main_of(own)), str(stall)]
+        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match
+        self.cycles = 0  # of the last event, until the node had nothing to do
 
     def __enter__(self) -> World:
         return self
@@ -62,14 +68,16 @@ class World:
         found = Results()
         while (row := self._process.stdout.readline()) != "done\n":
             assert row, "the node ended"
-            kind, *numbers = row.split()
-            content = bytes(map(int, numbers))
+            kind, *texts = row.split()
+            numbers = [int(text) for text in texts]
             if kind == "entries":
-                self.entries = list(map(int, numbers))
+                self.entries = numbers
+            elif kind == "cycles":
+                (self.cycles,) = numbers
             elif kind == "frame":
-                found.frames.append(content)
+                found.frames.append(bytes(numbers))
             elif kind == "sent":
-                found.sent.append(sent(content))
+                found.sent.append(sent(bytes(numbers)))
             else:
                 self.pulses[kind] += 1
         return found

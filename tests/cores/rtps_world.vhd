@@ -2,9 +2,20 @@
 -- A node with firm_packet_builder and its memories, for events from outside: see firm_rtps_node_tb.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 library firm;
 
 entity rtps_world is
+  generic (
+    WRITERS      : integer := 4; -- see firm_rtps_node
+    READERS      : integer := 3;
+    SOURCES      : integer := 8;
+    SINKS        : integer := 8;
+    SLOTS        : integer := 16;
+    RELIABLE     : integer := 0; -- a bit for each endpoint
+    TRANSIENT    : integer := 0;
+    PROGRAM_BITS : integer := 13 -- of an address in the memory of packets
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -48,24 +59,20 @@ end entity rtps_world;
 
 architecture rtl of rtps_world is
 
-  constant READERS : positive := 3;
-  constant WRITERS : positive := 4;
-  -- The third reader; the second and the third writer, and that of ros_discovery_info.
-  constant ARE_RELIABLE  : std_logic_vector(READERS+WRITERS-1 downto 0) := "1110100";
-  constant ARE_TRANSIENT : std_logic_vector(READERS+WRITERS-1 downto 0) := "1100010";
+  constant ENDPOINTS : positive := READERS+WRITERS;
 
   signal names_address   : std_logic_vector(9 downto 0);
-  signal names_data      : std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
+  signal names_data      : std_logic_vector(8*ENDPOINTS-1 downto 0);
   signal control_enable  : std_logic;
   signal control_address : std_logic_vector(9 downto 0);
   signal control_word    : std_logic_vector(35 downto 0);
   signal packets_enable  : std_logic;
-  signal packets_address : std_logic_vector(12 downto 0);
+  signal packets_address : std_logic_vector(PROGRAM_BITS-1 downto 0);
   signal packets_word    : std_logic_vector(10 downto 0);
 
   signal start          : std_logic;
   signal packet         : std_logic_vector(7 downto 0);
-  signal entry          : std_logic_vector(12 downto 0);
+  signal entry          : std_logic_vector(PROGRAM_BITS-1 downto 0);
   signal busy           : std_logic;
   signal build_valid    : std_logic;
   signal build_address  : std_logic_vector(6 downto 0);
@@ -85,6 +92,13 @@ begin
     );
 
   u_control : entity work.rtps_world_control
+    generic map (
+      WRITERS => WRITERS,
+      READERS => READERS,
+      SOURCES => SOURCES,
+      SINKS   => SINKS,
+      SLOTS   => SLOTS
+    )
     port map (
       clk     => clk,
       enable  => control_enable,
@@ -106,9 +120,10 @@ begin
     generic map (
       WRITERS => WRITERS,
       READERS => READERS,
-      SOURCES => 8,
+      SOURCES => SOURCES,
+      SINKS   => SINKS,
       SAMPLE  => 64,
-      SLOTS   => 16,
+      SLOTS   => SLOTS,
       DEPTH   => 4096,
       SAMPLES => 16
     )
@@ -117,8 +132,8 @@ begin
       rst_n               => rst_n,
       tick                => tick,
       prefix              => x"000002000000000200000000",
-      are_reliable        => ARE_RELIABLE,
-      are_transient       => ARE_TRANSIENT,
+      are_reliable        => std_logic_vector(to_unsigned(RELIABLE, ENDPOINTS)),
+      are_transient       => std_logic_vector(to_unsigned(TRANSIENT, ENDPOINTS)),
       program_enable      => control_enable,
       program_address     => control_address,
       program_word        => control_word,
@@ -160,7 +175,7 @@ begin
 
   u_builder : entity firm.firm_packet_builder
     generic map (
-      ADDRESS_BITS => 13
+      ADDRESS_BITS => PROGRAM_BITS
     )
     port map (
       clk             => clk,

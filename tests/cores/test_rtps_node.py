@@ -12,7 +12,6 @@ from fusesoc_firm.fabric.control import main_of
 from tests.cores.announcements import SURE, WRITTEN, Event, Kind, Peers, Results, a_node, expected, sent
 from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
-from tests.fabric.memories import bits
 from tests.fabric.messages import AckNack, parse
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
@@ -36,7 +35,7 @@ def _library(directory: Path, standard: str = "93") -> Library:
 def _results(library: Library, folder: Path, events: list[Event], **generics: Generic) -> Results:
     (folder / "events.txt").write_text("".join(event.row for event in events), encoding="ascii")
     write_memories(folder)
-    given = {**SIZES, **bits(NODE), "MAIN": main_of(NODE), **generics}
+    given = {**SIZES, "MAIN": main_of(NODE), **generics}
     result = library.run("firm_rtps_node_tb", given, directory=folder, seconds=600)
     assert result.exit_code == 0, result.output
     found = Results()
@@ -58,7 +57,7 @@ def test_the_data_of_the_core_are_those_of_the_program(tmp_path: Path) -> None:
         assert path.read_bytes() == (DATA / path.name).read_bytes(), path.name
     bench = (DATA.parent / "firm_rtps_node_tb.vhd").read_text(encoding="ascii")
     defaults = {name: int(value) for name, value in re.findall(r"^    (\w+) +: integer := (\d+)", bench, re.MULTILINE)}
-    wanted = {**SIZES, **bits(NODE), "MAIN": main_of(NODE)}
+    wanted = {**SIZES, "MAIN": main_of(NODE)}
     assert {name: defaults[name] for name in wanted} == wanted
 
 
@@ -103,7 +102,7 @@ def test_frames_that_come_with_the_first_cycle_are_kept(library: Library, tmp_pa
     _check(_results(library, tmp_path, events, SEED=seed), wanted)
 
 
-def test_milliseconds_that_the_program_cannot_take_at_once_are_counted(library: Library, tmp_path: Path) -> None:
+def test_milliseconds_that_the_program_cannot_take_at_once_are_taken_together(library: Library, tmp_path: Path) -> None:
     print(f"seed {SEED}")
     events = [
         part
@@ -178,10 +177,12 @@ def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("entity", "generic", "value", "legal"),
     [
-        ("firm_net_keys", "ENTRIES", 33, "1 to 32"),
+        ("firm_net_keys", "ENTRIES", 65, "1 to 64"),
         ("firm_net_keys", "KEY_BYTES", 17, "2 to 16"),
         ("firm_net_keys", "TAIL", 16, "1 to 15"),
         ("firm_rtps_control", "ENDPOINTS", 25, "1 to 24"),
+        ("firm_rtps_control", "SOURCES", 65, "1 to 64"),
+        ("firm_rtps_control", "SINKS", 129, "1 to 128"),
         ("firm_rtps_endpoint", "READERS", 9, "0 to 8"),
         ("firm_rtps_endpoint", "WRITERS", 10, "1 to 9"),
         ("firm_rtps_history", "WRITERS", 9, "1 to 8"),
@@ -191,6 +192,7 @@ def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
         ("firm_rtps_readers", "FIRST", 256, "0 to 256-READERS"),
         ("firm_rtps_readers", "BYTES", 1000, "powers of two, 4 to 65536"),
         ("firm_rtps_readers", "SAMPLES", 3, "powers of two, 2 or more"),
+        ("firm_rtps_sequencer", "ENTRIES", 193, "1 to 192"),
     ],
 )
 def test_bad_generics_are_refused(library: Library, entity: str, generic: str, value: int, legal: str) -> None:

@@ -3,7 +3,9 @@
 All tables have a fixed size, and time is an input, in milliseconds. A sample is never kept for another one: a reliable
 reader takes its samples in order, and asks for what it lacks. Of the samples that one request asks for, only the last
 carries a heartbeat, and a request is repeated only after a while. Otherwise each sample would cause a further request
-for many samples, and a network that loses packets would be flooded.
+for many samples, and a network that loses packets would be flooded. A peer may answer a request in one datagram, which
+needs fragments if the answer is long. Thus few announcements are asked for at once, and what was asked for and has not
+come is asked for alone.
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ DISCOVERY_REQUEST, DISCOVERY_HEARTBEAT = 200, 500
 # A writer that has written nothing may not answer.
 USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
 REASSEMBLY = 1000
-WINDOW = 32
+WINDOW = 2
 MOST_REQUESTED = 8
 FRAGMENT_BYTES = 1344
 XCDR1 = 0
@@ -67,11 +69,15 @@ class Limits:
 
 @dataclass
 class Window:
-    """The numbers that have come from a writer of discovery: all below `expected`. Later ones are not kept."""
+    """The numbers that have come from a writer of discovery: all below `expected`. Later ones are not kept.
+
+    `asked` is the number after those that were asked for, of which the hardware has the lowest byte.
+    """
 
     expected: int = 1
     last: int = 0
     is_heard: bool = False
+    asked: int = 0
 
     def take(self, number: int) -> bool:
         """Note a number; whether it is the next one."""
@@ -85,9 +91,21 @@ class Window:
         self.expected = max(self.expected, first)
 
     @property
-    def missing(self) -> Numbers:
+    def is_behind(self) -> bool:
+        """Whether numbers are missing."""
+        return self.last >= self.expected
+
+    @property
+    def has_answer(self) -> bool:
+        """Whether all that was asked for has come."""
+        return self.asked == self.expected % 256
+
+    def ask(self) -> Numbers:
         """The numbers to ask for."""
-        return Numbers.of(range(self.expected, min(self.last + 1, self.expected + WINDOW)), self.expected)
+        most = 1 if 1 <= (self.asked - self.expected) % 256 <= WINDOW else WINDOW
+        end = max(self.expected, min(self.last + 1, self.expected + most))
+        self.asked = end % 256
+        return Numbers.of(range(self.expected, end), self.expected)
 
 
 @dataclass
@@ -258,11 +276,11 @@ class Participant:
                 self._send_sample(sink, history.number)
 
     def tick(self, now: int) -> None:
-        """Do what is due."""
+        """Do what is due; there may be several milliseconds since the last time."""
         self._now = now
         if now >= self._next_announcement:
             self._announcements += 1
-            self._next_announcement = now + (SOON if self._announcements < FIRST_ANNOUNCEMENTS else LATER)
+            self._next_announcement += SOON if self._announcements < FIRST_ANNOUNCEMENTS else LATER
             self._announce(self._group)
         passed = (now - self._started) // 1000 - self._seconds
         self._seconds += passed
@@ -273,11 +291,11 @@ class Participant:
                 self._forget(peer)
             else:
                 self._tick_peer(peer)
+        for source in self.sources:
+            self._tick_source(source)
         for sink in self.sinks:
             if sink.is_reliable and sink.is_behind and now >= sink.next_heartbeat:
                 self._send_heartbeat(sink)
-        for source in self.sources:
-            self._tick_source(source)
 
     def _tick_peer(self, peer: Peer) -> None:
         if self._now >= peer.next_request:
@@ -285,7 +303,7 @@ class Participant:
             if not any(window.is_heard for window in peer.windows.values()):
                 self._announce(peer.metatraffic)
             for writer, window in peer.windows.items():
-                if not window.is_heard or window.missing.size:
+                if not window.is_heard or window.is_behind:
                     self._request_discovery(peer, writer)
         if self._now >= peer.next_heartbeat:
             peer.next_heartbeat = self._now + DISCOVERY_HEARTBEAT
@@ -320,7 +338,7 @@ class Participant:
 
     def _request_discovery(self, peer: Peer, writer: bytes) -> None:
         window = peer.windows[writer]
-        request = AckNack(DISCOVERY[writer], writer, window.missing, self._next_count(), is_final=window.is_heard)
+        request = AckNack(DISCOVERY[writer], writer, window.ask(), self._next_count(), is_final=window.is_heard)
         self._send_to(peer, peer.metatraffic, request)
 
     def _heartbeat(self, sink: Sink) -> Heartbeat:
@@ -344,6 +362,7 @@ class Participant:
 
     def _request(self, source: Source) -> None:
         """Ask for what is missing, or for a heartbeat if the writer has not told what it has."""
+        most = 1 if source.requested == source.expected else MOST_REQUESTED
         source.requested = source.expected
         source.next_request = self._now + (USER_REQUEST if source.is_heard else UNHEARD_REQUEST)
         ends = source.endpoint.entity, source.entity
@@ -356,7 +375,7 @@ class Participant:
                 NackFrag(*ends, source.reassembly.number, missing, self._next_count()),
             )
             return
-        wanted = range(source.expected, min(source.last + 1, source.expected + MOST_REQUESTED))
+        wanted = range(source.expected, min(source.last + 1, source.expected + most))
         numbers = Numbers.of(wanted, source.expected) if source.is_heard else Numbers(source.expected)
         request = AckNack(*ends, numbers, self._next_count(), is_final=source.is_heard)
         self._send_to(source.peer, source.address, request)
@@ -428,7 +447,7 @@ class Participant:
         window.is_heard = True
         window.begin(item.first)
         window.last = max(window.last, item.last)
-        if not item.is_final or window.missing.size:
+        if not item.is_final or window.is_behind:
             self._request_discovery(peer, item.writer)
 
     def _discovery_gap(self, peer: Peer, item: Gap) -> None:
@@ -453,8 +472,11 @@ class Participant:
     # --- matching --------------------------------------------------------------------------------------------------
 
     def _endpoint(self, peer: Peer, item: Data) -> None:
-        if not peer.windows[item.writer].take(item.number):
+        window = peer.windows[item.writer]
+        if not window.take(item.number):
             return
+        if window.has_answer and window.is_behind:
+            self._request_discovery(peer, item.writer)
         facts = ParameterList.of(item.payload or b"")
         guid = next(iter(facts.all(Parameter.ENDPOINT_GUID)), item.key) or b""
         if guid[:12] != peer.prefix or len(guid) != 16:
@@ -579,6 +601,8 @@ class Participant:
 
     def _told(self, source: Source, item: Heartbeat) -> None:
         if source.is_reliable and 1 <= item.first <= item.last + 1:
+            # What was asked for before the first heartbeat was this heartbeat.
+            source.requested = source.requested if source.is_heard else 0
             source.is_heard = True
             source.advance(item.first)
             source.last = max(source.last, item.last)

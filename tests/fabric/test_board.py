@@ -14,10 +14,11 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.control import Sizes
 from tests.bench.model import compiled
 from tests.fabric.echo_node import node_in
 from tests.fabric.hosts import Host, switched
-from tests.fabric.memories import bits, memories
+from tests.fabric.memories import generics, memories
 from tests.fabric.test_peers import HERE, Peer, Process, _why_not
 from tests.hdl.ghdl import REPOSITORY, core_files
 from tests.hdl.verilog import netlist
@@ -60,8 +61,10 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = folder / "node.yaml"
     path.write_text(SPECIFICATION, encoding="utf-8")
     node = node_in(path)
-    files = memories(node, "net_node", folder)
-    verilog = netlist("net_node", folder, [*files, CORES / "net_node.vhd"], HARDWARE, (), **bits(node))
+    files = memories(node, "net_node", folder, Sizes.of(node))
+    verilog = netlist(
+        "net_node", folder, [*files, CORES / "net_node.vhd"], HARDWARE, (), **generics(node, Sizes.of(node))
+    )
     bench = (CORES / "net_node.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "net_node", bench, folder, [CORES])
 

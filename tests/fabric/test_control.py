@@ -7,10 +7,21 @@ from dataclasses import replace
 import pytest
 
 from fusesoc_firm.fabric import control
-from fusesoc_firm.fabric.control import MOST_WORDS, WORD_BITS, ProgramError, Sizes, rings_of, slots_of, words_of
+from fusesoc_firm.fabric.control import (
+    MOST_PEERS,
+    MOST_WORDS,
+    WORD_BITS,
+    ProgramError,
+    Sizes,
+    rings_of,
+    slots_of,
+    words_of,
+)
 from fusesoc_firm.fabric.node import Node
 from fusesoc_firm.system.derived.model import Quality
 from tests.fabric.test_participant import a_node
+
+SMALL = Sizes(sources=1, sinks=1)
 
 
 def node(*qualities: Quality) -> Node:
@@ -30,15 +41,22 @@ def words(text: str, monkeypatch: pytest.MonkeyPatch) -> list[int]:
             return tables + text
 
     monkeypatch.setattr(control, "PROGRAM", Program)
-    return words_of(replace(node(), endpoints=node().endpoints[:1]))
+    return words_of(replace(node(), endpoints=node().endpoints[:1]), SMALL)
 
 
 def test_the_program_of_the_largest_node_fits() -> None:
     quality = Quality(depth=15)
     largest = a_node(1, {f"o{n}": quality for n in range(8)}, {f"i{n}": quality for n in range(8)})
-    made = words_of(largest, Sizes(peers=8, sources=32, sinks=32))
+    made = words_of(largest, Sizes.of(largest))
     assert len(made) <= MOST_WORDS
     assert all(0 <= word < 1 << WORD_BITS for word in made)
+
+
+def test_there_is_room_for_each_topic_of_each_peer() -> None:
+    """The writer of ros_discovery_info has readers, too."""
+    assert Sizes.of(node(Quality())) == Sizes(sources=MOST_PEERS, sinks=2 * MOST_PEERS)
+    # The hardware has at least one entry for the writers of peers.
+    assert Sizes.of(a_node(1, {}, {})) == Sizes(sources=1, sinks=MOST_PEERS)
 
 
 @pytest.mark.parametrize(
@@ -55,6 +73,7 @@ def test_the_program_of_the_largest_node_fits() -> None:
         ("jump here", 0b1011_0_000 << 28),
         ("jump nc, here", 0b1011_0_000 << 28 | 0b0101 << 14),
         ("jump no_frame, here", 0b1011_0_000 << 28 | 0b1101 << 14),
+        ("jump work, here", 0b1011_0_000 << 28 | 0b1110 << 14),
         ("call here", 0b1100_0_000 << 28),
         ("return ; a comment", 0b1101_0_000 << 28),
     ],
@@ -95,4 +114,4 @@ def test_the_rings_of_writers_do_not_overlap_and_begin_at_multiples_of_their_siz
 )
 def test_a_history_that_is_too_large_is_refused(qualities: tuple[Quality, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        words_of(node(*qualities))
+        words_of(node(*qualities), SMALL)

@@ -13,10 +13,11 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.control import Sizes
 from fusesoc_firm.fabric.node import Endpoint
 from tests.bench.model import compiled
 from tests.fabric.echo_node import node_in
-from tests.fabric.memories import bits, memories
+from tests.fabric.memories import generics, memories
 from tests.fabric.messages import Address
 from tests.fabric.participant import Participant
 from tests.fabric.test_board import CORES, HARDWARE, sample
@@ -55,8 +56,8 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     host = subprocess.check_output([sys.executable, str(HERE / "liteeth_host.py")], text=True, cwd=folder)
     (folder / "board.yaml").write_text(BOARD_SPECIFICATION, encoding="utf-8")
     node = node_in(folder / "board.yaml")
-    files = [*memories(node, "net_node", folder), CORES / "net_node.vhd"]
-    verilog = netlist("net_node", folder, files, HARDWARE, (), **bits(node))
+    files = [*memories(node, "net_node", folder, Sizes.of(node)), CORES / "net_node.vhd"]
+    verilog = netlist("net_node", folder, files, HARDWARE, (), **generics(node, Sizes.of(node)))
     parts = verilog.read_text(encoding="utf-8"), host, (HERE / "liteeth_bench.v").read_text(encoding="ascii")
     bench = (HERE / "liteeth_bench.cpp").read_text(encoding="ascii")
     return compiled("\n".join(parts), "liteeth_bench", bench, folder)

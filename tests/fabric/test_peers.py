@@ -114,6 +114,19 @@ class Peer(Process):
         """The next samples that come."""
         return [(topic, values) for topic, values in (self.line() for _ in range(count))]
 
+    def next_sample(self, seconds: float) -> Sample | None:
+        """The next sample, if one comes within a time."""
+        try:
+            topic, values = json.loads(self._lines.get(timeout=seconds))
+        except Empty:
+            return None
+        return topic, values
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether it has said nothing that was not read."""
+        return self._lines.empty()
+
 
 class Place:
     """Three hosts at a switch: the board, one with rclpy and one with Cyclone DDS."""

@@ -9,7 +9,7 @@ use ieee.numeric_std.all;
 
 entity firm_net_keys is
   generic (
-    ENTRIES   : integer := 8;  -- 1 to 32
+    ENTRIES   : integer := 8;  -- 1 to 64
     KEY_BYTES : integer := 16; -- 2 to 16
     TAIL      : integer := 12  -- the place of the tail, 1 to KEY_BYTES-1
   );
@@ -33,7 +33,7 @@ end entity firm_net_keys;
 
 architecture rtl of firm_net_keys is
 
-  constant MOST_ENTRIES : positive := 32;
+  constant MOST_ENTRIES : positive := 64;
   constant MOST_BYTES   : positive := 16;
 
   subtype mask_t is std_logic_vector(ENTRIES-1 downto 0);

@@ -16,6 +16,7 @@ entity firm_net_link is
     WRITERS      : integer := 2;   -- see firm_rtps_node
     READERS      : integer := 1;
     SOURCES      : integer := 8;
+    SINKS        : integer := 16;
     SAMPLE       : integer := 64;
     SLOTS        : integer := 16;
     PROGRAM_BITS : integer := 12;  -- of an address in the memory of packets
@@ -289,6 +290,7 @@ begin
       WRITERS => WRITERS,
       READERS => READERS,
       SOURCES => SOURCES,
+      SINKS   => SINKS,
       SAMPLE  => SAMPLE,
       SLOTS   => SLOTS,
       DEPTH   => DEPTH

@@ -10,7 +10,9 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_control is
   generic (
-    ENDPOINTS : integer := 2 -- of the node, 1 to 24
+    ENDPOINTS : integer := 2; -- of the node, 1 to 24
+    SOURCES   : integer := 8; -- matched writers of peers, 1 to 64
+    SINKS     : integer := 16 -- matched readers of peers, 1 to 128
   );
   port (
     clk   : in std_logic;
@@ -42,7 +44,7 @@ entity firm_rtps_control is
     entity_id       : in  std_logic_vector(31 downto 0);
 
     -- Of firm_rtps_readers.
-    source       : out std_logic_vector(4 downto 0);
+    source       : out std_logic_vector(5 downto 0);
     key_write    : out std_logic;
     note_write   : out std_logic;
     number_write : out std_logic;
@@ -53,7 +55,7 @@ entity firm_rtps_control is
     is_locked    : out std_logic;
     is_judging   : in  std_logic;
     has_early    : in  std_logic;
-    early_source : in  std_logic_vector(4 downto 0);
+    early_source : in  std_logic_vector(5 downto 0);
     early_number : in  std_logic_vector(31 downto 0);
     takes_early  : out std_logic;
 
@@ -88,8 +90,10 @@ architecture rtl of firm_rtps_control is
 
   constant MOST_ENDPOINTS : positive := 24;
   -- The program is held while a packet leaves: more milliseconds than these are lost.
-  constant TICK_BITS      : positive := 4;
+  constant TICK_BITS      : positive := 8;
   constant MOST_TICKS     : positive := 2**TICK_BITS-1;
+  constant MOST_SOURCES   : positive := 64;
+  constant MOST_SINKS     : positive := 128;
 
   -- Addresses outside the memory. Fields of the builder are at 0 to 127.
   subtype address_t is std_logic_vector(7 downto 0);
@@ -113,7 +117,7 @@ architecture rtl of firm_rtps_control is
   constant WORD_OF_EARLY  : std_logic_vector(1 downto 0) := "10";
 
   signal conditions    : std_logic_vector(3 downto 0);
-  signal index         : std_logic_vector(5 downto 0);
+  signal index         : std_logic_vector(7 downto 0);
   signal coming        : std_logic;
   signal next_address  : std_logic_vector(7 downto 0);
   signal write_address : std_logic_vector(7 downto 0);
@@ -144,6 +148,7 @@ architecture rtl of firm_rtps_control is
 
   signal ticks_r   : unsigned(TICK_BITS-1 downto 0);  -- that the program has not taken
   signal has_tick  : std_logic;
+  signal work_r    : std_logic;                        -- there was something for the program
   signal ends_tick : std_logic;
   signal locked_r  : std_logic;
   signal payload_r : std_logic;
@@ -172,10 +177,19 @@ begin
     report "firm_rtps_control: ENDPOINTS is " & integer'image(ENDPOINTS) & "; legal: 1 to "
            & integer'image(MOST_ENDPOINTS)
     severity failure;
+  assert SOURCES >= 1 and SOURCES <= MOST_SOURCES
+    report "firm_rtps_control: SOURCES is " & integer'image(SOURCES) & "; legal: 1 to " & integer'image(MOST_SOURCES)
+    severity failure;
+  assert SINKS >= 1 and SINKS <= MOST_SINKS
+    report "firm_rtps_control: SINKS is " & integer'image(SINKS) & "; legal: 1 to " & integer'image(MOST_SINKS)
+    severity failure;
 
-  conditions <= '0' & has_sample & has_early & has_tick;
+  conditions <= work_r & has_sample & has_early & has_tick;
 
   u_sequencer : entity firm.firm_rtps_sequencer
+    generic map (
+      ENTRIES => SOURCES+SINKS
+    )
     port map (
       clk                => clk,
       rst_n              => rst_n,
@@ -263,6 +277,7 @@ begin
   note : process (clk)
   begin
     if rising_edge(clk) then
+      work_r <= has_word or has_sample or has_early or has_tick;
       if at_writer_r = '1' then
         writer_r <= data(2 downto 0);
       end if;
@@ -306,7 +321,7 @@ begin
     end if;
   end process note;
 
-  source       <= index(4 downto 0);
+  source       <= index(5 downto 0);
   key_write    <= at_key_r;
   number_write <= at_number_r;
   note_write   <= at_note_r;
@@ -359,7 +374,7 @@ begin
     elsif read_address(3 downto 2) = WORD_OF_EARLY then
       word <= early_number;
     else
-      word <= x"00" & "0000000" & is_large & "00000" & writer & "000" & early_source;
+      word <= x"00" & "0000000" & is_large & "00000" & writer & "00" & early_source;
     end if;
   end process choose_word;
 

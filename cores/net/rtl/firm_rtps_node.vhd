@@ -11,7 +11,8 @@ entity firm_rtps_node is
   generic (
     WRITERS : integer := 2;    -- of the node, the one of ros_discovery_info included, 1 to 9
     READERS : integer := 1;    -- 0 to 8
-    SOURCES : integer := 8;    -- matched writers of peers, 1 to 32
+    SOURCES : integer := 8;    -- matched writers of peers, 1 to 64
+    SINKS   : integer := 16;   -- matched readers of peers, 1 to 128
     SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 1024
     SLOTS   : integer := 16;   -- for the last samples of all writers, a power of two, 2 to 256
     DEPTH   : integer := 2048; -- bytes of waiting discovery, and of waiting payloads; a power of two, 4 to 65536
@@ -133,7 +134,7 @@ architecture rtl of firm_rtps_node is
   signal has_unicast     : std_logic;
   signal has_lease       : std_logic;
 
-  signal source       : std_logic_vector(4 downto 0);
+  signal source       : std_logic_vector(5 downto 0);
   signal key_write    : std_logic;
   signal note_write   : std_logic;
   signal number_write : std_logic;
@@ -144,7 +145,7 @@ architecture rtl of firm_rtps_node is
   signal is_locked    : std_logic;
   signal is_judging   : std_logic;
   signal has_early    : std_logic;
-  signal early_source : std_logic_vector(4 downto 0);
+  signal early_source : std_logic_vector(5 downto 0);
   signal early_number : std_logic_vector(31 downto 0);
   signal takes_early  : std_logic;
 
@@ -364,7 +365,9 @@ begin
 
   u_control : entity firm.firm_rtps_control
     generic map (
-      ENDPOINTS => ENDPOINTS
+      ENDPOINTS => ENDPOINTS,
+      SOURCES   => SOURCES,
+      SINKS     => SINKS
     )
     port map (
       clk                 => clk,

@@ -17,7 +17,7 @@ entity firm_rtps_readers is
   generic (
     READERS : integer := 1;    -- of the node, 0 to 8
     FIRST   : integer := 2;    -- the number in the entity id of the first one; those of the others follow
-    SOURCES : integer := 8;    -- matched writers, 1 to 32
+    SOURCES : integer := 8;    -- matched writers, 1 to 64
     BYTES   : integer := 2048; -- of payloads that wait, a power of two, 4 to 65536
     SAMPLES : integer := 16    -- that wait, a power of two, 2 or more
   );
@@ -44,7 +44,7 @@ entity firm_rtps_readers is
     -- What the program notes about the writer with number `source`: a byte of its GUID; whether there is one (bit 7),
     -- its reader's reliability (bit 6) and number (bits 2 to 0); a byte of its next sample's number, the lowest
     -- first.
-    source       : in  std_logic_vector(4 downto 0);
+    source       : in  std_logic_vector(5 downto 0);
     key_write    : in  std_logic;
     note_write   : in  std_logic;
     number_write : in  std_logic;
@@ -59,7 +59,7 @@ entity firm_rtps_readers is
 
     -- A sample that a reliable reader cannot take yet.
     has_early    : out std_logic;
-    early_source : out std_logic_vector(4 downto 0);
+    early_source : out std_logic_vector(5 downto 0);
     early_number : out std_logic_vector(31 downto 0);
     takes_early  : in  std_logic;
 
@@ -522,7 +522,7 @@ begin
   early_from   <= unsigned(early_entry_r(SOURCE_BITS+MARK_BITS+31 downto MARK_BITS+32));
   same_early   <= '1' when unsigned(early_entry_r(MARK_BITS+31 downto 32)) = marks(to_integer(early_from)) else '0';
   has_early    <= has_early_r;
-  early_source <= std_logic_vector(resize(early_from, 5));
+  early_source <= std_logic_vector(resize(early_from, 6));
   early_number <= early_entry_r(31 downto 0);
 
   note_early : process (clk)

@@ -13,6 +13,9 @@ library firm;
 use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_sequencer is
+  generic (
+    ENTRIES : integer := 64 -- that register E selects, 1 to 192
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -33,7 +36,7 @@ entity firm_rtps_sequencer is
     -- Addresses 256 to 511 of the memory are outside. A read's data follow its address at once. While `hold` is high,
     -- everything waits.
     -- What is written is known one cycle before.
-    port_index         : out std_logic_vector(5 downto 0);  -- register E
+    port_index         : out std_logic_vector(7 downto 0);  -- register E
     port_next          : out std_logic;
     port_next_address  : out std_logic_vector(7 downto 0);
     port_write_address : out std_logic_vector(7 downto 0);
@@ -48,7 +51,18 @@ end entity firm_rtps_sequencer;
 
 architecture rtl of firm_rtps_sequencer is
 
-  constant ADDRESS_BITS : positive := 12;
+  -- The memory has 2048 bytes below the entries, and is a power of two.
+  function bits_of(entries : integer) return positive is
+  begin
+    if entries > 64 then
+      return 13;
+    end if;
+    return 12;
+  end function bits_of;
+
+  constant MOST_ENTRIES : positive := 192;
+  constant MEMORY_BITS  : positive := bits_of(ENTRIES);
+  constant ADDRESS_BITS : positive := 13;
   constant STACK_BITS   : positive := 3;
 
   -- The lowest bit is that of a number as the source.
@@ -75,7 +89,7 @@ architecture rtl of firm_rtps_sequencer is
   subtype byte_t is std_logic_vector(7 downto 0);
   subtype address_t is unsigned(ADDRESS_BITS-1 downto 0);
   subtype program_t is unsigned(9 downto 0);
-  type memory_t is array (natural range 0 to 2**ADDRESS_BITS-1) of byte_t;
+  type memory_t is array (natural range 0 to 2**MEMORY_BITS-1) of byte_t;
   type stack_t is array (natural range 0 to 2**STACK_BITS-1) of program_t;
 
   signal memory : memory_t := (others => (others => '0'));
@@ -100,7 +114,7 @@ architecture rtl of firm_rtps_sequencer is
 
   -- Registers. The entries of P have 64 bytes, those of E 32 and those of W 16.
   signal peer_r  : unsigned(2 downto 0) := (others => '0');
-  signal entry_r : unsigned(5 downto 0) := (others => '0');
+  signal entry_r : unsigned(7 downto 0) := (others => '0');
   signal table_r : unsigned(5 downto 0) := (others => '0');
   signal index_r : unsigned(7 downto 0) := (others => '0');
 
@@ -148,16 +162,17 @@ architecture rtl of firm_rtps_sequencer is
   signal write_data  : byte_t;
 
   function address_of(operand : std_logic_vector(13 downto 0); peer : unsigned(2 downto 0);
-    entry : unsigned(5 downto 0); table : unsigned(5 downto 0)) return address_t is
-    variable place : address_t := unsigned(operand(11 downto 0));
+    entry : unsigned(7 downto 0); table : unsigned(5 downto 0)) return address_t is
+    variable place : address_t := resize(unsigned(operand(11 downto 0)), ADDRESS_BITS);
   begin
     if operand(13 downto 12) = IN_PEER then
-      place := "010" & peer & place(5 downto 0);
+      place := "0010" & peer & place(5 downto 0);
     elsif operand(13 downto 12) = IN_ENTRY then
-      place := '1' & entry & place(4 downto 0);
+      -- From 2048 on, 64 entries later.
+      place := (entry(7 downto 6) + 1) & entry(5 downto 0) & place(4 downto 0);
     elsif operand(13 downto 12) = IN_TABLE then
       -- From 512 on, so that tables 32 to 63 are in the entries of peers.
-      place := '0' & (table(5)) & (not table(5)) & table(4 downto 0) & place(3 downto 0);
+      place := "00" & (table(5)) & (not table(5)) & table(4 downto 0) & place(3 downto 0);
     end if;
     return place;
   end function address_of;
@@ -178,6 +193,11 @@ architecture rtl of firm_rtps_sequencer is
   end function set_byte;
 
 begin
+
+  assert ENTRIES >= 1 and ENTRIES <= MOST_ENTRIES
+    report "firm_rtps_sequencer: ENTRIES is " & integer'image(ENTRIES) & "; legal: 1 to "
+           & integer'image(MOST_ENTRIES)
+    severity failure;
 
   kind      <= word_r(35 downto 32);
   is_number <= word_r(31);
@@ -204,7 +224,7 @@ begin
   end process choose_size;
 
   stepped <= resize(peer_r, 8) + 1 when chosen = 0 else
-             resize(entry_r, 8) + 1 when chosen = 1 else
+             entry_r + 1 when chosen = 1 else
              resize(table_r, 8) + 1 when chosen = 2 else
              index_r + 1;
 
@@ -286,7 +306,7 @@ begin
             if chosen = 0 then
               peer_r <= stepped(2 downto 0);
             elsif chosen = 1 then
-              entry_r <= stepped(5 downto 0);
+              entry_r <= stepped;
             elsif chosen = 2 then
               table_r <= stepped(5 downto 0);
             else
@@ -312,7 +332,7 @@ begin
             if chosen = 0 then
               peer_r <= unsigned(result_r(2 downto 0));
             elsif chosen = 1 then
-              entry_r <= unsigned(result_r(5 downto 0));
+              entry_r <= unsigned(result_r);
             elsif chosen = 2 then
               table_r <= unsigned(result_r(5 downto 0));
             else
@@ -349,17 +369,17 @@ begin
   begin
     if rising_edge(clk) then
       if hold = '0' then
-        memory_r  <= memory(to_integer(read_place));
+        memory_r  <= memory(to_integer(read_place(MEMORY_BITS-1 downto 0)));
         port_r    <= std_logic_vector(read_place(7 downto 0));
         outside_r <= '0';
-        if read_place(11 downto 8) = 1 then
+        if read_place(ADDRESS_BITS-1 downto 8) = 1 then
           outside_r <= '1';
         end if;
         if state_r = DECODE then
           place_r <= (others => '0');
           to_r    <= address_of(word_r(27 downto 14), peer_r, entry_r, table_r);
           if kind = OP_BIT then
-            to_r <= to_unsigned(RECORD_SET/32, 7) & index_r(7 downto 3);
+            to_r <= to_unsigned(RECORD_SET/32, 8) & index_r(7 downto 3);
           end if;
           from_r  <= address_of(word_r(13 downto 0), peer_r, entry_r, table_r);
         elsif state_r = SOURCE then
@@ -405,7 +425,7 @@ begin
         if word_r(1 downto 0) = "00" then
           constant_r(2 downto 0) <= std_logic_vector(peer_r);
         elsif word_r(1 downto 0) = "01" then
-          constant_r(5 downto 0) <= std_logic_vector(entry_r);
+          constant_r <= std_logic_vector(entry_r);
         elsif word_r(1 downto 0) = "10" then
           constant_r(5 downto 0) <= std_logic_vector(table_r);
         else
@@ -445,7 +465,7 @@ begin
 
   has_result <= '0' when kind = OP_CMP or kind = OP_TEST or kind = OP_BIT or kind = OP_LOAD else computes_r;
 
-  port_next         <= has_result when at_r(11 downto 8) = 1 else '0';
+  port_next         <= has_result when at_r(ADDRESS_BITS-1 downto 8) = 1 else '0';
   port_next_address <= std_logic_vector(at_r(7 downto 0));
 
   compute_byte : process (clk)
@@ -477,14 +497,14 @@ begin
   port_index         <= std_logic_vector(entry_r);
 
   -- What TAKE has moved is written before a byte of the next instruction can be.
-  write_place <= "0000" & unsigned(record_address) when record_valid = '1' else place_2_r;
+  write_place <= "00000" & unsigned(record_address) when record_valid = '1' else place_2_r;
   write_data  <= record_data when record_valid = '1' else result_r;
 
   write_bytes : process (clk)
   begin
     if rising_edge(clk) then
       if record_valid = '1' or writes_r = '1' then
-        memory(to_integer(write_place)) <= write_data;
+        memory(to_integer(write_place(MEMORY_BITS-1 downto 0))) <= write_data;
       end if;
     end if;
   end process write_bytes;

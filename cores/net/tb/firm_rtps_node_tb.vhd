@@ -27,10 +27,11 @@ entity firm_rtps_node_tb is
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;              -- the chance, each cycle, that the host takes nothing
-    MAIN          : integer := 29;             -- the address of the program's loop
+    MAIN          : integer := 30;             -- the address of the program's loop
     WRITERS       : integer := 4;
     READERS       : integer := 3;
     SOURCES       : integer := 8;
+    SINKS         : integer := 8;
     DEPTH         : integer := 4096;
     SAMPLES       : integer := 16;
     SAMPLE        : integer := 64;
@@ -45,7 +46,7 @@ architecture simulation of firm_rtps_node_tb is
   constant ENDPOINTS : positive := READERS+WRITERS;
   -- The loop of the program takes fewer cycles if there is nothing to do, and a packet passes the node in fewer ones.
   constant LOOP_CYCLES : positive := 24;
-  constant LOOPS       : positive := 6;
+  constant LOOPS       : positive := 50;
   constant LAST_CYCLES : positive := 200;
 
   constant ABORTED_PACKET : natural := 1;
@@ -144,6 +145,7 @@ begin
       WRITERS => WRITERS,
       READERS => READERS,
       SOURCES => SOURCES,
+      SINKS   => SINKS,
       DEPTH   => DEPTH,
       SAMPLES => SAMPLES,
       SAMPLE  => SAMPLE,

@@ -10,7 +10,7 @@ from fusesoc_firm.system.derived.model import Converter, DerivedSystem, NetworkK
 from fusesoc_firm.system.written.specification import Block, Project, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
-MOST_SUBSCRIBERS = MOST_PUBLISHERS = 1
+MOST_SUBSCRIBERS = MOST_PUBLISHERS = 8
 # Bytes of the longest payload: of a sample in one packet, and of a slot of the history.
 LONGEST_TAKEN, LONGEST_SENT = 1344, 1024
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
@@ -33,12 +33,12 @@ def check_ethernet(written: Specification, system: DerivedSystem, faults: Diagno
     message = f"interconnect '{project.interconnect}' "
     _check_clock(project, system.network.phy, system.clock, faults)
     for items, most, name in (
-        (system.subscribers, MOST_SUBSCRIBERS, "subscriber"),
-        (system.publishers, MOST_PUBLISHERS, "publisher"),
+        (system.subscribers, MOST_SUBSCRIBERS, "subscribers"),
+        (system.publishers, MOST_PUBLISHERS, "publishers"),
     ):
         if len(items) > most:
             place = blocks[items[most].block].name.source
-            faults.error(f"{message}allows {most} {name} so far, not {len(items)}", place)
+            faults.error(f"{message}allows {most} {name}, not {len(items)}", place)
     for item in system.subscribers:
         _check_size(item, blocks[item.block], LONGEST_TAKEN, faults)
     for item in system.publishers:

@@ -1,0 +1,133 @@
+"""A node with eight topics each way and eight peers, whose tables are full, and the time that its program needs."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+
+import pytest
+
+from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric.control import MOST_PEERS, Sizes
+from tests.cores.announcements import Event, Kind
+from tests.cores.rtps_peers import Host, Net, a_node_with, peer_of
+from tests.cores.rtps_world import World
+from tests.fabric.messages import AckNack, Heartbeat, InfoDestination, Submessage, Writer, parse
+
+TOPICS = 8
+NODE = a_node_with(TOPICS)
+SIZES = Sizes.of(NODE)
+FULL = [MOST_PEERS, SIZES.sources, SIZES.sinks]
+# Of a millisecond at 125 MHz, the clock of a GMII.
+CYCLES = 125_000
+# Cycles for the timers of a millisecond in which nothing is due: 13 for each entry, 40 for each peer, and some more.
+IDLE_CYCLES = 13 * (SIZES.sources + SIZES.sinks) + 40 * MOST_PEERS + 100
+# Of the time of the timers, a packet waits for that of one packet at most; it takes its own time, too.
+FEW = 6
+
+pytestmark = pytest.mark.check
+
+
+@pytest.fixture
+def net() -> Iterator[Net]:
+    """All peers match all topics, and nothing is under way."""
+    with World(0, NODE, SIZES) as world:
+        made = Net(world, [Host(peer_of(NODE, number)) for number in range(1, MOST_PEERS + 1)])
+        made.run(lambda: world.entries == FULL)
+        _rest(made)
+        yield made
+
+
+def _rest(net: Net) -> None:
+    """Wait until all is acknowledged."""
+    for _ in range(1200):
+        net.step()
+
+
+def _exchange(net: Net, peers: list[Host], count: int) -> None:
+    """Samples of all writers, which all their readers get once and in order."""
+    net.frames.clear()
+    before = [[len(items) for items in peer.topics] for peer in peers]
+    wanted = [rtps.XCDR1 + struct.pack("<I", number) for number in range(count)]
+    for payload in wanted:
+        for topic in range(TOPICS):
+            net.publish(topic, payload)
+            for peer in peers:
+                peer.participant.publish(peer.node.writers[1 + topic], payload, net.now)
+            net.step()
+    net.run(lambda: len(net.frames) == count * TOPICS * len(peers))
+    for peer, counts in zip(peers, before, strict=True):
+        net.run(lambda peer=peer, counts=counts: sum(map(len, peer.topics)) == sum(counts) + count * len(counts))  # type: ignore[misc]
+        assert [items[first:] for items, first in zip(peer.topics, counts, strict=True)] == [wanted] * len(counts)
+    for topic in range(TOPICS):
+        frames = [frame[5:] for frame in net.frames if frame[0] == topic]
+        # All peers send the same samples, each of them in order.
+        assert frames == sorted(frames)
+        assert sorted(frames) == sorted(wanted * len(peers))
+
+
+def test_a_ninth_peer_is_refused_and_disturbs_nobody(net: Net) -> None:
+    peers = list(net.peers)
+    _exchange(net, peers, 3)
+    ninth = Host(peer_of(NODE, MOST_PEERS + 1))
+    net.add(ninth)
+    net.run(lambda: net.world.pulses["peer"] > 0)
+    assert net.world.entries == FULL
+    _exchange(net, peers, 3)
+    assert not any(ninth.took.values())
+    # When one leaves, there is room.
+    peers[0].participant.leave()
+    net.run(lambda: net.world.entries[0] < MOST_PEERS)
+    net.peers.remove(peers[0])
+    net.run(lambda: net.world.entries == FULL)
+    _exchange(net, [*peers[1:], ninth], 2)
+
+
+def test_several_readers_of_a_topic_at_one_peer_get_all() -> None:
+    """One peer has seven readers of each topic, and room is left for the writer and the readers of another one."""
+    with World(0, NODE, SIZES) as world:
+        several, other = Host(peer_of(NODE, 1, readers=7)), Host(peer_of(NODE, 2))
+        net = Net(world, [several, other])
+        net.run(lambda: world.entries == [2, 2 * TOPICS, 7 * TOPICS + 1 + TOPICS + 1])
+        assert world.pulses["endpoint"] == 0
+        _exchange(net, [several, other], 3)
+
+
+def test_the_timers_leave_time(net: Net) -> None:
+    """Those of a millisecond need less than it lasts, whatever is due; without anything due, few cycles."""
+    idle = []
+    for _ in range(150):
+        net.step()
+        net.world.do(Event(Kind.TICKS, count=1))
+        idle.append(net.world.cycles)
+    print(f"{min(idle)} cycles without anything due, {max(idle)} at most")
+    assert min(idle) <= IDLE_CYCLES
+    # Of all topics, a sample is under way to all peers, which are silent.
+    for topic in range(TOPICS):
+        net.world.do(Event(Kind.FRAME, struct.pack("<BI", topic, 8) + bytes(8)))
+    due = []
+    for _ in range(201):
+        found = net.world.do(Event(Kind.TICKS, count=1))
+        due.append((net.world.cycles, len(found.sent)))
+    print(f"{max(due)} cycles and packets at most")
+    assert max(count for _, count in due) >= MOST_PEERS * TOPICS
+    assert max(cycles for cycles, _ in due) < CYCLES
+
+
+def test_a_packet_does_not_wait_for_the_timers(net: Net) -> None:
+    for topic in range(TOPICS):
+        net.world.do(Event(Kind.FRAME, struct.pack("<BI", topic, 8) + bytes(8)))
+    net.world.do(Event(Kind.TICKS, count=99))
+    peer = net.peers[-1].node
+    writer = peer.writers[-1]
+    wants = Heartbeat(NODE.readers[-1].entity, writer.entity, 1, 0, 1, False)
+    packet = Writer().message(peer.prefix, InfoDestination(NODE.prefix), wants)
+    # The heartbeats to all sinks are due.
+    net.world.do(Event(Kind.RUSHED, count=1))
+    sent = [*net.world.do(Event(Kind.PACKET, packet, before=1000)).sent, *net.world.do(Event(Kind.TICKS)).sent]
+    items: list[Submessage] = [item for _, text in sent if (message := parse(text)) for item in message.submessages]
+    kinds = [type(item) for item in items if isinstance(item, AckNack | Heartbeat)]
+    assert kinds.count(Heartbeat) >= MOST_PEERS * TOPICS and kinds.count(AckNack) == 1
+    # Some left before the packet came.
+    print(f"{kinds.index(AckNack)} of {len(kinds)} packets left before the answer")
+    assert kinds.index(AckNack) <= FEW + 1000 // 100

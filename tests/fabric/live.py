@@ -1,0 +1,122 @@
+"""`firm live` of a system that is a node by Ethernet: the board at a TAP device, and its peers at the same switch."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from tests.fabric.hosts import Host, switched
+from tests.fabric.test_peers import HERE, Peer, Sample, _why_not
+from tests.ros.cpp_nodes import ros2
+
+# Without a sample for so long, no further one is expected of a round.
+_PATIENCE = 10.0
+_BOARD = "/board is at 192.0.2.9, at tap0, in domain 0; Ctrl-C ends it\n"
+
+
+def skip_without_peers() -> None:
+    """Skip a test where there is no Verilator, TAP device, rclpy or Cyclone DDS."""
+    if reason := _why_not():
+        pytest.skip(reason)
+    if not shutil.which("verilator"):
+        pytest.skip("verilator is not installed")
+    if not Path("/dev/net/tun").exists():
+        pytest.skip("there is no /dev/net/tun")
+
+
+class Lab:
+    """A switch with the board's TAP device, and hosts for peers. The simulator is built beside the specification."""
+
+    def __init__(self, specification: Path, folder: Path, stack: ExitStack, depend: Sequence[str] = ()) -> None:
+        self._specification, self._stack, self._ros, self._depend = specification, stack, ros2(folder), depend
+        self.switch, *self._hosts = stack.enter_context(switched(2))
+        self.switch.run("ip", "tuntap", "add", "dev", "tap0", "mode", "tap")
+        self.switch.run("ip", "link", "set", "tap0", "master", "switch", "up")
+
+    def board(self) -> subprocess.Popen[str]:
+        """The board, when it runs."""
+        words = [sys.executable, "-m", "fusesoc_firm.cli", "live", str(self._specification), "--tool", "verilator"]
+        words += ["--network", "tap0", "--build-root", str(self._specification.parent / "build")]
+        for core in self._depend:
+            words += ["--depend", core]
+        board = subprocess.Popen(self.switch.command(*words), stdout=subprocess.PIPE, text=True)
+        self._stack.callback(_end, board)
+        assert board.stdout
+        assert board.stdout.readline() == _BOARD
+        return board
+
+    def members(self) -> list[tuple[str, str]]:
+        """Port and group of each membership that the switch knows."""
+        command = self.switch.command("bridge", "-json", "mdb", "show", "dev", "switch")
+        shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        return [(item["port"], item["grp"]) for part in json.loads(shown) for item in part.get("mdb", [])]
+
+    def rclpy(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> Peer:
+        """A peer of rclpy, at the first host."""
+        others = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DOMAIN_ID")
+        environment = {name: value for name, value in self._ros.environment.items() if name not in others}
+        return self._peer(self._hosts[0], [self._ros.python, str(HERE / "ros_peer.py")], environment, reads, writes)
+
+    def cyclone(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> Peer:
+        """A peer of Cyclone DDS, at the second host."""
+        words = [sys.executable, str(HERE / "cyclone_peer.py")]
+        return self._peer(self._hosts[1], words, dict(os.environ), reads, writes)
+
+    def _peer(
+        self,
+        host: Host,
+        words: list[str],
+        environment: dict[str, str],
+        reads: Mapping[str, str],
+        writes: Mapping[str, str],
+    ) -> Peer:
+        peer = Peer(host, [*words, "reliable", json.dumps(reads), json.dumps(writes)], environment)
+        self._stack.callback(peer.kill)
+        return peer
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    process.kill()
+    process.communicate()
+
+
+Round = tuple[list[tuple[Peer, Sample]], list[Sample]]
+"""What peers send, and what each of them gets then."""
+
+
+def exchange(peers: Sequence[Peer], round_: Round) -> None:
+    """Let all peers send, and check what each of them gets."""
+    sent, wanted = round_
+    for peer, sample in sent:
+        peer.send([sample])
+    for peer in peers:
+        assert sorted(peer.take(len(wanted))) == sorted(wanted)
+
+
+def settled(peers: Sequence[Peer], round_: Round) -> bool:
+    """Whether what peers send comes to all; otherwise, the board has not matched all of their readers yet.
+
+    A peer only knows that it has matched the board.
+    """
+    sent, wanted = round_
+    for peer, sample in sent:
+        peer.send([sample])
+    answers = [_gets(peer, wanted) for peer in peers]
+    return all(answers)
+
+
+def _gets(peer: Peer, wanted: list[Sample]) -> bool:
+    """Whether a peer gets some samples, perhaps after others."""
+    left = list(wanted)
+    while left and (sample := peer.next_sample(_PATIENCE)):
+        if sample in left:
+            left.remove(sample)
+    return not left
