@@ -10,18 +10,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fusesoc_firm.fabric.control import main_of, words_of
+from fusesoc_firm.fabric.control import generics_of, main_of, words_of
 from fusesoc_firm.fabric.names import names
 from fusesoc_firm.fabric.packets import programs_of
 from tests.cores.announcements import ROOM, Peers, a_node
-from tests.fabric.memories import generics
 from tests.hdl.ghdl import CORES, Generic
 
 DATA = CORES / "net" / "tb" / "data"
 NODE = a_node()
 SEED, TURNS = 20261127, 15
 SIZES: dict[str, Generic] = {
-    **generics(NODE, ROOM),
+    **generics_of(NODE, ROOM),
     "DEPTH": 4096,
     "SAMPLES": 16,
 }

@@ -12,6 +12,7 @@ from fusesoc_firm.fabric.control import main_of
 from tests.cores.announcements import SURE, WRITTEN, Event, Kind, Peers, Results, a_node, expected, sent
 from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
+from tests.fabric.memories import bits
 from tests.fabric.messages import AckNack, parse
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
@@ -35,7 +36,7 @@ def _library(directory: Path, standard: str = "93") -> Library:
 def _results(library: Library, folder: Path, events: list[Event], **generics: Generic) -> Results:
     (folder / "events.txt").write_text("".join(event.row for event in events), encoding="ascii")
     write_memories(folder)
-    given = {**SIZES, "MAIN": main_of(NODE), **generics}
+    given = {**SIZES, **bits(NODE), "MAIN": main_of(NODE), **generics}
     result = library.run("firm_rtps_node_tb", given, directory=folder, seconds=600)
     assert result.exit_code == 0, result.output
     found = Results()
@@ -57,7 +58,7 @@ def test_the_data_of_the_core_are_those_of_the_program(tmp_path: Path) -> None:
         assert path.read_bytes() == (DATA / path.name).read_bytes(), path.name
     bench = (DATA.parent / "firm_rtps_node_tb.vhd").read_text(encoding="ascii")
     defaults = {name: int(value) for name, value in re.findall(r"^    (\w+) +: integer := (\d+)", bench, re.MULTILINE)}
-    wanted = {**SIZES, "MAIN": main_of(NODE)}
+    wanted = {**SIZES, **bits(NODE), "MAIN": main_of(NODE)}
     assert {name: defaults[name] for name in wanted} == wanted
 
 

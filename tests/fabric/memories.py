@@ -25,11 +25,15 @@ def memories(node: Node, top: str, folder: Path, sizes: Sizes) -> list[Path]:
     return written
 
 
-def generics(node: Node, sizes: Sizes) -> dict[str, Generic]:
-    """The generics of the hardware of a node, and those that tell the qualities of its endpoints."""
+def bits(node: Node) -> dict[str, Generic]:
+    """The generics that tell the qualities of a node's endpoints."""
     qualities = [item.quality for item in node.compared]
     return {
-        **generics_of(node, sizes),
         "RELIABLE": sum(item.is_reliable << place for place, item in enumerate(qualities)),
         "TRANSIENT": sum(item.is_transient_local << place for place, item in enumerate(qualities)),
     }
+
+
+def generics(node: Node, sizes: Sizes) -> dict[str, Generic]:
+    """The generics of the hardware of a node, and those that tell the qualities of its endpoints."""
+    return {**generics_of(node, sizes), **bits(node)}
