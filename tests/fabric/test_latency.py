@@ -60,7 +60,7 @@ def _frames(node: Node) -> list[bytes]:
         ),
         node.gid_bytes,
     )
-    fields = _Fields(node.prefix, read.entity, peer.writers[1].entity, *[1] * 9, node)
+    fields = _Fields(node.prefix, read.entity, peer.writers[1].entity, 1, 1, 1, 1, 1, 1, 1, 1, 1, node)
     programs = programs_of(peer)
     announced = ["announce_to_group", "writer_1", "writer_2", "reader_1"]
     return [*(run(programs, name, fields) for name in announced), run(programs, "sample", fields, QUATERNION)]
@@ -75,7 +75,8 @@ def test_a_sample_comes_and_leaves_in_time(tmp_path: Path, phase: int) -> None:
     )
     rows = [(len(line), *line) for line in map(on_line, _frames(_node()))]
     (tmp_path / "frames.txt").write_text("".join(f"{' '.join(map(str, row))}\n" for row in rows), encoding="ascii")
-    result = library.run("latency", {"FRAME_BYTES": 5 + len(QUATERNION), "PHASE": phase}, directory=tmp_path, seconds=600)
+    generics = {"FRAME_BYTES": 5 + len(QUATERNION), "PHASE": phase}
+    result = library.run("latency", generics, directory=tmp_path, seconds=600)
     assert result.exit_code == 0, result.output
     found = dict(row.split() for row in (tmp_path / "latency.txt").read_text(encoding="ascii").splitlines())
     print(found)

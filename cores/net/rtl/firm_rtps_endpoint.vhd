@@ -90,7 +90,6 @@ architecture rtl of firm_rtps_endpoint is
   constant OF_CODING   : natural := 6;
   constant OF_GUID     : natural := 7;
   subtype ids_t is std_logic_vector(OF_GUID downto 0);
-  signal of_r : ids_t;
 
   -- ------------------------------------------------------------------ one cycle later
   signal comes_r  : std_logic;
@@ -98,7 +97,8 @@ architecture rtl of firm_rtps_endpoint is
   signal at_r     : unsigned(15 downto 0) := (others => '0');
   signal last_r   : std_logic;
   signal place_r  : unsigned(1 downto 0) := (others => '0');
-  signal of_2_r   : ids_t;
+  signal of_r     : ids_t;  -- of which parameter the byte before it is
+  signal of_2_r   : ids_t;  -- and this one
   signal over_r   : std_logic;  -- the byte is after those that the first word counts
   signal final_r  : std_logic;  -- it is the last one of them
   signal in_word  : std_logic;  -- it is in the first word
@@ -229,7 +229,8 @@ begin
       if past_r = number_r then
         final_r <= '1';
       end if;
-      if (past_r(15 downto 1) <= number_r or beyond_r = '1') and (past_r(15 downto 5) = 0 or past_r(15 downto 1) = MOST_ENCODINGS) then
+      if (past_r(15 downto 1) <= number_r or beyond_r = '1')
+         and (past_r(15 downto 5) = 0 or past_r(15 downto 1) = MOST_ENCODINGS) then
         coding_r <= '1';
       end if;
       -- The id is there before the first byte of the value.

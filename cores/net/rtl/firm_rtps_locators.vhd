@@ -40,22 +40,22 @@ architecture rtl of firm_rtps_locators is
 
   constant LOCATOR_BYTES : natural := 24;
 
-  signal at             : unsigned(15 downto 0);  -- the place in a parameter
-  signal word           : unsigned(13 downto 0);  -- of four bytes in it
-  signal comes          : std_logic;
+  signal at               : unsigned(15 downto 0);  -- the place in a parameter
+  signal word             : unsigned(13 downto 0);  -- of four bytes in it
+  signal comes            : std_logic;
   signal of_metatraffic_r : std_logic;
   signal of_default_r     : std_logic;
   signal of_unicast_r     : std_logic;
   signal of_lease_r       : std_logic;
-  signal udp_r          : std_logic;              -- the locator is one for UDP over IPv4, so far
-  signal metatraffic_r  : std_logic := '0';
-  signal default_r      : std_logic := '0';
-  signal unicast_r      : std_logic := '0';
-  signal lease_r        : std_logic := '0';
-  signal is_metatraffic : std_logic;
-  signal is_default     : std_logic;
-  signal is_unicast     : std_logic;
-  signal is_lease       : std_logic;
+  signal udp_r            : std_logic;              -- the locator is one for UDP over IPv4, so far
+  signal metatraffic_r    : std_logic := '0';
+  signal default_r        : std_logic := '0';
+  signal unicast_r        : std_logic := '0';
+  signal lease_r          : std_logic := '0';
+  signal is_metatraffic   : std_logic;
+  signal is_default       : std_logic;
+  signal is_unicast       : std_logic;
+  signal is_lease         : std_logic;
 
 begin
 

@@ -91,7 +91,7 @@ architecture rtl of firm_rtps_walker is
   constant RTPS_2        : protocol_t := (x"52", x"54", x"50", x"53", x"02", others => x"00");
   constant CHECKED_BYTES : positive   := 5;  -- the minor version and the vendor are any
 
-  -- ------------------------------------------------------------------ the byte, and what it would mean at the end of a step
+  -- ------------------------------------------------------------------ the byte, and what it means as the end of a step
   signal byte_r     : std_logic_vector(7 downto 0) := (others => '0');
   signal valid_r    : std_logic;
   signal end_r      : std_logic;
@@ -120,7 +120,7 @@ architecture rtl of firm_rtps_walker is
 
   -- Of the submessage.
   signal kind_r       : std_logic_vector(7 downto 0) := (others => '0');
-  signal kinds_r      : kinds_t;                    -- which of those that are read; from its third byte on
+  signal kinds_r      : kinds_t;                    -- which one of those that are read, from its third byte on
   signal flags_r      : std_logic_vector(7 downto 0) := (others => '0');
   signal body_r       : size_t := (others => '0');  -- bytes of it, this one included
   signal final_r      : std_logic;                  -- this byte is its last one
@@ -138,12 +138,12 @@ architecture rtl of firm_rtps_walker is
   signal status_r     : std_logic;  -- the parameter is the first status
 
   -- What follows a step of two bytes and more, as far as no byte of it tells; and its size, less one.
-  signal plan        : steps_t;
-  signal planned_r   : steps_t;
-  signal plan_less_r : unsigned(3 downto 0) := (others => '0');
-  signal plan_done_r : std_logic;  -- it needs no byte
+  signal plan          : steps_t;
+  signal planned_r     : steps_t;
+  signal plan_less_r   : unsigned(3 downto 0) := (others => '0');
+  signal plan_done_r   : std_logic;  -- it needs no byte
   signal has_payload_r : std_logic;  -- a payload or a key is after the inline parameters
-  signal few_ends      : std_logic;  -- the last field of DATA or DATA_FRAG ends, and the inline parameters are next
+  signal fields_end    : std_logic;  -- the step is the last one of DATA or DATA_FRAG before SKIP
 
   signal is_little  : std_logic;
   signal next_step  : steps_t;                        -- if this byte is the last one of its step
@@ -195,6 +195,7 @@ architecture rtl of firm_rtps_walker is
     variable nack_frag : std_logic;
     variable beat_frag : std_logic;
     variable target    : std_logic;
+    variable begins    : std_logic;  -- with the entities
   begin
     data      := kinds(OF_DATA);
     frag      := kinds(OF_FRAG);
@@ -204,26 +205,25 @@ architecture rtl of firm_rtps_walker is
     nack_frag := kinds(OF_NACK_FRAG);
     beat_frag := kinds(OF_BEAT_FRAG);
     target    := kinds(OF_TARGET);
+    begins    := gap or heartbeat or acknack or nack_frag or beat_frag;
 
-    found(SOURCE)           := step(PROTOCOL);
-    found(HEAD)             := step(SOURCE);
-    found(EXTRA)            := step(HEAD) and (data or frag);
-    found(ENDS)             := step(EXTRA)
-                               or (step(HEAD) and (gap or heartbeat or acknack or nack_frag or beat_frag));
-    found(DESTINATION)      := step(HEAD) and target;
-    found(NUMBER)           := step(ENDS);
-    found(FRAGMENTS)        := step(NUMBER) and frag;
-    found(SECOND)           := step(NUMBER) and (heartbeat or gap);
-    found(FRAGMENT)         := step(NUMBER) and (nack_frag or beat_frag);
-    found(SET_SIZE)         := (step(NUMBER) and acknack) or (step(SECOND) and gap) or (step(FRAGMENT) and nack_frag);
-    found(COUNT)            := (step(SECOND) and heartbeat) or (step(FRAGMENT) and beat_frag)
-                               or ((step(SET_SIZE) or step(SET)) and not gap);
-    found(ITEM)             := step(VALUE);
-    found(PAYLOAD)          := step(PAYLOAD);
-    found(REST)             := (step(HEAD) and not (data or frag or gap or heartbeat or acknack or nack_frag or beat_frag
-                                                    or target))
-                               or ((step(SET_SIZE) or step(SET)) and gap)
-                               or step(COUNT) or step(DESTINATION) or step(REST);
+    found(SOURCE)      := step(PROTOCOL);
+    found(HEAD)        := step(SOURCE);
+    found(EXTRA)       := step(HEAD) and (data or frag);
+    found(ENDS)        := step(EXTRA) or (step(HEAD) and begins);
+    found(DESTINATION) := step(HEAD) and target;
+    found(NUMBER)      := step(ENDS);
+    found(FRAGMENTS)   := step(NUMBER) and frag;
+    found(SECOND)      := step(NUMBER) and (heartbeat or gap);
+    found(FRAGMENT)    := step(NUMBER) and (nack_frag or beat_frag);
+    found(SET_SIZE)    := (step(NUMBER) and acknack) or (step(SECOND) and gap) or (step(FRAGMENT) and nack_frag);
+    found(COUNT)       := (step(SECOND) and heartbeat) or (step(FRAGMENT) and beat_frag)
+                          or ((step(SET_SIZE) or step(SET)) and not gap);
+    found(ITEM)        := step(VALUE);
+    found(PAYLOAD)     := step(PAYLOAD);
+    found(REST)        := (step(HEAD) and not (data or frag or begins or target))
+                          or ((step(SET_SIZE) or step(SET)) and gap)
+                          or step(COUNT) or step(DESTINATION) or step(REST);
     return found;
   end function next_of;
 
@@ -317,14 +317,14 @@ begin
 
   -- ------------------------------------------------------------------ the order of the steps
 
-  few_ends <= step_r(FRAGMENTS) when kinds_r(OF_FRAG) = '1' else
-              step_r(NUMBER) when kinds_r(OF_DATA) = '1' else
-              '0';
+  fields_end <= step_r(FRAGMENTS) when kinds_r(OF_FRAG) = '1' else
+                step_r(NUMBER) when kinds_r(OF_DATA) = '1' else
+                '0';
 
-  choose_plan : process (step_r, kinds_r, flags_r, few_r, few_ends, has_payload_r)
+  choose_plan : process (step_r, kinds_r, flags_r, few_r, fields_end, has_payload_r)
   begin
     plan <= next_of(step_r, kinds_r);
-    if few_ends = '1' then
+    if fields_end = '1' then
       plan          <= (others => '0');
       plan(SKIP)    <= not few_r;
       plan(ITEM)    <= few_r and flags_r(RTPS_INLINE);
