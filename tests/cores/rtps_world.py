@@ -47,7 +47,7 @@ class World:
 
     def __init__(self, stall: int = 0, node: Node | None = None, sizes: Sizes = ROOM) -> None:
         own = node or a_node()
-        words = [program(own, sizes), str(main_of(own)), str(stall)]
+        words = [str(program(own, sizes)), str(main_of(own)), str(stall)]
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match

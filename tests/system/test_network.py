@@ -116,7 +116,7 @@ def test_its_node_has_the_qualities_of_the_specification(path: Path) -> None:
     node = _files(path.parent)["turtle_system_node.vhd"]
     assert 'ARE_RELIABLE  : std_logic_vector(2 downto 0) := "110"' in node
     assert 'ARE_TRANSIENT : std_logic_vector(2 downto 0) := "110"' in node
-    assert "SLOTS         => 8" in node
+    assert "constant SLOTS   : integer := 8;" in node
 
 
 def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:

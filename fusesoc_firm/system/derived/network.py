@@ -81,20 +81,22 @@ def network_of(
         )
     _check_system(specification, scheduling, software, faults)
     blocks = {str(block.name): block for block in specification.blocks}
+    namespace = network.namespace if network else ""
     for side in converters:
-        _check_topics([item for item in side if not item.service], blocks, faults)
+        _check_topics([item for item in side if not item.service], namespace, blocks, faults)
     if is_chip:
         check_chip(specification, *converters, faults)
     return network
 
 
-def _check_topics(items: Iterable[Converter], blocks: dict[str, Block], faults: Diagnostics) -> None:
+def _check_topics(items: Iterable[Converter], namespace: str, blocks: dict[str, Block], faults: Diagnostics) -> None:
     """Note blocks of one direction with the same topic, since a node in fabric has an end for each topic."""
     owners: dict[str, str] = {}
     for item in items:
-        if (owner := owners.setdefault(item.name, item.block)) != item.block:
+        name = item.ros_name if item.ros_name.startswith("/") else f"{namespace.rstrip('/')}/{item.ros_name}"
+        if (owner := owners.setdefault(name, item.block)) != item.block:
             block = blocks[item.block]
-            message = f"'{item.block}' and '{owner}' have the same topic {item.name}"
+            message = f"'{item.block}' and '{owner}' have the same topic {name}"
             hint = "a node in fabric has a topic only once in each direction; connect one block to several others"
             faults.error(message, block.topic.source if block.topic else block.name.source, hint)
 
