@@ -23,21 +23,23 @@ from tests.ros.cpp_nodes import ros2
 
 SYSTEM = HERE.parents[1] / "specs" / "quat2euler"
 SEED = 20261127
+CLOCKS = {"rmii": "50 MHz", "rgmii": "125 MHz"}
 # Quaternions that each peer sends before both wait for all results.
 LOT, LOTS = 10, 5
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
 
-@pytest.fixture(scope="module")
-def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module", params=["rmii", "rgmii"])
+def specification(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The demo with the names and the address of the other tests here; its simulator is built beside it, once."""
     folder = tmp_path_factory.mktemp("board")
     shutil.copytree(SYSTEM / "rtl", folder / "rtl")
     text = (SYSTEM / "quat2euler_ethernet.yaml").read_text(encoding="utf-8")
     for old, new in {
         "192.168.1.20": "192.0.2.9",
-        "name: quat2euler, phy": "name: board, phy",
+        "clock: 50 MHz": f"clock: {CLOCKS[request.param]}",
+        "name: quat2euler, phy: rmii": f"name: board, phy: {request.param}",
         "topic: quaternion": "topic: /quaternion_in",
         "topic: euler": "topic: /euler_out",
     }.items():

@@ -20,6 +20,7 @@ _SHORTEST_SLOT = 2
 _CLOCKS = {
     Phy.GMII: ((125, 125), "125 MHz, which is also the clock of the line"),
     Phy.MII: ((25, None), "25 MHz, the clock of the line at 100 Mbit/s, and more"),
+    Phy.RGMII: ((125, 125), "125 MHz, which is also the clock of the line"),
     Phy.RMII: ((50, 50), "50 MHz, which is also the clock of the line"),
 }
 _MEGAHERTZ = 10**6

@@ -334,6 +334,7 @@ class Phy(Enum):
 
     GMII = "gmii"
     MII = "mii"
+    RGMII = "rgmii"
     RMII = "rmii"
 
 

@@ -54,6 +54,14 @@ PHY_PINS: Mapping[Phy, tuple[tuple[str, str, int | None], ...]] = {
         ("mii_tx_er", "out", None),
         ("mii_txd", "out", 4),
     ),
+    Phy.RGMII: (
+        ("rgmii_rx_clk", "in", None),
+        ("rgmii_rx_ctl", "in", None),
+        ("rgmii_rxd", "in", 4),
+        ("rgmii_tx_clk", "out", None),
+        ("rgmii_tx_ctl", "out", None),
+        ("rgmii_txd", "out", 4),
+    ),
     Phy.RMII: (
         ("rmii_crs_dv", "in", None),
         ("rmii_rxd", "in", 2),
@@ -61,14 +69,19 @@ PHY_PINS: Mapping[Phy, tuple[tuple[str, str, int | None], ...]] = {
         ("rmii_txd", "out", 2),
     ),
 }
-# The bits of a byte that each PHY moves in a cycle of the line.
-_LINE_BITS = {Phy.GMII: 8, Phy.MII: 4, Phy.RMII: 2}
-# The signal at firm_sim_phy of each pin, by the pin's name without the PHY's; None for pins of errors.
+# The bits of a byte that each PHY moves at an edge of the line's clock, and the clocks that it gives, in MHz.
+_LINE_BITS = {Phy.GMII: 8, Phy.MII: 4, Phy.RGMII: 4, Phy.RMII: 2}
+PHY_CLOCKS: Mapping[Phy, Mapping[str, int]] = {
+    Phy.GMII: {"gmii_rx_clk": 125},
+    Phy.MII: {"mii_rx_clk": 25, "mii_tx_clk": 25},
+    Phy.RGMII: {"rgmii_rx_clk": 125},
+    Phy.RMII: {},
+}
+# The signal at firm_sim_phy of each pin, by the pin's name without the PHY's; others are pins of errors, or open.
 _SIMULATED = {
-    **dict.fromkeys(("rx_clk", "tx_clk"), "clk"),
-    **dict.fromkeys(("rx_dv", "crs_dv"), "rx_dv"),
-    **dict.fromkeys(("rx_er", "tx_er")),
-    **{name: name for name in ("rxd", "tx_en", "txd")},
+    **dict.fromkeys(("rx_dv", "crs_dv", "rx_ctl"), "rx_dv"),
+    **dict.fromkeys(("tx_en", "tx_ctl"), "tx_en"),
+    **{name: name for name in ("rxd", "txd")},
 }
 # The bits of network_error of firm_net_link.
 NETWORK_FAULTS = (
@@ -134,17 +147,19 @@ def _ethernet(system: DerivedSystem, phy: Phy) -> dict[str, Any]:
         "phy": f"firm_{phy.value}",
         # An RMII does not report errors to the PHY.
         "sends_errors": phy is not Phy.RMII,
-        "pins": [{**pin, **_in_simulation(pin["name"])} for pin in _pins(phy_pins(phy))],
+        "pins": [{**pin, **_in_simulation(phy, pin)} for pin in _pins(phy_pins(phy))],
         "line_bits": _LINE_BITS[phy],
+        "is_ddr": phy is Phy.RGMII,
         "faults": [{"bit": bit, "meaning": meaning} for bit, meaning in enumerate(NETWORK_FAULTS)],
         "fault_count": len(NETWORK_FAULTS),
     }
 
 
-def _in_simulation(pin: str) -> dict[str, Any]:
+def _in_simulation(phy: Phy, pin: Mapping[str, str]) -> dict[str, Any]:
     """Return what the PHY of a simulated board, whose line has the system's clock, connects to a pin."""
-    signal = _SIMULATED[pin.partition("_")[2]]
-    return {"signal": signal or "", "is_low": pin.endswith("rx_er"), "is_open": pin.endswith("tx_er")}
+    name, is_input = pin["name"], pin["direction"] == "in"
+    signal = "clk" if name in PHY_CLOCKS[phy] else _SIMULATED.get(name.partition("_")[2], "")
+    return {"signal": signal, "is_low": not signal and is_input, "is_open": not (signal or is_input)}
 
 
 def _node(system: DerivedSystem) -> dict[str, Any]:
