@@ -49,6 +49,7 @@ def test_it_is_checked_and_shown(path: Path, capsys: pytest.CaptureFixture[str])
         "namespace": "/lab",
         "domain": 0,
         "phy": "gmii",
+        "reassemblies": 1,
     }
 
 

@@ -83,18 +83,21 @@ _SIMULATED = {
     **dict.fromkeys(("tx_en", "tx_ctl"), "tx_en"),
     **{name: name for name in ("rxd", "txd")},
 }
-# The bits of network_error of firm_net_link.
-NETWORK_FAULTS = (
-    "a frame on the line is broken or too long",
-    "a datagram for the board is broken",
-    "a fragment is dropped",
-    "a reply to ARP or ping, or a packet of discovery, has no room",
-    "another node has no room",
-    "a publisher or subscriber of another node, of a topic of the board, has no room",
-    "a message of another node has no room",
-    "a message to send is too long",
-    "another host has the address of the board",
-)
+# The bits of network_error of firm_net_link, by the names of their counters.
+NETWORK_FAULTS = {
+    "broken_frames": "a frame on the line is broken or too long",
+    "broken_datagrams": "a datagram for the board is broken",
+    "dropped_fragments": "a fragment or an incomplete packet is dropped",
+    "lost_packets": "a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room",
+    "refused_nodes": "another node has no room",
+    "refused_endpoints": "a publisher or subscriber of another node, of a topic of the board, has no room",
+    "lost_messages": "a message of another node has no room, or comes in fragments of RTPS",
+    "refused_messages": "a message to send is too long",
+    "taken_addresses": "another host has the address of the board",
+    "broken_packets": "a packet of RTPS, or a list of parameters in it, is broken",
+    "other_endpoints": "a publisher or subscriber of another node, of a topic of the board, differs in type, hash,"
+    " quality, partition or encoding",
+}
 ADDRESS_FAULT = 8
 """The bit of an address that is taken."""
 CHIP_NUMBERS = {NetworkKind.W5500: 5500, NetworkKind.W5200: 5200}
@@ -150,7 +153,7 @@ def _ethernet(system: DerivedSystem, phy: Phy) -> dict[str, Any]:
         "pins": [{**pin, **_in_simulation(phy, pin)} for pin in _pins(phy_pins(phy))],
         "line_bits": _LINE_BITS[phy],
         "is_ddr": phy is Phy.RGMII,
-        "faults": [{"bit": bit, "meaning": meaning} for bit, meaning in enumerate(NETWORK_FAULTS)],
+        "faults": [{"bit": bit, "meaning": meaning} for bit, meaning in enumerate(NETWORK_FAULTS.values())],
         "fault_count": len(NETWORK_FAULTS),
     }
 

@@ -141,6 +141,11 @@ class NodeNetwork(Section):
         is_asked=False,
     )
     phy: Text = key("the interface of the PHY; only used with ethernet", choices=PHYS, default=Text(PHYS[0]))
+    reassemblies: int = key(
+        "messages in several packets that may arrive at the same time, 1 to 4; only used with ethernet",
+        form="integer",
+        default=1,
+    )
 
 
 @dataclass(frozen=True)
