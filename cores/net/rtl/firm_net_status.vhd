@@ -94,27 +94,36 @@ architecture rtl of firm_net_status is
   signal writes       : std_logic;
   signal write_place  : place_t;
   signal write_data   : byte_t;
-  signal read_place   : place_t;
+  signal step_place   : place_t;
+  signal step_shift   : place_t;
   signal read_data    : byte_t;
 
-  -- The place in the request from which a byte of the reply comes.
-  function origin_of(place : place_t) return place_t is
+  -- A number of places, forwards or back, modulo 64.
+  function shift(places : integer) return place_t is
+  begin
+    return to_unsigned(places mod 64, place_t'length);
+  end function shift;
+
+  -- From the place of a byte of the reply to its place in the request.
+  function way_back(place : place_t) return place_t is
   begin
     if place < MAC_BYTES then
-      return place + MAC_BYTES;
+      return shift(MAC_BYTES);
     elsif place < 2*MAC_BYTES then
-      return place - MAC_BYTES;
-    elsif place >= SOURCE_PLACE and place < TARGET_PLACE then
-      return place + (TARGET_PLACE-SOURCE_PLACE);
-    elsif place >= TARGET_PLACE and place < PORTS_PLACE then
-      return place - (TARGET_PLACE-SOURCE_PLACE);
-    elsif place >= PORTS_PLACE and place < PORT_PLACE then
-      return place + (PORT_PLACE-PORTS_PLACE);
-    elsif place >= PORT_PLACE and place < SIZE_PLACE then
-      return place - (PORT_PLACE-PORTS_PLACE);
+      return shift(-MAC_BYTES);
+    elsif place < SOURCE_PLACE then
+      return shift(0);
+    elsif place < TARGET_PLACE then
+      return shift(TARGET_PLACE-SOURCE_PLACE);
+    elsif place < PORTS_PLACE then
+      return shift(SOURCE_PLACE-TARGET_PLACE);
+    elsif place < PORT_PLACE then
+      return shift(PORT_PLACE-PORTS_PLACE);
+    elsif place < SIZE_PLACE then
+      return shift(PORTS_PLACE-PORT_PLACE);
     end if;
-    return place;
-  end function origin_of;
+    return shift(0);
+  end function way_back;
 
 begin
 
@@ -196,10 +205,11 @@ begin
 
   -- The request, then the payload of the answer in its place.
   writes      <= s_axis_tvalid when state_r = LISTENING else answer_tvalid;
-  write_place <= place_r when state_r = LISTENING else step_r + (PAYLOAD_PLACE-HEAD_BYTES);
+  write_place <= place_r when state_r = LISTENING else step_place;
   write_data  <= s_axis_tdata when state_r = LISTENING else answer_tdata;
-  read_place  <= origin_of(step_r) when state_r = REPLYING else step_r + (PAYLOAD_PLACE-HEAD_BYTES);
-  read_data   <= memory(to_integer(read_place));
+  step_place  <= step_r + step_shift;
+  step_shift  <= way_back(step_r) when state_r = REPLYING else shift(PAYLOAD_PLACE-HEAD_BYTES);
+  read_data   <= memory(to_integer(step_place));
 
   access_memory : process (clk)
   begin
