@@ -130,6 +130,17 @@ def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:
     assert 'LOCATE COMP "rmii_rxd[1]" SITE "B9";' in files["ulx3s_lan8720.lpf"]
 
 
+def test_its_status_counts_the_faults_of_its_network(path: Path) -> None:
+    assert "HAS_STATUS    => false" in _files(path.parent)["turtle_system_node.vhd"]
+    text = path.read_text(encoding="utf-8").replace("interconnect:", "status: frames\n  interconnect:")
+    path.write_text(text, encoding="utf-8")
+    files = _files(path.parent)
+    assert "HAS_STATUS    => true" in files["turtle_system_node.vhd"]
+    assert "network_other_endpoints_count" in files["turtle_system.vhd"]
+    # With a host instead, there is no network.
+    assert "network_" not in _files(path.parent, interconnect="axi_stream")["turtle_system.vhd"]
+
+
 _RGMII = """\
 description: a PHY with RGMII
 flow: {flow}
