@@ -95,8 +95,7 @@ NETWORK_FAULTS = {
     "refused_messages": "a message to send is too long",
     "taken_addresses": "another host has the address of the board",
     "broken_packets": "a packet of RTPS, or a list of parameters in it, is broken",
-    "other_endpoints": "a publisher or subscriber of another node, of a topic of the board, differs in type, hash,"
-    " quality, partition or encoding",
+    "other_endpoints": "a publisher or subscriber of a topic of the board has another type, hash, quality or encoding",
 }
 ADDRESS_FAULT = 8
 """The bit of an address that is taken."""
