@@ -22,8 +22,8 @@ def add_status(commands: Any) -> None:
     status.add_argument(
         "address",
         metavar="ADDRESS",
-        help="the transport to the hardware, node:SYSTEM for the running node of a system, or axi:UIO for a status "
-        "with AXI4-Lite, such as axi:/dev/uio1",
+        help="the transport to the hardware, node:SYSTEM for the running node of a system, axi:UIO for a status "
+        "with AXI4-Lite, such as axi:/dev/uio1, or udp:ADDRESS for a node in fabric, such as udp:192.168.1.20",
     )
     status.add_argument(
         "--system",

@@ -190,7 +190,7 @@ def _print_json(data: object) -> None:
 
 
 def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
-    from fusesoc_firm.fabric.ethernet import ethernet_node, history_bytes
+    from fusesoc_firm.fabric.ethernet import ethernet_node, fragment_bytes, history_bytes
     from fusesoc_firm.fabric.ros1 import memory_of
     from fusesoc_firm.system.views.show import counts, default_lengths
 
@@ -207,6 +207,8 @@ def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -
         print(f"the node needs {len(memory)} bytes of memory for its program and texts")
     if node:
         print(f"the node needs {history_bytes(system, node)} bytes of memory for the last messages of its publishers")
+    if node and (size := fragment_bytes(system, node)):
+        print(f"the node needs {size} bytes of memory for messages in several packets")
 
 
 def _check_stimuli(loaded: LoadedSystem, paths: Iterable[Path]) -> None:

@@ -12,12 +12,16 @@ from fusesoc_firm.fabric.packets import memory_of, programs_of
 from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.system.derived.ethernet import slot_bytes
+from fusesoc_firm.system.derived.ethernet import reassembled_bytes, slot_bytes, waiting_bytes
 from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entity
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Context, Rendering, render
 
+# Packets in memory for each one that is reassembled (firm_net_link).
+_PLACES = 2
+# What the hardware's generic may be at least; without a reassembly it has no effect.
+_LEAST_REASSEMBLED = 2048
 _NODE_TEMPLATE = "vhdl/net_node.vhd"
 
 
@@ -62,6 +66,13 @@ def history_bytes(system: DerivedSystem, node: Node) -> int:
     return slots_of(node) * slot_bytes(system.publishers)
 
 
+def fragment_bytes(system: DerivedSystem, node: Node) -> int:
+    """Return the bytes of the memories for messages in several packets, which are in use until they have left."""
+    longest = reassembled_bytes(system.subscribers)
+    places = 1 << (_PLACES * node.network.reassemblies - 1).bit_length()
+    return longest * places + waiting_bytes(system.subscribers) if longest else 0
+
+
 def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:
     """Return the configuration of the node."""
     assert system.clock is not None
@@ -95,6 +106,10 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "sample": slot_bytes(system.publishers),
         "report_packet": numbers[REPORT],
         "probe_packet": numbers[PROBE],
+        "payloads": waiting_bytes(system.subscribers),
+        "reassemblies": node.network.reassemblies if reassembled_bytes(system.subscribers) else 0,
+        "reassembled": reassembled_bytes(system.subscribers) or _LEAST_REASSEMBLED,
+        "has_status": str(bool(system.status)).lower(),
     }
 
 

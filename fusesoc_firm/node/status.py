@@ -20,7 +20,7 @@ from fusesoc_firm.frame.model import ID_BYTES
 from fusesoc_firm.node.status_exchange import NO_ANSWER
 from fusesoc_firm.node.transport.transport import Transport, TransportError
 from fusesoc_firm.system.hardware.registers import Register
-from fusesoc_firm.system.hardware.status import DIGEST_ADDRESS, DIGEST_WORDS, status_map
+from fusesoc_firm.system.hardware.status import DIGEST_ADDRESS, DIGEST_WORDS, Part, network_words, status_map
 from fusesoc_firm.system.status_frames import answered, read_request, write_request
 
 # A simulator may have to start first, on a busy machine.
@@ -28,6 +28,7 @@ _ANSWER_SECONDS = 20.0
 _MAGIC = 0x4D524946
 _VERSION = 1
 _SHAPE_ADDRESS, _FEATURES_ADDRESS = 0x04, 0x28
+_KNOWN_PARTS = sum(part.value for part in Part)
 _EVENTS = {"id_errors": "unknown ids", "link_errors": "link errors", "lost": "uncounted faults"}
 _CHANNEL_WORDS = {"frames": "frames", "longest_wait": "longest wait in cycles"}
 # The highest word first.
@@ -100,8 +101,8 @@ def status_registers(read: Callable[[int], int]) -> tuple[Register, ...]:
     magic, shape = read(0), read(_SHAPE_ADDRESS)
     if magic != _MAGIC or shape >> 24 != _VERSION:
         raise TransportError(f"the hardware has another kind of status: it begins with {magic:08x} {shape:08x}")
-    has_time_stamps = bool(read(_FEATURES_ADDRESS) & 1)
-    return status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF, has_time_stamps=has_time_stamps).registers
+    parts = Part(read(_FEATURES_ADDRESS) & _KNOWN_PARTS)
+    return status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF, parts=parts).registers
 
 
 class StatusWatch:
@@ -166,7 +167,7 @@ def status_text(status: Status, names: Sequence[str] = ()) -> str:
     channels += [f"publisher[{number}]" for number in range(publishers)]
     shown = dict(zip(channels, names or channels, strict=True))
     width = max(map(len, shown.values()))
-    lines = [f"digest {status.digest}", _events(status, shown, channels)]
+    lines = [f"digest {status.digest}", _events(status, shown, channels), *_network(status)]
     if status.has_time_stamps:
         lines.append(f"cycle {status.words['cycles']}; stamps: a subscriber's first beat, a publisher's last beat")
     stamp = f"  {'stamp':>10}" if status.has_time_stamps else ""
@@ -203,6 +204,13 @@ def _events(status: Status, shown: Mapping[str, str], channels: Sequence[str]) -
     last = f"code {code} of {shown[channels[channel]]}" if code else "none"
     counts = ", ".join(f"{text} {status.words[name]}" for name, text in _EVENTS.items())
     return f"last fault: {last}; {counts}"
+
+
+def _network(status: Status) -> list[str]:
+    """Return a line for each counter of a node's network that is not zero, or one line about all."""
+    counts = {text: status.words[name] for name, text in network_words().items() if name in status.words}
+    counted = [f"network: {count} times {text}" for text, count in counts.items() if count]
+    return counted or ["network: no faults"] * bool(counts)
 
 
 def check_digest(transport: Transport, expected: str, system: str, id_bytes: int = ID_BYTES) -> None:

@@ -26,6 +26,7 @@ from types import TracebackType
 from fusesoc_firm.node.transport.open_transport import device_of, open_transport
 from fusesoc_firm.node.transport.status_registers import AXI, open_registers_at
 from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError
+from fusesoc_firm.node.transport.udp import UDP, UdpStatus
 from fusesoc_firm.system.status_frames import answered
 
 NODE = "node"
@@ -143,11 +144,13 @@ class NodeTransport:
 def open_status(address: str) -> Transport:
     """Return a transport for the status at an address: that of the node that uses it, or else one of its own.
 
-    `node:SYSTEM` is the running node of a system, and `axi:UIO` a status with AXI4-Lite at a UIO device. May raise
-    `TransportError`.
+    `node:SYSTEM` is the running node of a system, `axi:UIO` a status with AXI4-Lite at a UIO device, and `udp:ADDRESS`
+    a node in fabric. May raise `TransportError`.
     """
     if address.startswith(f"{AXI}:"):
         return open_registers_at(address)
+    if address.startswith(f"{UDP}:"):
+        return UdpStatus(address.removeprefix(f"{UDP}:"))
     is_node = address.startswith(f"{NODE}:")
     name = address if is_node else device_of(address)
     if name and (peer := _connected(name)):

@@ -59,6 +59,7 @@ from fusesoc_firm.system.hardware.status import (
     Identity,
     address_bits,
     identity_of,
+    parts_of,
     status_description,
     status_entity,
 )
@@ -309,7 +310,7 @@ def status_text(loaded: LoadedSystem) -> str:
     system = loaded.system
     shape = len(system.subscribers), len(system.publishers)
     digest = identity(loaded).digest
-    return status_description(system.name, *shape, digest, has_time_stamps=system.has_time_stamps)
+    return status_description(system.name, *shape, digest, parts_of(system))
 
 
 def system_core(loaded: LoadedSystem) -> GeneratedCore:

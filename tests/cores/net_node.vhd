@@ -187,7 +187,8 @@ begin
       SINKS   => SINKS,
       SAMPLE  => SAMPLE,
       SLOTS   => SLOTS,
-      DEPTH   => 4096
+      DEPTH   => 4096,
+      BYTES   => 4096
     )
     port map (
       clk                 => clk,
@@ -232,7 +233,10 @@ begin
       is_sample_lost      => open,
       is_peer_refused     => open,
       is_endpoint_refused => open,
-      is_frame_refused    => open
+      is_frame_refused    => open,
+      is_sample_parted    => open,
+      is_packet_broken    => open,
+      is_endpoint_other   => open
     );
 
   u_packets : entity work.net_node_packets

@@ -125,6 +125,7 @@ begin
       SAMPLE  => 64,
       SLOTS   => SLOTS,
       DEPTH   => 4096,
+      BYTES   => 4096,
       SAMPLES => 16
     )
     port map (
@@ -170,7 +171,10 @@ begin
       is_sample_lost      => is_sample_lost,
       is_peer_refused     => is_peer_refused,
       is_endpoint_refused => is_endpoint_refused,
-      is_frame_refused    => is_frame_refused
+      is_frame_refused    => is_frame_refused,
+      is_sample_parted    => open,
+      is_packet_broken    => open,
+      is_endpoint_other   => open
     );
 
   u_builder : entity firm.firm_packet_builder

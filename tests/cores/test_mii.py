@@ -1,4 +1,4 @@
-"""Ethernet frames at the pins of an MII, a GMII or an RMII: both directions, with clocks that are unrelated."""
+"""Ethernet frames at the pins of an MII, a GMII, an RGMII or an RMII: both directions, with unrelated clocks."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ SEED = 20261126
 ENTITIES: dict[str, tuple[str, ...]] = {
     "firm_mii": ("mii_rx", "mii_tx"),
     "firm_gmii": ("gmii_rx",),
+    "firm_rgmii": ("rgmii_rx",),
     "firm_rmii": (),
 }
 CORES = (
@@ -27,6 +28,7 @@ CORES = (
     "sim/host",
     "sim/parts",
     "net/mac",
+    "net/ddr",
     "net/mii",
 )
 
@@ -77,19 +79,29 @@ def test_good_frames_come_back_and_no_others(library: Library, tmp_path: Path, p
     assert min(idle for idle, _, _ in back[1:]) >= 2 * GAP_BYTES
 
 
+@pytest.mark.parametrize("pins", ["IS_GMII", "IS_RGMII"])
 @pytest.mark.parametrize("period", [7990, 8000, 8010])
-def test_good_frames_come_back_at_a_gmii(library: Library, tmp_path: Path, period: int) -> None:
+def test_good_frames_come_back_at_1_gbit(library: Library, tmp_path: Path, period: int, pins: str) -> None:
     """The clocks differ by some 0.2 %, more than any two of 125 MHz; the longest frames do not overrun the FIFO."""
     seed = SEED + period
     print(f"seed {seed}")
     bursts = [Burst(burst.data, GAP_BYTES, burst.fault) for burst in random_bursts(60, 250, seed)]
     bursts += [Burst(on_line(random.Random(seed).randbytes(LONGEST)))] * 3
     rows = [burst.row() for burst in bursts]
-    back = _back(library, tmp_path, rows, PERIOD_PS=period, PHY_PERIOD_PS=8000, SEED=seed, IS_GMII=True)
+    back = _back(library, tmp_path, rows, PERIOD_PS=period, PHY_PERIOD_PS=8000, SEED=seed, **{pins: True})
     verdicts = map(verdict, bursts)
     assert [bytes(data) for _, _, data in back] == [on_line(item.frame) for item in verdicts if item.pulse == "good"]
     assert {fault for _, fault, _ in back} == {-1}
     assert min(idle for idle, _, _ in back[1:]) >= GAP_BYTES
+
+
+def test_frames_of_a_slower_line_are_broken_at_an_rgmii(library: Library, tmp_path: Path) -> None:
+    """At 100 Mbit/s, the PHY shows each nibble at both edges of its clock. A byte in each cycle still passes."""
+    frames = [random.Random(number).randbytes(60 + number) for number in range(8)]
+    slow = [bytes(17 * nibble for nibble in _nibbles(on_line(frame))) for frame in frames]
+    rows = [Burst(line, GAP_BYTES).row() for line in (*slow, on_line(frames[0]))]
+    back = _back(library, tmp_path, rows, PERIOD_PS=8000, PHY_PERIOD_PS=40000, IS_RGMII=True)
+    assert [bytes(data) for _, _, data in back] == [on_line(frames[0])]
 
 
 def _pairs(data: bytes) -> list[int]:
@@ -138,7 +150,7 @@ def test_frames_follow_each_other_without_a_pause(library: Library, tmp_path: Pa
 
 def _hardware(folder: Path) -> Library:
     library = Library("firm", folder)
-    library.analyse(core_files("axis/package", "axis/axis", "cdc/sync", "cdc/cdc", "net/mii"))
+    library.analyse(core_files("axis/package", "axis/axis", "cdc/sync", "cdc/cdc", "net/ddr", "net/mii"))
     return library
 
 

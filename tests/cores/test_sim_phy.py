@@ -20,7 +20,7 @@ use ieee.std_logic_1164.all;
 library firm;
 
 entity bench is
-  generic (BITS : integer := 8);
+  generic (BITS : integer := 8; IS_DDR : boolean := false);
 end entity bench;
 
 architecture simulation of bench is
@@ -32,18 +32,20 @@ architecture simulation of bench is
 begin
   other <= not other after 3 ns;
   u_phy : entity firm.firm_sim_phy
-    generic map (BITS => BITS)
+    generic map (BITS => BITS, IS_DDR => IS_DDR)
     port map (clk => clk, rst_n => rst_n, rx_dv => dv, rxd => data, tx_en => dv, txd => data);
 end architecture simulation;
 """
 _VERILOG = """
 `timescale 1ns / 1ps
-module bench #(parameter BITS = 8);
+module bench #(parameter BITS = 8, parameter IS_DDR = 0);
   reg other = 0;
   always #3 other = !other;
   wire clk, rst_n, dv;
   wire [BITS-1:0] data;
-  firm_sim_phy #(.BITS(BITS)) phy (.clk(clk), .rst_n(rst_n), .rx_dv(dv), .rxd(data), .tx_en(dv), .txd(data));
+  firm_sim_phy #(.BITS(BITS), .IS_DDR(IS_DDR)) phy (
+    .clk(clk), .rst_n(rst_n), .rx_dv(dv), .rxd(data), .tx_en(dv), .txd(data)
+  );
 endmodule
 """
 # File descriptors 3 and 4 are the files that are named.
@@ -62,22 +64,22 @@ ANSWERS = {
 }
 
 
-def _vhdl(folder: Path, bits: int) -> Sequence[str]:
+def _vhdl(folder: Path, bits: int, *, is_ddr: bool = False) -> Sequence[str]:
     library = Library("firm", folder)
     library.analyse(core_files("sim/phy"))
     (folder / "bench.vhd").write_text(_BENCH, encoding="ascii")
     options = ["--std=93", f"-P{folder}", f"--workdir={folder}"]
     subprocess.run(["ghdl", "-a", *options, "bench.vhd"], cwd=folder, check=True)
     subprocess.run(["ghdl", "-e", *options, "bench"], cwd=folder, check=True)
-    return ["ghdl", "-r", *options, "bench", f"-gBITS={bits}"]
+    return ["ghdl", "-r", *options, "bench", f"-gBITS={bits}", f"-gIS_DDR={str(is_ddr).lower()}"]
 
 
-def _verilog(folder: Path, bits: int) -> Sequence[str]:
+def _verilog(folder: Path, bits: int, *, is_ddr: bool = False) -> Sequence[str]:
     if not shutil.which("iverilog"):
         pytest.skip("iverilog is not installed")
     (folder / "bench.v").write_text(_VERILOG, encoding="ascii")
     source = CORES / "sim" / "rtl" / "firm_sim_phy.v"
-    options = ["-g2012", "-s", "bench", f"-Pbench.BITS={bits}", "-o", "bench.vvp"]
+    options = ["-g2012", "-s", "bench", f"-Pbench.BITS={bits}", f"-Pbench.IS_DDR={is_ddr:d}", "-o", "bench.vvp"]
     subprocess.run(["iverilog", *options, "bench.v", source], cwd=folder, check=True)
     return ["vvp", "-n", "bench.vvp"]
 
@@ -112,10 +114,10 @@ def _frames(reports: bytes) -> tuple[int, list[bytes]]:
     return questions, frames
 
 
-@pytest.mark.parametrize("bits", [2, 4, 8])
-def test_the_simulation_ends_with_the_file(made: object, tmp_path: Path, bits: int) -> None:
+@pytest.mark.parametrize(("bits", "is_ddr"), [(2, False), (4, False), (8, False), (4, True)])
+def test_the_simulation_ends_with_the_file(made: object, tmp_path: Path, bits: int, is_ddr: bool) -> None:
     assert callable(made)
-    command = made(tmp_path, bits)
+    command = made(tmp_path, bits, is_ddr=is_ddr)
     wanted = {
         "at once": (1, []),
         "in a size": (2, []),
@@ -135,3 +137,10 @@ def test_an_illegal_width_is_refused(made: object, tmp_path: Path, bits: int) ->
     done, _ = _run(made(tmp_path, bits), tmp_path, b"")
     assert done.returncode != 0
     assert f"firm_sim_phy: BITS is {bits}; legal: 2, 4, 8" in done.stdout + done.stderr
+
+
+def test_both_edges_need_four_bits(made: object, tmp_path: Path) -> None:
+    assert callable(made)
+    done, _ = _run(made(tmp_path, 8, is_ddr=True), tmp_path, b"")
+    assert done.returncode != 0
+    assert "firm_sim_phy: BITS is 8; legal with IS_DDR: 4" in done.stdout + done.stderr

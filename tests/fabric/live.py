@@ -59,6 +59,11 @@ class Lab:
         shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         return [(item["port"], item["grp"]) for part in json.loads(shown) for item in part.get("mdb", [])]
 
+    def status(self) -> str:
+        """The status of the board."""
+        command = self._hosts[0].command(sys.executable, "-m", "fusesoc_firm.cli", "status", "udp:192.0.2.9")
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
     def rclpy(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> Peer:
         """A peer of rclpy, at the first host."""
         others = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DOMAIN_ID")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import random
+import re
 import shutil
 import signal
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from tests.fabric.test_peers import HERE, Peer
 SYSTEM = HERE.parents[1] / "specs" / "quat2euler"
 SEED = 20261127
 CORES = ("robot:acc:firm_cordic:0.2.0", "robot:acc:firm_float64:0.2.0")
+CLOCKS = {"rmii": "50 MHz", "rgmii": "125 MHz"}
 # Quaternions and points that each peer sends before both wait for all results.
 LOT, LOTS = 10, 5
 # Points come back as they are.
@@ -29,19 +31,32 @@ POINTS = """\
      qos: {durability: transient_local, depth: 60}}
 """
 READS, WRITES = {"euler": "Point", "point": "Point"}, {"quaternion": "Quaternion", "point": "Point"}
+LONG_TEXTS = """\
+project:
+  name: board
+  clock: 125 MHz
+  interconnect: ethernet
+  network: {mac: "02:00:00:00:00:02", address: 192.0.2.9, phy: rgmii}
+  status: frames
+blocks:
+  - {name: words, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /words_in, maxLength: 7936,
+     outgoing: [{name: said}]}
+  - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_out}
+"""
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
 
-@pytest.fixture(scope="module")
-def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module", params=["rmii", "rgmii"])
+def specification(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The demo with other names, an address and `POINTS`; its simulator is built beside it, once."""
     folder = tmp_path_factory.mktemp("board")
     shutil.copytree(SYSTEM / "rtl", folder / "rtl")
     text = (SYSTEM / "quat2euler_ethernet.yaml").read_text(encoding="utf-8")
     for old, new in {
         "192.168.1.20": "192.0.2.9",
-        "name: quat2euler, phy": "name: board, phy",
+        "clock: 50 MHz": f"clock: {CLOCKS[request.param]}",
+        "name: quat2euler, phy: rmii": f"name: board, phy: {request.param}",
         "topic: quaternion": "topic: /quaternion_in",
         "topic: euler": "topic: /euler_out",
     }.items():
@@ -114,3 +129,20 @@ def test_a_switch_with_snooping_knows_the_board_as_a_member(lab: Lab) -> None:
         assert board.poll() is None
     peers = _peers(lab, chance)
     exchange([*peers.values()], _round(peers, chance))
+
+
+def test_long_texts_of_rclpy_are_taken_and_counted(tmp_path: Path) -> None:
+    """Fast DDS sends each in one datagram, which the kernel parts; the board reassembles it."""
+    skip_without_peers()
+    path = tmp_path / "board.yaml"
+    path.write_text(LONG_TEXTS, encoding="utf-8")
+    sizes = [10, 1400, 3000, 7900, 1, 5000]
+    with ExitStack() as stack:
+        lab = Lab(path, tmp_path, stack)
+        lab.board()
+        peer = lab.rclpy({}, {"words": "String"})
+        peer.wait_until_matched()
+        peer.send([("words", ["x" * size]) for size in sizes])
+        while not re.search(rf"^subscriber\[0\] +\w+ +{len(sizes)} .* none$", lab.status(), re.MULTILINE):
+            pass
+        assert "\nnetwork: no faults\n" in lab.status()

@@ -10,6 +10,7 @@ import yaml
 from fusesoc_firm.cli import main
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
+from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.text.diagnostics import InputError
 
 SPECIFICATION = """\
@@ -48,6 +49,7 @@ def test_it_is_checked_and_shown(path: Path, capsys: pytest.CaptureFixture[str])
         "namespace": "/lab",
         "domain": 0,
         "phy": "gmii",
+        "reassemblies": 1,
     }
 
 
@@ -83,7 +85,8 @@ def test_it_has_streams_instead(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("phy", "clock"), [("gmii", "125 MHz"), ("mii", "25 MHz"), ("mii", "100 MHz"), ("rmii", "50 MHz")]
+    ("phy", "clock"),
+    [("gmii", "125 MHz"), ("mii", "25 MHz"), ("mii", "100 MHz"), ("rgmii", "125 MHz"), ("rmii", "50 MHz")],
 )
 def test_each_phy_has_its_pins(path: Path, phy: str, clock: str) -> None:
     text = path.read_text(encoding="utf-8").replace("125 MHz", clock).replace("namespace", f"phy: {phy}, namespace")
@@ -125,6 +128,51 @@ def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:
     assert "u_phy : entity firm.firm_rmii" in files["turtle_system.vhd"]
     assert "CLOCK_HZ      => 50000000" in files["turtle_system_node.vhd"]
     assert 'LOCATE COMP "rmii_rxd[1]" SITE "B9";' in files["ulx3s_lan8720.lpf"]
+
+
+def test_its_status_counts_the_faults_of_its_network(path: Path) -> None:
+    assert "HAS_STATUS    => false" in _files(path.parent)["turtle_system_node.vhd"]
+    text = path.read_text(encoding="utf-8").replace("interconnect:", "status: frames\n  interconnect:")
+    path.write_text(text, encoding="utf-8")
+    files = _files(path.parent)
+    assert "HAS_STATUS    => true" in files["turtle_system_node.vhd"]
+    assert "network_other_endpoints_count" in files["turtle_system.vhd"]
+    # With a host instead, there is no network.
+    assert "network_" not in _files(path.parent, interconnect="axi_stream")["turtle_system.vhd"]
+
+
+_RGMII = """\
+description: a PHY with RGMII
+flow: {flow}
+clock: 125 MHz
+interconnect: ethernet
+phy: rgmii
+pins:
+  - {{port: clk, site: A1}}
+  - {{port: rgmii_rx_clk, site: B1}}
+  - {{port: rgmii_rx_ctl, site: B2}}
+  - {{port: rgmii_tx_clk, site: C1}}
+  - {{port: rgmii_tx_ctl, site: C2}}
+"""
+
+
+def _board(folder: Path, flow: str) -> str:
+    bits = "".join(f"  - {{port: 'rgmii_{way}[{bit}]', site: D{bit}}}\n" for way in ("rxd", "txd") for bit in range(4))
+    (folder / "rgmii.yaml").write_text(_RGMII.format(flow=flow) + bits, encoding="utf-8")
+    return "rgmii.yaml"
+
+
+def test_the_clocks_of_a_phy_are_constrained(path: Path) -> None:
+    files = _files(path.parent, board=_board(path.parent, "trellis"))
+    clocks = [line for line in files["rgmii.lpf"].splitlines() if line.startswith("FREQUENCY")]
+    assert clocks == [f'FREQUENCY PORT "{port}" 125 MHZ;' for port in ("clk", "rgmii_rx_clk")]
+    assert read_board("rgmii.yaml", path.parent).ddr_flag == "ddr_ecp5"
+    assert read_board("ulx3s_lan8720").ddr_flag is None
+
+
+def test_pins_with_both_edges_need_cells(path: Path) -> None:
+    with pytest.raises(InputError, match=r"boards with flow 'icestorm' have no cells for phy 'rgmii'"):
+        _files(path.parent, board=_board(path.parent, "icestorm"))
 
 
 def test_a_topic_may_be_too_long_for_the_hardware(path: Path, capsys: pytest.CaptureFixture[str]) -> None:

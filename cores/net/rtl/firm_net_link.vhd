@@ -22,7 +22,13 @@ entity firm_net_link is
     PROGRAM_BITS : integer := 12;  -- of an address in the memory of packets
     -- Numbers of packets.
     REPORT_PACKET : integer := 0;
-    PROBE_PACKET  : integer := 0
+    PROBE_PACKET  : integer := 0;
+    HAS_STATUS    : boolean := false; -- the system has a status, which is read by UDP
+    PAYLOADS      : integer := 4096;  -- bytes of payloads that wait, see firm_rtps_node
+    -- Packets whose fragments may be interleaved, 0 to 4, and the bytes of the longest one; without them, fragments
+    -- are dropped.
+    REASSEMBLIES : integer := 0;
+    REASSEMBLED  : integer := 16384
   );
   port (
     clk   : in std_logic;
@@ -78,14 +84,16 @@ entity firm_net_link is
     -- Pulses:
     --   0  a frame on the line is broken or too long
     --   1  a datagram for the board is broken
-    --   2  a fragment is dropped
-    --   3  a reply to ARP or ping, or a packet of discovery, has no room
+    --   2  a fragment or an incomplete packet is dropped
+    --   3  a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room
     --   4  a peer has no room
     --   5  a matching writer or reader of a peer has no room
-    --   6  a sample has no room
+    --   6  a sample has no room, or comes in fragments of RTPS
     --   7  a frame to send has too long a payload, or the id of no writer
     --   8  another host has the board's address
-    network_error : out std_logic_vector(8 downto 0)
+    --   9  a packet of RTPS, or a list of parameters in it, is broken
+    --  10  a peer's writer or reader of a topic of the board differs in type, hash, quality, partition or encoding
+    network_error : out std_logic_vector(10 downto 0)
   );
 end entity firm_net_link;
 
@@ -93,7 +101,7 @@ architecture rtl of firm_net_link is
 
   constant PORTS    : positive := 3;
   constant GROUP_IP : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
-  constant DEPTH    : positive := 4096;  -- bytes of waiting discovery, and of waiting payloads
+  constant DEPTH    : positive := 4096;  -- bytes of waiting discovery
 
   function cycles_of(hertz : integer) return positive is
   begin
@@ -114,7 +122,16 @@ architecture rtl of firm_net_link is
     return bits;
   end function number_of;
 
-  constant CYCLES      : positive := cycles_of(CLOCK_HZ);
+  function sources_sent_of(answers : boolean) return positive is
+  begin
+    if answers then
+      return 3;
+    end if;
+    return 2;
+  end function sources_sent_of;
+
+  constant CYCLES       : positive := cycles_of(CLOCK_HZ);
+  constant SOURCES_SENT : positive := sources_sent_of(HAS_STATUS);
   -- A constant prefix does not change at a restart: vendor, MAC address, zeros.
   constant PREFIX_HEAD : std_logic_vector(15 downto 0) := x"0000";
   constant PREFIX_TAIL : std_logic_vector(31 downto 0) := x"00000000";
@@ -126,6 +143,12 @@ architecture rtl of firm_net_link is
   signal received_tuser  : std_logic_vector(0 downto 0);
   signal received_tvalid : std_logic;
   signal received_tlast  : std_logic;
+
+  -- The same, with whole packets instead of their fragments.
+  signal whole_tdata  : std_logic_vector(7 downto 0);
+  signal whole_tuser  : std_logic_vector(0 downto 0);
+  signal whole_tvalid : std_logic;
+  signal whole_tlast  : std_logic;
 
   signal datagram_tdata  : std_logic_vector(7 downto 0);
   signal datagram_tuser  : std_logic_vector(0 downto 0);
@@ -143,6 +166,14 @@ architecture rtl of firm_net_link is
   signal out_tvalid : std_logic;
   signal out_tlast  : std_logic;
   signal out_tready : std_logic;
+
+  -- Frames of the node without those of the status.
+  signal sample_tdata  : std_logic_vector(7 downto 0);
+  signal sample_tvalid : std_logic;
+  signal sample_tlast  : std_logic;
+  signal sample_tready : std_logic;
+  signal frame_tvalid  : std_logic;
+  signal frame_tready  : std_logic;
 
   -- Packets of the node, and of its presence.
   signal node_start    : std_logic;
@@ -162,11 +193,11 @@ architecture rtl of firm_net_link is
   signal payload_tvalid : std_logic;
   signal payload_tready : std_logic;
 
-  -- Replies to ARP and ping, then packets.
-  signal sources_tdata  : std_logic_vector(15 downto 0);
-  signal sources_tvalid : std_logic_vector(1 downto 0);
-  signal sources_tlast  : std_logic_vector(1 downto 0);
-  signal sources_tready : std_logic_vector(1 downto 0);
+  -- Replies to ARP and ping, packets, then replies of the status.
+  signal sources_tdata  : std_logic_vector(8*SOURCES_SENT-1 downto 0);
+  signal sources_tvalid : std_logic_vector(SOURCES_SENT-1 downto 0);
+  signal sources_tlast  : std_logic_vector(SOURCES_SENT-1 downto 0);
+  signal sources_tready : std_logic_vector(SOURCES_SENT-1 downto 0);
   signal sent_tdata     : std_logic_vector(7 downto 0);
   signal sent_tvalid    : std_logic;
   signal sent_tlast     : std_logic;
@@ -176,6 +207,12 @@ architecture rtl of firm_net_link is
   signal is_too_long   : std_logic;
   signal is_reply_lost : std_logic;
   signal is_lost       : std_logic;
+
+  signal is_fragment       : std_logic;
+  signal is_sample_lost    : std_logic;
+  signal is_sample_parted  : std_logic;
+  signal is_packet_dropped : std_logic;
+  signal is_frame_lost     : std_logic;
 
 begin
 
@@ -254,6 +291,43 @@ begin
       is_taken      => network_error(8)
     );
 
+  without_fragments : if REASSEMBLIES = 0 generate
+    whole_tdata        <= received_tdata;
+    whole_tuser        <= received_tuser;
+    whole_tvalid       <= received_tvalid;
+    whole_tlast        <= received_tlast;
+    is_packet_dropped  <= '0';
+    is_frame_lost      <= '0';
+  end generate without_fragments;
+
+  with_fragments : if REASSEMBLIES /= 0 generate
+
+    u_reassembly : entity firm.firm_ipv4_reassembly
+      generic map (
+        -- As many may leave at the same time.
+        PACKETS => 2*REASSEMBLIES,
+        BYTES   => REASSEMBLED
+      )
+      port map (
+        clk           => clk,
+        rst_n         => rst_n,
+        tick          => tick_r,
+        mac           => mac,
+        address       => address,
+        s_axis_tdata  => received_tdata,
+        s_axis_tuser  => received_tuser,
+        s_axis_tvalid => received_tvalid,
+        s_axis_tlast  => received_tlast,
+        m_axis_tdata  => whole_tdata,
+        m_axis_tuser  => whole_tuser,
+        m_axis_tvalid => whole_tvalid,
+        m_axis_tlast  => whole_tlast,
+        is_dropped    => is_packet_dropped,
+        is_lost       => is_frame_lost
+      );
+
+  end generate with_fragments;
+
   u_udp : entity firm.firm_udp_receiver
     generic map (
       PORTS => PORTS
@@ -265,10 +339,10 @@ begin
       address        => address,
       group_ip       => GROUP_IP,
       udp_ports      => udp_ports,
-      s_axis_tdata   => received_tdata,
-      s_axis_tuser   => received_tuser,
-      s_axis_tvalid  => received_tvalid,
-      s_axis_tlast   => received_tlast,
+      s_axis_tdata   => whole_tdata,
+      s_axis_tuser   => whole_tuser,
+      s_axis_tvalid  => whole_tvalid,
+      s_axis_tlast   => whole_tlast,
       m_axis_tdata   => datagram_tdata,
       m_axis_tuser   => datagram_tuser,
       m_axis_tvalid  => datagram_tvalid,
@@ -277,7 +351,7 @@ begin
       source_address => open,
       source_port    => open,
       port_match     => open,
-      is_fragment    => network_error(2),
+      is_fragment    => is_fragment,
       is_broken      => network_error(1)
     );
 
@@ -293,7 +367,8 @@ begin
       SINKS   => SINKS,
       SAMPLE  => SAMPLE,
       SLOTS   => SLOTS,
-      DEPTH   => DEPTH
+      DEPTH   => DEPTH,
+      BYTES   => PAYLOADS
     )
     port map (
       clk                 => clk,
@@ -312,15 +387,15 @@ begin
       source_mac          => source_mac,
       names_address       => names_address,
       names_data          => names_data,
-      frame_tdata         => in_tdata,
-      frame_tvalid        => in_tvalid,
-      frame_tlast         => in_tlast,
-      frame_tready        => in_tready,
+      frame_tdata         => sample_tdata,
+      frame_tvalid        => sample_tvalid,
+      frame_tlast         => sample_tlast,
+      frame_tready        => sample_tready,
       sample_tdata        => out_tdata,
       sample_tuser        => out_tuser,
-      sample_tvalid       => out_tvalid,
+      sample_tvalid       => frame_tvalid,
       sample_tlast        => out_tlast,
-      sample_tready       => out_tready,
+      sample_tready       => frame_tready,
       start               => node_start,
       packet              => node_packet,
       payload_bytes       => node_bytes,
@@ -335,11 +410,109 @@ begin
       source_count        => open,
       sink_count          => open,
       is_discovery_lost   => is_lost,
-      is_sample_lost      => network_error(6),
+      is_sample_lost      => is_sample_lost,
       is_peer_refused     => network_error(4),
       is_endpoint_refused => network_error(5),
-      is_frame_refused    => network_error(7)
+      is_frame_refused    => network_error(7),
+      is_sample_parted    => is_sample_parted,
+      is_packet_broken    => network_error(9),
+      is_endpoint_other   => network_error(10)
     );
+
+  -- ------------------------------------------------------------------ the status
+
+  without_status : if not HAS_STATUS generate
+    in_tdata      <= sample_tdata;
+    in_tvalid     <= sample_tvalid;
+    in_tlast      <= sample_tlast;
+    sample_tready <= in_tready;
+    frame_tvalid  <= out_tvalid;
+    out_tready    <= frame_tready;
+  end generate without_status;
+
+  with_status : if HAS_STATUS generate
+
+    constant STATUS_ID : std_logic_vector(7 downto 0) := x"ff";
+
+    -- Frames to the system: samples, then requests.
+    signal merged_tdata  : std_logic_vector(15 downto 0);
+    signal merged_tvalid : std_logic_vector(1 downto 0);
+    signal merged_tlast  : std_logic_vector(1 downto 0);
+    signal merged_tready : std_logic_vector(1 downto 0);
+
+    signal inside_r      : std_logic;  -- the byte of the system is not the first one of its frame
+    signal is_answer_r   : std_logic;  -- its frame is of the status
+    signal is_answer     : std_logic;
+    signal answer_tvalid : std_logic;
+
+  begin
+
+    u_status : entity firm.firm_net_status
+      port map (
+        clk            => clk,
+        rst_n          => rst_n,
+        mac            => mac,
+        address        => address,
+        s_axis_tdata   => received_tdata,
+        s_axis_tuser   => received_tuser,
+        s_axis_tvalid  => received_tvalid,
+        s_axis_tlast   => received_tlast,
+        request_tdata  => merged_tdata(15 downto 8),
+        request_tvalid => merged_tvalid(1),
+        request_tlast  => merged_tlast(1),
+        request_tready => merged_tready(1),
+        answer_tdata   => out_tdata,
+        answer_tvalid  => answer_tvalid,
+        answer_tlast   => out_tlast,
+        m_axis_tdata   => sources_tdata(23 downto 16),
+        m_axis_tvalid  => sources_tvalid(2),
+        m_axis_tlast   => sources_tlast(2),
+        m_axis_tready  => sources_tready(2)
+      );
+
+    merged_tdata(7 downto 0) <= sample_tdata;
+    merged_tvalid(0)         <= sample_tvalid;
+    merged_tlast(0)          <= sample_tlast;
+    sample_tready            <= merged_tready(0);
+
+    u_requests : entity firm.firm_net_merge
+      generic map (
+        SOURCES => 2
+      )
+      port map (
+        clk           => clk,
+        rst_n         => rst_n,
+        s_axis_tdata  => merged_tdata,
+        s_axis_tvalid => merged_tvalid,
+        s_axis_tlast  => merged_tlast,
+        s_axis_tready => merged_tready,
+        m_axis_tdata  => in_tdata,
+        m_axis_tvalid => in_tvalid,
+        m_axis_tlast  => in_tlast,
+        m_axis_tready => in_tready
+      );
+
+    is_answer     <= is_answer_r when inside_r = '1' else
+                     '1' when out_tdata = STATUS_ID else
+                     '0';
+    answer_tvalid <= out_tvalid and is_answer;
+    frame_tvalid  <= out_tvalid and not is_answer;
+    out_tready    <= frame_tready or is_answer;
+
+    follow_frame : process (clk)
+    begin
+      if rising_edge(clk) then
+        if out_tvalid = '1' and (frame_tready = '1' or is_answer = '1') then
+          inside_r    <= not out_tlast;
+          is_answer_r <= is_answer;
+        end if;
+        if rst_n = '0' then
+          inside_r <= '0';
+        end if;
+      end if;
+    end process follow_frame;
+
+  end generate with_status;
 
   u_streams : entity firm.firm_net_streams
     generic map (
@@ -410,7 +583,7 @@ begin
 
   u_merge : entity firm.firm_net_merge
     generic map (
-      SOURCES => 2
+      SOURCES => SOURCES_SENT
     )
     port map (
       clk           => clk,
@@ -442,6 +615,8 @@ begin
     );
 
   network_error(0) <= is_broken or is_too_long;
-  network_error(3) <= is_reply_lost or is_lost;
+  network_error(6) <= is_sample_lost or is_sample_parted;
+  network_error(2) <= is_fragment or is_packet_dropped;
+  network_error(3) <= is_reply_lost or is_lost or is_frame_lost;
 
 end architecture rtl;

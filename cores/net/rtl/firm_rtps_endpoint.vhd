@@ -42,6 +42,7 @@ entity firm_rtps_endpoint is
 
     -- From seven cycles after the last word on.
     matches      : out std_logic_vector(READERS+WRITERS-1 downto 0);
+    differs      : out std_logic;  -- a topic of the node's in another type, hash, quality, partition or encoding
     is_known     : out std_logic;  -- the GUID was told, and is one of the sender
     is_reliable  : out std_logic;  -- the peer's endpoint
     is_transient : out std_logic;
@@ -70,6 +71,7 @@ architecture rtl of firm_rtps_endpoint is
   constant MOST_ENCODINGS  : positive := 16;
 
   subtype mask_t is std_logic_vector(ENDPOINTS-1 downto 0);
+  constant NO_ENDPOINT : mask_t := (others => '0');
   type memory_t is array (natural range 0 to 15) of std_logic_vector(7 downto 0);
 
   -- ------------------------------------------------------------------ a byte of a value
@@ -456,6 +458,7 @@ begin
   tell : process (clk)
     variable found     : mask_t;
     variable is_enough : boolean;
+    variable towards   : mask_t;  -- the node's readers for a writer, and its writers for a reader
   begin
     if rising_edge(clk) then
       found := topics_r and types_r;
@@ -468,9 +471,11 @@ begin
       for index in found'range loop
         -- What is wanted has to be offered, by the peer's writer or by the node's.
         if index < READERS then
+          towards(index) := not is_reader;
           is_enough := is_reader = '0' and (are_reliable(index) and not offers) = '0'
                        and (are_transient(index) and not transient_r) = '0';
         else
+          towards(index) := is_reader;
           is_enough := is_reader = '1' and (offers and not are_reliable(index)) = '0'
                        and (transient_r and not are_transient(index)) = '0';
         end if;
@@ -479,6 +484,10 @@ begin
         end if;
       end loop;
       matches <= found;
+      differs <= '0';
+      if (topics_r and towards and not found) /= NO_ENDPOINT then
+        differs <= '1';
+      end if;
     end if;
   end process tell;
 

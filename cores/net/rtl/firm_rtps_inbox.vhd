@@ -60,7 +60,9 @@ entity firm_rtps_inbox is
     is_little : out std_logic;
     is_last   : out std_logic;
 
-    is_lost : out std_logic  -- a pulse for each packet without room
+    -- Pulses.
+    is_lost : out std_logic; -- a packet without room
+    is_cut  : out std_logic  -- a payload whose list of parameters has no end
   );
 end entity firm_rtps_inbox;
 
@@ -88,6 +90,8 @@ architecture rtl of firm_rtps_inbox is
   signal value       : std_logic_vector(7 downto 0);
   signal new_kind    : std_logic;
   signal list_valid  : std_logic;
+  signal in_list     : std_logic;
+  signal ended_r     : std_logic;  -- the word before was the last one of its submessage
 
   signal from_r  : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
   signal large_r : std_logic := '0';
@@ -276,7 +280,18 @@ begin
       size      => size,
       place     => place,
       is_little => is_little,
-      is_last   => is_last
+      is_last   => is_last,
+      is_open   => in_list
     );
+
+  -- The last word may be the last byte of the list.
+  note_end : process (clk)
+  begin
+    if rising_edge(clk) then
+      ended_r <= takes and taken_r(16) and rst_n;
+    end if;
+  end process note_end;
+
+  is_cut <= ended_r and in_list;
 
 end architecture rtl;

@@ -15,7 +15,8 @@ entity firm_rtps_node is
     SINKS   : integer := 16;   -- matched readers of peers, 1 to 128
     SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 1024
     SLOTS   : integer := 16;   -- for the last samples of all writers, a power of two, 2 to 256
-    DEPTH   : integer := 2048; -- bytes of waiting discovery, and of waiting payloads; a power of two, 4 to 65536
+    DEPTH   : integer := 2048; -- bytes of waiting discovery, a power of two, 4 to 65536
+    BYTES   : integer := 2048; -- of waiting payloads, a power of two, 4 to 65536
     SAMPLES : integer := 16    -- that wait for the host, a power of two, 2 or more
   );
   port (
@@ -79,7 +80,11 @@ entity firm_rtps_node is
     is_sample_lost      : out std_logic;  -- a sample in a packet
     is_peer_refused     : out std_logic;
     is_endpoint_refused : out std_logic;  -- one that matches
-    is_frame_refused    : out std_logic   -- a frame to send: without a payload, too long, or of another id
+    is_frame_refused    : out std_logic;  -- a frame to send: without a payload, too long, or of another id
+    -- Pulses: something was wrong, or another than it should be.
+    is_sample_parted    : out std_logic;  -- a packet with a sample in fragments
+    is_packet_broken    : out std_logic;  -- a packet, or the list of parameters in it
+    is_endpoint_other   : out std_logic   -- the announcement of a topic of the node's that differs from it
   );
 end entity firm_rtps_node;
 
@@ -87,6 +92,9 @@ architecture rtl of firm_rtps_node is
 
   constant FIRST_READER : positive := 2;  -- 1 is the writer of ros_discovery_info
   constant ENDPOINTS    : positive := READERS+WRITERS;
+
+  -- Cycles from the last word of an announcement until it is known what it was.
+  constant JUDGED : positive := 7;
 
   signal field_valid   : std_logic;
   signal field_address : std_logic_vector(RECORD_BITS-1 downto 0);
@@ -120,6 +128,9 @@ architecture rtl of firm_rtps_node is
   signal is_little : std_logic;
   signal is_last   : std_logic;
 
+  signal is_cut          : std_logic;
+  signal announced_r     : std_logic_vector(JUDGED-1 downto 0);  -- an announcement ended some cycles ago
+  signal differs         : std_logic;
   signal is_reader_r     : std_logic;
   signal matches         : std_logic_vector(ENDPOINTS-1 downto 0);
   signal is_known        : std_logic;
@@ -221,7 +232,8 @@ begin
       place         => place,
       is_little     => is_little,
       is_last       => is_last,
-      is_lost       => is_discovery_lost
+      is_lost       => is_discovery_lost,
+      is_cut        => is_cut
     );
 
   note_kind : process (clk)
@@ -233,6 +245,23 @@ begin
       end if;
     end if;
   end process note_kind;
+
+  is_packet_broken <= is_faulty or is_cut;
+
+  note_announcement : process (clk)
+  begin
+    if rising_edge(clk) then
+      announced_r <= announced_r(JUDGED-2 downto 0) & '0';
+      if writer = RTPS_PUBLICATIONS_WRITER or writer = RTPS_SUBSCRIPTIONS_WRITER then
+        announced_r(0) <= take and has_word and is_end and not is_gone;
+      end if;
+      if rst_n = '0' then
+        announced_r <= (others => '0');
+      end if;
+    end if;
+  end process note_announcement;
+
+  is_endpoint_other <= announced_r(JUDGED-1) and differs;
 
   u_locators : entity firm.firm_rtps_locators
     port map (
@@ -281,6 +310,7 @@ begin
       names_address => names_address,
       names_data    => names_data,
       matches       => matches,
+      differs       => differs,
       is_known      => is_known,
       is_reliable   => is_reliable,
       is_transient  => is_transient,
@@ -292,7 +322,7 @@ begin
       READERS => READERS,
       FIRST   => FIRST_READER,
       SOURCES => SOURCES,
-      BYTES   => DEPTH,
+      BYTES   => BYTES,
       SAMPLES => SAMPLES
     )
     port map (
@@ -329,7 +359,8 @@ begin
       m_axis_tvalid => frame_tvalid,
       m_axis_tlast  => frame_tlast,
       m_axis_tready => frame_tready,
-      is_lost       => is_sample_lost
+      is_lost       => is_sample_lost,
+      is_parted     => is_sample_parted
     );
 
   u_history : entity firm.firm_rtps_history

@@ -23,7 +23,8 @@ entity firm_rtps_parameters is
     size      : out std_logic_vector(15 downto 0);  -- bytes of the value; it stays for two further cycles
     place     : out std_logic_vector(15 downto 0);  -- in the value, from 0
     is_little : out std_logic;                      -- the byte order of the list
-    is_last   : out std_logic                       -- the byte is the last one of the value
+    is_last   : out std_logic;                      -- the byte is the last one of the value
+    is_open   : out std_logic                       -- a list has begun, and not ended
   );
 end entity firm_rtps_parameters;
 
@@ -105,5 +106,6 @@ begin
   id        <= id_r;
   size      <= std_logic_vector(size_r);
   is_little <= little_r;
+  is_open   <= '1' when head_r = HEAD_BYTES and over_r = '0' else '0';
 
 end architecture rtl;

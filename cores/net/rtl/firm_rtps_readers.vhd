@@ -69,7 +69,9 @@ entity firm_rtps_readers is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    is_lost : out std_logic  -- a pulse for each good packet with a sample without room
+    -- A pulse for each good packet with a sample:
+    is_lost   : out std_logic; -- without room
+    is_parted : out std_logic  -- in fragments
   );
 end entity firm_rtps_readers;
 
@@ -139,6 +141,7 @@ architecture rtl of firm_rtps_readers is
   signal submessage_r : std_logic;
   signal data_r       : std_logic;  -- it is a sample for this node
   signal filled_r     : std_logic;  -- with a payload that is whole
+  signal fragment_r   : std_logic;  -- with a part of one
   signal ends_r       : std_logic;
   signal spoils_r     : std_logic;
 
@@ -149,6 +152,7 @@ architecture rtl of firm_rtps_readers is
   signal has_room  : std_logic;
   signal is_sample : std_logic;
   signal misses_r  : std_logic;  -- a sample of the packet found no room
+  signal parts_r   : std_logic;  -- a sample of the packet is a fragment
   signal pushes    : std_logic;
   signal size      : size_t;
   signal spare_r   : std_logic;
@@ -320,6 +324,10 @@ begin
       if kind = RTPS_DATA or kind = RTPS_DATA_FRAG then
         data_r <= is_submessage and is_mine;
       end if;
+      fragment_r <= '0';
+      if kind = RTPS_DATA_FRAG then
+        fragment_r <= '1';
+      end if;
       filled_r <= '0';
       if kind = RTPS_DATA then
         filled_r <= flags(RTPS_PAYLOAD);
@@ -368,9 +376,10 @@ begin
     variable last  : count_t;
   begin
     if rising_edge(clk) then
-      is_lost <= '0';
-      place   := sample_r;
-      last    := last_r;
+      is_lost   <= '0';
+      is_parted <= '0';
+      place     := sample_r;
+      last      := last_r;
       if payload_valid = '1' then
         full_r <= full_r or not has_room;
         if has_room = '1' then
@@ -387,10 +396,13 @@ begin
         write_r  <= place;
         full_r   <= '0';
         misses_r <= misses_r or (is_sample and not pushes);
+        parts_r  <= parts_r or (is_sample and fragment_r);
       end if;
       if ends_r = '1' then
-        is_lost  <= misses_r and not spoils_r;
-        misses_r <= '0';
+        is_lost   <= misses_r and not spoils_r;
+        is_parted <= parts_r and not spoils_r;
+        misses_r  <= '0';
+        parts_r   <= '0';
         if spoils_r = '1' then
           place := start_r;
           last  := first_r;
@@ -409,8 +421,10 @@ begin
         first_r  <= (others => '0');
         last_r   <= (others => '0');
         full_r   <= '0';
-        misses_r <= '0';
-        is_lost  <= '0';
+        misses_r  <= '0';
+        parts_r   <= '0';
+        is_lost   <= '0';
+        is_parted <= '0';
       end if;
     end if;
   end process gather;

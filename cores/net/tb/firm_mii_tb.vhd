@@ -13,6 +13,7 @@ use firm.firm_sim_pkg.all;
 entity firm_mii_tb is
   generic (
     IS_GMII       : boolean := false;
+    IS_RGMII      : boolean := false;
     IS_RMII       : boolean := false;
     LINE_FILE     : string  := "nibbles.txt";
     RESULT_FILE   : string  := "sent.txt";
@@ -42,6 +43,16 @@ architecture simulation of firm_mii_tb is
   signal pin_tx_en : std_logic;
   signal pin_tx_er : std_logic;
   signal pin_txd   : std_logic_vector(7 downto 0);
+
+  -- Of an RGMII. The PHY delays both clocks by a quarter of their period.
+  constant RX_DELAY : time := PHY_PERIOD_PS * 250 fs;
+  constant TX_DELAY : time := PERIOD_PS * 250 fs;
+
+  signal rgmii_rx_ctl : std_logic                    := '0';
+  signal rgmii_rxd    : std_logic_vector(3 downto 0) := x"0";
+  signal rgmii_tx_clk : std_logic;
+  signal rgmii_tx_ctl : std_logic;
+  signal rgmii_txd    : std_logic_vector(3 downto 0);
 
   signal rx_step : std_logic;
   signal rx_dv   : std_logic;
@@ -107,7 +118,7 @@ begin
 
   end generate if_rmii;
 
-  if_mii : if not (IS_GMII or IS_RMII) generate
+  if_mii : if not (IS_GMII or IS_RGMII or IS_RMII) generate
 
     u_tx_clock : entity firm.firm_sim_clock
       generic map (
@@ -171,6 +182,58 @@ begin
       );
 
   end generate if_gmii;
+
+  if_rgmii : if IS_RGMII generate
+
+    tx_clk <= transport rgmii_tx_clk after TX_DELAY;
+
+    u_rgmii : entity firm.firm_rgmii
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        rgmii_rx_clk => rx_clk,
+        rgmii_rx_ctl => rgmii_rx_ctl,
+        rgmii_rxd    => rgmii_rxd,
+        rgmii_tx_clk => rgmii_tx_clk,
+        rgmii_tx_ctl => rgmii_tx_ctl,
+        rgmii_txd    => rgmii_txd,
+        rx_step      => rx_step,
+        rx_dv        => rx_dv,
+        rx_er        => rx_er,
+        rxd          => rxd,
+        tx_step      => tx_step,
+        tx_en        => tx_en,
+        tx_er        => tx_er,
+        txd          => txd
+      );
+
+    -- The PHY shows each nibble in the half of its clock's period around an edge.
+    show_nibbles : process
+    begin
+      wait until falling_edge(rx_clk);
+      wait for RX_DELAY;
+      rgmii_rx_ctl <= pin_rx_dv;
+      rgmii_rxd    <= pin_rxd(3 downto 0);
+      wait until rising_edge(rx_clk);
+      wait for RX_DELAY;
+      rgmii_rx_ctl <= pin_rx_dv xor pin_rx_er;
+      rgmii_rxd    <= pin_rxd(7 downto 4);
+    end process show_nibbles;
+
+    take_nibbles : process
+      variable lower : std_logic_vector(3 downto 0);
+      variable valid : std_logic;
+    begin
+      wait until rising_edge(tx_clk);
+      lower := rgmii_txd;
+      valid := rgmii_tx_ctl;
+      wait until falling_edge(tx_clk);
+      pin_txd   <= rgmii_txd & lower;
+      pin_tx_en <= valid;
+      pin_tx_er <= rgmii_tx_ctl xor valid;
+    end process take_nibbles;
+
+  end generate if_rgmii;
 
   u_receiver : entity firm.firm_mac_receiver
     port map (

@@ -147,6 +147,7 @@ begin
       SOURCES => SOURCES,
       SINKS   => SINKS,
       DEPTH   => DEPTH,
+      BYTES   => DEPTH,
       SAMPLES => SAMPLES,
       SAMPLE  => SAMPLE,
       SLOTS   => SLOTS
@@ -194,7 +195,10 @@ begin
       is_sample_lost      => is_sample_lost,
       is_peer_refused     => is_peer_refused,
       is_endpoint_refused => is_endpoint_refused,
-      is_frame_refused    => is_frame_refused
+      is_frame_refused    => is_frame_refused,
+      is_sample_parted    => open,
+      is_packet_broken    => open,
+      is_endpoint_other   => open
     );
 
   u_builder : entity firm.firm_packet_builder

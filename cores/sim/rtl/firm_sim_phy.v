@@ -5,7 +5,8 @@
 `timescale 1ns / 1ps
 
 module firm_sim_phy #(
-  parameter BITS = 8  // 2, 4 or 8
+  parameter BITS   = 8,  // 2, 4 or 8
+  parameter IS_DDR = 0   // both edges, with 4 bits
 ) (
   output reg             clk,
   output reg             rst_n,
@@ -17,6 +18,7 @@ module firm_sim_phy #(
 );
 
   localparam HALF_PERIOD  = 5;
+  localparam QUARTER      = 2.5;
   localparam RESET_CYCLES = 8;
   localparam QUIET_CYCLES = 200;
   localparam GAP_CYCLES   = 12 * 8 / BITS;
@@ -94,9 +96,18 @@ module firm_sim_phy #(
     end
   endtask
 
+  task exchange;
+    begin
+      take;
+      show;
+    end
+  endtask
+
   initial begin : phy
     if (BITS != 2 && BITS != 4 && BITS != 8)
       $fatal(1, "firm_sim_phy: BITS is %0d; legal: 2, 4, 8", BITS);
+    if (IS_DDR && BITS != 4)
+      $fatal(1, "firm_sim_phy: BITS is %0d; legal with IS_DDR: 4", BITS);
     answers = $fopen("/dev/fd/3", "rb");
     reports = $fopen("/dev/fd/4", "wb");
     if (answers == 0 || reports == 0)
@@ -117,11 +128,19 @@ module firm_sim_phy #(
     end
     rst_n = 1;
     forever begin
-      #HALF_PERIOD clk = 1;
-      #HALF_PERIOD clk = 0;
       cycles = cycles + 1;
-      take;
-      show;
+      if (IS_DDR) begin
+        // The first nibble of a byte is shown around the rising edge, and taken while the clock is high.
+        #QUARTER exchange;
+        #QUARTER clk = 1;
+        #QUARTER exchange;
+        #QUARTER clk = 0;
+      end
+      else begin
+        #HALF_PERIOD clk = 1;
+        #HALF_PERIOD clk = 0;
+        exchange;
+      end
     end
   end
 

@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The clock, the reset and the PHY of a simulated board, whose frames another program exchanges. BITS of a byte cross
--- in each cycle, the lowest ones first: 8 for a GMII, 4 for an MII, 2 for an RMII. Frames have preamble and checksum.
+-- in each cycle, the lowest ones first: 8 for a GMII, 4 for an MII, 2 for an RMII. With IS_DDR, they cross at both
+-- edges: 4 for an RGMII, whose control pins are rx_dv and tx_en. Frames have preamble and checksum.
 -- It reports at file descriptor 4:
 --
 --     w CYCLES   a frame to the system may begin, after a number of cycles (4 bytes, the lowest first)
@@ -16,7 +17,8 @@ use ieee.numeric_std.all;
 
 entity firm_sim_phy is
   generic (
-    BITS : integer := 8 -- 2, 4 or 8
+    BITS   : integer := 8;    -- 2, 4 or 8
+    IS_DDR : boolean := false -- with 4 bits
   );
   port (
     clk   : out std_logic;
@@ -32,6 +34,7 @@ end entity firm_sim_phy;
 architecture simulation of firm_sim_phy is
 
   constant HALF_PERIOD  : time     := 5 ns;
+  constant QUARTER      : time     := HALF_PERIOD / 2;
   constant RESET_CYCLES : positive := 8;
   constant QUIET_CYCLES : positive := 200;
   constant GAP_CYCLES   : positive := 12 * 8 / BITS;
@@ -62,6 +65,9 @@ begin
 
   assert BITS = 2 or BITS = 4 or BITS = 8
     report "firm_sim_phy: BITS is " & integer'image(BITS) & "; legal: 2, 4, 8"
+    severity failure;
+  assert BITS = 4 or not IS_DDR
+    report "firm_sim_phy: BITS is " & integer'image(BITS) & "; legal with IS_DDR: 4"
     severity failure;
 
   phy : process
@@ -169,6 +175,34 @@ begin
       end if;
     end procedure show;
 
+    procedure exchange is
+    begin
+      take;
+      show;
+    end procedure exchange;
+
+    -- The first nibble of a byte is shown around the rising edge, and taken while the clock is high.
+    procedure pass_cycle_of_both_edges is
+    begin
+      wait for QUARTER;
+      exchange;
+      wait for QUARTER;
+      clk <= '1';
+      wait for QUARTER;
+      exchange;
+      wait for QUARTER;
+      clk <= '0';
+    end procedure pass_cycle_of_both_edges;
+
+    procedure pass_cycle is
+    begin
+      wait for HALF_PERIOD;
+      clk <= '1';
+      wait for HALF_PERIOD;
+      clk <= '0';
+      exchange;
+    end procedure pass_cycle;
+
   begin
     open_pipes;
     clk   <= '0';
@@ -183,13 +217,12 @@ begin
     end loop;
     rst_n <= '1';
     loop
-      wait for HALF_PERIOD;
-      clk <= '1';
-      wait for HALF_PERIOD;
-      clk <= '0';
       cycles := cycles + 1;
-      take;
-      show;
+      if IS_DDR then
+        pass_cycle_of_both_edges;
+      else
+        pass_cycle;
+      end if;
     end loop;
   end process phy;
 

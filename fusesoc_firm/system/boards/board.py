@@ -8,7 +8,7 @@ the system is part of a block design (`block_design`).
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from fusesoc_firm.system.hardware.interconnect import (
     CHIP_PINS,
     LINK_PINS,
     NETWORK_FAULTS,
+    PHY_CLOCKS,
     PHY_PINS,
     phy_pins,
 )
@@ -36,6 +37,8 @@ BOARD_TEMPLATE = "vhdl/board.vhd"
 
 # Edalize's flows for boards with pins, each with the template and FuseSoC file type of the constraints.
 FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
+# The flag that selects the cells for pins with both edges (robot:net:firm_ddr) by flow.
+_DDR_FLAGS = {"trellis": "ddr_ecp5"}
 # Tools for systems whose streams are ports: Vivado places the system next to a processor, Quartus uses it unchanged.
 VIVADO, QUARTUS = "vivado", "quartus"
 # The keys of a board that each tool requires.
@@ -111,6 +114,11 @@ class Board(Section):
         return self.flow in FLOWS
 
     @property
+    def ddr_flag(self) -> str | None:
+        """The flag of the board's target that selects the cells for pins with both edges, if there are such pins."""
+        return _DDR_FLAGS[self.flow] if self.phy == Phy.RGMII.value else None
+
+    @property
     def host_pins(self) -> Sequence[tuple[str, str, str]]:
         """The pins of the interconnect: name, direction and type."""
         return phy_pins(Phy(str(self.phy))) if self.phy else _PINS[self.interconnect]
@@ -175,6 +183,10 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
     if (board.interconnect == ETHERNET) != (board.phy is not None):
         place = board.phy.source if board.phy else board.interconnect.source
         faults.error(f"the key 'phy' and interconnect '{ETHERNET}' need each other", place)
+        return
+    if board.phy == Phy.RGMII.value and board.flow not in _DDR_FLAGS:
+        message = f"boards with flow '{board.flow}' have no cells for phy '{board.phy}'"
+        faults.error(message, board.phy.source, nearest("", [phy for phy in PHYS if phy != board.phy]))
         return
     seen: dict[str, Text] = {}
     for pin in board.pins:
@@ -291,7 +303,10 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
         "is_spi": is_spi,
         "has_link": system.link is not None,
         "network": {"fault_count": len(NETWORK_FAULTS), "address_fault": ADDRESS_FAULT} if board.phy else None,
-        "clock_mhz": f"{clock_hz / 10**6:g}",
+        "clocks": [
+            {"port": _CLOCK, "mhz": f"{clock_hz / 10**6:g}"},
+            *({"port": name, "mhz": mhz} for name, mhz in _line_clocks(board).items()),
+        ],
         "pins": [
             {
                 "port": str(pin.port).lower(),
@@ -301,6 +316,11 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
             for pin in board.pins
         ],
     }
+
+
+def _line_clocks(board: Board) -> Mapping[str, int]:
+    """Return the clocks of the line that the PHY gives, in MHz."""
+    return PHY_CLOCKS[Phy(str(board.phy))] if board.phy else {}
 
 
 def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:

@@ -11,8 +11,12 @@ from fusesoc_firm.system.written.specification import Block, Project, Specificat
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 MOST_SUBSCRIBERS = MOST_PUBLISHERS = 8
-# Bytes of the longest payload: of a sample in one packet, and of a slot of the history.
-LONGEST_TAKEN, LONGEST_SENT = 1344, 1024
+# Bytes of the longest payload: of a sample in one frame, of one whose frame is reassembled, and of a slot of the
+# history.
+LONGEST_IN_FRAME, LONGEST_TAKEN, LONGEST_SENT = 1344, 16128, 1024
+# Bytes of the headers beside a payload in a packet of IPv4, with further submessages before it.
+_HEADERS_BYTES = 256
+_LEAST_WAITING = 4096
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
 MOST_DEPTH, MOST_SLOTS = 127, 256
 _SHORTEST_SLOT = 2
@@ -20,6 +24,7 @@ _SHORTEST_SLOT = 2
 _CLOCKS = {
     Phy.GMII: ((125, 125), "125 MHz, which is also the clock of the line"),
     Phy.MII: ((25, None), "25 MHz, the clock of the line at 100 Mbit/s, and more"),
+    Phy.RGMII: ((125, 125), "125 MHz, which is also the clock of the line"),
     Phy.RMII: ((50, 50), "50 MHz, which is also the clock of the line"),
 }
 _MEGAHERTZ = 10**6
@@ -50,6 +55,17 @@ def slot_bytes(publishers: Iterable[Converter]) -> int:
     """Return the bytes of a slot, a power of two: the longest payload that a node sends fits in."""
     longest = max(map(_longest, publishers), default=1)
     return max(_SHORTEST_SLOT, 1 << (longest - 1).bit_length())
+
+
+def reassembled_bytes(subscribers: Iterable[Converter]) -> int:
+    """Return the bytes of the longest packet that is reassembled, a power of two; 0 if none needs to be."""
+    longest = max(map(_longest, subscribers), default=0)
+    return 0 if longest <= LONGEST_IN_FRAME else 1 << (longest + _HEADERS_BYTES - 1).bit_length()
+
+
+def waiting_bytes(subscribers: Iterable[Converter]) -> int:
+    """Return the bytes of payloads that wait, a power of two: one comes while one leaves."""
+    return max(_LEAST_WAITING, 2 * reassembled_bytes(subscribers))
 
 
 def kept_of(quality: Quality) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from fusesoc_firm.frame.length import DEFAULT_LONGEST, MOST_BYTES, bounded_payload, length_of
-from fusesoc_firm.system.derived.ethernet import LONGEST_SENT, LONGEST_TAKEN
+from fusesoc_firm.system.derived.ethernet import LONGEST_IN_FRAME, LONGEST_SENT
 from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -82,7 +82,7 @@ def _limited(converter: Converter, block: Block, default: int, faults: Diagnosti
 def _default(subscriber: Converter, project: Project) -> int:
     """Return the longest payload of a message without bounds; software of the system itself keeps its lengths."""
     if project.interconnect == ETHERNET:
-        return LONGEST_TAKEN
+        return LONGEST_IN_FRAME
     if project.interconnect != AXI_STREAM:
         return _LINK_DEFAULT
     return DEFAULT_LONGEST if subscriber.software is None else MOST_BYTES

@@ -334,6 +334,7 @@ class Phy(Enum):
 
     GMII = "gmii"
     MII = "mii"
+    RGMII = "rgmii"
     RMII = "rmii"
 
 
@@ -350,7 +351,7 @@ class Network:
     """The place of a system that is a node itself: its MAC address (six bytes), IPv4 addresses and names.
 
     `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port, and knows the
-    names of `hosts`.
+    names of `hosts`. `reassemblies` are the messages in several packets that may arrive at the same time.
     """
 
     mac: bytes
@@ -364,6 +365,7 @@ class Network:
     master: tuple[IPv4Address, int] | None = None
     hosts: tuple[Host, ...] = ()
     phy: Phy = Phy.GMII
+    reassemblies: int = 1
 
 
 class StatusAccess(Enum):

@@ -16,6 +16,8 @@ from fusesoc_firm.system.written.specification import (
     ETHERNET,
     NETWORKS,
     NO_STATUS,
+    STATUS_AXI_LITE,
+    STATUS_FRAMES,
     Block,
     NodeNetwork,
     Project,
@@ -34,6 +36,8 @@ _HIGHEST_PORT = 0xFFFF
 _VERSIONS = {ETHERNET: ("ROS2", 2), **dict.fromkeys(CHIPS, ("ROS", 1))}
 _MAC = re.compile(r"[0-9A-Fa-f]{2}(:[0-9A-Fa-f]{2}){5}")
 _GROUP_BIT = 1
+# Half of those of firm_ipv4_reassembly: as many may wait until they leave.
+_MOST_REASSEMBLIES = 4
 # The limit of rmw (RMW_NODE_NAME_MAX_NAME_LENGTH).
 _LONGEST_NAME = 255
 _WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
@@ -111,9 +115,12 @@ def _check_system(written: Specification, scheduling: Scheduling, software: Soft
         faults.error(f"{message}cannot carry the bursts of scheduler '{scheduling.policy}'", source, hint)
     if project.id_bytes != ONE_BYTE:
         faults.error(f"{message}is not possible with 'idBytes: {project.id_bytes}'", source, f"use '{AXI_STREAM}'")
-    if project.status != NO_STATUS:
+    if project.interconnect in CHIPS and project.status != NO_STATUS:
         hint = f"remove the key, or use '{AXI_STREAM}'"
         faults.error(f"{message}has no host that reads a status", project.status.source, hint)
+    elif project.status == STATUS_AXI_LITE:
+        hint = f"use 'status: {STATUS_FRAMES}', which is read by UDP"
+        faults.error(f"{message}has no port for AXI4-Lite", project.status.source, hint)
     services = dict.fromkeys(block.service_block for block in written.blocks if block.service_block)
     for block in services if project.interconnect == ETHERNET else ():
         place = block.mode.source if block.mode else block.name.source
@@ -145,6 +152,9 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     if not 0 <= section.domain <= _LAST_DOMAIN:
         hint = f"legal here: 0 to {_LAST_DOMAIN}"
         faults.error(f"'domain: {section.domain}' is not possible", section.place("domain"), hint)
+    if not 1 <= section.reassemblies <= _MOST_REASSEMBLIES:
+        hint = f"legal here: 1 to {_MOST_REASSEMBLIES}"
+        faults.error(f"'reassemblies: {section.reassemblies}' is not possible", section.place("reassemblies"), hint)
     if not section.is_sound or mac is None or network is None:
         return None
     address, netmask, gateway = network
@@ -152,7 +162,8 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
         _check_reachable(section, address, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
     kind = NetworkKind(project.interconnect) if project.interconnect in NETWORKS else NetworkKind.ETHERNET
     namespace, domain, phy = str(section.namespace), section.domain, Phy(section.phy)
-    return Network(mac, address, netmask, gateway, name, namespace, domain, kind, master, hosts, phy)
+    others = (kind, master, hosts, phy, section.reassemblies)
+    return Network(mac, address, netmask, gateway, name, namespace, domain, *others)
 
 
 def _hosts(section: NodeNetwork, faults: Diagnostics) -> tuple[Host, ...]:

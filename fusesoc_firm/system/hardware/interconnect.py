@@ -54,6 +54,14 @@ PHY_PINS: Mapping[Phy, tuple[tuple[str, str, int | None], ...]] = {
         ("mii_tx_er", "out", None),
         ("mii_txd", "out", 4),
     ),
+    Phy.RGMII: (
+        ("rgmii_rx_clk", "in", None),
+        ("rgmii_rx_ctl", "in", None),
+        ("rgmii_rxd", "in", 4),
+        ("rgmii_tx_clk", "out", None),
+        ("rgmii_tx_ctl", "out", None),
+        ("rgmii_txd", "out", 4),
+    ),
     Phy.RMII: (
         ("rmii_crs_dv", "in", None),
         ("rmii_rxd", "in", 2),
@@ -61,27 +69,34 @@ PHY_PINS: Mapping[Phy, tuple[tuple[str, str, int | None], ...]] = {
         ("rmii_txd", "out", 2),
     ),
 }
-# The bits of a byte that each PHY moves in a cycle of the line.
-_LINE_BITS = {Phy.GMII: 8, Phy.MII: 4, Phy.RMII: 2}
-# The signal at firm_sim_phy of each pin, by the pin's name without the PHY's; None for pins of errors.
-_SIMULATED = {
-    **dict.fromkeys(("rx_clk", "tx_clk"), "clk"),
-    **dict.fromkeys(("rx_dv", "crs_dv"), "rx_dv"),
-    **dict.fromkeys(("rx_er", "tx_er")),
-    **{name: name for name in ("rxd", "tx_en", "txd")},
+# The bits of a byte that each PHY moves at an edge of the line's clock, and the clocks that it gives, in MHz.
+_LINE_BITS = {Phy.GMII: 8, Phy.MII: 4, Phy.RGMII: 4, Phy.RMII: 2}
+PHY_CLOCKS: Mapping[Phy, Mapping[str, int]] = {
+    Phy.GMII: {"gmii_rx_clk": 125},
+    Phy.MII: {"mii_rx_clk": 25, "mii_tx_clk": 25},
+    Phy.RGMII: {"rgmii_rx_clk": 125},
+    Phy.RMII: {},
 }
-# The bits of network_error of firm_net_link.
-NETWORK_FAULTS = (
-    "a frame on the line is broken or too long",
-    "a datagram for the board is broken",
-    "a fragment is dropped",
-    "a reply to ARP or ping, or a packet of discovery, has no room",
-    "another node has no room",
-    "a publisher or subscriber of another node, of a topic of the board, has no room",
-    "a message of another node has no room",
-    "a message to send is too long",
-    "another host has the address of the board",
-)
+# The signal at firm_sim_phy of each pin, by the pin's name without the PHY's; others are pins of errors, or open.
+_SIMULATED = {
+    **dict.fromkeys(("rx_dv", "crs_dv", "rx_ctl"), "rx_dv"),
+    **dict.fromkeys(("tx_en", "tx_ctl"), "tx_en"),
+    **{name: name for name in ("rxd", "txd")},
+}
+# The bits of network_error of firm_net_link, by the names of their counters.
+NETWORK_FAULTS = {
+    "broken_frames": "a frame on the line is broken or too long",
+    "broken_datagrams": "a datagram for the board is broken",
+    "dropped_fragments": "a fragment or an incomplete packet is dropped",
+    "lost_packets": "a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room",
+    "refused_nodes": "another node has no room",
+    "refused_endpoints": "a publisher or subscriber of another node, of a topic of the board, has no room",
+    "lost_messages": "a message of another node has no room, or comes in fragments of RTPS",
+    "refused_messages": "a message to send is too long",
+    "taken_addresses": "another host has the address of the board",
+    "broken_packets": "a packet of RTPS, or a list of parameters in it, is broken",
+    "other_endpoints": "a publisher or subscriber of a topic of the board has another type, hash, quality or encoding",
+}
 ADDRESS_FAULT = 8
 """The bit of an address that is taken."""
 CHIP_NUMBERS = {NetworkKind.W5500: 5500, NetworkKind.W5200: 5200}
@@ -134,17 +149,19 @@ def _ethernet(system: DerivedSystem, phy: Phy) -> dict[str, Any]:
         "phy": f"firm_{phy.value}",
         # An RMII does not report errors to the PHY.
         "sends_errors": phy is not Phy.RMII,
-        "pins": [{**pin, **_in_simulation(pin["name"])} for pin in _pins(phy_pins(phy))],
+        "pins": [{**pin, **_in_simulation(phy, pin)} for pin in _pins(phy_pins(phy))],
         "line_bits": _LINE_BITS[phy],
-        "faults": [{"bit": bit, "meaning": meaning} for bit, meaning in enumerate(NETWORK_FAULTS)],
+        "is_ddr": phy is Phy.RGMII,
+        "faults": [{"bit": bit, "meaning": meaning} for bit, meaning in enumerate(NETWORK_FAULTS.values())],
         "fault_count": len(NETWORK_FAULTS),
     }
 
 
-def _in_simulation(pin: str) -> dict[str, Any]:
+def _in_simulation(phy: Phy, pin: Mapping[str, str]) -> dict[str, Any]:
     """Return what the PHY of a simulated board, whose line has the system's clock, connects to a pin."""
-    signal = _SIMULATED[pin.partition("_")[2]]
-    return {"signal": signal or "", "is_low": pin.endswith("rx_er"), "is_open": pin.endswith("tx_er")}
+    name, is_input = pin["name"], pin["direction"] == "in"
+    signal = "clk" if name in PHY_CLOCKS[phy] else _SIMULATED.get(name.partition("_")[2], "")
+    return {"signal": signal, "is_low": not signal and is_input, "is_open": not (signal or is_input)}
 
 
 def _node(system: DerivedSystem) -> dict[str, Any]:

@@ -6,11 +6,13 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Flag
 
 from fusesoc_firm.converter.vhdl import index_bits
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, StatusAccess
 from fusesoc_firm.system.derived.status import TREE_CHANNELS
 from fusesoc_firm.system.hardware.instances import ERROR_CODE_BITS, INNER, error_of
+from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map
 from fusesoc_firm.text.render import Context, render
 
@@ -18,6 +20,7 @@ DESCRIPTION_TEMPLATE = "rdl/status.rdl"
 REGISTERS_TEMPLATE = "vhdl/registers.vhd"
 
 DIGEST_ADDRESS, DIGEST_WORDS = 0x30, 4
+_NETWORK_ADDRESS = 0x40
 _CHANNELS_ADDRESS, _CHANNEL_BYTES = 0x8000, 0x40
 _WORD_DIGITS = 8
 
@@ -27,6 +30,16 @@ ADDRESS_BITS, MOST_CHANNELS = 16, 512
 _TREE_ADDRESS_BITS = 20
 # Of the address of a word within a channel.
 _WORD_BITS = 4
+
+
+class Part(Flag):
+    """The parts that not every status has; the values are the bits of the register `features`."""
+
+    TIME_STAMPS = 1
+    NETWORK = 2
+
+
+NO_PART = Part(0)
 
 
 @dataclass(frozen=True)
@@ -61,9 +74,7 @@ def _described(item: Converter) -> list[object]:
     return [item.id, item.block, item.name, item.frame.ros.title, str(item.frame.message)]
 
 
-def status_description(
-    name: str, subscribers: int, publishers: int, digest: str = "", *, has_time_stamps: bool = False
-) -> str:
+def status_description(name: str, subscribers: int, publishers: int, digest: str = "", parts: Part = NO_PART) -> str:
     """Return the description of a status in SystemRDL; without a `digest`, its registers have the value 0."""
     digits = digest or "0" * (DIGEST_WORDS * _WORD_DIGITS)
     return render(
@@ -72,7 +83,17 @@ def status_description(
             "name": name,
             "subscribers": subscribers,
             "publishers": publishers,
-            "time_stamps": has_time_stamps,
+            "time_stamps": Part.TIME_STAMPS in parts,
+            "network": [
+                {
+                    "register": _network_register(name),
+                    "title": f"Times that {meaning}",
+                    "address": f"{_NETWORK_ADDRESS + 4 * number:03x}",
+                }
+                for number, (name, meaning) in enumerate(NETWORK_FAULTS.items())
+            ]
+            if Part.NETWORK in parts
+            else [],
             "publisher_address": f"{_CHANNELS_ADDRESS + subscribers * _CHANNEL_BYTES:x}",
             "digest": [
                 {
@@ -87,11 +108,24 @@ def status_description(
     )
 
 
-def status_map(
-    name: str, subscribers: int, publishers: int, digest: str = "", *, has_time_stamps: bool = False
-) -> RegisterMap:
+def status_map(name: str, subscribers: int, publishers: int, digest: str = "", parts: Part = NO_PART) -> RegisterMap:
     """Return the registers of a status."""
-    return register_map(status_description(name, subscribers, publishers, digest, has_time_stamps=has_time_stamps))
+    return register_map(status_description(name, subscribers, publishers, digest, parts))
+
+
+def parts_of(system: DerivedSystem) -> Part:
+    """Return the parts of the status of a system."""
+    wanted = {Part.TIME_STAMPS: system.has_time_stamps, Part.NETWORK: bool(system.network)}
+    return Part(sum(part.value for part, is_wanted in wanted.items() if is_wanted))
+
+
+def network_words() -> dict[str, str]:
+    """Return the meanings of the counters of a network, by their registers' names."""
+    return {_network_register(name): meaning for name, meaning in NETWORK_FAULTS.items()}
+
+
+def _network_register(name: str) -> str:
+    return f"network_{name}"
 
 
 def status_entity(system: DerivedSystem) -> str:
@@ -136,8 +170,13 @@ def _instances(system: DerivedSystem) -> Context:
         "entity": status_entity(system),
         "is_frames": system.status is StatusAccess.FRAMES,
         "has_link": bool(system.link),
+        "has_network": bool(system.network),
+        "fault_count": len(NETWORK_FAULTS),
+        "network_faults": [{"register": name, "bit": bit} for bit, name in enumerate(network_words())]
+        if system.network
+        else [],
         "time_stamps": system.has_time_stamps,
-        "host_tid": "open" if system.link else "m_axis_tid",
+        "host_tid": "open" if system.link or system.network else "m_axis_tid",
         "width": system.width,
         "lanes": system.width // 8,
         "subscriber_count": len(system.subscribers),

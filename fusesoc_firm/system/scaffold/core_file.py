@@ -274,6 +274,7 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
         # Edalize does not have a flow for Quartus.
         "is_tool": board.flow == QUARTUS,
         "flow": str(board.flow),
+        "further_flag": board.ddr_flag,
         "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],
         "toplevel": f"{top}_wrapper" if board.flow == VIVADO else top,
     }

@@ -51,7 +51,7 @@ ETHERNET = "ethernet"
 CHIPS = W5500, W5200 = ("w5500", "w5200")
 NETWORKS = (ETHERNET, *CHIPS)
 # The interface of the PHY of a node by Ethernet.
-PHYS = ("gmii", "mii", "rmii")
+PHYS = ("gmii", "mii", "rgmii", "rmii")
 # The accesses to the registers of a system's status, if it has one.
 NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
@@ -141,6 +141,11 @@ class NodeNetwork(Section):
         is_asked=False,
     )
     phy: Text = key("the interface of the PHY; only used with ethernet", choices=PHYS, default=Text(PHYS[0]))
+    reassemblies: int = key(
+        "messages in several packets that may arrive at the same time, 1 to 4; only used with ethernet",
+        form="integer",
+        default=1,
+    )
 
 
 @dataclass(frozen=True)

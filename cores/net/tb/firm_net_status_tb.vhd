@@ -1,0 +1,182 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Sends frames to the status of the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before
+-- it, whether it is aborted (0 or 1), the number of bytes, and the bytes. The system answers a frame with each byte of
+-- its payload's word inverted. The replies go to a file, a row each: the number of bytes, and the bytes.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use ieee.math_real.all;
+use std.textio.all;
+library firm;
+use firm.firm_sim_pkg.all;
+
+entity firm_net_status_tb is
+  generic (
+    FRAME_FILE    : string  := "frames.txt";
+    RESULT_FILE   : string  := "replies.txt";
+    EXPECTED_FILE : string  := "";
+    SEED          : integer := 1;
+    -- The chances, each cycle, that no byte comes, and that the reader or the system takes nothing.
+    SLOW_PERCENT  : integer := 0;
+    STALL_PERCENT : integer := 0
+  );
+end entity firm_net_status_tb;
+
+architecture simulation of firm_net_status_tb is
+
+  -- After the last frame, for the reader.
+  constant LAST_CYCLES : positive := 1000;
+
+  -- A frame of the status id: the id, the length, an address and a word.
+  constant WORD_PLACE  : positive := 9;
+  constant FRAME_BYTES : positive := 13;
+  type frame_t is array (natural range 0 to FRAME_BYTES-1) of std_logic_vector(7 downto 0);
+
+  signal clk   : std_logic := '0';
+  signal rst_n : std_logic;
+  signal over  : boolean;
+
+  signal s_tdata  : std_logic_vector(7 downto 0);
+  signal s_tuser  : std_logic_vector(0 downto 0);
+  signal s_tvalid : std_logic;
+  signal s_tlast  : std_logic;
+
+  signal m_tdata  : std_logic_vector(7 downto 0);
+  signal m_tvalid : std_logic;
+  signal m_tlast  : std_logic;
+  signal m_tready : std_logic := '0';
+
+  signal request_tdata  : std_logic_vector(7 downto 0);
+  signal request_tvalid : std_logic;
+  signal request_tlast  : std_logic;
+  signal request_tready : std_logic := '0';
+  signal answer_tdata   : std_logic_vector(7 downto 0) := x"00";
+  signal answer_tvalid  : std_logic := '0';
+  signal answer_tlast   : std_logic := '0';
+
+begin
+
+  clk <= not clk after 4 ns when not over else '0';
+
+  u_status : entity firm.firm_net_status
+    port map (
+      clk            => clk,
+      rst_n          => rst_n,
+      mac            => x"020000000002",
+      address        => x"c0000202",
+      s_axis_tdata   => s_tdata,
+      s_axis_tuser   => s_tuser,
+      s_axis_tvalid  => s_tvalid,
+      s_axis_tlast   => s_tlast,
+      request_tdata  => request_tdata,
+      request_tvalid => request_tvalid,
+      request_tlast  => request_tlast,
+      request_tready => request_tready,
+      answer_tdata   => answer_tdata,
+      answer_tvalid  => answer_tvalid,
+      answer_tlast   => answer_tlast,
+      m_axis_tdata   => m_tdata,
+      m_axis_tvalid  => m_tvalid,
+      m_axis_tlast   => m_tlast,
+      m_axis_tready  => m_tready
+    );
+
+  u_rows : entity firm.firm_sim_rows
+    generic map (
+      FRAME_FILE   => FRAME_FILE,
+      SEED         => SEED,
+      SLOW_PERCENT => SLOW_PERCENT,
+      LAST_CYCLES  => LAST_CYCLES
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      m_axis_tdata  => s_tdata,
+      m_axis_tuser  => s_tuser,
+      m_axis_tvalid => s_tvalid,
+      m_axis_tlast  => s_tlast,
+      over          => over
+    );
+
+  take : process (clk)
+    variable random_1 : positive := SEED;
+    variable random_2 : positive := 5;
+    variable draw     : real;
+  begin
+    if rising_edge(clk) then
+      uniform(random_1, random_2, draw);
+      m_tready <= '1';
+      if 100.0 * draw < real(STALL_PERCENT) then
+        m_tready <= '0';
+      end if;
+      uniform(random_1, random_2, draw);
+      request_tready <= '1';
+      if 100.0 * draw < real(STALL_PERCENT) then
+        request_tready <= '0';
+      end if;
+    end if;
+  end process take;
+
+  answer : process
+    variable frame : frame_t;
+    variable size  : natural;
+  begin
+    size := 0;
+    loop
+      wait until rising_edge(clk);
+      next when rst_n = '0' or request_tvalid = '0' or request_tready = '0';
+      assert size < FRAME_BYTES
+        report "a request is too long" severity failure;
+      frame(size) := request_tdata;
+      size        := size + 1;
+      exit when request_tlast = '1';
+    end loop;
+    assert size = FRAME_BYTES
+      report "a request is too short" severity failure;
+    for place in frame'range loop
+      answer_tdata <= frame(place);
+      if place >= WORD_PLACE then
+        answer_tdata <= not frame(place);
+      end if;
+      answer_tvalid <= '1';
+      answer_tlast  <= '0';
+      if place = FRAME_BYTES-1 then
+        answer_tlast <= '1';
+      end if;
+      wait until rising_edge(clk);
+      answer_tvalid <= '0';
+      if place mod 3 = SEED mod 3 then
+        wait until rising_edge(clk);
+      end if;
+    end loop;
+  end process answer;
+
+  record_replies : process
+    file replies     : text open write_mode is RESULT_FILE;
+    file expected    : text open read_mode is existing(EXPECTED_FILE);
+    variable row     : line;
+    variable content : line;
+    variable size    : natural := 0;
+  begin
+    while not over loop
+      wait until rising_edge(clk) or over;
+      next when over or rst_n = '0';
+      next when m_tvalid = '0' or m_tready = '0';
+      size := size + 1;
+      write(content, ' ' & integer'image(to_integer(unsigned(m_tdata))));
+      if m_tlast = '1' then
+        write(row, integer'image(size) & content.all);
+        write_result(replies, expected, EXPECTED_FILE, row);
+        deallocate(content);
+        size := 0;
+      end if;
+    end loop;
+    assert size = 0
+      report "a reply without an end" severity failure;
+    assert endfile(expected)
+      report EXPECTED_FILE & " has more lines than there are replies" severity failure;
+    print("PASS");
+    wait;
+  end process record_replies;
+
+end architecture simulation;

@@ -1,0 +1,90 @@
+"""The status of a node in fabric, as a transport for the frames that access it: each is the payload of a datagram.
+
+A datagram may be lost, so a request is repeated until it is answered. An access that is repeated reads the same word,
+or a newer one of a counter; a word that was written is written again.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from types import TracebackType
+
+from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.system.status_frames import answered, status_answer
+
+# The kind of the addresses of such nodes, and the port of firm_net_status.
+UDP = "udp"
+PORT = 7399
+_REPEAT_SECONDS = 0.25
+_WORD_BYTES = 4
+_MOST_BYTES = 100
+
+
+class UdpStatus:
+    """A transport to the status of the node at an IPv4 address."""
+
+    def __init__(self, address: str) -> None:
+        """Open a socket. Raise `TransportError` if the address is not one of a host."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._payload = b""
+        try:
+            self._socket.connect((address, PORT))
+        except OSError as error:
+            self._socket.close()
+            raise TransportError(f"the node at '{address}' cannot be reached: {error.strerror}") from None
+
+    def send(self, frame: bytes) -> None:
+        """Send a request; all other frames are dropped."""
+        if (asked := answered(frame)) is not None:
+            self._payload = b"".join(item.to_bytes(_WORD_BYTES, "little") for item in asked)
+            self._ask()
+
+    def receive(self, timeout: float | None = None) -> Burst | None:
+        """Return the answer to the last request, or None after `timeout` seconds, or without a request."""
+        end = None if timeout is None else time.monotonic() + timeout
+        while self._payload and (end is None or time.monotonic() < end):
+            left = _REPEAT_SECONDS if end is None else min(_REPEAT_SECONDS, max(0.001, end - time.monotonic()))
+            self._socket.settimeout(left)
+            try:
+                found = self._socket.recv(_MOST_BYTES)
+            except TimeoutError:
+                self._ask()
+                continue
+            except OSError:
+                # The host, or its port, is not there yet.
+                time.sleep(left)
+                self._ask()
+                continue
+            if len(found) == len(self._payload) and found[:_WORD_BYTES] == self._payload[:_WORD_BYTES]:
+                self._payload = b""
+                words = (found[:_WORD_BYTES], found[_WORD_BYTES:])
+                return Burst(status_answer(*(int.from_bytes(word, "little") for word in words)))
+        return None
+
+    def is_ready(self) -> bool:
+        """Return True, since a request never waits."""
+        return True
+
+    def is_at_rest(self) -> bool | None:
+        """Return None, since the node's frames are unknown."""
+        return None
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def __enter__(self) -> UdpStatus:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _ask(self) -> None:
+        try:
+            self._socket.send(self._payload)
+        except OSError:
+            # Repeated later, as a lost datagram.
+            return

@@ -1,0 +1,101 @@
+"""The status of a node in fabric by UDP: datagrams get lost, come twice, or come from elsewhere."""
+
+from __future__ import annotations
+
+import random
+import socket
+import struct
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from fusesoc_firm.node.status import read_status, read_word, status_text, write_word
+from fusesoc_firm.node.status_socket import open_status
+from fusesoc_firm.node.transport import udp
+from fusesoc_firm.node.transport.transport import TransportError
+from fusesoc_firm.system.hardware.status import Part, network_words, status_map
+
+SEED = 20261127
+WRITE = 1 << 31
+MAP = {register.address: register for register in status_map("board", 1, 1, parts=Part.NETWORK).registers}
+COUNTED = {"network_broken_frames": 7, "subscriber[0].frames": 3}
+
+
+class Board(threading.Thread):
+    """A node that drops some requests, answers some twice, and sends other datagrams in between."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.words = dict(COUNTED)
+        self.dropped = 0
+
+    def run(self) -> None:
+        chance = random.Random(SEED)
+        while True:
+            payload, peer = self.socket.recvfrom(100)
+            if payload == b"end":
+                return
+            address, word = struct.unpack("<2I", payload)
+            if chance.random() < 0.02:
+                self.dropped += 1
+                continue
+            for other in (b"", b"abc", struct.pack("<2I", address ^ 4, 9)):
+                self.socket.sendto(other, peer)
+            register = MAP[address & ~WRITE]
+            found = self.words.get(register.name, sum(field.reset << field.low for field in register.fields))
+            if address & WRITE:
+                self.words[register.name] = word
+            for _ in range(chance.choice([1, 1, 2])):
+                self.socket.sendto(struct.pack("<2I", address, found), peer)
+
+    def end(self) -> None:
+        self.socket.sendto(b"end", self.socket.getsockname())
+        self.join()
+        self.socket.close()
+
+
+@pytest.fixture
+def board(monkeypatch: pytest.MonkeyPatch) -> Iterator[Board]:
+    started = Board()
+    monkeypatch.setattr(udp, "PORT", started.socket.getsockname()[1])
+    monkeypatch.setattr(udp, "_REPEAT_SECONDS", 0.02)
+    started.start()
+    yield started
+    started.end()
+
+
+def test_every_register_is_read(board: Board) -> None:
+    print(f"seed {SEED}")
+    with open_status("udp:127.0.0.1") as transport:
+        for _ in range(20):
+            status = read_status(transport)
+            assert {name: status.words[name] for name in COUNTED} == COUNTED
+            assert {name: status.words[name] for name in network_words()} == {
+                name: COUNTED.get(name, 0) for name in network_words()
+            }
+    assert board.dropped
+    assert "network: 7 times a frame on the line is broken or too long" in status_text(status)
+
+
+def test_a_word_is_written(board: Board) -> None:
+    with open_status("udp:127.0.0.1") as transport:
+        write_word(transport, 0x08, 0)
+        assert read_word(transport, 0x08) == 0
+
+
+def test_an_absent_node_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        monkeypatch.setattr(udp, "PORT", silent.getsockname()[1])
+        with open_status("udp:127.0.0.1") as transport:
+            assert transport.receive(0.01) is None
+            transport.send(b"other frames are dropped")
+            assert transport.receive(0.01) is None
+
+
+def test_a_name_that_is_unknown_is_told() -> None:
+    with pytest.raises(TransportError, match=r"the node at '256\.1\.1\.1' cannot be reached"):
+        open_status("udp:256.1.1.1")
