@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -18,11 +18,13 @@ from typing import Any
 from tqdm import tqdm
 
 from fusesoc_firm.bags.calls import Exchange, with_calls
-from fusesoc_firm.bags.goals import BagOfGoals, with_goals
+from fusesoc_firm.bags.events import EVENTS
+from fusesoc_firm.bags.goals import BagOfGoals, Told, with_goals
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, Stream, open_bag
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
@@ -32,17 +34,20 @@ from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Latency, Watch
 from fusesoc_firm.replay.goals import GoalLine, Verdict
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
+from fusesoc_firm.replay.sent_goals import SentGoals, ended_goals
 from fusesoc_firm.simulation.functions import Functions, importable_sources
 from fusesoc_firm.simulation.software_run import stimulated
-from fusesoc_firm.system.derived.model import Action, ServiceEnd, Topic, absolute_name
+from fusesoc_firm.system.derived.model import Action, DerivedSystem, ServiceEnd, Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
-from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, fail, nearest
 
 # The maximum number of lines about rejected messages; further messages are only counted.
 _SHOWN = 100
 # What became of a response of the system to a recorded call, in the summary's words.
 _EQUAL, _DIFFERENT = Verdict.EQUAL.value, Verdict.DIFFERENT.value
 _MISSING, _NOT_RECORDED = Verdict.MISSING.value, Verdict.NOT_RECORDED.value
+# What the hardware sends for goals, in the summary's words.
+_OF_GOALS = ("feedback", "results", "goals", "cancellations")
 
 
 @dataclass(frozen=True)
@@ -121,13 +126,17 @@ def replay(
         form = _form(target, bag.form)
         _check_speaks(publishers, target.path, form)
         routes = _routes(bag, loaded, subscribers, settings.names)
+        ended = _ended(bag, system, source.window(bag)[1])
+        warnings = _missing(bag, system, ended)
+        for warning in warnings:
+            print(warning, file=sys.stderr)
         with (
             importable_sources([type_.accelerator for type_ in system.software.types], loaded.folder),
             _started(start_simulator) as simulator,
             write_bag(target.path, form, list(topics.values())) as written,
         ):
             run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
-            going = _Replay(bag, source, routes, run, topics, written, clock, settings)
+            going = _Replay(bag, source, routes, run, topics, written, clock, settings, warnings, ended)
             if settings.watch:
                 settings.watch.epoch_ns = bag.start
             going.play()
@@ -152,12 +161,17 @@ class _Replay:
     written: BagWriter
     clock: Fraction | None
     settings: Settings
+    warnings: Sequence[Diagnostic]
+    # The ids of goals that the bag has results of, by the blocks of the actions to which the hardware sends goals.
+    ended: Mapping[str, set[bytes]]
     played: Counter[Stream] = field(default_factory=Counter)
     sent: Counter[str] = field(default_factory=Counter)
     # The system's responses that are not yet compared, by stream and number of the request.
     answers: dict[tuple[Stream, int], Sent] = field(default_factory=dict)
     # The numbers of calls of each stream by how the system responded.
     compared: Counter[tuple[Stream, str]] = field(default_factory=Counter)
+    # The hardware's requests without a response yet.
+    unanswered: deque[Sent] = field(default_factory=deque)
     # The numbers of the hardware's requests by their blocks and by how they compare with the recorded ones.
     asked: Counter[tuple[str, str]] = field(default_factory=Counter)
     # The stamp of the last message that was played, and whether it was the last one of the selected time.
@@ -195,7 +209,7 @@ class _Replay:
                     self._hear()
             except InputError as error:
                 self._report(str(error).removeprefix("error: "))
-            for left in (self.run.unfinished, *(line.unfinished for line in self._lines.values())):
+            for left in (self.run.unfinished, *(line.unfinished for line in self._served.values())):
                 if left:
                     self._report(left)
             if not self.is_over:
@@ -211,9 +225,7 @@ class _Replay:
         try:
             for subscriber in () if route.misfit else route.subscribers:
                 self._give(subscriber, recorded)
-            self._answer_calls()
-            for line in self._lines.values():
-                line.advance(recorded.stamp)
+            self._follow_up(recorded.stamp)
         except (StuckError, TransportError) as error:
             self._stop(error)
         self._count_waits()
@@ -227,16 +239,29 @@ class _Replay:
         self._conclude(recorded)
 
     def _hear(self) -> None:
-        """Take note of recorded feedback and results of goals."""
+        """Take note of recorded messages of actions."""
         while self.bag.told and not self.is_over:
             told = self.bag.told.popleft()
             try:
-                self._lines[told.action.block].tell(told.block, told.owner, told.payload, told.recorded.stamp)
+                self._tell(told)
+                self._follow_up(told.recorded.stamp)
             except (StuckError, TransportError) as error:
                 self._stop(error)
             except (CodecError, ValueError) as error:
                 self.run.faults.append(str(error))
             self._conclude(told.recorded)
+
+    def _tell(self, told: Told) -> None:
+        block, stamp = told.action.block, told.recorded.stamp
+        if line := self._served.get(block):
+            line.tell(told.block, told.owner, told.payload, stamp)
+        elif stamp >= self.source.window(self.bag)[0]:
+            self._sent_goals[block].tell(told)
+
+    def _follow_up(self, stamp: int) -> None:
+        """Give the hardware the responses to its calls and what is due for goals, which may lead to further ones."""
+        while self._answer_call() or any(line.advance(stamp) for line in self._lines):
+            pass
 
     def _stop(self, error: Exception) -> None:
         self.run.faults.append(f"the rest of the bag was not replayed: {error}")
@@ -267,43 +292,61 @@ class _Replay:
     def _take(self, subscriber: Topic, payload: bytes, stamp: int) -> None:
         known = len(self.run.sent)
         self.run.take(subscriber, payload, stamp, self._seen(subscriber, payload, stamp))
-        for line in self._lines.values():
-            line.take(self.run.sent[known:])
+        for sent in self.run.sent[known:]:
+            if sent.topic.block in self._asked:
+                self.unanswered.append(sent)
+            for line in self._lines:
+                try:
+                    line.take(sent)
+                except (CodecError, ValueError) as error:
+                    self.run.faults.append(f"the hardware sent invalid data at '{sent.topic.block}': {error}")
 
     @cached_property
-    def _served(self) -> list[Action]:
-        """The actions that the hardware serves."""
-        return [action for action in self.run.system.actions if action.end is ServiceEnd.SERVER]
+    def _action_topics(self) -> Mapping[str, Topic]:
+        return {item.block: item for item in (*self.run.system.subscribers, *self.run.system.publishers)}
 
     @cached_property
-    def _lines(self) -> Mapping[str, GoalLine]:
-        """The goals of the actions by their blocks."""
-        topics = {item.block: item for item in (*self.run.system.subscribers, *self.run.system.publishers)}
-        return {action.block: GoalLine(action, topics, self._send) for action in self._served}
+    def _served(self) -> Mapping[str, GoalLine]:
+        """The goals of the actions that the hardware serves, by the actions' blocks."""
+        served = (item for item in self.run.system.actions if item.end is ServiceEnd.SERVER)
+        return {action.block: GoalLine(action, self._action_topics, self._send) for action in served}
+
+    @cached_property
+    def _sent_goals(self) -> Mapping[str, SentGoals]:
+        """The goals that the hardware sends to other nodes, by the actions' blocks."""
+        return {
+            action.block: SentGoals(action, self._action_topics, self._send, self.ended[action.block])
+            for action in _asked_actions(self.run.system)
+        }
+
+    @cached_property
+    def _lines(self) -> Sequence[GoalLine | SentGoals]:
+        return [*self._served.values(), *self._sent_goals.values()]
 
     @cached_property
     def _to_lines(self) -> Mapping[str, GoalLine]:
-        """The same by the blocks of goals and of cancellations."""
-        return {block: self._lines[item.block] for item in self._served for block in (item.goal, item.cancel)}
+        """The goals of actions that the hardware serves, by the blocks of goals and of cancellations."""
+        return {block: line for line in self._served.values() for block in (line.action.goal, line.action.cancel)}
 
     @cached_property
     def _calls(self) -> set[Stream]:
         """The streams of requests."""
         return {calls.stream for calls in self.bag.calls.values()}
 
-    def _answer_calls(self) -> None:
-        """Give the hardware the recorded responses to its calls, which may lead to further calls."""
-        for sent in self.run.sent:
-            exchanges = self._asked.get(sent.topic.block)
-            if exchanges is None:
-                continue
-            exchange = next(exchanges, None)
-            if exchange is None:
-                self.asked[sent.topic.block, _NOT_RECORDED] += 1
-                continue
-            self.asked[sent.topic.block, _verdict(sent, exchange.request)] += 1
-            if exchange.response is not None:
-                self._take(self._takers[sent.topic.block], exchange.response, sent.cause.stamp)
+    def _answer_call(self) -> bool:
+        """Give the hardware the recorded response to its first call without one; return whether there was a call."""
+        if not self.unanswered:
+            return False
+        sent = self.unanswered.popleft()
+        block = sent.topic.block
+        exchange = next(self._asked[block], None)
+        if exchange is None:
+            self.asked[block, _NOT_RECORDED] += 1
+            return True
+        self.asked[block, _verdict(sent, exchange.request)] += 1
+        if exchange.response is not None:
+            self._take(self._takers[block], exchange.response, sent.cause.stamp)
+        return True
 
     @cached_property
     def _asked(self) -> Mapping[str, Iterator[Exchange]]:
@@ -354,14 +397,18 @@ class _Replay:
         return {"topic": self.topics[block].name, "type": calls.events.type.request_name} | counts
 
     def _of_goals(self) -> dict[str, list[dict[str, Any]]]:
-        """Return how much of the hardware's feedback and of its results is as recorded, for each action."""
-        rows: dict[str, list[dict[str, Any]]] = {"feedback": [], "results": []}
+        """Return how much of what the hardware sends for goals is as recorded, for each action in the bag.
+
+        This is feedback and results of actions that it serves, goals and cancellations of others.
+        """
+        rows: dict[str, list[dict[str, Any]]] = {kind: [] for kind in _OF_GOALS}
         used = {item.block for route in self.routes.values() for item in route.subscribers}
-        for action in self._served:
-            if action.goal in used:
+        for line in self._lines:
+            action = line.action
+            if action.goal in used | self.bag.blocks_of(action):
                 names = {"topic": absolute_name(action.ros_name), "type": str(action.type)}
-                for title, counts in self._lines[action.block].counts():
-                    rows[title].append(names | {verdict.value: counts[verdict] for verdict in Verdict})
+                for title, counts in line.counts():
+                    rows[title].append(names | {verdict.value: count for verdict, count in counts.items()})
         return rows
 
     def _seen(self, subscriber: Topic, payload: bytes, stamp: int) -> int | None:
@@ -429,6 +476,7 @@ class _Replay:
             "responses": [self._compared(stream) for stream in self.routes if stream in self._calls],
             "requests": [self._requests(block) for block in self.bag.asked],
             **self._of_goals(),
+            "warnings": [warning.data() for warning in self.warnings],
             "errors": self.errors,
             "messages_with_errors": self.refused,
             "first_errors": self.shown,
@@ -449,7 +497,7 @@ class _Replay:
             print(f"no subscriber for {row['topic']} ({row['type']}): {row['count']}")
         verdicts = [(f"responses to {row['topic']}", row) for row in found["responses"]]
         verdicts += [(f"requests on {row['topic']}", row) for row in found["requests"]]
-        verdicts += [(f"{kind} of {row['topic']}", row) for kind in ("feedback", "results") for row in found[kind]]
+        verdicts += [(f"{kind} of {row['topic']}", row) for kind in _OF_GOALS for row in found[kind]]
         for title, row in verdicts:
             kinds = (verdict.value for verdict in Verdict if verdict.value in row)
             counts = (f"{row[kind]} {kind.replace('_', ' ')}" for kind in kinds)
@@ -479,6 +527,38 @@ def _with_exchanges(bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic]
     system, libraries = loaded.system, loaded.libraries
     calls = with_calls(bag, system.services, libraries, names, plays_responses=False)
     return with_goals(calls, system.actions, libraries, names, compares=True)
+
+
+def _asked_actions(system: DerivedSystem) -> list[Action]:
+    """Return the actions of other nodes, to which the hardware sends goals."""
+    return [action for action in system.actions if action.end is ServiceEnd.CLIENT]
+
+
+def _ended(bag: BagOfGoals, system: DerivedSystem, stop: int | None) -> dict[str, set[bytes]]:
+    """Return the ids of goals with results, by the blocks of the actions to which the hardware sends goals."""
+    topics = {item.block: item for item in system.subscribers}
+    return {
+        action.block: ended_goals(bag.results(action, stop), action, topics[action.result])
+        for action in _asked_actions(system)
+    }
+
+
+def _missing(bag: BagOfGoals, system: DerivedSystem, ended: Mapping[str, set[bytes]]) -> tuple[Diagnostic, ...]:
+    """Return a warning for each action of another node of which the bag lacks the goals or all results."""
+    faults = Diagnostics()
+    for action in _asked_actions(system):
+        block, name, is_first = action.block, absolute_name(action.ros_name), action.ros is ROS1
+        if action.goal not in bag.blocks_of(action):
+            effect = "and feedback and results come at their recorded times" if is_first else "and get no results"
+            text = f"{bag.path} has no goals of '{block}', so those of the hardware are not compared, {effect}"
+            record = f"{name}/goal" if is_first else f"the contents of {name}/_action/send_goal/{EVENTS}"
+        elif not ended[block]:
+            text = f"{bag.path} has no results of '{block}', so the goals of the hardware are lost"
+            record = f"{name}/result" if is_first else f"the contents of {name}/_action/get_result/{EVENTS}"
+        else:
+            continue
+        faults.warn(text, hint=f"record {record}")
+    return faults.warnings
 
 
 def _count(topic: str, type_: str, count: int) -> dict[str, Any]:
@@ -533,12 +613,15 @@ def _routes(
     """Return the route of each stream. Raise `InputError` if there is no route, or if a requested topic is missing."""
     faults = Diagnostics()
     asked = [stream for stream, _ in bag.asked.values()]
-    topics = {absolute_name(stream.topic) for stream in (*bag.streams, *asked)}
+    topics = {absolute_name(stream.topic) for stream in (*bag.streams, *asked, *bag.goals)}
     for item in subscribers:
         if item.block in names and item.name not in topics:
             faults.error(f"{bag.path} has no topic {item.name} for '{item.block}'", hint=nearest(item.name, topics))
     faults.raise_if_any()
-    routes = routes_of(bag, subscribers, _signatures(loaded, subscribers))
+    # Messages for goals of the hardware have no other subscribers.
+    told = {block for action in _asked_actions(loaded.system) for block in bag.blocks_of(action)}
+    others = [item for item in subscribers if item.block not in told]
+    routes = routes_of(bag, others, _signatures(loaded, others))
     if not routes:
         wanted = ", ".join(f"{item.name} ({item.frame.message})" for item in subscribers)
         there = ", ".join(f"{stream.topic} ({stream.type})" for stream in bag.streams) or "nothing"

@@ -125,6 +125,12 @@ class Goals:
         else:
             self._add("_action/status", "action_msgs/msg/GoalStatusArray", [])
 
+    def order(self, value: int) -> None:
+        """Record an order to the hardware of tests/ros/planner."""
+        kind = "std_msgs/msg/UInt32"
+        payload = bytes(self._serialise(self._made(kind, value), kind))
+        self.items.append(("/order", kind, next(self._stamps), payload))
+
     def damage(self) -> None:
         """Cut off the last byte of the message recorded last."""
         topic, kind, stamp, payload = self.items[-1]
@@ -175,9 +181,11 @@ class Goals:
                 self._add(f"_action/{service}/_service_event", f"{kind}_Event", info, *parts)
 
     def _add(self, ending: str, kind: str, *values: Any) -> None:
-        serialise = self.store.serialize_ros1 if self.version == 1 else self.store.serialize_cdr
-        payload = bytes(serialise(self._made(kind, *values), kind))
+        payload = bytes(self._serialise(self._made(kind, *values), kind))
         self.items.append((f"{self.name}/{ending}", kind, next(self._stamps), payload))
+
+    def _serialise(self, message: Any, kind: str) -> Any:
+        return (self.store.serialize_ros1 if self.version == 1 else self.store.serialize_cdr)(message, kind)
 
     def _made(self, kind: str, *values: Any) -> Any:
         return self.store.types[kind](*values)
@@ -200,10 +208,27 @@ class Goals:
         return self._made("actionlib_msgs/msg/GoalStatus", self._id(goal), state, "told by the server")
 
 
+def what_is_told(path: Path) -> list[tuple[int, int, int]]:
+    """What the hardware of tests/ros/planner has told, in the bag of a replay: an order, a kind and a number each."""
+    values = (int.from_bytes(payload[-8:], "little") for topic, _, _, payload in read(path) if topic == "/told")
+    return [(value >> 40, value >> 32 & 0xFF, value & 0xFFFFFFFF) for value in values]
+
+
 def arm(folder: Path, version: int) -> Path:
     """The system of tests/ros/arm for a version of ROS."""
+    return system("arm", folder, version)
+
+
+def planner(folder: Path, version: int) -> Path:
+    """The system of tests/ros/planner for a version of ROS."""
     shutil.copytree(HERE / "arm", folder / "arm")
-    spec = folder / "arm/arm.yaml"
+    return system("planner", folder, version)
+
+
+def system(name: str, folder: Path, version: int) -> Path:
+    """A system of tests/ros for a version of ROS."""
+    shutil.copytree(HERE / name, folder / name)
+    spec = folder / f"{name}/{name}.yaml"
     text = spec.read_text(encoding="utf-8")
     spec.write_text(in_ros2(text) if version == 2 else text, encoding="utf-8")
     return spec
