@@ -61,9 +61,12 @@ class PlannerSimulator(model_simulator.Simulator):
     """The patient model; `version` is that of ROS."""
 
     version = 1
-    orders: deque[dict[str, Any]] = deque()
     is_busy = False
     sent = 0
+
+    def __init__(self, *arguments: Any, **values: Any) -> None:
+        super().__init__(*arguments, **values)
+        self.orders: deque[dict[str, Any]] = deque()
 
     def take(self, now: int) -> bytes:
         taken = self.waiting.popleft()
