@@ -69,10 +69,10 @@ class Middleware {
     return [](const firm::Bytes&, const firm::AnswerHandler&) { fail(); };
   }
 
-  bool spin(std::chrono::milliseconds) {
+  bool spin(std::chrono::milliseconds duration) {
     if (fault() == "spin") fail();
     if (give_) std::exchange(give_, nullptr)();
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(duration);
     return !is_done_;
   }
 

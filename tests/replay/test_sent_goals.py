@@ -37,13 +37,13 @@ def replayed(
     capsys: pytest.CaptureFixture[str],
     kind: str = "patient",
     names: Mapping[str, str] | None = None,
-    **part: Any,
+    part: Mapping[str, Any] | None = None,
 ) -> tuple[list[Told], dict[str, Any]]:
     """Replay a bag through a model of the hardware; what the hardware tells, and the summary."""
     command = [sys.executable, str(HERE / "planner_simulator.py"), kind, str(goals.version), "--width", "32"]
     target = folder / ("out.bag" if goals.version == 1 else "out.mcap")
     loaded, settings = load(planner(folder, goals.version)), Settings(names or {}, 1000, is_json=True)
-    source = Source(goals.write(folder), **part)
+    source = Source(goals.write(folder), **(part or {}))
     replay(loaded, source, Target(target), settings, lambda: Simulator(command))
     return what_is_told(target), json.loads(capsys.readouterr().out)
 
@@ -219,7 +219,7 @@ def test_goals_in_a_part_of_a_bag(tmp_path: Path, version: int, part: str, capsy
         goals.order(order)
         goals.goal(number, order)
         goals.result(number, SUCCEEDED[version], number + 1)
-    found, said = replayed(tmp_path, goals, capsys, **{part: 1 if part == "limit" else middle})
+    found, said = replayed(tmp_path, goals, capsys, part={part: 1 if part == "limit" else middle})
     told, counted = {
         "start": ([(7, SUCCEEDED[version], 2)], [1, 0, 0, 0]),
         "duration": ([(6, SUCCEEDED[version], 1)], [1, 0, 0, 0]),
