@@ -34,6 +34,13 @@ def run(driver: Driver, fault: str, simulator: str = "") -> subprocess.Completed
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
+def check_fault(done: subprocess.CompletedProcess[str], reason: str) -> None:
+    """The node has ended by itself, with a reason, and when its threads have left the middleware alone."""
+    assert (done.returncode, reason in done.stderr) == (1, True), done.stderr
+    assert "the calls are stopped" in done.stderr
+    assert "the middleware ends the node" not in done.stderr
+
+
 def test_a_node_ends_with_its_middleware(driver: Driver) -> None:
     done = run(driver, "none")
     assert done.returncode == 0, done.stderr
@@ -50,9 +57,7 @@ def test_a_node_ends_with_its_middleware(driver: Driver) -> None:
     ],
 )
 def test_a_node_whose_simulator_dies_ends(driver: Driver, simulator: str, reason: str) -> None:
-    done = run(driver, "stay", simulator)
-    assert (done.returncode, reason in done.stderr) == (1, True), done.stderr
-    assert "the calls are stopped" in done.stderr
+    check_fault(run(driver, "stay", simulator), reason)
 
 
 @pytest.mark.parametrize(
@@ -68,6 +73,4 @@ def test_a_node_whose_simulator_dies_ends(driver: Driver, simulator: str, reason
 )
 def test_a_node_whose_middleware_throws_ends(driver: Driver, fault: str, reason: str) -> None:
     """No exception leaves a thread, none is lost, and no thread calls a middleware that has ended."""
-    done = run(driver, fault)
-    assert (done.returncode, reason in done.stderr) == (1, True), done.stderr
-    assert "the calls are stopped" in done.stderr
+    check_fault(run(driver, fault), reason)

@@ -85,9 +85,27 @@ class Goals:
             message = self._made("actionlib/msg/TestGoal", value)
             self._add("goal", "actionlib/msg/TestActionGoal", self._header(), self._id(goal), message)
             return
-        request = self._made(f"{_FIBONACCI}_SendGoal_Request", self._id(goal), self._made(f"{_FIBONACCI}_Goal", value))
         response = self._made(f"{_FIBONACCI}_SendGoal_Response", is_accepted, self._time(1))
-        self._call("send_goal", f"{_FIBONACCI}_SendGoal", request, response)
+        self._call("send_goal", f"{_FIBONACCI}_SendGoal", self._request(goal, value), response)
+
+    def _request(self, goal: int, value: int) -> Any:
+        return self._made(f"{_FIBONACCI}_SendGoal_Request", self._id(goal), self._made(f"{_FIBONACCI}_Goal", value))
+
+    def payload(self, goal: int, value: int) -> bytes:
+        """The message of a goal."""
+        if self.version == 2:
+            return bytes(self._serialise(self._request(goal, value), f"{_FIBONACCI}_SendGoal_Request"))
+        self.goal(goal, value)
+        return self.items.pop()[3]
+
+    def id_in(self, kind: str, payload: bytes) -> int:
+        """The goal to which feedback or a result of ROS 1 belongs."""
+        message: Any = (
+            self.store.deserialize_ros1(payload, f"actionlib/msg/TestAction{kind}")
+            if self.version == 1
+            else self.store.deserialize_cdr(payload, f"{_FIBONACCI}_{kind}Message")
+        )
+        return int(message.status.goal_id.id.removeprefix("client-") if self.version == 1 else message.goal_id.uuid[0])
 
     def cancel(self, goal: int) -> None:
         """Record the cancellation of a goal."""
