@@ -299,21 +299,27 @@ def test_the_hardware_gets_the_ids_that_it_has_given(tmp_path: Path, version: in
         return True
 
     goals = Goals(version)
-    line = SentGoals(action, {**topics, "count_goal": goal}, give, [])
-    for own, number in ((7, 1), (8, 2)):
+    line = SentGoals(action, {**topics, "count_goal": goal}, give, [b"client-1"])
+
+    def tell(block: str, payload: bytes) -> None:
+        line.tell(Recording(action, block, Recorded(STREAM, 0, 0, payload), payload, payload))
+
+    for own in (7, 8):
         line.take(Sent(goal, goals.payload(own, 5), Cause(0), None))
-        recorded = goals.payload(number, 5)
-        line.tell(Recording(action, "count_goal", Recorded(STREAM, 0, 0, recorded), recorded, recorded))
+    for number in (1, 2, 3):
+        tell("count_goal", goals.payload(number, 5))
     goals.feedback(1, 6)
-    feedback = goals.items[-1][3]
-    line.tell(Recording(action, "count_feedback", Recorded(STREAM, 0, 0, feedback), feedback, feedback))
+    tell("count_feedback", goals.items[-1][3])
+    if version == 1:
+        goals.result(1, SUCCEEDED[1], 6)
+        tell("count_result", goals.items[-1][3])
     while line.advance(3 * 10**9 + 4):
         pass
-    assert [block for block, _ in given] == ["count_feedback", "count_result"]
+    assert [block for block, _ in given] == ["count_feedback", "count_result", "count_result"]
     assert goals.id_in("Feedback", given[0][1]) == 7
     if version == 1:
-        assert goals.id_in("Result", given[1][1]) == 7
-        message: Any = goals.store.deserialize_ros1(given[1][1], "actionlib/msg/TestActionResult")
+        assert [goals.id_in("Result", payload) for _, payload in given[1:]] == [7, 8]
+        message: Any = goals.store.deserialize_ros1(given[2][1], "actionlib/msg/TestActionResult")
         assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
     rows = {title: [*counts.values()] for title, counts in line.counts()}
-    assert rows["goals"] == [2, 0, 0, 0]
+    assert rows["goals"] == [2, 0, 1, 0]
