@@ -419,8 +419,9 @@ def _routes(
         if item.block in names and item.name not in topics:
             faults.error(f"{bag.path} has no topic {item.name} for '{item.block}'", hint=nearest(item.name, topics))
     faults.raise_if_any()
-    # Messages for goals of the hardware have no other subscribers.
-    told = {block for action in asked_actions(loaded.system) for block in bag.blocks_of(action)}
+    # The messages for goals of the hardware are not those of a topic with another name.
+    asking = [action for action in asked_actions(loaded.system) if action.goal in bag.blocks_of(action)]
+    told = {block for action in asking for block in (action.feedback, action.result)}
     others = [item for item in subscribers if item.block not in told]
     routes = routes_of(bag, others, _signatures(loaded, others))
     if not routes:

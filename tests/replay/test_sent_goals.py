@@ -21,7 +21,7 @@ from fusesoc_firm.replay.sent_goals import SentGoals
 from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.text.diagnostics import InputError
 from tests.replay.goals import CANCELED, RECALLED, REJECTED, SUCCEEDED, Goals, planner, what_is_told
-from tests.replay.replays import load
+from tests.replay.replays import Item, load
 from tests.ros.action_simulator import HELD, HERE
 
 pytestmark = pytest.mark.parametrize("version", [1, 2])
@@ -240,6 +240,29 @@ def test_goals_in_a_part_of_a_bag(tmp_path: Path, version: int, part: str, capsy
     assert (found, counts(said, "goals")) == (told, counted)
 
 
+def recorded_at(name: str, version: int) -> list[Item]:
+    """What is recorded of a goal of an action of the same type."""
+    goals = Goals(version, name)
+    goals.goal(9, 9)
+    goals.feedback(9, 99)
+    goals.result(9, SUCCEEDED[version], 9)
+    return goals.items
+
+
+def test_the_goals_of_other_actions_do_not_matter(
+    tmp_path: Path, version: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    goals = Goals(version)
+    goals.order(6)
+    goals.goal(1, 6)
+    goals.result(1, SUCCEEDED[version], 6)
+    goals.items += recorded_at("/other", version)
+    told, said = replayed(tmp_path, goals, capsys)
+    assert told == [(6, SUCCEEDED[version], 6)]
+    assert counts(said, "goals") == [1, 0, 0, 0]
+    assert {row["topic"].split("/")[1] for row in said["dropped"]} == {"other"}
+
+
 @pytest.mark.parametrize("is_mapped", [False, True])
 def test_the_goals_of_another_name_belong_to_the_only_action_of_the_type(
     tmp_path: Path, version: int, is_mapped: bool, capsys: pytest.CaptureFixture[str]
@@ -249,6 +272,9 @@ def test_the_goals_of_another_name_belong_to_the_only_action_of_the_type(
     goals.goal(1, 6)
     goals.feedback(1, 7)
     goals.result(1, SUCCEEDED[version], 6)
+    if is_mapped:
+        # The type has other goals as well.
+        goals.items += recorded_at("/right", version)
     topic = "/left/feedback" if version == 1 else "/left/_action/feedback"
     told, said = replayed(tmp_path, goals, capsys, names={"count_feedback": topic} if is_mapped else {})
     assert told == [(6, FEEDBACK, 7), (6, SUCCEEDED[version], 6)]
