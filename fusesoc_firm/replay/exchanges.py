@@ -149,13 +149,12 @@ class Exchanges:
     def responses(self, streams: Iterable[Stream]) -> list[dict[str, Any]]:
         """Return how many responses are as recorded, different, missing, and not recorded, for streams of requests."""
         self._compare()
-        rows = []
-        for stream in streams:
-            if stream in self._calls:
-                counts = {kind: self._compared[stream, kind] for kind in (_EQUAL, _DIFFERENT, _MISSING)}
-                rest = {_NOT_RECORDED: sum(key[0] == stream for key in self._answers)}
-                rows.append({"topic": stream.topic, "type": stream.type} | counts | rest)
-        return rows
+        return [self._responses(stream) for stream in streams if stream in self._calls]
+
+    def _responses(self, stream: Stream) -> dict[str, Any]:
+        counts = {kind: self._compared[stream, kind] for kind in (_EQUAL, _DIFFERENT, _MISSING)}
+        rest = {_NOT_RECORDED: sum(key[0] == stream for key in self._answers)}
+        return {"topic": stream.topic, "type": stream.type} | counts | rest
 
     def requests(self, topics: Mapping[str, RecordedTopic], last: int | None) -> list[dict[str, Any]]:
         """Return how many of the hardware's requests are as recorded, different, missing, and not recorded.
