@@ -78,7 +78,7 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 # Before cases are left out by their markers.
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: Iterable[pytest.Item]) -> None:
-    cases: Counter[tuple[pytest.Item | pytest.Collector | None, str]] = Counter()
+    cases: Counter[tuple[object, str]] = Counter()
     for item in items:
         if any(room in item.path.parents for room in _CLOSED):
             for rule in _OPEN:

@@ -1,8 +1,9 @@
-"""What tests/conftest.py promises: what tests start listens to SIGINT, and none of them waits for ever."""
+"""What test runs promise: what tests start listens to SIGINT, none waits for ever, and groups stay together."""
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -76,3 +77,28 @@ def test_a_run_that_inherits_an_ignored_interrupt(tmp_path: Path) -> None:
         "test_thorough": "PASSED",
     }
     assert "neither the test nor a process below it has done anything for 2 s" in done.stdout
+
+
+def test_a_group_of_tests_stays_in_one_process(tmp_path: Path) -> None:
+    """What a module makes for a version of ROS, such as nodes in C++, is made once."""
+    source = """
+import os
+import pytest
+
+VERSIONS = [pytest.param(version, marks=pytest.mark.xdist_group(f"version_{version}")) for version in (1, 2)]
+
+@pytest.fixture(scope="module", params=VERSIONS)
+def version(request):
+    return request.param
+
+@pytest.mark.parametrize("number", range(4))
+def test_process(version, number):
+    print(f"<{version} in {os.getpid()}>")
+"""
+    (tmp_path / "test_grouped.py").write_text(source)
+    options = ["-p", "no:cacheprovider", "-n", "2", "--dist", "loadgroup", "-rP"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *options], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    found = set(re.findall(r"<(\d) in (\d+)>", done.stdout))
+    assert sorted(version for version, _ in found) == ["1", "2"], done.stdout

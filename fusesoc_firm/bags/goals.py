@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -32,10 +33,11 @@ _CANCELING_TEXT = "GoalInfo goal_info\n---\nint8 return_code\nGoalInfo[] goals_c
 
 
 class Told(NamedTuple):
-    """Feedback or a result of a goal of an action in the hardware, at a recorded message.
+    """Feedback or a result of a goal, at a recorded message; of an action of another node, also a goal or cancellation.
 
     `block` is that of the converter. `owner` is a message that begins with the goal's id, or in ROS 1 with a header
-    before that. A goal without `payload` was rejected, which has no result in ROS 2.
+    before that; of a cancellation, it is the message itself. A goal without `payload` was rejected, which has no result
+    in ROS 2.
     """
 
     action: Action
@@ -49,7 +51,7 @@ class Told(NamedTuple):
 class _Source:
     """The messages of an action in a stream: its converter, and in ROS 2 the events that contain them, if any.
 
-    `stream` takes the place of a stream with messages to the hardware.
+    `stream` takes the place of a stream with goals or cancellations for the hardware.
     """
 
     action: Action
@@ -60,10 +62,10 @@ class _Source:
 
 @dataclass(frozen=True)
 class BagOfGoals(BagOfCalls):
-    """A bag with the goals of actions that the hardware serves: `goals` are the streams that contain them.
+    """A bag with the goals of actions: `goals` are the streams that contain them.
 
-    Goals and cancellations are messages to the hardware. While these are read, `told` gets the recorded feedback and
-    results.
+    For actions that the hardware serves, goals and cancellations are messages to the hardware. While these are read,
+    `told` gets the recorded feedback and results, and all four messages of actions to which the hardware sends goals.
     """
 
     goals: Mapping[Stream, _Source] = field(default_factory=dict)
@@ -71,43 +73,66 @@ class BagOfGoals(BagOfCalls):
 
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
         """Yield messages like `BagOfCalls`. Raise `InputError` if the bag is damaged."""
+        for item in self._items(topics, self.goals, stop):
+            if isinstance(item, Told):
+                self.told.append(item)
+            else:
+                yield item
+
+    def results(self, action: Action, stop: int | None = None) -> Iterator[Told]:
+        """Yield the results of an action up to a stamp in ns, or up to a damage, which the replay reports."""
+        blocks = (action.goal, action.result)
+        sources = {stream: source for stream, source in self.goals.items() if source.block in blocks}
+        with suppress(InputError):
+            for item in self._items((), sources, stop):
+                if isinstance(item, Told) and item.block == action.result:
+                    yield item
+
+    def blocks_of(self, action: Action) -> set[str]:
+        """Return the blocks of an action whose messages the bag contains."""
+        return {source.block for source in self.goals.values() if source.action is action}
+
+    def _items(
+        self, topics: Collection[str], sources: Mapping[Stream, _Source], stop: int | None
+    ) -> Iterator[Recorded | Told]:
         own = {
-            stream.topic
-            for stream, source in self.goals.items()
-            if source.stream is None or source.stream.topic in topics
+            stream.topic for stream, source in sources.items() if source.stream is None or source.stream.topic in topics
         }
         owners: dict[tuple[Stream, Key], bytes] = {}
         numbers: dict[Stream, int] = {}
         for recorded in super().messages({*topics, *own}, stop):
-            source = self.goals.get(recorded.stream)
+            source = sources.get(recorded.stream)
             if source is None:
                 yield recorded
             elif source.events is None:
-                self.told.append(Told(source.action, source.block, recorded, recorded.payload, recorded.payload))
-            elif payload := self._taken(source, source.events, recorded, owners):
-                assert source.stream is not None, "only requests to the hardware are taken"
+                yield Told(source.action, source.block, recorded, recorded.payload, recorded.payload)
+            elif told := _told_in(source, source.events, recorded, owners):
+                if source.stream is None or told.block != source.block:
+                    yield told
+                    continue
                 number = numbers[source.stream] = numbers.get(source.stream, -1) + 1
-                yield Recorded(source.stream, number, recorded.stamp, payload)
+                yield Recorded(source.stream, number, recorded.stamp, told.owner)
 
-    def _taken(
-        self, source: _Source, events: Events, recorded: Recorded, owners: dict[tuple[Stream, Key], bytes]
-    ) -> bytes | None:
-        """Return the message to the hardware in an event, if any; otherwise take note of what it tells."""
-        part = events.part_of(recorded)
-        if part is None:
-            return None
-        (key, request, response), action = part, source.action
-        if request is not None:
-            owners[recorded.stream, key] = request
-            return request if source.stream else None
-        owner = owners.pop((recorded.stream, key), None)
-        if owner is None or response is None:
-            return None
-        if source.block == action.result:
-            self.told.append(Told(action, action.result, recorded, owner, response))
-        elif source.block == action.goal and not _is_accepted(response):
-            self.told.append(Told(action, action.result, recorded, owner, None))
+
+def _told_in(
+    source: _Source, events: Events, recorded: Recorded, owners: dict[tuple[Stream, Key], bytes]
+) -> Told | None:
+    """Return what an event tells, if anything; `owners` are the requests that await their responses."""
+    part = events.part_of(recorded)
+    if part is None:
         return None
+    (key, request, response), action = part, source.action
+    if request is not None:
+        owners[recorded.stream, key] = request
+        return None if source.block == action.result else Told(action, source.block, recorded, request, request)
+    owner = owners.pop((recorded.stream, key), None)
+    if owner is None or response is None:
+        return None
+    if source.block == action.result:
+        return Told(action, action.result, recorded, owner, response)
+    if source.block == action.goal and not _is_accepted(response):
+        return Told(action, action.result, recorded, owner, None)
+    return None
 
 
 def with_goals(
@@ -118,16 +143,19 @@ def with_goals(
     *,
     compares: bool,
 ) -> BagOfGoals:
-    """Return the bag with the goals of the actions that the hardware serves; `names` are the topics of the blocks.
+    """Return the bag with the goals of the actions; `names` are the topics of the messages to the hardware, by block.
 
-    If the topic of the goals is renamed to that of another action, or if the only goals of the type are those of
-    another action, all are read from that action. Without `compares`, and without goals, feedback and results remain as
-    they are. Raise `InputError` if a definition differs from the system's.
+    If the topic of the goals or, of an action of another node, of the feedback is renamed to that of another action, or
+    if the only goals of the type are those of another action, all are read from that action. Without goals, feedback
+    and results remain as they are, and without `compares`, so do all messages except goals and cancellations for the
+    hardware. Raise `InputError` if a definition differs from the system's.
     """
     goals: dict[Stream, _Source] = {}
-    served = [item for item in actions if item.ros is bag.form.ros and item.end is ServiceEnd.SERVER]
-    for action in served:
-        is_only = [item.type for item in served].count(action.type) == 1
+    known = [item for item in actions if item.ros is bag.form.ros]
+    for action in known:
+        if not compares and action.end is ServiceEnd.CLIENT:
+            continue
+        is_only = [item.type for item in known].count(action.type) == 1
         found = _ActionInBag(bag, action, libraries[action.ros], names, is_only).sources()
         goals |= {stream: source for stream, source in found.items() if compares or source.stream}
     streams: dict[Stream, int] = {}
@@ -158,7 +186,8 @@ class _ActionInBag:
         if self.action.ros is ROS1:
             goals = absolute_name(f"{self._base}/goal")
             has_goals = any(absolute_name(stream.topic) == goals for stream in self.bag.streams)
-            found = [self._told("feedback", "feedback"), self._told("result", "result")] if has_goals else []
+            ends = ("feedback", "result") if self._is_served else ("goal", "cancel", "feedback", "result")
+            found = [self._told(end, end) for end in ends] if has_goals else []
         else:
             found = self._events()
         return {stream: source for streams in found for stream, source in streams.items()}
@@ -174,13 +203,14 @@ class _ActionInBag:
             EventType.of(MessageName(action.type.package, f"{action.type.name}_{end}"), interface.kind, definitions)
             for end in ("SendGoal", "GetResult")
         )
-        goals = self._of(_SEND_GOAL, send, action.goal, send.request_name)
+        entering = (send.request_name, "action_msgs/msg/GoalInfo") if self._is_served else ("", "")
+        goals = self._of(_SEND_GOAL, send, action.goal, entering[0])
         if not goals:
             return []
         cancel = EventType.of(_CANCELING, InterfaceKind.SERVICE, _canceling(self.library))
         return [
             goals,
-            self._of(_CANCEL_GOAL, cancel, action.cancel, "action_msgs/msg/GoalInfo"),
+            self._of(_CANCEL_GOAL, cancel, action.cancel, entering[1]),
             self._of(_GET_RESULT, get, action.result),
             self._told("_action/feedback", "feedback"),
         ]
@@ -200,10 +230,11 @@ class _ActionInBag:
         return {}
 
     def _told(self, ending: str, end: str) -> dict[Stream, _Source]:
-        """Return the streams of feedback or results on a topic of the action."""
+        """Return the streams of one of the messages on a topic of the action."""
+        action = self.action
         topic = absolute_name(f"{self._base}/{ending}")
-        name = action_messages(self.action.type, self.action.ros)[end]
-        block = self.action.feedback if end == "feedback" else self.action.result
+        name = action_messages(action.type, action.ros)[end]
+        blocks = {"goal": action.goal, "cancel": action.cancel, "feedback": action.feedback, "result": action.result}
         ours = signature(name, self.library.closure(name))
         found = {}
         for stream in self.bag.streams:
@@ -212,17 +243,23 @@ class _ActionInBag:
             if stream.signature not in ("", "*", ours):
                 text = f"its definition of {name} differs from the system's"
                 fail(f"topic {stream.topic} in {self.bag.path}: {text}: {stream.signature}, not {ours}")
-            found[stream] = _Source(self.action, block)
+            found[stream] = _Source(action, blocks[end])
         return found
+
+    @property
+    def _is_served(self) -> bool:
+        return self.action.end is ServiceEnd.SERVER
 
     @cached_property
     def _base(self) -> str:
         """The name of the action in the bag."""
         is_first = self.action.ros is ROS1
         ending = "/goal" if is_first else f"/_action/{_SEND_GOAL}/{EVENTS}"
-        given, own = self.names.get(self.action.goal, ""), absolute_name(self.action.ros_name)
-        if given.endswith(ending) and given != f"{own}{ending}":
-            return given.removesuffix(ending)
+        entering = ending if self._is_served else "/feedback" if is_first else "/_action/feedback"
+        block = self.action.goal if self._is_served else self.action.feedback
+        given, own = self.names[block], absolute_name(self.action.ros_name)
+        if given.endswith(entering) and given != f"{own}{entering}":
+            return given.removesuffix(entering)
         goal = action_messages(self.action.type, self.action.ros)["goal"]
         name = goal if is_first else MessageName(goal.package, f"{self.action.type.name}_SendGoal_Event")
         topics = {absolute_name(stream.topic) for stream in self.bag.streams if _name_of(stream) == name}

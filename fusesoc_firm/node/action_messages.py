@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import Enum
 from typing import NamedTuple, Protocol
 
@@ -122,7 +122,9 @@ class Messages(Protocol):
 class Ros1Messages:
     """The messages of actionlib (ROS 1)."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], Stamp] | None = None) -> None:
+        """Prepare headers with the time of a clock, by default that of this machine."""
+        self._clock = clock or now
         self._count = 0
 
     def goal(self, payload: bytes) -> Reference:
@@ -173,7 +175,7 @@ class Ros1Messages:
 
     def _header(self) -> bytes:
         self._count += 1
-        return struct.pack("<I", self._count & 0xFFFFFFFF) + struct.pack("<II", *now()) + _text(b"")
+        return struct.pack("<I", self._count & 0xFFFFFFFF) + struct.pack("<II", *self._clock()) + _text(b"")
 
     def _status(self, status: Status) -> bytes:
         number = _ROS1_STATES.get(status.state, _ROS1_PENDING)

@@ -17,12 +17,10 @@ from typing import Any
 
 from tqdm import tqdm
 
-from fusesoc_firm.bags.calls import Exchange, with_calls
-from fusesoc_firm.bags.goals import BagOfGoals, with_goals
+from fusesoc_firm.bags.goals import BagOfGoals
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
-from fusesoc_firm.frame.codec import CodecError, decode
-from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.codec import CodecError
 from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, Stream, open_bag
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
@@ -30,19 +28,17 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.node.transport.simulator import WAITS_SECONDS, Simulator, Waits
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.node.watch import Control, Latency, Watch
-from fusesoc_firm.replay.goals import GoalLine, Verdict
+from fusesoc_firm.replay.exchanges import OF_GOALS, Exchanges, asked_actions, ended_in, missing_in, with_exchanges
+from fusesoc_firm.replay.goals import Verdict
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
 from fusesoc_firm.simulation.functions import Functions, importable_sources
 from fusesoc_firm.simulation.software_run import stimulated
-from fusesoc_firm.system.derived.model import Action, ServiceEnd, Topic, absolute_name
+from fusesoc_firm.system.derived.model import Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
-from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, fail, nearest
 
 # The maximum number of lines about rejected messages; further messages are only counted.
 _SHOWN = 100
-# What became of a response of the system to a recorded call, in the summary's words.
-_EQUAL, _DIFFERENT = Verdict.EQUAL.value, Verdict.DIFFERENT.value
-_MISSING, _NOT_RECORDED = Verdict.MISSING.value, Verdict.NOT_RECORDED.value
 
 
 @dataclass(frozen=True)
@@ -117,10 +113,14 @@ def replay(
     publishers = renamed(published(system), settings.names)
     topics = {item.block: _recorded(item, loaded) for item in publishers}
     with open_bag(source.path) as opened:
-        bag = _with_exchanges(opened, loaded, subscribers)
+        bag = with_exchanges(opened, loaded, subscribers)
         form = _form(target, bag.form)
         _check_speaks(publishers, target.path, form)
         routes = _routes(bag, loaded, subscribers, settings.names)
+        ended = ended_in(bag, system, source.window(bag)[1])
+        warnings = missing_in(bag, system, ended)
+        for warning in warnings:
+            print(warning, file=sys.stderr)
         with (
             importable_sources([type_.accelerator for type_ in system.software.types], loaded.folder),
             _started(start_simulator) as simulator,
@@ -128,7 +128,7 @@ def replay(
         ):
             functions = Functions.of(system.software, loaded.folder)
             run = SystemRun(system, simulator, functions, settings.quiet, settings.watch)
-            going = _Replay(bag, source, routes, run, topics, written, clock, settings)
+            going = _Replay(bag, source, routes, run, topics, written, clock, settings, warnings, ended)
             if settings.watch:
                 settings.watch.epoch_ns = bag.start
             going.play()
@@ -153,14 +153,11 @@ class _Replay:
     written: BagWriter
     clock: Fraction | None
     settings: Settings
+    warnings: Sequence[Diagnostic]
+    # The ids of goals that the bag has results of, by the blocks of the actions to which the hardware sends goals.
+    ended: Mapping[str, set[bytes]]
     played: Counter[Stream] = field(default_factory=Counter)
     sent: Counter[str] = field(default_factory=Counter)
-    # The system's responses that are not yet compared, by stream and number of the request.
-    answers: dict[tuple[Stream, int], Sent] = field(default_factory=dict)
-    # The numbers of calls of each stream by how the system responded.
-    compared: Counter[tuple[Stream, str]] = field(default_factory=Counter)
-    # The numbers of the hardware's requests by their blocks and by how they compare with the recorded ones.
-    asked: Counter[tuple[str, str]] = field(default_factory=Counter)
     # The stamp of the last message that was played, and whether it was the last one of the selected time.
     last: int = 0
     is_whole: bool = False
@@ -171,6 +168,12 @@ class _Replay:
     is_over: bool = False
     # The first errors, each in one line.
     shown: list[str] = field(default_factory=list)
+
+    @cached_property
+    def exchanges(self) -> Exchanges:
+        """The calls and goals of the bag."""
+        window = self.source.window(self.bag)
+        return Exchanges(self.bag, self.run.system, window, self.ended, self._take)
 
     def play(self) -> None:
         """Replay all messages, and report an early end."""
@@ -196,7 +199,7 @@ class _Replay:
                     self._hear()
             except InputError as error:
                 self._report(str(error).removeprefix("error: "))
-            for left in (self.run.unfinished, *(line.unfinished for line in self._lines.values())):
+            for left in (self.run.unfinished, *self.exchanges.unfinished()):
                 if left:
                     self._report(left)
             if not self.is_over:
@@ -212,27 +215,21 @@ class _Replay:
         try:
             for subscriber in () if route.misfit else route.subscribers:
                 self._give(subscriber, recorded)
-            self._answer_calls()
-            for line in self._lines.values():
-                line.advance(recorded.stamp)
+            self.exchanges.follow_up(recorded.stamp)
         except (StuckError, TransportError) as error:
             self._stop(error)
         self._count_waits()
-        if recorded.stream in self._calls:
-            self._compare()
-            if answer := self._answer(route):
-                self.answers[recorded.stream, recorded.number] = answer
-            else:
-                self.compared[recorded.stream, _MISSING] += 1
+        self.exchanges.note_call(recorded, route, self.run.sent)
         self.refused += bool(faults)
         self._conclude(recorded)
 
     def _hear(self) -> None:
-        """Take note of recorded feedback and results of goals."""
+        """Take note of recorded messages of actions."""
         while self.bag.told and not self.is_over:
             told = self.bag.told.popleft()
             try:
-                self._lines[told.action.block].tell(told.block, told.owner, told.payload, told.recorded.stamp)
+                self.exchanges.tell(told)
+                self.exchanges.follow_up(told.recorded.stamp)
             except (StuckError, TransportError) as error:
                 self._stop(error)
             except (CodecError, ValueError) as error:
@@ -254,116 +251,20 @@ class _Replay:
 
     def _give(self, subscriber: Topic, recorded: Recorded) -> None:
         """Give a message to a subscriber; goals and cancellations of actions may have to wait."""
-        if line := self._to_lines.get(subscriber.block):
-            line.give(subscriber.block, recorded.payload, recorded.stamp)
-        else:
+        if not self.exchanges.give(subscriber.block, recorded.payload, recorded.stamp):
             self._take(subscriber, recorded.payload, recorded.stamp)
 
-    def _send(self, block: str, payload: bytes, stamp: int) -> bool:
-        """Send a message of an action to the hardware; return whether there was no fault."""
-        known = len(self.run.faults)
-        self._take(self._entering[block], payload, stamp)
-        return len(self.run.faults) == known
-
-    def _take(self, subscriber: Topic, payload: bytes, stamp: int) -> None:
-        known = len(self.run.sent)
+    def _take(self, subscriber: Topic, payload: bytes, stamp: int) -> bool:
+        """Send a message to the system; return whether there was no fault."""
+        sent, faults = len(self.run.sent), len(self.run.faults)
         self.run.take(subscriber, payload, stamp, self._seen(subscriber, payload, stamp))
-        for line in self._lines.values():
-            line.take(self.run.sent[known:])
-
-    @cached_property
-    def _served(self) -> list[Action]:
-        """The actions that the hardware serves."""
-        return [action for action in self.run.system.actions if action.end is ServiceEnd.SERVER]
-
-    @cached_property
-    def _lines(self) -> Mapping[str, GoalLine]:
-        """The goals of the actions by their blocks."""
-        topics = {item.block: item for item in (*self.run.system.subscribers, *self.run.system.publishers)}
-        return {action.block: GoalLine(action, topics, self._send) for action in self._served}
-
-    @cached_property
-    def _to_lines(self) -> Mapping[str, GoalLine]:
-        """The same by the blocks of goals and of cancellations."""
-        return {block: self._lines[item.block] for item in self._served for block in (item.goal, item.cancel)}
-
-    @cached_property
-    def _calls(self) -> set[Stream]:
-        """The streams of requests."""
-        return {calls.stream for calls in self.bag.calls.values()}
-
-    def _answer_calls(self) -> None:
-        """Give the hardware the recorded responses to its calls, which may lead to further calls."""
-        for sent in self.run.sent:
-            exchanges = self._asked.get(sent.topic.block)
-            if exchanges is None:
-                continue
-            exchange = next(exchanges, None)
-            if exchange is None:
-                self.asked[sent.topic.block, _NOT_RECORDED] += 1
-                continue
-            self.asked[sent.topic.block, _verdict(sent, exchange.request)] += 1
-            if exchange.response is not None:
-                self._take(self._takers[sent.topic.block], exchange.response, sent.cause.stamp)
-
-    @cached_property
-    def _asked(self) -> Mapping[str, Iterator[Exchange]]:
-        """The recorded calls of services that the hardware calls, in their order, by the blocks of requests."""
-        window = self.source.window(self.bag)
-        return {block: self.bag.exchanges(block, *window) for block in self.bag.asked}
-
-    @cached_property
-    def _takers(self) -> Mapping[str, Topic]:
-        """The topics of responses to the hardware, by the blocks of requests."""
-        services = [item for item in self.run.system.services if item.end is ServiceEnd.CLIENT]
-        return {item.request: self._entering[item.response] for item in services}
-
-    @cached_property
-    def _entering(self) -> Mapping[str, Topic]:
-        """The topics to the hardware by block."""
-        return {item.block: item for item in self.run.system.subscribers}
-
-    def _answer(self, route: Route) -> Sent | None:
-        """Return the response to the call that was sent last."""
-        requests = {item.block for item in route.subscribers}
-        responses = {service.response for service in self.run.system.services if service.request in requests}
-        return next((sent for sent in self.run.sent if sent.topic.block in responses), None)
-
-    def _compare(self) -> None:
-        """Compare the system's responses with those that were read since."""
-        for key, recorded in self.bag.responses.items():
-            if sent := self.answers.pop(key, None):
-                self.compared[key[0], _verdict(sent, recorded)] += 1
-        self.bag.responses.clear()
-
-    def _compared(self, stream: Stream) -> dict[str, Any]:
-        """Return how many of the system's responses are as recorded, different, missing, and not recorded."""
-        self._compare()
-        counts = {kind: self.compared[stream, kind] for kind in (_EQUAL, _DIFFERENT, _MISSING)}
-        rest = {_NOT_RECORDED: sum(key[0] == stream for key in self.answers)}
-        return {"topic": stream.topic, "type": stream.type} | counts | rest
-
-    def _requests(self, block: str) -> dict[str, Any]:
-        """Return how many of the hardware's requests are as recorded, different, missing, and not recorded.
-
-        A recorded request after the last message that was played is not missing, except after a whole replay.
-        """
-        counts = {kind: self.asked[block, kind] for kind in (_EQUAL, _DIFFERENT)}
-        missing = sum(self.is_whole or item.stamp <= self.last for item in self._asked[block])
-        counts |= {_MISSING: missing, _NOT_RECORDED: self.asked[block, _NOT_RECORDED]}
-        _, calls = self.bag.asked[block]
-        return {"topic": self.topics[block].name, "type": calls.events.type.request_name} | counts
-
-    def _of_goals(self) -> dict[str, list[dict[str, Any]]]:
-        """Return how much of the hardware's feedback and of its results is as recorded, for each action."""
-        rows: dict[str, list[dict[str, Any]]] = {"feedback": [], "results": []}
-        used = {item.block for route in self.routes.values() for item in route.subscribers}
-        for action in self._served:
-            if action.goal in used:
-                names = {"topic": absolute_name(action.ros_name), "type": str(action.type)}
-                for title, counts in self._lines[action.block].counts():
-                    rows[title].append(names | {verdict.value: counts[verdict] for verdict in Verdict})
-        return rows
+        is_right = len(self.run.faults) == faults
+        for message in self.run.sent[sent:]:
+            try:
+                self.exchanges.take(message)
+            except (CodecError, ValueError) as error:
+                self.run.faults.append(f"the hardware sent invalid data at '{message.topic.block}': {error}")
+        return is_right
 
     def _seen(self, subscriber: Topic, payload: bytes, stamp: int) -> int | None:
         watch = self.settings.watch
@@ -427,9 +328,10 @@ class _Replay:
                 for stream, count in self.bag.streams.items()
                 if stream not in self.routes
             ],
-            "responses": [self._compared(stream) for stream in self.routes if stream in self._calls],
-            "requests": [self._requests(block) for block in self.bag.asked],
-            **self._of_goals(),
+            "responses": self.exchanges.responses(self.routes),
+            "requests": self.exchanges.requests(self.topics, None if self.is_whole else self.last),
+            **self.exchanges.of_goals({item.block for route in self.routes.values() for item in route.subscribers}),
+            "warnings": [warning.data() for warning in self.warnings],
             "errors": self.errors,
             "messages_with_errors": self.refused,
             "first_errors": self.shown,
@@ -450,7 +352,7 @@ class _Replay:
             print(f"no subscriber for {row['topic']} ({row['type']}): {row['count']}")
         verdicts = [(f"responses to {row['topic']}", row) for row in found["responses"]]
         verdicts += [(f"requests on {row['topic']}", row) for row in found["requests"]]
-        verdicts += [(f"{kind} of {row['topic']}", row) for kind in ("feedback", "results") for row in found[kind]]
+        verdicts += [(f"{kind} of {row['topic']}", row) for kind in OF_GOALS for row in found[kind]]
         for title, row in verdicts:
             kinds = (verdict.value for verdict in Verdict if verdict.value in row)
             counts = (f"{row[kind]} {kind.replace('_', ' ')}" for kind in kinds)
@@ -459,27 +361,6 @@ class _Replay:
             f"{path}: {self.played.total()} in, {self.sent.total()} out,"
             f" {sum(row['count'] for row in found['dropped'])} dropped, {self.errors} errors, {found['cycles']} cycles"
         )
-
-
-def _verdict(sent: Sent, recorded: bytes) -> str:
-    """Return whether a message of the system is as recorded; only fields that the hardware sends count."""
-    return _EQUAL if _value(sent.topic, sent.payload) == _value(sent.topic, recorded) else _DIFFERENT
-
-
-def _value(topic: Topic, payload: bytes) -> bytes:
-    """Return the payload of a response with defaults in padding and unused fields, or unchanged if it is not valid."""
-    try:
-        return encode_used(topic.frame, decode(topic.frame, payload))
-    except CodecError:
-        return payload
-
-
-def _with_exchanges(bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic]) -> BagOfGoals:
-    """Return a bag with the calls of the system's services and the goals of its actions. May raise `InputError`."""
-    names = {item.block: item.name for item in subscribers}
-    system, libraries = loaded.system, loaded.libraries
-    calls = with_calls(bag, system.services, libraries, names, plays_responses=False)
-    return with_goals(calls, system.actions, libraries, names, compares=True)
 
 
 def _count(topic: str, type_: str, count: int) -> dict[str, Any]:
@@ -534,12 +415,16 @@ def _routes(
     """Return the route of each stream. Raise `InputError` if there is no route, or if a requested topic is missing."""
     faults = Diagnostics()
     asked = [stream for stream, _ in bag.asked.values()]
-    topics = {absolute_name(stream.topic) for stream in (*bag.streams, *asked)}
+    topics = {absolute_name(stream.topic) for stream in (*bag.streams, *asked, *bag.goals)}
     for item in subscribers:
         if item.block in names and item.name not in topics:
             faults.error(f"{bag.path} has no topic {item.name} for '{item.block}'", hint=nearest(item.name, topics))
     faults.raise_if_any()
-    routes = routes_of(bag, subscribers, _signatures(loaded, subscribers))
+    # The messages for goals of the hardware are not those of a topic with another name.
+    asking = [action for action in asked_actions(loaded.system) if action.goal in bag.blocks_of(action)]
+    told = {block for action in asking for block in (action.feedback, action.result)}
+    others = [item for item in subscribers if item.block not in told]
+    routes = routes_of(bag, others, _signatures(loaded, others))
     if not routes:
         wanted = ", ".join(f"{item.name} ({item.frame.message})" for item in subscribers)
         there = ", ".join(f"{stream.topic} ({stream.type})" for stream in bag.streams) or "nothing"

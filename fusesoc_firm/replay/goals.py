@@ -7,7 +7,7 @@ ids, headers, and the state in feedback. States of results count as a node under
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import count
@@ -32,7 +32,7 @@ from fusesoc_firm.system.derived.model import Action, Topic
 # hardware sends meanwhile is handed to `GoalLine.take` first.
 Send = Callable[[str, bytes, int], bool]
 # Fields of feedback and results: the header and the state in ROS 1, the id and the state in ROS 2.
-_SET_BY_NODE = ("header", "status", "goal_id")
+SET_BY_NODE = ("header", "status", "goal_id")
 
 
 class Verdict(Enum):
@@ -182,13 +182,15 @@ class GoalLine:
 
     # --- to and from the hardware ----------------------------------------------------------------------------------
 
-    def advance(self, stamp: int) -> None:
-        """Give the next goals to the hardware if it has none."""
+    def advance(self, stamp: int) -> bool:
+        """Give the next goals to the hardware if it has none; return whether there was one."""
+        has_next = self._current is None and bool(self._waiting)
         while self._current is None and self._waiting:
             goal = self._current = self._waiting.popleft()
             payload, goal.payload = goal.payload, b""
             if not self._send(self.action.goal, payload, stamp) and goal is self._current:
                 self._give_up(goal, stamp)
+        return has_next
 
     def _give_up(self, goal: _Goal, stamp: int) -> None:
         """Cancel a goal that has no result, as the hardware may still work."""
@@ -196,22 +198,21 @@ class GoalLine:
         if goal is self._current:
             self._current = None
 
-    def take(self, messages: Sequence[Sent]) -> None:
-        """Take what the hardware has sent."""
-        for sent in messages:
-            block = sent.topic.block
-            if block not in (self.action.feedback, self.action.result):
-                continue
-            goal = self._current
-            if goal is None:
-                self._unasked[block] += 1
-                continue
-            pairs = goal.feedback if block == self.action.feedback else goal.result
-            pairs.sent.append(self._sent_content(goal, sent))
-            pairs.compare()
-            goal.is_accepted = True
-            if block == self.action.result:
-                self._current = None
+    def take(self, sent: Sent) -> None:
+        """Take a message that the hardware has sent."""
+        block = sent.topic.block
+        if block not in (self.action.feedback, self.action.result):
+            return
+        goal = self._current
+        if goal is None:
+            self._unasked[block] += 1
+            return
+        pairs = goal.feedback if block == self.action.feedback else goal.result
+        pairs.sent.append(self._sent_content(goal, sent))
+        pairs.compare()
+        goal.is_accepted = True
+        if block == self.action.result:
+            self._current = None
 
     def _sent_content(self, goal: _Goal, sent: Sent) -> _Content:
         try:
@@ -231,19 +232,19 @@ class GoalLine:
         message = decode(frame, payload)
         is_result = block == self.action.result
         state = self._messages.state(payload) if is_result else None
-        kept: dict[str, Any] = {name: value for name, value in message.items() if name not in _SET_BY_NODE}
+        kept: dict[str, Any] = {name: value for name, value in message.items() if name not in SET_BY_NODE}
         if is_result and self.action.ros is ROS1:
             kept["status"] = {"text": message["status"]["text"]}
         return state, encode_used(frame, completed(frame, kept))
 
-    def counts(self) -> Iterator[tuple[str, Counter[Verdict]]]:
+    def counts(self) -> Iterator[tuple[str, Mapping[Verdict, int]]]:
         """Yield the words for feedback and for results, and what became of them."""
         for title, block in (("feedback", self.action.feedback), ("results", self.action.result)):
             total = Counter({Verdict.NO_GOAL: self._unasked[block]})
             for goal in self._goals.values():
                 pairs = goal.feedback if block == self.action.feedback else goal.result
                 total += pairs.total(has_goal=goal.is_in_bag)
-            yield title, total
+            yield title, {verdict: total[verdict] for verdict in Verdict}
 
     @property
     def unfinished(self) -> str:

@@ -85,9 +85,27 @@ class Goals:
             message = self._made("actionlib/msg/TestGoal", value)
             self._add("goal", "actionlib/msg/TestActionGoal", self._header(), self._id(goal), message)
             return
-        request = self._made(f"{_FIBONACCI}_SendGoal_Request", self._id(goal), self._made(f"{_FIBONACCI}_Goal", value))
         response = self._made(f"{_FIBONACCI}_SendGoal_Response", is_accepted, self._time(1))
-        self._call("send_goal", f"{_FIBONACCI}_SendGoal", request, response)
+        self._call("send_goal", f"{_FIBONACCI}_SendGoal", self._request(goal, value), response)
+
+    def _request(self, goal: int, value: int) -> Any:
+        return self._made(f"{_FIBONACCI}_SendGoal_Request", self._id(goal), self._made(f"{_FIBONACCI}_Goal", value))
+
+    def payload(self, goal: int, value: int) -> bytes:
+        """The message of a goal."""
+        if self.version == 2:
+            return bytes(self._serialise(self._request(goal, value), f"{_FIBONACCI}_SendGoal_Request"))
+        self.goal(goal, value)
+        return self.items.pop()[3]
+
+    def id_in(self, kind: str, payload: bytes) -> int:
+        """The goal to which feedback or a result of ROS 1 belongs."""
+        message: Any = (
+            self.store.deserialize_ros1(payload, f"actionlib/msg/TestAction{kind}")
+            if self.version == 1
+            else self.store.deserialize_cdr(payload, f"{_FIBONACCI}_{kind}Message")
+        )
+        return int(message.status.goal_id.id.removeprefix("client-") if self.version == 1 else message.goal_id.uuid[0])
 
     def cancel(self, goal: int) -> None:
         """Record the cancellation of a goal."""
@@ -124,6 +142,12 @@ class Goals:
             self._add("status", "actionlib_msgs/msg/GoalStatusArray", self._header(), [])
         else:
             self._add("_action/status", "action_msgs/msg/GoalStatusArray", [])
+
+    def order(self, value: int) -> None:
+        """Record an order to the hardware of tests/ros/planner."""
+        kind = "std_msgs/msg/UInt32"
+        payload = bytes(self._serialise(self._made(kind, value), kind))
+        self.items.append(("/order", kind, next(self._stamps), payload))
 
     def damage(self) -> None:
         """Cut off the last byte of the message recorded last."""
@@ -175,9 +199,11 @@ class Goals:
                 self._add(f"_action/{service}/_service_event", f"{kind}_Event", info, *parts)
 
     def _add(self, ending: str, kind: str, *values: Any) -> None:
-        serialise = self.store.serialize_ros1 if self.version == 1 else self.store.serialize_cdr
-        payload = bytes(serialise(self._made(kind, *values), kind))
+        payload = bytes(self._serialise(self._made(kind, *values), kind))
         self.items.append((f"{self.name}/{ending}", kind, next(self._stamps), payload))
+
+    def _serialise(self, message: Any, kind: str) -> Any:
+        return (self.store.serialize_ros1 if self.version == 1 else self.store.serialize_cdr)(message, kind)
 
     def _made(self, kind: str, *values: Any) -> Any:
         return self.store.types[kind](*values)
@@ -200,10 +226,27 @@ class Goals:
         return self._made("actionlib_msgs/msg/GoalStatus", self._id(goal), state, "told by the server")
 
 
+def what_is_told(path: Path) -> list[tuple[int, int, int]]:
+    """What the hardware of tests/ros/planner has told, in the bag of a replay: an order, a kind and a number each."""
+    values = (int.from_bytes(payload[-8:], "little") for topic, _, _, payload in read(path) if topic == "/told")
+    return [(value >> 40, value >> 32 & 0xFF, value & 0xFFFFFFFF) for value in values]
+
+
 def arm(folder: Path, version: int) -> Path:
     """The system of tests/ros/arm for a version of ROS."""
+    return system("arm", folder, version)
+
+
+def planner(folder: Path, version: int) -> Path:
+    """The system of tests/ros/planner for a version of ROS."""
     shutil.copytree(HERE / "arm", folder / "arm")
-    spec = folder / "arm/arm.yaml"
+    return system("planner", folder, version)
+
+
+def system(name: str, folder: Path, version: int) -> Path:
+    """A system of tests/ros for a version of ROS."""
+    shutil.copytree(HERE / name, folder / name)
+    spec = folder / f"{name}/{name}.yaml"
     text = spec.read_text(encoding="utf-8")
     spec.write_text(in_ros2(text) if version == 2 else text, encoding="utf-8")
     return spec

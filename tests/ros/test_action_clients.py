@@ -7,13 +7,18 @@ import random
 import re
 import shutil
 import subprocess
+import time
+import xmlrpc.client
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from fusesoc_firm.cli import main
+from tests.replay.goals import what_is_told
 from tests.ros.action_server_peer import HELD, Kind
 from tests.ros.action_simulator import in_ros2
 from tests.ros.cpp_nodes import Client, NodeProcess, Peer
@@ -77,6 +82,35 @@ class Planner(Place):
             options = ["-std=c++17", "-pthread", str(HERE / "action_server.cpp"), "-o", str(program)]
             subprocess.run(["g++", *options, *words.stdout.split(), "-lboost_thread"], check=True)
         return program
+
+    @contextmanager
+    def recording(self, bag: Path) -> Iterator[None]:
+        """Record the action, the orders and what the hardware tells with ROS 1's own recorder."""
+        topics = ["/order", "/told", *(f"{ACTION}/{end}" for end in ("goal", "cancel", "feedback", "result"))]
+        command = ["rosbag", "record", "--tcpnodelay", "-O", str(bag), *topics, "__name:=recorder"]
+        with NodeProcess(self.folder / "recorder.log", command, self.ros.environment) as recorder:
+            while not all(map(self._is_recorded, topics)):
+                assert recorder.process.poll() is None, recorder.said()
+                time.sleep(0.02)
+            yield
+            # Its script does not take a signal that it has inherited as ignored.
+            (node,) = self._nodes("/recorder")
+            node.shutdown("/test", "the test has ended")
+            assert recorder.wait() == 0, recorder.said()
+
+    def _is_recorded(self, topic: str) -> bool:
+        """Whether each publisher of a topic sends to the recorder."""
+        publishers = dict(self._master.getSystemState("/test")[2][0]).get(topic, [])
+        links = [link for node in self._nodes(*publishers) for link in node.getBusInfo("/test")[2]]
+        found = [link for link in links if [*link[1:3], link[4]] == ["/recorder", "o", topic]]
+        return len(found) == len(publishers) > 0
+
+    @property
+    def _master(self) -> Any:
+        return xmlrpc.client.ServerProxy(self.ros.environment["ROS_MASTER_URI"])
+
+    def _nodes(self, *names: str) -> list[Any]:
+        return [xmlrpc.client.ServerProxy(self._master.lookupNode("/test", name)[2]) for name in names]
 
 
 @dataclass
@@ -254,3 +288,30 @@ def test_goals_that_are_accepted_late_are_canceled(place: Planner, language: str
         while not ended >= {(order, "CANCELED") for order in orders}:
             ended.add(tuple(json.loads(server.line())))
         assert node.stop() == 0, node.said()
+
+
+def test_recorded_goals_are_replayed(place: Planner, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The hardware sends the goals and cancellations again, and gets the results of the server."""
+    if place.version == 2:
+        pytest.skip("rclpy cannot record the calls of an action")
+    seed = random.randrange(2**32)
+    print(f"seed {seed}")
+    source = random.Random(seed)
+    orders = [*(source.randrange(1 << 20) & ~0x10 for _ in range(8)), HELD, Kind.REJECTED << 20, HELD + 1]
+    bag, target = tmp_path / "in.bag", tmp_path / "out.bag"
+    with place.server(), place.node("python") as (node, hardware):
+        with place.recording(bag):
+            hardware.send(*orders)
+            results = [hardware.until_result()[1] for _ in orders]
+        assert node.stop() == 0, node.said()
+    capsys.readouterr()
+    arguments = ["replay", str(place.specification()), "--in", str(bag), "--out", str(target), "--json"]
+    assert main([*arguments, "--build-root", str(place.folder / "simulators")]) == 0
+    said = json.loads(capsys.readouterr().out)
+    names = ("as_recorded", "different", "missing", "not_recorded")
+    rows = {kind: row for kind in ("goals", "cancellations") for row in said[kind]}
+    counts = {kind: [row[name] for name in names if name in row] for kind, row in rows.items()}
+    assert counts == {"goals": [len(orders), 0, 0, 0], "cancellations": [2, 0, 0]}
+    assert said["warnings"] == []
+    # ROS may deliver feedback after the result of its goal.
+    assert [told for told in what_is_told(target) if told[1] != FEEDBACK] == results

@@ -1,4 +1,4 @@
-"""Bags with the goals of an action go through its hardware in GHDL, in both versions of ROS."""
+"""Bags with the goals of actions go through hardware in GHDL that serves or sends them, in both versions of ROS."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from tests.replay.goals import CANCELED, RECALLED, SUCCEEDED, Goals, arm
+from tests.replay.goals import CANCELED, RECALLED, SUCCEEDED, Goals, arm, planner, what_is_told
 from tests.ros.action_simulator import HELD
 
 SEED = 20261127
@@ -76,3 +76,59 @@ def test_hardware_pursues_the_goals_of_a_bag(tmp_path: Path, version: int, capsy
     # Messages of two topics with the same stamp have no order in a bag.
     for kind in ("feedback", "result"):
         assert [item for item in found[0] if item[0] == kind] == [item for item in told if item[0] == kind]
+
+
+# The kind of what the hardware tells of feedback.
+FEEDBACK = 0xFF
+
+
+def recorded_orders(goals: Goals, count: int) -> tuple[list[tuple[int, int, int]], int]:
+    """Record orders, each up to three goals before its own, and what becomes of the goals.
+
+    Return what the hardware tells, and how many goals it cancels.
+    """
+    choice = random.Random(SEED)
+    orders = [choice.choice([HELD + 128 * number, choice.randrange(1 << 20) & ~0x10]) for number in range(count)]
+    told: list[tuple[int, int, int]] = []
+    sent = canceled = 0
+    for goal, order in enumerate(orders, 1):
+        for _ in range(choice.randint(0, min(3, count - goal))):
+            if sent < goal + 3 and sent < count:
+                goals.order(orders[sent])
+                sent += 1
+        if sent < goal:
+            goals.order(order)
+            sent += 1
+        goals.goal(goal, order)
+        is_held = order & HELD == HELD
+        values = [choice.randrange(1 << 16) for _ in range(choice.randint(is_held, 3))]
+        for place, value in enumerate(values):
+            goals.feedback(goal, value)
+            if is_held and place == 0:
+                goals.cancel(goal)
+        state, value = (CANCELED if is_held else SUCCEEDED)[goals.version], choice.randrange(1 << 16)
+        goals.result(goal, state, value)
+        canceled += is_held
+        told += [(order, FEEDBACK, item) for item in values] + [(order, state, value)]
+    return told, canceled
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_hardware_sends_the_goals_of_a_bag(tmp_path: Path, version: int, capsys: pytest.CaptureFixture[str]) -> None:
+    """All goals and cancellations are as recorded, with random stalls; the hardware tells all that the bag has."""
+    print(f"seed {SEED}")
+    goals = Goals(version)
+    told, canceled = recorded_orders(goals, 24)
+    source, spec = goals.write(tmp_path), planner(tmp_path, version)
+    target = tmp_path / ("out.bag" if version == 1 else "out.mcap")
+    arguments = ["replay", str(spec), "--in", str(source), "--out", str(target), "--json"]
+    assert main([*arguments, "--stall-percent", "30", "--seed", "7", "--build-root", str(tmp_path / "build")]) == 0
+    said = json.loads(capsys.readouterr().out.partition("\n")[2])
+    counts = {
+        kind: [row[name] for name in ("as_recorded", "different", "missing", "not_recorded") if name in row]
+        for kind in ("goals", "cancellations")
+        for row in said[kind]
+    }
+    assert counts == {"goals": [24, 0, 0, 0], "cancellations": [canceled, 0, 0]}
+    assert 0 < canceled < 24, "the seed leads to both kinds of goals"
+    assert what_is_told(target) == told
