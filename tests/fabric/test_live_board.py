@@ -6,7 +6,6 @@ import importlib.util
 import json
 import os
 import random
-import re
 import shutil
 import signal
 import subprocess
@@ -27,19 +26,6 @@ SEED = 20261127
 CLOCKS = {"rmii": "50 MHz", "rgmii": "125 MHz"}
 # Quaternions that each peer sends before both wait for all results.
 LOT, LOTS = 10, 5
-
-LONG_TEXTS = """\
-project:
-  name: board
-  clock: 125 MHz
-  interconnect: ethernet
-  network: {mac: "02:00:00:00:00:02", address: 192.0.2.9, phy: rgmii}
-  status: frames
-blocks:
-  - {name: words, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /words_in, maxLength: 7936,
-     outgoing: [{name: said}]}
-  - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_out}
-"""
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
@@ -113,20 +99,6 @@ class Lab:
             "cyclone": self._peer(self._hosts[1], sys.executable, "cyclone_peer.py", dict(os.environ)),
         }
 
-    def writer(self) -> Peer:
-        """A peer with Fast DDS that writes texts."""
-        others = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DOMAIN_ID")
-        environment = {name: value for name, value in self._ros.environment.items() if name not in others}
-        options = ["reliable", "{}", json.dumps({"words": "String"})]
-        peer = Peer(self._hosts[0], [self._ros.python, str(HERE / "ros_peer.py"), *options], environment)
-        self._stack.callback(peer.kill)
-        return peer
-
-    def status(self) -> str:
-        """The status of the board."""
-        command = self._hosts[0].command(sys.executable, "-m", "fusesoc_firm.cli", "status", "udp:192.0.2.9")
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
-
     def _peer(self, host: Host, python: str, name: str, environment: dict[str, str]) -> Peer:
         types = {"euler": "Point"}, {"quaternion": "Quaternion"}
         peer = Peer(host, [python, str(HERE / name), "reliable", *map(json.dumps, types)], environment)
@@ -141,10 +113,6 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 @pytest.fixture
 def lab(specification: Path, tmp_path: Path) -> Iterator[Lab]:
-    yield from _lab(specification, tmp_path)
-
-
-def _lab(specification: Path, tmp_path: Path) -> Iterator[Lab]:
     if reason := _why_not():
         pytest.skip(reason)
     if not shutil.which("verilator"):
@@ -193,18 +161,3 @@ def test_a_switch_with_snooping_knows_the_board_as_a_member(lab: Lab) -> None:
     peers = lab.peers()
     print({name: peer.wait_until_matched() for name, peer in peers.items()})
     _exchange(peers, random.Random(SEED))
-
-
-def test_long_texts_of_rclpy_are_taken_and_counted(tmp_path: Path) -> None:
-    """Fast DDS sends each in one datagram, which the kernel parts; the board reassembles it."""
-    path = tmp_path / "board.yaml"
-    path.write_text(LONG_TEXTS, encoding="utf-8")
-    for lab in _lab(path, tmp_path):
-        lab.board()
-        peer = lab.writer()
-        peer.wait_until_matched()
-        sizes = [10, 1400, 3000, 7900, 1, 5000]
-        peer.send([("words", ["x" * size]) for size in sizes])
-        while not re.search(rf"^subscriber\[0\] +\w+ +{len(sizes)} .* none$", lab.status(), re.MULTILINE):
-            pass
-        assert "\nnetwork: no faults\n" in lab.status()
