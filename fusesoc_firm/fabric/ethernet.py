@@ -18,6 +18,8 @@ from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entit
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Context, Rendering, render
 
+# The bits of a byte of discovery that waits (firm_rtps_inbox).
+_DISCOVERY_BITS = 17
 # Packets in memory for each one that is reassembled (firm_net_link).
 _PLACES = 2
 # What the hardware's generic may be at least; without a reassembly it has no effect.
@@ -70,7 +72,8 @@ def fragment_bytes(system: DerivedSystem, node: Node) -> int:
     """Return the bytes of the memories for messages in several packets, which are in use until they have left."""
     longest = reassembled_bytes(system.subscribers)
     places = 1 << (_PLACES * node.network.reassemblies - 1).bit_length()
-    return longest * places + waiting_bytes(system.subscribers) if longest else 0
+    waiting = waiting_bytes(system.subscribers) * (8 + _DISCOVERY_BITS) // 8
+    return longest * places + waiting if longest else 0
 
 
 def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:
@@ -106,7 +109,7 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "sample": slot_bytes(system.publishers),
         "report_packet": numbers[REPORT],
         "probe_packet": numbers[PROBE],
-        "payloads": waiting_bytes(system.subscribers),
+        "waiting": waiting_bytes(system.subscribers),
         "reassemblies": node.network.reassemblies if reassembled_bytes(system.subscribers) else 0,
         "reassembled": reassembled_bytes(system.subscribers) or _LEAST_REASSEMBLED,
         "has_status": str(bool(system.status)).lower(),

@@ -13,7 +13,7 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.fabric.rtps import Parameter, Reliability, parameter, parameter_list, string
+from fusesoc_firm.fabric.rtps import Parameter, Reliability, octets, parameter, parameter_list, string
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
 from tests.cores.fragments import HOSTS, Host, fragments
@@ -84,6 +84,16 @@ def _frames(host: Host, number: int, port: int, *items: Submessage, size: int = 
     return fragments(host, number, udp, size)
 
 
+def _published(host: Host) -> bytes:
+    """The announcement of a publisher."""
+    return parameter_list(
+        parameter(Parameter.ENDPOINT_GUID, _prefix(host) + bytes([0, 0, 1, rtps.USER_WRITER])),
+        parameter(Parameter.TOPIC_NAME, string("rt/heard")),
+        parameter(Parameter.TYPE_NAME, string("std_msgs::msg::dds_::String_")),
+        parameter(Parameter.RELIABILITY, struct.pack("<I8x", Reliability.BEST_EFFORT)),
+    )
+
+
 def _announced(host: Host) -> list[bytes]:
     """A participant, and its publisher."""
     place = struct.pack("<II12x4s", 1, 7412, host.address)
@@ -93,14 +103,8 @@ def _announced(host: Host) -> list[bytes]:
         parameter(Parameter.METATRAFFIC_UNICAST_LOCATOR, place),
     )
     writer = rtps.PUBLICATIONS_WRITER
-    published = parameter_list(
-        parameter(Parameter.ENDPOINT_GUID, _prefix(host) + bytes([0, 0, 1, rtps.USER_WRITER])),
-        parameter(Parameter.TOPIC_NAME, string("rt/heard")),
-        parameter(Parameter.TYPE_NAME, string("std_msgs::msg::dds_::String_")),
-        parameter(Parameter.RELIABILITY, struct.pack("<I8x", Reliability.BEST_EFFORT)),
-    )
     participant = Data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 1, listed)
-    publisher = Data(DISCOVERY[writer], writer, 1, published)
+    publisher = Data(DISCOVERY[writer], writer, 1, _published(host))
     return [frame for item in (participant, publisher) for frame in _frames(host, 0, METATRAFFIC_PORT, item)]
 
 
@@ -174,12 +178,26 @@ def test_a_message_that_lacks_a_fragment_is_dropped(tmp_path: Path) -> None:
     assert taken == [_as_frame(payloads[0]), _as_frame(payloads[2])]
 
 
+def test_announcements_may_come_in_fragments(tmp_path: Path) -> None:
+    """Fast DDS announces all endpoints of a participant in one packet to those who ask."""
+    host, chance = HOSTS[0], random.Random(SEED)
+    (participant, _), writer = _announced(host), rtps.PUBLICATIONS_WRITER
+    filler = parameter(Parameter.USER_DATA, octets(chance.randbytes(500)))
+    others = [Data(DISCOVERY[writer], writer, number, parameter_list(filler)) for number in range(1, 11)]
+    packet = _frames(host, 0, METATRAFFIC_PORT, *others, Data(DISCOVERY[writer], writer, 11, _published(host)))
+    assert len(packet) == 4
+    payload = _payload(chance, 100)
+    bursts = [(SLOW_CYCLES, participant), (SLOW_CYCLES, packet[0]), *((GAP_CYCLES, frame) for frame in packet[1:])]
+    bursts += [(4 * SLOW_CYCLES, frame) for frame in _sample(host, 1, payload)]
+    assert _taken(_library(tmp_path, 1), tmp_path, bursts) == [_as_frame(payload)]
+
+
 def test_its_memory_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Packets of 8,192 bytes, four of them, and twice as much for messages that wait."""
+    """Packets of 8,192 bytes, four of them, and twice as many for messages and for words of discovery that wait."""
     path = tmp_path / "turtle.yaml"
     path.write_text(SPECIFICATION.format(reassemblies=2, longest=7936), encoding="utf-8")
     assert main(["system", "check", str(path)]) == 0
-    assert "the node needs 49152 bytes of memory for messages in several packets\n" in capsys.readouterr().out
+    assert "the node needs 83968 bytes of memory for messages in several packets\n" in capsys.readouterr().out
 
 
 def test_a_node_for_short_messages_has_no_reassembly(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import random
-import re
 import shutil
 import signal
 from collections.abc import Iterator
@@ -31,18 +30,6 @@ POINTS = """\
      qos: {durability: transient_local, depth: 60}}
 """
 READS, WRITES = {"euler": "Point", "point": "Point"}, {"quaternion": "Quaternion", "point": "Point"}
-LONG_TEXTS = """\
-project:
-  name: board
-  clock: 125 MHz
-  interconnect: ethernet
-  network: {mac: "02:00:00:00:00:02", address: 192.0.2.9, phy: rgmii}
-  status: frames
-blocks:
-  - {name: words, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /words_in, maxLength: 7936,
-     outgoing: [{name: said}]}
-  - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /words_out}
-"""
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
@@ -129,20 +116,3 @@ def test_a_switch_with_snooping_knows_the_board_as_a_member(lab: Lab) -> None:
         assert board.poll() is None
     peers = _peers(lab, chance)
     exchange([*peers.values()], _round(peers, chance))
-
-
-def test_long_texts_of_rclpy_are_taken_and_counted(tmp_path: Path) -> None:
-    """Fast DDS sends each in one datagram, which the kernel parts; the board reassembles it."""
-    skip_without_peers()
-    path = tmp_path / "board.yaml"
-    path.write_text(LONG_TEXTS, encoding="utf-8")
-    sizes = [10, 1400, 3000, 7900, 1, 5000]
-    with ExitStack() as stack:
-        lab = Lab(path, tmp_path, stack)
-        lab.board()
-        peer = lab.rclpy({}, {"words": "String"})
-        peer.wait_until_matched()
-        peer.send([("words", ["x" * size]) for size in sizes])
-        while not re.search(rf"^subscriber\[0\] +\w+ +{len(sizes)} .* none$", lab.status(), re.MULTILINE):
-            pass
-        assert "\nnetwork: no faults\n" in lab.status()

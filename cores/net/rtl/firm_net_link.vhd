@@ -24,7 +24,8 @@ entity firm_net_link is
     REPORT_PACKET : integer := 0;
     PROBE_PACKET  : integer := 0;
     HAS_STATUS    : boolean := false; -- the system has a status, which is read by UDP
-    PAYLOADS      : integer := 4096;  -- bytes of payloads that wait, see firm_rtps_node
+    DISCOVERY     : integer := 4096;  -- bytes of discovery and of payloads that wait, see firm_rtps_node
+    PAYLOADS      : integer := 4096;
     -- Packets whose fragments may be interleaved, 0 to 4, and the bytes of the longest one; without them, fragments
     -- are dropped.
     REASSEMBLIES : integer := 0;
@@ -101,7 +102,6 @@ architecture rtl of firm_net_link is
 
   constant PORTS    : positive := 3;
   constant GROUP_IP : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
-  constant DEPTH    : positive := 4096;  -- bytes of waiting discovery
 
   function cycles_of(hertz : integer) return positive is
   begin
@@ -367,7 +367,7 @@ begin
       SINKS   => SINKS,
       SAMPLE  => SAMPLE,
       SLOTS   => SLOTS,
-      DEPTH   => DEPTH,
+      DEPTH   => DISCOVERY,
       BYTES   => PAYLOADS
     )
     port map (

@@ -64,7 +64,11 @@ def reassembled_bytes(subscribers: Iterable[Converter]) -> int:
 
 
 def waiting_bytes(subscribers: Iterable[Converter]) -> int:
-    """Return the bytes of payloads that wait, a power of two: one comes while one leaves."""
+    """Return the bytes of payloads that wait, and of discovery, a power of two.
+
+    One payload comes while one leaves. Peers also announce all their endpoints in one packet, with whose payloads the
+    fields of its submessages wait.
+    """
     return max(_LEAST_WAITING, 2 * reassembled_bytes(subscribers))
 
 
