@@ -31,10 +31,10 @@ _CORES = (
     "net/builder",
     "net/net_node",
 )
-_TOPICS: Mapping[str, Generic] = {"WRITERS": 3, "READERS": 2, "SAMPLE": 64}
-_NOTE = """The node has eight peers, eight writers of peers, two topics in and one topic out, with up to 64 bytes. It is
-    measured without the memories of its program, packets and names. Block RAMs and distributed memories are not
-    counted."""
+_TOPICS: Mapping[str, Generic] = {"WRITERS": 3, "READERS": 2, "SOURCES": 16, "SINKS": 24, "SAMPLE": 64}
+_NOTE = """The node consists of the MAC, ARP and ping, IGMP and the probes for its address, UDP, RTPS and the packet
+    builder. It has two topics each way, with up to 64 bytes, and room for eight peers with all of them. It is measured
+    without the memories of its program, packets and names. Block RAMs and distributed memories are not counted."""
 
 
 def rows() -> list[Row]:

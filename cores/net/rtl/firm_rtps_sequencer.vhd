@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Runs the program of a node in fabric (fusesoc_firm.fabric.control): instructions that copy, compare and add numbers
--- of 1 to 28 bytes in one memory, two cycles for each byte. The memory holds the record of firm_rtps_walker and all
--- tables.
+-- of 1 to 28 bytes in one memory, two cycles for each byte and four for each instruction. A jump takes two cycles, or
+-- one if it is not taken. The memory holds the record of firm_rtps_walker and all tables.
 --
 -- An instruction is `operation (5 bits) | size (3) | destination (14) | source (14)`. An operand is a mode (2 bits)
 -- and a place (12): in the memory itself, or in the entry that register P, E or W selects. If the lowest bit of the
