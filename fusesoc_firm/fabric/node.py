@@ -20,9 +20,12 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import ArrayType, MessageName
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.system.derived.model import DerivedSystem, Network, Quality, Topic
+from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
+from fusesoc_firm.system.written.specification import ETHERNET
 
-# Seconds without a packet after which peers forget the node.
-LEASE_SECONDS = 20
+# Seconds without a packet after which peers forget the node. The time of a simulated board may be much slower than
+# theirs, so it has more of them.
+LEASE_SECONDS, SIMULATED_LEASE_SECONDS = 20, 100
 _GRAPH_TOPIC = "ros_discovery_info"
 _GRAPH_TYPE = MessageName("rmw_dds_common", "ParticipantEntitiesInfo")
 _GID = MessageName("rmw_dds_common", "Gid")
@@ -59,6 +62,7 @@ class Node:
     network: Network
     endpoints: tuple[Endpoint, ...]
     gid_bytes: int
+    lease_seconds: int = LEASE_SECONDS
 
     @property
     def prefix(self) -> bytes:
@@ -91,7 +95,7 @@ class Node:
             parameter(Parameter.BUILTIN_ENDPOINT_SET, struct.pack("<I", rtps.BUILTIN_ENDPOINTS)),
             parameter(Parameter.METATRAFFIC_UNICAST_LOCATOR, self._locator(metatraffic)),
             parameter(Parameter.DEFAULT_UNICAST_LOCATOR, self._locator(user)),
-            parameter(Parameter.LEASE_DURATION, struct.pack("<iI", LEASE_SECONDS, 0)),
+            parameter(Parameter.LEASE_DURATION, struct.pack("<iI", self.lease_seconds, 0)),
             parameter(Parameter.USER_DATA, rtps.octets(b"enclave=/;")),
         )
 
@@ -162,4 +166,6 @@ def node_of(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary
     writers = [of_topic(2 + len(readers) + item.id, rtps.USER_WRITER, item) for item in system.publishers]
     data = library.get(_GID).fields[0].type
     assert isinstance(data, ArrayType)
-    return Node(network, (graph, *readers, *writers), data.length)
+    is_simulated = system.clock == NETWORK_HERTZ[ETHERNET]
+    lease = SIMULATED_LEASE_SECONDS if is_simulated else LEASE_SECONDS
+    return Node(network, (graph, *readers, *writers), data.length, lease)

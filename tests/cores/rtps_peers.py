@@ -13,7 +13,7 @@ from fusesoc_firm.system.derived.model import Network, Quality
 from tests.cores.announcements import HASH, Event, Kind, Results, a_node
 from tests.cores.rtps_world import World
 from tests.fabric.messages import Address
-from tests.fabric.participant import Participant
+from tests.fabric.participant import Limits, Participant
 
 TYPE = "std_msgs::msg::dds_::UInt32_"
 DEPTH = 15  # of the node's topics
@@ -63,7 +63,8 @@ class Host:
 
     def __post_init__(self) -> None:
         self.took = {item.entity[2]: [] for item in self.node.readers}
-        self.participant = Participant(self.node, lambda end, payload: self.took[end.entity[2]].append(payload))
+        room = Limits(sources=len(self.node.readers), sinks=len(self.node.writers))
+        self.participant = Participant(self.node, lambda end, payload: self.took[end.entity[2]].append(payload), room)
 
     @property
     def address(self) -> str:

@@ -100,9 +100,14 @@ class Window:
         """Whether all that was asked for has come."""
         return self.asked == self.expected % 256
 
+    @property
+    def is_under_way(self) -> bool:
+        """Whether something that was asked for has not come."""
+        return 1 <= (self.asked - self.expected) % 256 <= WINDOW
+
     def ask(self) -> Numbers:
         """The numbers to ask for."""
-        most = 1 if 1 <= (self.asked - self.expected) % 256 <= WINDOW else WINDOW
+        most = 1 if self.is_under_way else WINDOW
         end = max(self.expected, min(self.last + 1, self.expected + most))
         self.asked = end % 256
         return Numbers.of(range(self.expected, end), self.expected)
@@ -447,7 +452,8 @@ class Participant:
         window.is_heard = True
         window.begin(item.first)
         window.last = max(window.last, item.last)
-        if not item.is_final or window.is_behind:
+        # What is under way is not asked for again: each answer comes with a heartbeat.
+        if not window.is_under_way if window.is_behind else not item.is_final:
             self._request_discovery(peer, item.writer)
 
     def _discovery_gap(self, peer: Peer, item: Gap) -> None:

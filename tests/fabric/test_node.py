@@ -26,6 +26,7 @@ SPECIFICATION = """\
 project:
   name: turtle
   width: 64
+  clock: CLOCK
   interconnect: ethernet
   network: {mac: "02:00:00:00:00:02", address: 192.0.2.9, namespace: NAMESPACE, domain: 3}
 blocks:
@@ -36,10 +37,11 @@ blocks:
 """
 
 
-def node(distribution: str | None = None, namespace: str = "/lab") -> Node:
+def node(distribution: str | None = None, namespace: str = "/lab", clock: str = "125 MHz") -> Node:
     """The node of the specification."""
     faults, known = Diagnostics(), libraries((), None, distribution)
-    draft = Draft(Path("turtle.yaml"), SPECIFICATION.replace("NAMESPACE", namespace))
+    text = SPECIFICATION.replace("NAMESPACE", namespace).replace("CLOCK", clock)
+    draft = Draft(Path("turtle.yaml"), text)
     system = derive(read_specification(draft, "turtle.yaml", faults), Path(), known, faults)
     return node_of(system, known)
 
@@ -63,6 +65,15 @@ def test_the_participant_names_its_ports() -> None:
     assert facts.address(Parameter.DEFAULT_UNICAST_LOCATOR) == Address("192.0.2.9", 8161)
     assert facts.all(Parameter.PARTICIPANT_GUID) == [bytes(2) + MAC + bytes(4) + rtps.PARTICIPANT]
     assert facts.octets(Parameter.USER_DATA) == b"enclave=/;"
+
+
+def test_a_simulated_board_has_a_longer_lease() -> None:
+    """Its clock is that of the target of `firm live`."""
+    leases = [
+        ParameterList.of(node(clock=clock).participant_data).integers(Parameter.LEASE_DURATION, "iI")
+        for clock in ("25 MHz", "0.25 MHz")
+    ]
+    assert leases == [(20, 0), (100, 0)]
 
 
 def test_an_endpoint_tells_its_quality() -> None:
