@@ -12,6 +12,7 @@ import xmlrpc.client
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -101,9 +102,9 @@ class Planner(Place):
     def _is_recorded(self, topic: str) -> bool:
         """Whether each publisher of a topic sends to the recorder."""
         publishers = dict(self._master.getSystemState("/test")[2][0]).get(topic, [])
-        links = [link for node in self._nodes(*publishers) for link in node.getBusInfo("/test")[2]]
-        found = [link for link in links if [*link[1:3], link[4]] == ["/recorder", "o", topic]]
-        return len(found) == len(publishers) > 0
+        alive = [links for node in self._nodes(*publishers) if (links := _links_of(node)) is not None]
+        found = [link for link in chain(*alive) if [*link[1:3], link[4]] == ["/recorder", "o", topic]]
+        return len(found) == len(alive) > 0
 
     @property
     def _master(self) -> Any:
@@ -111,6 +112,14 @@ class Planner(Place):
 
     def _nodes(self, *names: str) -> list[Any]:
         return [xmlrpc.client.ServerProxy(self._master.lookupNode("/test", name)[2]) for name in names]
+
+
+def _links_of(node: Any) -> list[Any] | None:
+    """The connections of a node; None if it was killed, which its master does not notice."""
+    try:
+        return list(node.getBusInfo("/test")[2])
+    except ConnectionRefusedError:
+        return None
 
 
 @dataclass
