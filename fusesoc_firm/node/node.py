@@ -236,9 +236,10 @@ class Node:
         self._is_wanted_to_end.set()
 
     def close(self) -> None:
-        """Close the transport; a second call does nothing."""
+        """Close the transport and the queues, so that nothing waits for either; a second call does nothing."""
         self._is_over.set()
         self._hardware.transport.close()
+        self._queues.close()
 
     def access_status(self, request: bytes, seconds: float = ANSWER_SECONDS) -> bytes:
         """Return the answer of the hardware's status to a request; any thread may call this method.

@@ -8,6 +8,7 @@ import random
 import re
 import struct
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,8 +20,9 @@ from fusesoc_firm.node.bursts import split_frame
 from fusesoc_firm.node.carrier import CarrierError, ros_arguments
 from fusesoc_firm.node.cpp_trace import are_steps, write_ways
 from fusesoc_firm.node.description import describe
-from fusesoc_firm.node.node import HardwareListener, NodeSettings
+from fusesoc_firm.node.node import HardwareListener, Node, NodeSettings
 from fusesoc_firm.node.options import add_node_options, remappings
+from fusesoc_firm.node.player import Player
 from fusesoc_firm.node.python_node import python_node
 from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.run import run_options
@@ -28,7 +30,7 @@ from fusesoc_firm.node.software import node_software
 from fusesoc_firm.node.trace import COLUMNS, CYCLES, WALL_TIMES, Trace
 from fusesoc_firm.node.trace_picture import draw_trace
 from fusesoc_firm.node.transport.transport import Burst, TransportError
-from fusesoc_firm.node.watch import Latency, Load, Watch
+from fusesoc_firm.node.watch import Control, Latency, Load, Watch
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
 from tests.node.fake_node import FakeHardware, Run, echo, loaded, pairs, until
@@ -203,6 +205,27 @@ def test_hardware_that_is_gone_ends_the_node(tmp_path: Path) -> None:
     run.wait()
     assert isinstance(run.error, TransportError)
     assert str(run.error) == "the simulator was killed"
+
+
+@pytest.mark.parametrize("fault", ["the simulator was killed", ""], ids=["failure", "close"])
+def test_a_carrier_that_waits_for_room_does_not_hold_up_the_end(tmp_path: Path, fault: str) -> None:
+    """One message is being sent, one waits in the queue, and the third waits for room in it."""
+    bench = Bench(gate=threading.Event())
+    settings = NodeSettings(1, Overflow.BLOCK, drain=600, report=lambda _: None)
+    node = Node(describe(pairs(tmp_path)), bench.open, settings)
+    player = Player([(0, item) for item in POINTS], Control())
+    with ThreadPoolExecutor() as pool:
+        ended = pool.submit(node.run, {ROS1: player})
+        until(lambda: node.statistics.inputs["a0"].received == 3)
+        if fault:
+            bench.hardware.error = TransportError(fault)
+        else:
+            node.stop()
+            node.close()
+        error = ended.exception(60)
+    assert str(error or "") == fault
+    assert player.wait_until_stopped(0)
+    assert node.statistics.unfinished == 3
 
 
 def test_hardware_that_is_gone_is_started_anew(tmp_path: Path) -> None:

@@ -328,6 +328,16 @@ def test_a_run_waits_for_slow_hardware_until_it_is_stopped(spec: Path, monkeypat
         until(studio, lambda now: now["run"]["state"] == "ended")
 
 
+def test_a_run_whose_queue_is_full_can_be_stopped(spec: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The player waits for room in a queue, and hung hardware takes no more messages."""
+    monkeypatch.setattr(run, "_STOP_SECONDS", 0.1)
+    with served(spec, modelled("--fault=hang", "--at=2")) as studio:
+        begin(studio, isEndless=True)
+        until(studio, lambda now: any(load["waiting"] == load["capacity"] for load in now.get("loads", {}).values()))
+        control(studio, "stop")
+        until(studio, lambda now: now["run"]["state"] == "ended")
+
+
 @pytest.mark.parametrize("fault", ["exit", "kill", "garbage"])
 def test_a_simulator_that_fails_ends_the_run(spec: Path, fault: str) -> None:
     with served(spec, modelled(f"--fault={fault}", "--at=3")) as studio:
