@@ -33,7 +33,7 @@ from fusesoc_firm.node.transport.transport import Burst, TransportError
 from fusesoc_firm.node.watch import Control, Latency, Load, Watch
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
-from tests.node.fake_node import FakeHardware, Run, echo, loaded, pairs, until
+from tests.node.fake_node import Answers, FakeHardware, Run, echo, loaded, pairs, until
 from tests.system.systems import accelerator, converter, instance, specification
 
 
@@ -407,6 +407,57 @@ def test_software_that_gives_more_than_fits_never_waits_for_itself(tmp_path: Pat
     counts = run.node.statistics.inputs["b1_out"]
     assert counts.received == 8 * 39
     assert len(run.carrier.published) == counts.sent == counts.received - counts.dropped
+
+
+class LingeringHardware(FakeHardware):
+    """Answers one frame and fails at the next one; its bursts are received when the test says so, even after that."""
+
+    def __init__(self, answers: Answers, listener: HardwareListener) -> None:
+        super().__init__(answers, listener)
+        self.is_received = threading.Event()
+
+    def is_ready(self) -> bool:
+        return False
+
+    def send(self, frame: bytes) -> None:
+        if self.sent:
+            raise TransportError("it is gone")
+        super().send(frame)
+
+    def receive(self, timeout: float | None = None) -> Burst | None:
+        return super().receive(timeout) if self.is_received.wait(timeout) else None
+
+    def _check(self) -> None:
+        """Give what is left."""
+
+
+def test_bursts_that_arrived_before_a_failure_are_published(tmp_path: Path) -> None:
+    """The first one is for software, whose answer is dropped, as there is no hardware to take it."""
+    blocks = converter("sub", "subscriber", "Point", "hard") + instance("hard", "hard", "soft", "pub")
+    blocks += instance("soft", "soft", "end") + instance("end", "hard", "other")
+    blocks += converter("pub", "publisher", "Point") + converter("other", "publisher", "Point")
+    types = accelerator("hard", "Point", "Point") + accelerator("soft", "Point", "Point", "ROS-SW", "soft.py")
+    (tmp_path / "soft.py").write_text("def soft(message):\n    return message\n", encoding="utf-8")
+    system = loaded(tmp_path, specification(blocks, types))
+    publishers = {item.block: item.id for item in system.system.publishers}
+    opened: list[LingeringHardware] = []
+
+    def open_hardware(listener: HardwareListener) -> LingeringHardware:
+        ends = (publishers["soft_in"], publishers["pub"])
+        opened.append(LingeringHardware(lambda _, payload: [Burst(pack_frame(end, payload)) for end in ends], listener))
+        return opened[-1]
+
+    with node_software(system, lambda error: None) as software:
+        run = Run(describe(system), open_hardware, NodeSettings(drain=600), software)
+        run.carrier.give(0, *POINTS[1:3])
+        # The node closes its queues before it stops its carriers.
+        until(lambda: run.carrier.wait_until_stopped(0))
+        opened[-1].is_received.set()
+        run.wait()
+    assert str(run.error) == "it is gone"
+    assert run.carrier.published == [(publishers["pub"], POINTS[1])]
+    answers = run.node.statistics.inputs["soft_out"]
+    assert (answers.received, answers.dropped, answers.sent) == (1, 1, 0)
 
 
 def test_a_fault_of_software_holds_up_nobody_else(tmp_path: Path) -> None:
