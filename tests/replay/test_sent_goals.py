@@ -156,6 +156,22 @@ def test_a_goal_without_a_result_is_lost_when_the_next_one_comes(
     assert counts(said, "cancellations") == [0, 0, 0]
 
 
+def test_goals_that_wait_at_the_end_are_not_recorded(
+    tmp_path: Path, version: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first goal never ends. The order 0 cancels one that waits, which belongs to none."""
+    goals = Goals(version)
+    goals.order(5)
+    goals.goal(1, 5)
+    goals.order(6)
+    goals.order(0)
+    goals.order(7)
+    goals.order(8)
+    told, said = replayed(tmp_path, goals, capsys, "eager")
+    assert told == []
+    assert counts(said, "goals") == [1, 0, 0, 2]
+
+
 def test_an_invalid_result_is_an_error_and_loses_its_goal(
     tmp_path: Path, version: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
