@@ -151,10 +151,9 @@ def with_goals(
     hardware. Raise `InputError` if a definition differs from the system's.
     """
     goals: dict[Stream, _Source] = {}
-    known = [item for item in actions if item.ros is bag.form.ros]
+    ends = {ServiceEnd.SERVER, ServiceEnd.CLIENT} if compares else {ServiceEnd.SERVER}
+    known = [item for item in actions if item.ros is bag.form.ros and item.end in ends]
     for action in known:
-        if not compares and action.end is ServiceEnd.CLIENT:
-            continue
         is_only = [item.type for item in known].count(action.type) == 1
         found = _ActionInBag(bag, action, libraries[action.ros], names, is_only).sources()
         goals |= {stream: source for stream, source in found.items() if compares or source.stream}
