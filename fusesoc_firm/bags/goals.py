@@ -148,7 +148,7 @@ def with_goals(
     If the topic of the goals or, of an action of another node, of the feedback is renamed to that of another action, or
     if the only goals of the type are those of another action, all are read from that action. Without goals, feedback
     and results remain as they are, and without `compares`, so do all messages except goals and cancellations for the
-    hardware. Raise `InputError` if a definition differs from the system's.
+    hardware. Raise `InputError` if a definition differs from the system's, or if two actions have the same topic.
     """
     goals: dict[Stream, _Source] = {}
     ends = {ServiceEnd.SERVER, ServiceEnd.CLIENT} if compares else {ServiceEnd.SERVER}
@@ -156,7 +156,12 @@ def with_goals(
     for action in known:
         is_only = [item.type for item in known].count(action.type) == 1
         found = _ActionInBag(bag, action, libraries[action.ros], names, is_only).sources()
-        goals |= {stream: source for stream, source in found.items() if compares or source.stream}
+        for stream, own in found.items():
+            if not compares and own.stream is None:
+                continue
+            if (owner := goals.setdefault(stream, own)) is not own:
+                message = f"topic {stream.topic} in {bag.path} belongs to two actions"
+                fail(f"{message}, '{owner.action.block}' and '{action.block}'", hint="a bag cannot tell them apart")
     streams: dict[Stream, int] = {}
     for stream, count in bag.streams.items():
         source = goals.get(stream)

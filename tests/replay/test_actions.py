@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -189,3 +190,14 @@ def test_an_action_that_the_hardware_asks_for_takes_no_goals_of_a_simulation(tmp
     goals.cancel(1)
     found = system_stimuli(goals.write(tmp_path), load(arm_and_planner(tmp_path, version, "asked")))
     assert [item.subscriber.block for item in found] == ["count_goal", "count_cancel"]
+
+
+def test_two_actions_of_one_name_are_refused(tmp_path: Path, version: int) -> None:
+    goals = Goals(version)
+    goals.goal(1, 5)
+    goals.feedback(1, 6)
+    source, loaded = Source(goals.write(tmp_path)), load(arm_and_planner(tmp_path, version, "count"))
+    topic = "/count/feedback" if version == 1 else "/count/_action/send_goal/_service_event"
+    message = f"topic {topic} in {source.path} belongs to two actions, 'asked' and 'count'"
+    with pytest.raises(InputError, match=re.escape(message)):
+        replay(loaded, source, Target(tmp_path / "out.bag"), Settings({}, 1000), lambda: pytest.fail("it is started"))
