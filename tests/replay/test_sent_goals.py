@@ -321,7 +321,7 @@ def test_a_bag_without_results_is_reported(tmp_path: Path, version: int, capsys:
     told, said = replayed(tmp_path, goals, capsys)
     assert told == [(6, LOST[version], 0)]
     (warning,) = said["warnings"]
-    assert warning["message"].endswith("has no results of 'count', so the goals of the hardware are lost")
+    assert warning["message"].endswith("has no results of 'count', so the goals of the hardware are lost or do not end")
     topic = "/count/result" if version == 1 else "the contents of /count/_action/get_result/_service_event"
     assert warning["hint"] == f"record {topic}"
 
