@@ -15,6 +15,7 @@ from fusesoc_firm.bags.goals import Told as Recording
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message.bag_reader import Recorded, Stream
 from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.watch import Control
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.replay.run import Cause, Sent
 from fusesoc_firm.replay.sent_goals import SentGoals
@@ -45,11 +46,12 @@ def replayed(
     kind: str = "patient",
     names: Mapping[str, str] | None = None,
     part: Mapping[str, Any] | None = None,
+    control: Control | None = None,
 ) -> tuple[list[Told], dict[str, Any]]:
     """Replay a bag through a model of the hardware; what the hardware tells, and the summary."""
     command = [sys.executable, str(HERE / "planner_simulator.py"), kind, str(goals.version), "--width", "32"]
     target = folder / ("out.bag" if goals.version == 1 else "out.mcap")
-    loaded, settings = load(planner(folder, goals.version)), Settings(names or {}, 1000, is_json=True)
+    loaded, settings = load(planner(folder, goals.version)), Settings(names or {}, 1000, is_json=True, control=control)
     source = Source(goals.write(folder), **(part or {}))
     replay(loaded, source, Target(target), settings, lambda: Simulator(command))
     return what_is_told(target), json.loads(capsys.readouterr().out)
@@ -254,6 +256,33 @@ def test_goals_in_a_part_of_a_bag(tmp_path: Path, version: int, part: str, capsy
         "limit": ([], [0, 0, 0, 1]),
     }[part]
     assert (found, counts(said, "goals")) == (told, counted)
+
+
+class Valve(Control):
+    """Lets some messages pass, and ends."""
+
+    def __init__(self, passed: int) -> None:
+        super().__init__()
+        self._left = passed
+
+    def passes(self) -> bool:
+        self._left -= 1
+        return self._left >= 0
+
+
+@pytest.mark.parametrize("passed", range(5))
+def test_messages_of_actions_are_paused_and_ended_like_others(
+    tmp_path: Path, version: int, passed: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also without an ordinary message after them: the order, the goal, its feedback and its result pass one by one."""
+    goals = Goals(version)
+    goals.order(6)
+    goals.goal(1, 6)
+    goals.feedback(1, 70)
+    goals.result(1, SUCCEEDED[version], 60)
+    told, said = replayed(tmp_path, goals, capsys, control=Valve(passed))
+    assert told == [(6, FEEDBACK, 70), (6, SUCCEEDED[version], 60)][: max(0, passed - 2)]
+    assert counts(said, "goals") == [int(passed >= 2), 0, 0, int(passed == 1)]
 
 
 def recorded_at(name: str, version: int) -> list[Item]:
