@@ -212,10 +212,11 @@ def test_a_carrier_that_waits_for_room_does_not_hold_up_the_end(tmp_path: Path, 
     """One message is being sent, one waits in the queue, and the third waits for room in it."""
     bench = Bench(gate=threading.Event())
     settings = NodeSettings(1, Overflow.BLOCK, drain=600, report=lambda _: None)
-    node = Node(describe(pairs(tmp_path)), bench.open, settings)
+    description = describe(pairs(tmp_path))
+    node = Node(description, bench.open, settings)
     player = Player([(0, item) for item in POINTS], Control())
     with ThreadPoolExecutor() as pool:
-        ended = pool.submit(node.run, {ROS1: player})
+        ended = pool.submit(node.run, dict.fromkeys(description.versions, player))
         until(lambda: node.statistics.inputs["a0"].received == 3)
         if fault:
             bench.hardware.error = TransportError(fault)
