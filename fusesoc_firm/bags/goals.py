@@ -5,7 +5,6 @@ What ROS 2 sends as calls becomes the messages of the action's converters.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -64,20 +63,22 @@ class _Source:
 class BagOfGoals(BagOfCalls):
     """A bag with the goals of actions: `goals` are the streams that contain them.
 
-    For actions that the hardware serves, goals and cancellations are messages to the hardware. While these are read,
-    `told` gets the recorded feedback and results, and all four messages of actions to which the hardware sends goals.
+    For actions that the hardware serves, goals and cancellations are messages to the hardware.
     """
 
     goals: Mapping[Stream, _Source] = field(default_factory=dict)
-    told: deque[Told] = field(default_factory=deque)
 
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
         """Yield messages like `BagOfCalls`. Raise `InputError` if the bag is damaged."""
-        for item in self._items(topics, self.goals, stop):
-            if isinstance(item, Told):
-                self.told.append(item)
-            else:
-                yield item
+        return (item for item in self.items(topics, stop) if isinstance(item, Recorded))
+
+    def items(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded | Told]:
+        """Yield the same messages, and in between what the bag tells of goals.
+
+        This is the feedback and the results of actions that the hardware serves, and all four messages of actions to
+        which it sends goals.
+        """
+        return self._items(topics, self.goals, stop)
 
     def results(self, action: Action, stop: int | None = None) -> Iterator[Told]:
         """Yield the results of an action up to a stamp in ns, or up to a damage, which the replay reports."""
@@ -148,16 +149,20 @@ def with_goals(
     If the topic of the goals or, of an action of another node, of the feedback is renamed to that of another action, or
     if the only goals of the type are those of another action, all are read from that action. Without goals, feedback
     and results remain as they are, and without `compares`, so do all messages except goals and cancellations for the
-    hardware. Raise `InputError` if a definition differs from the system's.
+    hardware. Raise `InputError` if a definition differs from the system's, or if two actions have the same topic.
     """
     goals: dict[Stream, _Source] = {}
-    known = [item for item in actions if item.ros is bag.form.ros]
+    ends = {ServiceEnd.SERVER, ServiceEnd.CLIENT} if compares else {ServiceEnd.SERVER}
+    known = [item for item in actions if item.ros is bag.form.ros and item.end in ends]
     for action in known:
-        if not compares and action.end is ServiceEnd.CLIENT:
-            continue
         is_only = [item.type for item in known].count(action.type) == 1
         found = _ActionInBag(bag, action, libraries[action.ros], names, is_only).sources()
-        goals |= {stream: source for stream, source in found.items() if compares or source.stream}
+        for stream, own in found.items():
+            if not compares and own.stream is None:
+                continue
+            if (owner := goals.setdefault(stream, own)) is not own:
+                message = f"topic {stream.topic} in {bag.path} belongs to two actions"
+                fail(f"{message}, '{owner.action.block}' and '{action.block}'", hint="a bag cannot tell them apart")
     streams: dict[Stream, int] = {}
     for stream, count in bag.streams.items():
         source = goals.get(stream)

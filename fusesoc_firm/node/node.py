@@ -236,9 +236,10 @@ class Node:
         self._is_wanted_to_end.set()
 
     def close(self) -> None:
-        """Close the transport; a second call does nothing."""
+        """Close the transport and the queues, so that nothing waits for either; a second call does nothing."""
         self._is_over.set()
         self._hardware.transport.close()
+        self._queues.close()
 
     def access_status(self, request: bytes, seconds: float = ANSWER_SECONDS) -> bytes:
         """Return the answer of the hardware's status to a request; any thread may call this method.
@@ -352,7 +353,18 @@ class Node:
 
     def _put_service_message(self, block: str, payload: bytes) -> None:
         """Send a message of a service or an action to the hardware."""
-        self._put(self._numbers[block], payload, time.monotonic_ns(), None)
+        self._put_own(block, payload, None)
+
+    def _put_own(self, block: str, payload: bytes, timeout: float | None) -> None:
+        """Add a message that the node or its software makes to a queue; without hardware to take it, it is dropped.
+
+        The thread goes on, as it may still have messages to publish.
+        """
+        number = self._numbers[block]
+        try:
+            self._put(number, payload, time.monotonic_ns(), timeout)
+        except ClosedError:
+            self._decline(number)
 
     def _put(self, number: int, payload: bytes, received_ns: int, timeout: float | None) -> None:
         """Add a message to a queue; if a full queue blocks, wait `timeout` seconds at most."""
@@ -375,10 +387,13 @@ class Node:
             return
         is_there = self._queues.put(number, message, timeout)
         if not is_there and self._settings.overflow is Overflow.BLOCK:
-            # No other thread counts this message.
-            with self._lock:
-                counts.dropped += 1
-                self._declined += 1
+            self._decline(number)
+
+    def _decline(self, number: int) -> None:
+        """Count a message that no queue took, and that no other thread counts."""
+        with self._lock:
+            self.statistics.inputs[self._inputs[number].block].dropped += 1
+            self._declined += 1
 
     def _waiting(self) -> int:
         """Return the number of messages that are in queues or being sent."""
@@ -443,7 +458,7 @@ class Node:
                     self._record(self._watch, name, made, None, None)
                 self._publish(name, made)
             else:
-                self._put(self._numbers[name], made, time.monotonic_ns(), 0.0)
+                self._put_own(name, made, 0.0)
 
     # --- from the hardware to topics -------------------------------------------------------------------------------
 
@@ -468,7 +483,7 @@ class Node:
             if burst is not None:
                 self._join(hardware, burst)
                 self._last_traffic = time.monotonic()
-            elif self._drains.is_set() and self._is_at_rest(hardware):
+            elif isinstance(self._fault, TransportError) or (self._drains.is_set() and self._is_at_rest(hardware)):
                 return
             elif not self._waiting() and hardware.transport.is_at_rest():
                 self._calls.rest()

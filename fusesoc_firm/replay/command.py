@@ -11,13 +11,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
-from fusesoc_firm.bags.goals import BagOfGoals
+from fusesoc_firm.bags.goals import BagOfGoals, Told
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
 from fusesoc_firm.frame.codec import CodecError
@@ -53,10 +52,18 @@ class Source:
     start: float = 0
     duration: float | None = None
 
-    def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
-        """Return the selected messages of some topics."""
+    def items(self, bag: BagOfGoals, topics: Collection[str]) -> Iterator[Recorded | Told]:
+        """Yield the selected messages of some topics, and what the bag tells of goals up to the last of them."""
         first, stop = self.window(bag)
-        return islice((item for item in bag.messages(topics, stop) if item.stamp >= first), self.limit)
+        selected = 0
+        for item in bag.items(topics, stop):
+            if isinstance(item, Recorded):
+                if item.stamp < first:
+                    continue
+                selected += 1
+            yield item
+            if selected == self.limit:
+                return
 
     def window(self, bag: Bag) -> tuple[int, int | None]:
         """Return the stamps in ns from which on and before which messages are selected."""
@@ -184,19 +191,18 @@ class _Replay:
         with tqdm(total=total, unit="msg", disable=None, file=sys.stderr) as bar:
             self._count_waits()
             try:
-                for recorded in source.messages(self.bag, topics):
+                for item in source.items(self.bag, topics):
                     if self.settings.control and not self.settings.control.passes():
                         break
-                    self._hear()
-                    if not self.is_over:
-                        self._play(recorded)
+                    if isinstance(item, Told):
+                        self._hear(item)
+                    else:
+                        self._play(item)
                         bar.update()
                     if self.is_over:
                         break
                 else:
                     self.is_whole = self.played.total() != source.limit
-                if not self.is_over:
-                    self._hear()
             except InputError as error:
                 self._report(str(error).removeprefix("error: "))
             for left in (self.run.unfinished, *self.exchanges.unfinished()):
@@ -223,18 +229,16 @@ class _Replay:
         self.refused += bool(faults)
         self._conclude(recorded)
 
-    def _hear(self) -> None:
-        """Take note of recorded messages of actions."""
-        while self.bag.told and not self.is_over:
-            told = self.bag.told.popleft()
-            try:
-                self.exchanges.tell(told)
-                self.exchanges.follow_up(told.recorded.stamp)
-            except (StuckError, TransportError) as error:
-                self._stop(error)
-            except (CodecError, ValueError) as error:
-                self.run.faults.append(str(error))
-            self._conclude(told.recorded)
+    def _hear(self, told: Told) -> None:
+        """Take note of a recorded message of an action."""
+        try:
+            self.exchanges.tell(told)
+            self.exchanges.follow_up(told.recorded.stamp)
+        except (StuckError, TransportError) as error:
+            self._stop(error)
+        except (CodecError, ValueError) as error:
+            self.run.faults.append(str(error))
+        self._conclude(told.recorded)
 
     def _stop(self, error: Exception) -> None:
         self.run.faults.append(f"the rest of the bag was not replayed: {error}")

@@ -236,7 +236,7 @@ def missing_in(bag: BagOfGoals, system: DerivedSystem, ended: Mapping[str, set[b
             text = f"{bag.path} has no goals of '{block}', so those of the hardware are not compared, {effect}"
             record = f"{name}/goal" if is_first else f"the contents of {name}/_action/send_goal/{EVENTS}"
         elif not ended[block]:
-            text = f"{bag.path} has no results of '{block}', so the goals of the hardware are lost"
+            text = f"{bag.path} has no results of '{block}', so the goals of the hardware are lost or do not end"
             record = f"{name}/result" if is_first else f"the contents of {name}/_action/get_result/{EVENTS}"
         else:
             continue

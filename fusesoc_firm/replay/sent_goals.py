@@ -196,7 +196,9 @@ class SentGoals:
     def counts(self) -> Iterator[tuple[str, Mapping[Verdict, int]]]:
         """Yield the words for goals and for cancellations, and what became of them."""
         sent = [goal for goal in self._goals if goal.was_sent]
-        goals = Counter(map(_verdict, sent)) + Counter({Verdict.MISSING: len(self._free)})
+        # Goals that still wait for the server have no counterpart.
+        waiting = [goal for goal in self._open if not goal.was_sent and not goal.is_canceled]
+        goals = Counter(map(_verdict, (*sent, *waiting))) + Counter({Verdict.MISSING: len(self._free)})
         known = (Verdict.EQUAL, Verdict.DIFFERENT, Verdict.MISSING, Verdict.NOT_RECORDED)
         yield "goals", {verdict: goals[verdict] for verdict in known}
         canceled = [goal for goal in sent if goal.is_canceled]

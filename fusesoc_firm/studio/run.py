@@ -101,19 +101,21 @@ class SimulatedRun(Run):
         self._description = describe(loaded)
         self._stimuli = stimuli_of(self.spec, loaded)
         self._is_over = threading.Event()
-        self._node: Node | None = None
+        # The node, and what closes it some time after `stop`.
+        self._running: tuple[Node, threading.Timer] | None = None
         self._thread = threading.Thread(target=self._work, name="watched run", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End the simulation; a build that has begun goes on to its end."""
+        """End the simulation, if it has not ended; a build that has begun goes on to its end."""
+        if self._is_over.is_set():
+            return
         self._is_over.set()
         if self.control:
             self.control.end()
-        if node := self._node:
+        if self._running:
+            node, limit = self._running
             node.stop()
-            limit = threading.Timer(_STOP_SECONDS, node.close)
-            limit.daemon = True
             limit.start()
 
     def wait(self) -> None:
@@ -142,7 +144,11 @@ class SimulatedRun(Run):
             raw = replace(description, services=(), actions=())
             node = Node(raw, checked(opener, description), settings, software)
             stack.callback(node.close)
-            self._node = node
+            limit = threading.Timer(_STOP_SECONDS, node.close)
+            limit.daemon = True
+            # A timer that is started after this does nothing.
+            stack.callback(limit.cancel)
+            self._running = node, limit
             if self._is_over.is_set():
                 return ""
             self.watch.restart()
@@ -151,6 +157,7 @@ class SimulatedRun(Run):
             rounds = None if wishes.is_endless else 1
             player = Player(_numbered(self._stimuli, description), self.control, wishes.rate, rounds)
             node.run(dict.fromkeys(description.versions, player))
+            self._is_over.set()
             return node.statistics.text()
 
     def _tell(self, report: str) -> None:

@@ -8,6 +8,7 @@ import random
 import re
 import struct
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,8 +20,9 @@ from fusesoc_firm.node.bursts import split_frame
 from fusesoc_firm.node.carrier import CarrierError, ros_arguments
 from fusesoc_firm.node.cpp_trace import are_steps, write_ways
 from fusesoc_firm.node.description import describe
-from fusesoc_firm.node.node import HardwareListener, NodeSettings
+from fusesoc_firm.node.node import HardwareListener, Node, NodeSettings
 from fusesoc_firm.node.options import add_node_options, remappings
+from fusesoc_firm.node.player import Player
 from fusesoc_firm.node.python_node import python_node
 from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.run import run_options
@@ -28,10 +30,10 @@ from fusesoc_firm.node.software import node_software
 from fusesoc_firm.node.trace import COLUMNS, CYCLES, WALL_TIMES, Trace
 from fusesoc_firm.node.trace_picture import draw_trace
 from fusesoc_firm.node.transport.transport import Burst, TransportError
-from fusesoc_firm.node.watch import Latency, Load, Watch
+from fusesoc_firm.node.watch import Control, Latency, Load, Watch
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
-from tests.node.fake_node import FakeHardware, Run, echo, loaded, pairs, until
+from tests.node.fake_node import Answers, FakeHardware, Run, echo, loaded, pairs, until
 from tests.system.systems import accelerator, converter, instance, specification
 
 
@@ -203,6 +205,28 @@ def test_hardware_that_is_gone_ends_the_node(tmp_path: Path) -> None:
     run.wait()
     assert isinstance(run.error, TransportError)
     assert str(run.error) == "the simulator was killed"
+
+
+@pytest.mark.parametrize("fault", ["the simulator was killed", ""], ids=["failure", "close"])
+def test_a_carrier_that_waits_for_room_does_not_hold_up_the_end(tmp_path: Path, fault: str) -> None:
+    """One message is being sent, one waits in the queue, and the third waits for room in it."""
+    bench = Bench(gate=threading.Event())
+    settings = NodeSettings(1, Overflow.BLOCK, drain=600, report=lambda _: None)
+    description = describe(pairs(tmp_path))
+    node = Node(description, bench.open, settings)
+    player = Player([(0, item) for item in POINTS], Control())
+    with ThreadPoolExecutor() as pool:
+        ended = pool.submit(node.run, dict.fromkeys(description.versions, player))
+        until(lambda: node.statistics.inputs["a0"].received == 3)
+        if fault:
+            bench.hardware.error = TransportError(fault)
+        else:
+            node.stop()
+            node.close()
+        error = ended.exception(60)
+    assert str(error or "") == fault
+    assert player.wait_until_stopped(0)
+    assert node.statistics.unfinished == 3
 
 
 def test_hardware_that_is_gone_is_started_anew(tmp_path: Path) -> None:
@@ -384,6 +408,57 @@ def test_software_that_gives_more_than_fits_never_waits_for_itself(tmp_path: Pat
     counts = run.node.statistics.inputs["b1_out"]
     assert counts.received == 8 * 39
     assert len(run.carrier.published) == counts.sent == counts.received - counts.dropped
+
+
+class LingeringHardware(FakeHardware):
+    """Answers one frame and fails at the next one; its bursts are received when the test says so, even after that."""
+
+    def __init__(self, answers: Answers, listener: HardwareListener) -> None:
+        super().__init__(answers, listener)
+        self.is_received = threading.Event()
+
+    def is_ready(self) -> bool:
+        return False
+
+    def send(self, frame: bytes) -> None:
+        if self.sent:
+            raise TransportError("it is gone")
+        super().send(frame)
+
+    def receive(self, timeout: float | None = None) -> Burst | None:
+        return super().receive(timeout) if self.is_received.wait(timeout) else None
+
+    def _check(self) -> None:
+        """Give what is left."""
+
+
+def test_bursts_that_arrived_before_a_failure_are_published(tmp_path: Path) -> None:
+    """The first one is for software, whose answer is dropped, as there is no hardware to take it."""
+    blocks = converter("sub", "subscriber", "Point", "hard") + instance("hard", "hard", "soft", "pub")
+    blocks += instance("soft", "soft", "end") + instance("end", "hard", "other")
+    blocks += converter("pub", "publisher", "Point") + converter("other", "publisher", "Point")
+    types = accelerator("hard", "Point", "Point") + accelerator("soft", "Point", "Point", "ROS-SW", "soft.py")
+    (tmp_path / "soft.py").write_text("def soft(message):\n    return message\n", encoding="utf-8")
+    system = loaded(tmp_path, specification(blocks, types))
+    publishers = {item.block: item.id for item in system.system.publishers}
+    opened: list[LingeringHardware] = []
+
+    def open_hardware(listener: HardwareListener) -> LingeringHardware:
+        ends = (publishers["soft_in"], publishers["pub"])
+        opened.append(LingeringHardware(lambda _, payload: [Burst(pack_frame(end, payload)) for end in ends], listener))
+        return opened[-1]
+
+    with node_software(system, lambda error: None) as software:
+        run = Run(describe(system), open_hardware, NodeSettings(drain=600), software)
+        run.carrier.give(0, *POINTS[1:3])
+        # The node closes its queues before it stops its carriers.
+        until(lambda: run.carrier.wait_until_stopped(0))
+        opened[-1].is_received.set()
+        run.wait()
+    assert str(run.error) == "it is gone"
+    assert run.carrier.published == [(publishers["pub"], POINTS[1])]
+    answers = run.node.statistics.inputs["soft_out"]
+    assert (answers.received, answers.dropped, answers.sent) == (1, 1, 0)
 
 
 def test_a_fault_of_software_holds_up_nobody_else(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from fusesoc_firm.node.status_socket import open_status
 from fusesoc_firm.node.transport import udp
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.hardware.status import Part, network_words, status_map
+from fusesoc_firm.system.status_frames import answered, read_request
 
 SEED = 20261127
 WRITE = 1 << 31
@@ -86,14 +87,52 @@ def test_a_word_is_written(board: Board) -> None:
         assert read_word(transport, 0x08) == 0
 
 
-def test_an_absent_node_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
-        silent.bind(("127.0.0.1", 0))
-        monkeypatch.setattr(udp, "PORT", silent.getsockname()[1])
-        with open_status("udp:127.0.0.1") as transport:
-            assert transport.receive(0.01) is None
-            transport.send(b"other frames are dropped")
-            assert transport.receive(0.01) is None
+@pytest.fixture
+def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
+    """A port that does not answer by itself; accesses to it last for a short time."""
+    monkeypatch.setattr(udp, "_REPEAT_SECONDS", 0.02)
+    monkeypatch.setattr("fusesoc_firm.node.status._ANSWER_SECONDS", 0.2)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(("127.0.0.1", 0))
+        monkeypatch.setattr(udp, "PORT", port.getsockname()[1])
+        yield port
+
+
+def test_a_silent_node_is_asked_again_and_told(silent: socket.socket) -> None:
+    with open_status("udp:127.0.0.1") as transport:
+        with pytest.raises(TransportError, match="the hardware did not answer"):
+            read_word(transport, 0)
+        assert [silent.recv(100) for _ in range(2)] == [bytes(8)] * 2
+
+
+def test_a_closed_port_cannot_be_reached(silent: socket.socket) -> None:
+    silent.close()
+    message = r"the node at '127\.0\.0\.1' cannot be reached: Connection refused"
+    with open_status("udp:127.0.0.1") as transport, pytest.raises(TransportError, match=message):
+        read_word(transport, 0)
+
+
+def test_a_late_answer_is_not_that_to_the_next_request(silent: socket.socket) -> None:
+    with open_status("udp:127.0.0.1") as transport:
+        transport.send(read_request(0))
+        _, peer = silent.recvfrom(100)
+        for word in (1, 2):
+            silent.sendto(struct.pack("<2I", 0, word), peer)
+        burst = transport.receive()
+        assert burst
+        assert answered(burst.data) == (0, 1)
+        with pytest.raises(TransportError, match="the hardware did not answer"):
+            read_word(transport, 0)
+
+
+def test_other_frames_are_dropped(silent: socket.socket) -> None:
+    silent.settimeout(0.1)
+    with open_status("udp:127.0.0.1") as transport:
+        assert transport.receive(0.01) is None
+        transport.send(b"not a request")
+        assert transport.receive(0.01) is None
+        with pytest.raises(TimeoutError):
+            silent.recv(100)
 
 
 def test_a_name_that_is_unknown_is_told() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import get_types_from_idl
@@ -241,6 +242,21 @@ def planner(folder: Path, version: int) -> Path:
     """The system of tests/ros/planner for a version of ROS."""
     shutil.copytree(HERE / "arm", folder / "arm")
     return system("planner", folder, version)
+
+
+def arm_and_planner(folder: Path, version: int, topic: str) -> Path:
+    """Both systems in one; the action of the planner, `asked`, has a topic."""
+    spec = planner(folder, version)
+    text = spec.read_text(encoding="utf-8").replace("name: count", "name: asked")
+    both = yaml.safe_load(text.replace("mode: client", f"mode: client\n    topic: {topic}"))
+    arm_text = (folder / "arm/arm.yaml").read_text(encoding="utf-8")
+    other = yaml.safe_load(in_ros2(arm_text) if version == 2 else arm_text)
+    for accelerator in other["accelerators"]:
+        accelerator["sources"] = [f"../arm/{name}" for name in accelerator["sources"]]
+    for key in ("accelerators", "blocks"):
+        both[key] += other[key]
+    spec.write_text(yaml.safe_dump(both), encoding="utf-8")
+    return spec
 
 
 def system(name: str, folder: Path, version: int) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +16,7 @@ from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.simulation.software_run import system_stimuli
 from fusesoc_firm.text.diagnostics import InputError
-from tests.replay.goals import CANCELED, RECALLED, REJECTED, SUCCEEDED, Goals, arm
+from tests.replay.goals import CANCELED, RECALLED, REJECTED, SUCCEEDED, Goals, arm, arm_and_planner
 from tests.replay.replays import load
 from tests.ros.action_simulator import HELD, HERE, Goal
 
@@ -180,3 +181,23 @@ def test_goals_and_cancellations_are_stimuli_of_a_simulation(tmp_path: Path, ver
     assert [item.subscriber.block for item in found] == ["count_goal", "count_cancel"]
     field = "goal" if version == 1 else "order"
     assert found[0].message["goal"] == {field: HELD}
+
+
+def test_an_action_that_the_hardware_asks_for_takes_no_goals_of_a_simulation(tmp_path: Path, version: int) -> None:
+    """So the only goals of the type are those of the action that the hardware serves, whatever their name."""
+    goals = Goals(version, "/left")
+    goals.goal(1, HELD)
+    goals.cancel(1)
+    found = system_stimuli(goals.write(tmp_path), load(arm_and_planner(tmp_path, version, "asked")))
+    assert [item.subscriber.block for item in found] == ["count_goal", "count_cancel"]
+
+
+def test_two_actions_of_one_name_are_refused(tmp_path: Path, version: int) -> None:
+    goals = Goals(version)
+    goals.goal(1, 5)
+    goals.feedback(1, 6)
+    source, loaded = Source(goals.write(tmp_path)), load(arm_and_planner(tmp_path, version, "count"))
+    topic = "/count/feedback" if version == 1 else "/count/_action/send_goal/_service_event"
+    message = f"topic {topic} in {source.path} belongs to two actions, 'asked' and 'count'"
+    with pytest.raises(InputError, match=re.escape(message)):
+        replay(loaded, source, Target(tmp_path / "out.bag"), Settings({}, 1000), lambda: pytest.fail("it is started"))

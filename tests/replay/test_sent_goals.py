@@ -15,6 +15,7 @@ from fusesoc_firm.bags.goals import Told as Recording
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message.bag_reader import Recorded, Stream
 from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.watch import Control
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.replay.run import Cause, Sent
 from fusesoc_firm.replay.sent_goals import SentGoals
@@ -45,11 +46,12 @@ def replayed(
     kind: str = "patient",
     names: Mapping[str, str] | None = None,
     part: Mapping[str, Any] | None = None,
+    control: Control | None = None,
 ) -> tuple[list[Told], dict[str, Any]]:
     """Replay a bag through a model of the hardware; what the hardware tells, and the summary."""
     command = [sys.executable, str(HERE / "planner_simulator.py"), kind, str(goals.version), "--width", "32"]
     target = folder / ("out.bag" if goals.version == 1 else "out.mcap")
-    loaded, settings = load(planner(folder, goals.version)), Settings(names or {}, 1000, is_json=True)
+    loaded, settings = load(planner(folder, goals.version)), Settings(names or {}, 1000, is_json=True, control=control)
     source = Source(goals.write(folder), **(part or {}))
     replay(loaded, source, Target(target), settings, lambda: Simulator(command))
     return what_is_told(target), json.loads(capsys.readouterr().out)
@@ -156,6 +158,22 @@ def test_a_goal_without_a_result_is_lost_when_the_next_one_comes(
     assert counts(said, "cancellations") == [0, 0, 0]
 
 
+def test_goals_that_wait_at_the_end_are_not_recorded(
+    tmp_path: Path, version: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first goal never ends. The order 0 cancels one that waits, which belongs to none."""
+    goals = Goals(version)
+    goals.order(5)
+    goals.goal(1, 5)
+    goals.order(6)
+    goals.order(0)
+    goals.order(7)
+    goals.order(8)
+    told, said = replayed(tmp_path, goals, capsys, "eager")
+    assert told == []
+    assert counts(said, "goals") == [1, 0, 0, 2]
+
+
 def test_an_invalid_result_is_an_error_and_loses_its_goal(
     tmp_path: Path, version: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -240,6 +258,33 @@ def test_goals_in_a_part_of_a_bag(tmp_path: Path, version: int, part: str, capsy
     assert (found, counts(said, "goals")) == (told, counted)
 
 
+class Valve(Control):
+    """Lets some messages pass, and ends."""
+
+    def __init__(self, passed: int) -> None:
+        super().__init__()
+        self._left = passed
+
+    def passes(self) -> bool:
+        self._left -= 1
+        return self._left >= 0
+
+
+@pytest.mark.parametrize("passed", range(5))
+def test_messages_of_actions_are_paused_and_ended_like_others(
+    tmp_path: Path, version: int, passed: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also without an ordinary message after them: the order, the goal, its feedback and its result pass one by one."""
+    goals = Goals(version)
+    goals.order(6)
+    goals.goal(1, 6)
+    goals.feedback(1, 70)
+    goals.result(1, SUCCEEDED[version], 60)
+    told, said = replayed(tmp_path, goals, capsys, control=Valve(passed))
+    assert told == [(6, FEEDBACK, 70), (6, SUCCEEDED[version], 60)][: max(0, passed - 2)]
+    assert counts(said, "goals") == [int(passed >= 2), 0, 0, int(passed == 1)]
+
+
 def recorded_at(name: str, version: int) -> list[Item]:
     """What is recorded of a goal of an action of the same type."""
     goals = Goals(version, name)
@@ -305,7 +350,7 @@ def test_a_bag_without_results_is_reported(tmp_path: Path, version: int, capsys:
     told, said = replayed(tmp_path, goals, capsys)
     assert told == [(6, LOST[version], 0)]
     (warning,) = said["warnings"]
-    assert warning["message"].endswith("has no results of 'count', so the goals of the hardware are lost")
+    assert warning["message"].endswith("has no results of 'count', so the goals of the hardware are lost or do not end")
     topic = "/count/result" if version == 1 else "the contents of /count/_action/get_result/_service_event"
     assert warning["hint"] == f"record {topic}"
 

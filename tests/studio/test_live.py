@@ -6,6 +6,7 @@ import asyncio
 import io
 import json
 import math
+import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import replace
@@ -321,11 +322,41 @@ def test_a_run_waits_for_slow_hardware_until_it_is_stopped(spec: Path, monkeypat
     with served(spec, modelled("--fault=hang", "--at=2")) as studio:
         begin(studio)
         until(studio, lambda now: now["last"] >= 3)
-        # Longer than the silence after which other systems are at rest.
-        time.sleep(3)
+        # A run of hardware that reports rest would end in this silence; hung hardware never does.
+        time.sleep(5 * run._SETTLE_SECONDS)
         assert until(studio, lambda _: True)["run"]["state"] == "running"
         control(studio, "stop")
         until(studio, lambda now: now["run"]["state"] == "ended")
+
+
+def test_a_run_whose_queue_is_full_can_be_stopped(spec: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The player waits for room in a queue, and hung hardware takes no more messages."""
+    monkeypatch.setattr(run, "_STOP_SECONDS", 0.1)
+    with served(spec, modelled("--fault=hang", "--at=2")) as studio:
+        begin(studio, isEndless=True)
+        until(studio, lambda now: any(load["waiting"] == load["capacity"] for load in now.get("loads", {}).values()))
+        control(studio, "stop")
+        until(studio, lambda now: now["run"]["state"] == "ended")
+
+
+def timers() -> list[threading.Timer]:
+    return [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
+
+
+def test_the_limit_of_a_stop_ends_with_the_run(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "_STOP_SECONDS", 600)
+    others = timers()
+    begin(studio, isEndless=True)
+    until(studio, lambda now: now["run"] and now["last"] > 5)
+    control(studio, "stop")
+    control(studio, "stop")
+    until(studio, lambda now: now["run"]["state"] == "ended")
+    for timer in timers():
+        if timer not in others:
+            timer.join(60)
+            assert not timer.is_alive()
+    control(studio, "stop")
+    assert timers() == others
 
 
 @pytest.mark.parametrize("fault", ["exit", "kill", "garbage"])

@@ -379,6 +379,16 @@ def test_bounds_and_schedulers_are_compared(robot: Path, tmp_path: Path) -> None
     run(robot, tmp_path, steps)
 
 
+def test_an_action_without_a_name_is_drawn(robot: Path, tmp_path: Path) -> None:
+    robot.write_text(f"{TEXT}  - {{middleware: ROS1, mode: server, action: actionlib/Test}}\n", encoding="utf-8")
+
+    async def steps(page: Page) -> None:
+        await page.until("document.querySelectorAll('.svelte-flow__edge').length === 6")
+        await page.until("document.querySelector('.block.service').innerText.includes('block 4')")
+
+    run(robot, tmp_path, steps)
+
+
 @pytest.mark.skipif(not AXE.exists(), reason="make studio installs axe-core")
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_resources_are_shown_as_they_come(

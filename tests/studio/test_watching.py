@@ -173,7 +173,8 @@ def test_the_streams_of_an_action_have_their_rates_and_waits(tmp_path: Path) -> 
     spec = folder / "arm.yaml"
     write_core(spec)
     # On the wires of the host, to goals and cancellations, to and from the accelerator, and from feedback and results.
-    hardware = modelled(width=32, waits=(0, 0, 10, 30, 20, 0, 0, 0, 0, 60))
+    # Cancellations wait longest, since the accelerator takes none; goals begin to wait before their converter.
+    hardware = modelled(width=32, waits=(0, 0, 10, 30, 0, 20, 0, 0, 0, 60))
 
     async def steps(page: Page) -> None:
         await page.until("document.querySelector('.block.service').innerText.includes('server of actionlib/Test')")

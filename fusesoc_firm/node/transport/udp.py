@@ -26,22 +26,30 @@ class UdpStatus:
 
     def __init__(self, address: str) -> None:
         """Open a socket. Raise `TransportError` if the address is not one of a host."""
+        self._address = address
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._payload = b""
+        # The last fault since the last request.
+        self._fault: OSError | None = None
         try:
             self._socket.connect((address, PORT))
         except OSError as error:
             self._socket.close()
-            raise TransportError(f"the node at '{address}' cannot be reached: {error.strerror}") from None
+            raise self._unreachable(error) from None
 
     def send(self, frame: bytes) -> None:
         """Send a request; all other frames are dropped."""
         if (asked := answered(frame)) is not None:
             self._payload = b"".join(item.to_bytes(_WORD_BYTES, "little") for item in asked)
+            self._empty()
+            self._fault = None
             self._ask()
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """Return the answer to the last request, or None after `timeout` seconds, or without a request."""
+        """Return the answer to the last request, or None after `timeout` seconds, or without a request.
+
+        Raise `TransportError` if the host or its port could not be reached in this time.
+        """
         end = None if timeout is None else time.monotonic() + timeout
         while self._payload and (end is None or time.monotonic() < end):
             left = _REPEAT_SECONDS if end is None else min(_REPEAT_SECONDS, max(0.001, end - time.monotonic()))
@@ -51,8 +59,9 @@ class UdpStatus:
             except TimeoutError:
                 self._ask()
                 continue
-            except OSError:
+            except OSError as error:
                 # The host, or its port, is not there yet.
+                self._fault = error
                 time.sleep(left)
                 self._ask()
                 continue
@@ -60,6 +69,8 @@ class UdpStatus:
                 self._payload = b""
                 words = (found[:_WORD_BYTES], found[_WORD_BYTES:])
                 return Burst(status_answer(*(int.from_bytes(word, "little") for word in words)))
+        if self._payload and self._fault:
+            raise self._unreachable(self._fault)
         return None
 
     def is_ready(self) -> bool:
@@ -85,6 +96,21 @@ class UdpStatus:
     def _ask(self) -> None:
         try:
             self._socket.send(self._payload)
-        except OSError:
+        except OSError as error:
             # Repeated later, as a lost datagram.
-            return
+            self._fault = error
+
+    def _empty(self) -> None:
+        """Drop what has arrived, since a late answer to an earlier request would be taken for one to the next."""
+        self._socket.settimeout(0.0)
+        while True:
+            try:
+                self._socket.recv(_MOST_BYTES)
+            except BlockingIOError:
+                return
+            except OSError:
+                # The fault of an earlier request.
+                continue
+
+    def _unreachable(self, error: OSError) -> TransportError:
+        return TransportError(f"the node at '{self._address}' cannot be reached: {error.strerror}")

@@ -50,7 +50,7 @@ export function kindOf(specification: Section, block: Section): Kind {
 function factsOf(block: Section, derived: Section | null): string {
   const converters = Object.values(derived?.Converters ?? {}).flat() as Section[];
   const { taken, given } = convertersOf(block);
-  const own = [...taken, ...given].flatMap((name) => converters.filter((item) => item.block === name));
+  const own = [...taken, ...given].flatMap(({ name }) => converters.filter((item) => item.block === name));
   if (!own.length) return FACTS;
   return isCalled(block) ? `ids ${own.map((item) => item.id).join(", ")}` : `id ${own[0].id}, payload ${own[0].payloadBytes} bytes`;
 }
@@ -121,9 +121,10 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
   const edges: Edge[] = [];
   blocks.forEach((block, index) => {
     const { taken, given } = convertersOf(block ?? {});
-    const streams = (names: string[], wire: (name: string) => string) => {
-      const title = (name: string) => (names.length > 1 ? name.slice(block.name.length + 1) : undefined);
-      return { file: scene.file, ends: names.map((name) => ({ wire: wire(name), block: name, title: title(name) })) };
+    const streams = (converters: Converter[], wire: (name: string) => string) => {
+      const titled = converters.length > 1;
+      const ends = converters.map(({ name, end }) => ({ wire: wire(name), block: name, title: titled ? end : undefined }));
+      return { file: scene.file, ends };
     };
     if (taken.length) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, streams(taken, (name) => wireKey(FROM_HOST, name))));
     if (given.length) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", streams(given, (name) => wireKey(name, TO_HOST))));
@@ -150,18 +151,21 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
   return { nodes, edges };
 }
 
+/** A converter; of a service or an action, with the word for its end. */
+type Converter = { name: string; end?: string };
+
 /** The converters of a block that take from the Manager, and those that give to it. */
-function convertersOf(block: Section): { taken: string[]; given: string[] } {
+function convertersOf(block: Section): { taken: Converter[]; given: Converter[] } {
   if (!isCalled(block)) {
-    const own = (mode: string) => (block.mode === mode ? [block.name] : []);
+    const own = (mode: string) => (block.mode === mode ? [{ name: block.name }] : []);
     return { taken: own("subscriber"), given: own("publisher") };
   }
-  const [taken, given] = ENDS[interfaceOf(block)].map((ends) => ends.map((end) => `${block.name}_${end}`));
+  const [taken, given] = ENDS[interfaceOf(block)].map((ends) => ends.map((end) => ({ name: `${block.name}_${end}`, end })));
   return block.mode === "server" ? { taken, given } : { taken: given, given: taken };
 }
 
 /** A block's converters on one side, or the block itself if it has none there. */
-const endsOr = (converters: string[], name: string) => (converters.length ? converters : [name]);
+const endsOr = (converters: Converter[], name: string) => (converters.length ? converters.map((item) => item.name) : [name]);
 
 /** The streams between the Manager and a block's converters, whose wire shows their live words. */
 function fixed(id: string, source: string, target: string, data: WireData): Edge {

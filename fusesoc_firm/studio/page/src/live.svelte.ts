@@ -112,19 +112,19 @@ export class Live {
     return this.#waits.get(key);
   }
 
-  /** What a drawn wire shows; of several streams that wait, the waits of the one that waits most. */
+  /** What a drawn wire shows: of several streams that wait, the longest wait, and whether waiting begins at any of them. */
   shown({ file, ends }: WireData): Shown {
     if (this.run?.file !== file) return NOTHING;
     const words = ends.flatMap(({ block, title }) => {
       const own = this.words[block ?? ""];
       return own && title ? [`${title}: ${own.replaceAll("\n", ", ")}`] : (own ?? []);
     });
-    const waits = ends.flatMap(({ wire }) => this.waits(wire) ?? []);
-    const wait = waits.reduce<Wait | undefined>((most, item) => (item.share > (most?.share ?? 0) ? item : most), undefined);
-    const waiting = waitWords(wait);
+    const waits = ends.flatMap(({ wire }) => this.waits(wire) ?? []).filter((wait) => waitWords(wait));
+    const isFirst = waits.some((wait) => wait.isFirst);
+    const waiting = waitWords({ share: Math.max(0, ...waits.map((wait) => wait.share)), isFirst });
     return {
       words: [...words, waiting].filter(Boolean).join("\n"),
-      waiting: waiting && (wait!.isFirst ? "waits first" : "waits"),
+      waiting: waiting && (isFirst ? "waits first" : "waits"),
       isCrowded: ends.some(({ block }) => this.crowded.has(block ?? "")),
     };
   }

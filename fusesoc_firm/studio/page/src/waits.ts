@@ -56,7 +56,7 @@ export function since(now: Waits | null, before: Waits | null): Waits | null {
 }
 
 /** The words for a wait; none for a wire that hardly waits. */
-export function waitWords(wait: Wait | undefined): string {
-  const percent = Math.round(100 * (wait?.share ?? 0));
-  return percent ? `waits ${percent} %${wait!.isFirst ? "\nbegins here" : ""}` : "";
+export function waitWords({ share, isFirst }: Wait): string {
+  const percent = Math.round(100 * share);
+  return percent ? `waits ${percent} %${isFirst ? "\nbegins here" : ""}` : "";
 }
