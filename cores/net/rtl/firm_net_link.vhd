@@ -87,13 +87,13 @@ entity firm_net_link is
     --   1  a datagram for the board is broken
     --   2  a fragment or an incomplete packet is dropped
     --   3  a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room
-    --   4  a peer has no room
-    --   5  a matching writer or reader of a peer has no room
-    --   6  a sample has no room, or comes in fragments of RTPS
-    --   7  a frame to send has too long a payload, or the id of no writer
-    --   8  another host has the board's address
+    --   4  another node has no room
+    --   5  a publisher or subscriber of another node, of a topic of the board, has no room
+    --   6  a message of another node has no room, or comes in fragments of RTPS
+    --   7  a message to send is empty, too long or of no publisher
+    --   8  another host has the address of the board
     --   9  a packet of RTPS, or a list of parameters in it, is broken
-    --  10  a peer's writer or reader of a topic of the board differs in type, hash, quality, partition or encoding
+    --  10  a publisher or subscriber of a topic of the board has another type, hash, quality, partition or encoding
     network_error : out std_logic_vector(10 downto 0)
   );
 end entity firm_net_link;
