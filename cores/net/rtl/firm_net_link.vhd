@@ -100,8 +100,9 @@ end entity firm_net_link;
 
 architecture rtl of firm_net_link is
 
-  constant PORTS    : positive := 3;
-  constant GROUP_IP : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
+  constant PORTS             : positive := 3;
+  constant GROUP_IP          : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
+  constant MOST_REASSEMBLIES : natural := 4;
 
   function cycles_of(hertz : integer) return positive is
   begin
@@ -219,6 +220,10 @@ begin
   assert CLOCK_HZ >= 1
     report "firm_net_link: CLOCK_HZ is " & integer'image(CLOCK_HZ) & "; legal: 1 and more"
     severity failure;
+  assert REASSEMBLIES >= 0 and REASSEMBLIES <= MOST_REASSEMBLIES
+    report "firm_net_link: REASSEMBLIES is " & integer'image(REASSEMBLIES) & "; legal: 0 to "
+           & integer'image(MOST_REASSEMBLIES)
+    severity failure;
 
   count_time : process (clk)
   begin
@@ -292,15 +297,16 @@ begin
     );
 
   without_fragments : if REASSEMBLIES = 0 generate
-    whole_tdata        <= received_tdata;
-    whole_tuser        <= received_tuser;
-    whole_tvalid       <= received_tvalid;
-    whole_tlast        <= received_tlast;
-    is_packet_dropped  <= '0';
-    is_frame_lost      <= '0';
+    whole_tdata       <= received_tdata;
+    whole_tuser       <= received_tuser;
+    whole_tvalid      <= received_tvalid;
+    whole_tlast       <= received_tlast;
+    is_packet_dropped <= '0';
+    is_frame_lost     <= '0';
   end generate without_fragments;
 
-  with_fragments : if REASSEMBLIES /= 0 generate
+  -- Of another number, the part would complain first.
+  with_fragments : if REASSEMBLIES >= 1 and REASSEMBLIES <= MOST_REASSEMBLIES generate
 
     u_reassembly : entity firm.firm_ipv4_reassembly
       generic map (
@@ -615,8 +621,8 @@ begin
     );
 
   network_error(0) <= is_broken or is_too_long;
-  network_error(6) <= is_sample_lost or is_sample_parted;
   network_error(2) <= is_fragment or is_packet_dropped;
   network_error(3) <= is_reply_lost or is_lost or is_frame_lost;
+  network_error(6) <= is_sample_lost or is_sample_parted;
 
 end architecture rtl;
