@@ -415,12 +415,12 @@ begin
       sample_r <= place;
       last_r   <= last;
       if rst_n = '0' then
-        write_r  <= (others => '0');
-        start_r  <= (others => '0');
-        sample_r <= (others => '0');
-        first_r  <= (others => '0');
-        last_r   <= (others => '0');
-        full_r   <= '0';
+        write_r   <= (others => '0');
+        start_r   <= (others => '0');
+        sample_r  <= (others => '0');
+        first_r   <= (others => '0');
+        last_r    <= (others => '0');
+        full_r    <= '0';
         misses_r  <= '0';
         parts_r   <= '0';
         is_lost   <= '0';
