@@ -56,6 +56,7 @@ architecture rtl of firm_net_responder is
   constant SENDER_PLACE      : natural := 22;
   constant TARGET_PLACE      : natural := 32;
   constant MAC_BYTES         : natural := 6;
+  constant ADDRESS_BYTES     : natural := 4;
   constant ETHERNET_BYTES    : natural := 14;
   constant IPV4_BYTES        : natural := 20;
   -- The place from which nothing more is decided; counts of places stop there.
@@ -143,17 +144,6 @@ architecture rtl of firm_net_responder is
     return '0';
   end function differs;
 
-  -- The byte, or that of `by` which has this place.
-  function replaced(place : natural; byte : byte_t; by : bytes_t) return byte_t is
-  begin
-    for index in by'range loop
-      if place = index then
-        return by(index);
-      end if;
-    end loop;
-    return byte;
-  end function replaced;
-
   -- Whether the upper byte of a request's checksum overflows in the reply.
   function carries(byte : byte_t) return std_logic is
   begin
@@ -195,6 +185,22 @@ architecture rtl of firm_net_responder is
     end if;
     return SAME;
   end function origin_of;
+
+  -- Which byte of the reply's opcode, this host's MAC address and address, and the reply's type has this place.
+  function given_of(place : natural; is_arp : std_logic) return natural is
+    constant MAC_AT     : natural := 1;
+    constant ADDRESS_AT : natural := MAC_AT+MAC_BYTES;
+    constant TYPE_AT    : natural := ADDRESS_AT+ADDRESS_BYTES;
+  begin
+    for index in 0 to TYPE_AT-1 loop
+      if (index >= MAC_AT and index < ADDRESS_AT and place = MAC_BYTES-MAC_AT+index)
+         or (is_arp = '1' and place = OPCODE_PLACE+1+index)
+         or (is_arp = '0' and index >= ADDRESS_AT and place = SOURCE_PLACE-ADDRESS_AT+index) then
+        return index;
+      end if;
+    end loop;
+    return TYPE_AT;
+  end function given_of;
 
 begin
 
@@ -347,7 +353,6 @@ begin
   end process follow_reply;
 
   decide : process (clk)
-    variable byte : byte_t;
   begin
     if rising_edge(clk) then
       if reply_tvalid = '1' then
@@ -355,13 +360,7 @@ begin
           reply_next_r <= reply_next_r + 1;
         end if;
         origin_r <= origin_of(reply_next_r, arp_r);
-        byte     := replaced(reply_next_r, ECHO_REPLY, placed(mac, MAC_BYTES));
-        if arp_r = '1' then
-          byte := replaced(reply_next_r, byte, placed(ARP_REPLY & mac & address, OPCODE_PLACE+1));
-        else
-          byte := replaced(reply_next_r, byte, placed(address, SOURCE_PLACE));
-        end if;
-        given_r <= byte;
+        given_r  <= byte_of(ARP_REPLY & mac & address & ECHO_REPLY, given_of(reply_next_r, arp_r));
         upper_r <= '0';
         lower_r <= '0';
         if arp_r = '0' and reply_next_r = CHECKSUM_PLACE then
