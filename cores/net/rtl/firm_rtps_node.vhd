@@ -206,6 +206,7 @@ begin
       field_data    => field_data,
       payload_valid => payload_valid,
       payload_data  => payload_data,
+      kind          => kind,
       is_submessage => is_submessage,
       is_whole      => is_whole,
       is_faulty     => is_faulty,
