@@ -93,7 +93,8 @@ _TIMES = {
 }
 _FACTS = ("KNOWN", "RELIABLE", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
 _OTHERS = {
-    # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, in fragments.
+    # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, whose fragments
+    # a node without a reassembly drops.
     "WINDOW": 2,
     "BEYOND_WINDOW": 3,
     "MOST_REQUESTED": 8,

@@ -22,8 +22,9 @@ from fusesoc_firm.system.scaffold.core_file import NETWORK
 from fusesoc_firm.system.status_frames import answered, status_answer
 from tests.cores.datagrams import ADDRESS, MAC, PEER_ADDRESS, PEER_MAC, Packet
 from tests.cores.ethernet import padded
+from tests.cores.fragments import HOSTS, fragments
 from tests.cores.requests import echo_request
-from tests.fabric.messages import Data, Submessage, Writer
+from tests.fabric.messages import Data, DataFrag, Submessage, Writer
 from tests.fabric.participant import DISCOVERY
 
 STATUS_PORT = 7399
@@ -35,6 +36,7 @@ MOST_QUESTIONS = 20_000
 # Questions in which the node acts on what came.
 QUESTIONS = 400
 TYPE = "geometry_msgs::msg::dds_::Quaternion_"
+OTHER_TYPE = "std_msgs::msg::dds_::String_"
 SPECIFICATION = """\
 project:
   name: turtle
@@ -46,6 +48,14 @@ blocks:
   - {name: turn, middleware: ROS2, mode: subscriber, message: geometry_msgs/Quaternion, qos: {profile: sensor_data},
      outgoing: [{name: turned}]}
   - {name: turned, middleware: ROS2, mode: publisher, message: geometry_msgs/Quaternion, qos: {profile: sensor_data}}
+"""
+# Messages that need several packets are put together.
+LONGEST = 8000
+LONG_SPECIFICATION = f"""\
+{SPECIFICATION}\
+  - {{name: heard, middleware: ROS2, mode: subscriber, message: std_msgs/String, maxLength: {LONGEST},
+     qos: {{profile: sensor_data}}, outgoing: [{{name: said}}]}}
+  - {{name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, qos: {{profile: sensor_data}}}}
 """
 
 pytestmark = [pytest.mark.check]
@@ -116,18 +126,20 @@ def line(frame: bytes) -> bytes:
     return PREAMBLE + frame + zlib.crc32(frame).to_bytes(FCS_BYTES, "little")
 
 
-@pytest.fixture(scope="module")
-def board(tmp_path_factory: pytest.TempPathFactory) -> Iterable[Board]:
+def _board(folder: Path, specification: str) -> Board:
     if not shutil.which("verilator"):
         pytest.skip("verilator is not installed")
-    folder = tmp_path_factory.mktemp("board")
     spec = folder / "turtle.yaml"
-    spec.write_text(SPECIFICATION, encoding="utf-8")
+    spec.write_text(specification, encoding="utf-8")
     target = f"{NETWORK}_verilator"
     built = build_simulator(spec, "verilator", build_root=folder / "build", target=target)
-    started = Board(built.words, built.folder)
-    yield started
-    started.close()
+    return Board(built.words, built.folder)
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterable[Board]:
+    with _board(tmp_path_factory.mktemp("board"), SPECIFICATION) as started:
+        yield started
 
 
 # --- what peers send -------------------------------------------------------------------------------------------------
@@ -156,14 +168,17 @@ def _announced(number: int, payload: bytes | None = None) -> bytes:
 def _publisher(peer: int, number: int, type_: str = TYPE) -> bytes:
     """The publisher with this number, from 1 on, of a participant."""
     writer = rtps.PUBLICATIONS_WRITER
-    listed = parameter_list(
+    return _packet(METATRAFFIC_PORT, peer, Data(DISCOVERY[writer], writer, number, _listed(peer, number, type_)))
+
+
+def _listed(peer: int, number: int, type_: str) -> bytes:
+    return parameter_list(
         parameter(Parameter.ENDPOINT_GUID, _prefix(peer) + _entity(number)),
         parameter(Parameter.TOPIC_NAME, string("rt/turn")),
         parameter(Parameter.TYPE_NAME, string(type_)),
         parameter(Parameter.RELIABILITY, struct.pack("<I8x", Reliability.BEST_EFFORT)),
         parameter(Parameter.USER_DATA, octets(b"typehash=;")),
     )
-    return _packet(METATRAFFIC_PORT, peer, Data(DISCOVERY[writer], writer, number, listed))
 
 
 def _entity(number: int) -> bytes:
@@ -209,6 +224,14 @@ def test_a_good_network_counts_nothing(board: Board) -> None:
     assert "network: no faults" in status_text(status)
 
 
+def test_a_fragment_of_an_announcement_is_not_read_as_a_list(board: Board) -> None:
+    """It has the topic and another type, and no end."""
+    writer = rtps.PUBLICATIONS_WRITER
+    listed = _listed(1, 2, OTHER_TYPE)
+    first = DataFrag(DISCOVERY[writer], writer, 2, 1, 1, len(listed) - 8, len(listed), listed[:-8])
+    assert _new(board, [_packet(METATRAFFIC_PORT, 1, first)]) == {}
+
+
 def test_each_fault_of_the_network_is_counted(board: Board) -> None:
     """The board knows one participant with one publisher, of the test before."""
     good, broken = line(echo_request(bytes(40))), bytearray(line(echo_request(bytes(40))))
@@ -222,9 +245,12 @@ def test_each_fault_of_the_network_is_counted(board: Board) -> None:
     assert _new(board, [_cut(cut)]) == {"broken_packets": 1}
     endless = rtps.PARAMETER_LIST + parameter(Parameter.USER_DATA, bytes(40))
     assert _new(board, [_announced(1, endless), _announced(1, endless[:-8])]) == {"broken_packets": 2}
-    assert _new(board, [_publisher(1, 2, "std_msgs::msg::dds_::String_")]) == {"other_endpoints": 1}
+    assert _new(board, [_publisher(1, 2, OTHER_TYPE)]) == {"other_endpoints": 1}
     # Sixteen of a packet's messages can wait.
-    assert _new(board, [_samples(1, 1, 4, 20)]) == {"lost_messages": 1}
+    assert _new(board, [_samples(1, 1, 4, 16)]) == {}
+    assert _new(board, [_samples(1, 1, 20, 17)]) == {"lost_messages": 1}
+    part = DataFrag(rtps.NO_ENTITY, _entity(1), 40, 1, 1, 1000, 3000, bytes(1000))
+    assert _new(board, [_packet(USER_PORT, 1, part)]) == {"lost_messages": 1}
     # Eight places for publishers.
     assert _new(board, [_publisher(1, number) for number in range(3, 12)]) == {"refused_endpoints": 2}
     # Eight places for participants.
@@ -236,3 +262,21 @@ def test_packets_of_discovery_that_come_too_fast_are_counted(board: Board) -> No
     counted = _new(board, [_announced(1)] * 200)
     assert set(counted) == {"lost_packets"}
     assert 0 < counted["lost_packets"] < 200
+
+
+def _in_fragments(number: int) -> list[bytes]:
+    """A datagram of several packets, to a port at which nothing listens."""
+    udp = struct.pack(">4H", 9, 9, 8 + LONGEST, 0) + bytes(LONGEST)
+    return [line(frame) for frame in fragments(HOSTS[0], number, udp)]
+
+
+def test_faults_of_a_board_that_puts_packets_together_are_counted(tmp_path: Path) -> None:
+    with _board(tmp_path, LONG_SPECIFICATION) as board:
+        whole = _in_fragments(1)
+        assert len(whole) > 3
+        assert _new(board, whole) == {}
+        # The third fragment ends the packet.
+        assert _new(board, [_in_fragments(2)[place] for place in (0, 2)]) == {"dropped_fragments": 1}
+        # Frames wait while a packet leaves, up to 4,095 bytes of them.
+        waiting = [line(Packet(bytes(1400), port=9).frame())] * 4
+        assert _new(board, [*_in_fragments(3), *waiting]) == {"lost_packets": 2}

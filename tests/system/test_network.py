@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,9 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
 from fusesoc_firm.system.boards.board import read_board
+from fusesoc_firm.system.hardware.status import Part, network_words, status_map
 from fusesoc_firm.text.diagnostics import InputError
+from tests.hdl.ghdl import REPOSITORY
 
 SPECIFICATION = """\
 project:
@@ -139,6 +142,19 @@ def test_its_status_counts_the_faults_of_its_network(path: Path) -> None:
     assert "network_other_endpoints_count" in files["turtle_system.vhd"]
     # With a host instead, there is no network.
     assert "network_" not in _files(path.parent, interconnect="axi_stream")["turtle_system.vhd"]
+
+
+def test_the_faults_of_the_network_are_told_in_the_same_words() -> None:
+    """In the table of the page, and at the port of the core."""
+    addresses = {item.name: item.address for item in status_map("board", 1, 1, parts=Part.NETWORK).registers}
+    page = (REPOSITORY / "docs" / "reference" / "status.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| 0x(\w+) \| `(network_\w+)` \| (.+) \|$", page, re.MULTILINE)
+    assert [(int(address, 16), name, meaning) for address, name, meaning in rows] == [
+        (addresses[name], name, meaning) for name, meaning in network_words().items()
+    ]
+    core = (REPOSITORY / "cores" / "net" / "rtl" / "firm_net_link.vhd").read_text(encoding="ascii")
+    told = re.findall(r"^ +-- +(\d+)  (.+)$", core, re.MULTILINE)
+    assert told == [(str(bit), meaning) for bit, meaning in enumerate(network_words().values())]
 
 
 _RGMII = """\

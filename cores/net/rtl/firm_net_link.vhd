@@ -87,21 +87,22 @@ entity firm_net_link is
     --   1  a datagram for the board is broken
     --   2  a fragment or an incomplete packet is dropped
     --   3  a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room
-    --   4  a peer has no room
-    --   5  a matching writer or reader of a peer has no room
-    --   6  a sample has no room, or comes in fragments of RTPS
-    --   7  a frame to send has too long a payload, or the id of no writer
-    --   8  another host has the board's address
+    --   4  another node has no room
+    --   5  a publisher or subscriber of another node, of a topic of the board, has no room
+    --   6  a message of another node has no room, or comes in fragments of RTPS
+    --   7  a message to send is empty, too long or of no publisher
+    --   8  another host has the address of the board
     --   9  a packet of RTPS, or a list of parameters in it, is broken
-    --  10  a peer's writer or reader of a topic of the board differs in type, hash, quality, partition or encoding
+    --  10  a publisher or subscriber of a topic of the board has another type, hash, quality, partition or encoding
     network_error : out std_logic_vector(10 downto 0)
   );
 end entity firm_net_link;
 
 architecture rtl of firm_net_link is
 
-  constant PORTS    : positive := 3;
-  constant GROUP_IP : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
+  constant PORTS             : positive := 3;
+  constant GROUP_IP          : std_logic_vector(31 downto 0) := x"efff0001";  -- 239.255.0.1
+  constant MOST_REASSEMBLIES : natural := 4;
 
   function cycles_of(hertz : integer) return positive is
   begin
@@ -219,6 +220,10 @@ begin
   assert CLOCK_HZ >= 1
     report "firm_net_link: CLOCK_HZ is " & integer'image(CLOCK_HZ) & "; legal: 1 and more"
     severity failure;
+  assert REASSEMBLIES >= 0 and REASSEMBLIES <= MOST_REASSEMBLIES
+    report "firm_net_link: REASSEMBLIES is " & integer'image(REASSEMBLIES) & "; legal: 0 to "
+           & integer'image(MOST_REASSEMBLIES)
+    severity failure;
 
   count_time : process (clk)
   begin
@@ -292,15 +297,16 @@ begin
     );
 
   without_fragments : if REASSEMBLIES = 0 generate
-    whole_tdata        <= received_tdata;
-    whole_tuser        <= received_tuser;
-    whole_tvalid       <= received_tvalid;
-    whole_tlast        <= received_tlast;
-    is_packet_dropped  <= '0';
-    is_frame_lost      <= '0';
+    whole_tdata       <= received_tdata;
+    whole_tuser       <= received_tuser;
+    whole_tvalid      <= received_tvalid;
+    whole_tlast       <= received_tlast;
+    is_packet_dropped <= '0';
+    is_frame_lost     <= '0';
   end generate without_fragments;
 
-  with_fragments : if REASSEMBLIES /= 0 generate
+  -- Of another number, the part would complain first.
+  with_fragments : if REASSEMBLIES >= 1 and REASSEMBLIES <= MOST_REASSEMBLIES generate
 
     u_reassembly : entity firm.firm_ipv4_reassembly
       generic map (
@@ -615,8 +621,8 @@ begin
     );
 
   network_error(0) <= is_broken or is_too_long;
-  network_error(6) <= is_sample_lost or is_sample_parted;
   network_error(2) <= is_fragment or is_packet_dropped;
   network_error(3) <= is_reply_lost or is_lost or is_frame_lost;
+  network_error(6) <= is_sample_lost or is_sample_parted;
 
 end architecture rtl;

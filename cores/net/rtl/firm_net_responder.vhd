@@ -72,9 +72,8 @@ architecture rtl of firm_net_responder is
   constant ARP_REPLY    : byte_t            := x"02";
   -- The flag for more fragments, and the offset.
   constant FRAGMENT     : byte_t            := x"3f";
-  -- The reply's checksum is higher by the difference of the types, in its upper byte.
-  constant TYPE_DIFFERENCE : unsigned(7 downto 0) := x"08";
-  constant OVERFLOWING     : unsigned(7 downto 0) := x"f8";
+  -- The reply's checksum is higher by the difference of the types, 8 in its upper byte, which overflows from here on.
+  constant OVERFLOWING : unsigned(7 downto 0) := x"f8";
 
   -- The newest byte first. A reply's byte of the same place is AHEAD bytes behind it: its first bytes are those of the
   -- request's source.
@@ -102,7 +101,22 @@ architecture rtl of firm_net_responder is
   signal holds_r     : std_logic;                       -- the frame holds the IPv4 packet
   signal aborted_r   : std_logic;
 
-  signal reply_place_r : natural range 0 to END_PLACE;
+  -- What a reply's byte is: the request's byte of the same place, one of another place, or none of it.
+  type origin_t is (SAME, SOURCE, ARP_MOVED, IPV4_MOVED, GIVEN);
+
+  -- The place after that of the reply's byte. What that byte is depends on its place only, and is decided one byte
+  -- before.
+  signal reply_next_r : natural range 0 to END_PLACE;
+  signal origin_r     : origin_t;
+  signal given_r      : byte_t;
+  signal upper_r      : std_logic;  -- it is the upper byte of the checksum
+  signal lower_r      : std_logic;
+  signal overflows_r  : std_logic;  -- the byte at AHEAD overflows as the upper byte of a checksum
+  signal overflowed_r : std_logic;  -- the one before it
+  signal full_r       : std_logic;  -- the one after it is all ones
+  signal carry        : std_logic;
+  signal increase     : unsigned(7 downto 0);  -- of a byte of the checksum
+
   signal reply_tdata   : byte_t;
   signal reply_tuser   : std_logic_vector(0 downto 0);
   signal reply_tvalid  : std_logic;
@@ -130,17 +144,6 @@ architecture rtl of firm_net_responder is
     return '0';
   end function differs;
 
-  -- The byte, or that of `by` which has this place.
-  function replaced(place : natural; byte : byte_t; by : bytes_t) return byte_t is
-  begin
-    for index in by'range loop
-      if place = index then
-        return by(index);
-      end if;
-    end loop;
-    return byte;
-  end function replaced;
-
   -- Whether the upper byte of a request's checksum overflows in the reply.
   function carries(byte : byte_t) return std_logic is
   begin
@@ -160,6 +163,45 @@ architecture rtl of firm_net_responder is
     return bytes;
   end function placed;
 
+  -- What the byte at `place` of a reply is.
+  function origin_of(place : natural; is_arp : std_logic) return origin_t is
+  begin
+    if place < MAC_BYTES then
+      return SOURCE;
+    elsif place < 2*MAC_BYTES then
+      return GIVEN;
+    elsif is_arp = '1' then
+      if place > OPCODE_PLACE and place < TARGET_PLACE then
+        return GIVEN;
+      elsif place >= TARGET_PLACE and place < TARGET_PLACE+ARP_MOVE then
+        return ARP_MOVED;
+      end if;
+    elsif place >= SOURCE_PLACE and place < DESTINATION_PLACE then
+      return GIVEN;
+    elsif place >= DESTINATION_PLACE and place < DESTINATION_PLACE+IPV4_MOVE then
+      return IPV4_MOVED;
+    elsif place = ICMP_PLACE then
+      return GIVEN;
+    end if;
+    return SAME;
+  end function origin_of;
+
+  -- Which byte of the reply's opcode, this host's MAC address and address, and the reply's type has this place.
+  function given_of(place : natural; is_arp : std_logic) return natural is
+    constant MAC_AT     : natural := 1;
+    constant ADDRESS_AT : natural := MAC_AT+MAC_BYTES;
+    constant TYPE_AT    : natural := ADDRESS_AT+ADDRESS_BYTES;
+  begin
+    for index in 0 to TYPE_AT-1 loop
+      if (index >= MAC_AT and index < ADDRESS_AT and place = MAC_BYTES-MAC_AT+index)
+         or (is_arp = '1' and place = OPCODE_PLACE+1+index)
+         or (is_arp = '0' and index >= ADDRESS_AT and place = SOURCE_PLACE-ADDRESS_AT+index) then
+        return index;
+      end if;
+    end loop;
+    return TYPE_AT;
+  end function given_of;
+
 begin
 
   shift <= '1' when s_axis_tvalid = '1' or left_r /= 0 else '0';
@@ -169,6 +211,12 @@ begin
     if rising_edge(clk) and shift = '1' then
       delay_r(0)                 <= s_axis_tdata;
       delay_r(1 to delay_r'high) <= delay_r(0 to delay_r'high-1);
+      overflows_r                <= carries(delay_r(AHEAD-1));
+      overflowed_r               <= overflows_r;
+      full_r                     <= '0';
+      if delay_r(AHEAD-2) = x"ff" then
+        full_r <= '1';
+      end if;
     end if;
   end process delay;
 
@@ -297,54 +345,48 @@ begin
           reply_tlast <= '1';
         end if;
       end if;
-      if reply_tvalid = '1' then
-        if reply_tlast = '1' then
-          reply_place_r <= 0;
-        elsif reply_place_r /= END_PLACE then
-          reply_place_r <= reply_place_r + 1;
-        end if;
-      end if;
       if rst_n = '0' then
-        reply_tvalid  <= '0';
-        reply_place_r <= 0;
-        early_r       <= AHEAD;
+        reply_tvalid <= '0';
+        early_r      <= AHEAD;
       end if;
     end if;
   end process follow_reply;
 
-  choose : process (delay_r, reply_place_r, arp_r, mac, address)
-    variable byte : byte_t;
+  decide : process (clk)
   begin
-    byte := delay_r(AHEAD);
-    if reply_place_r < MAC_BYTES then
-      byte := delay_r(0);
-    end if;
-    byte := replaced(reply_place_r, byte, placed(mac, MAC_BYTES));
-    if arp_r = '1' then
-      byte := replaced(reply_place_r, byte, placed(mac & address, SENDER_PLACE));
-      if reply_place_r = OPCODE_PLACE+1 then
-        byte := ARP_REPLY;
-      elsif reply_place_r >= TARGET_PLACE and reply_place_r < TARGET_PLACE+ARP_MOVE then
-        byte := delay_r(AHEAD+ARP_MOVE);
-      end if;
-    else
-      byte := replaced(reply_place_r, byte, placed(address, SOURCE_PLACE));
-      if reply_place_r >= DESTINATION_PLACE and reply_place_r < DESTINATION_PLACE+IPV4_MOVE then
-        byte := delay_r(AHEAD+IPV4_MOVE);
-      elsif reply_place_r = ICMP_PLACE then
-        byte := ECHO_REPLY;
-      elsif reply_place_r = CHECKSUM_PLACE then
-        -- In ones' complement, a carry out of this byte enters the next one, and may come back from there.
-        byte := std_logic_vector(unsigned(byte) + TYPE_DIFFERENCE);
-        if carries(delay_r(AHEAD)) = '1' and delay_r(AHEAD-1) = x"ff" then
-          byte := std_logic_vector(unsigned(byte) + 1);
+    if rising_edge(clk) then
+      if reply_tvalid = '1' then
+        if reply_next_r /= END_PLACE then
+          reply_next_r <= reply_next_r + 1;
         end if;
-      elsif reply_place_r = CHECKSUM_PLACE+1 and carries(delay_r(AHEAD+1)) = '1' then
-        byte := std_logic_vector(unsigned(byte) + 1);
+        origin_r <= origin_of(reply_next_r, arp_r);
+        given_r  <= byte_of(ARP_REPLY & mac & address & ECHO_REPLY, given_of(reply_next_r, arp_r));
+        upper_r <= '0';
+        lower_r <= '0';
+        if arp_r = '0' and reply_next_r = CHECKSUM_PLACE then
+          upper_r <= '1';
+        elsif arp_r = '0' and reply_next_r = CHECKSUM_PLACE+1 then
+          lower_r <= '1';
+        end if;
+      end if;
+      if rst_n = '0' or (reply_tvalid = '1' and reply_tlast = '1') then
+        reply_next_r <= 1;
+        origin_r     <= SOURCE;
+        upper_r      <= '0';
+        lower_r      <= '0';
       end if;
     end if;
-    reply_tdata <= byte;
-  end process choose;
+  end process decide;
+
+  -- In ones' complement, a carry out of the upper byte enters the lower one, and may come back from there.
+  carry    <= (upper_r and overflows_r and full_r) or (lower_r and overflowed_r);
+  increase <= "0000" & upper_r & "00" & carry;
+
+  reply_tdata <= delay_r(0) when origin_r = SOURCE else
+                 delay_r(AHEAD+ARP_MOVE) when origin_r = ARP_MOVED else
+                 delay_r(AHEAD+IPV4_MOVE) when origin_r = IPV4_MOVED else
+                 given_r when origin_r = GIVEN else
+                 std_logic_vector(unsigned(delay_r(AHEAD)) + increase);
 
   reply_tuser(0) <= aborted_r or not (arp_r or (echo_r and summed_r and holds_r));
 

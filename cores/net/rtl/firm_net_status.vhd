@@ -4,6 +4,9 @@
 --
 -- The reply is the request with the parties exchanged, and without a checksum of UDP, so the checksum of IPv4 holds.
 -- One request is under way at a time; others meanwhile are dropped, and their senders ask again.
+--
+-- An answer always comes, so there is no time-out: a request has the only form that firm_status_frames takes, and the
+-- registers answer an access to any address. A frame of the system that is under way delays the answer.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -29,7 +32,7 @@ entity firm_net_status is
     request_tlast  : out std_logic;
     request_tready : in  std_logic;
 
-    -- The system's frames of the status id, taken at once.
+    -- The system's frames of the status id, taken at once: one for each request.
     answer_tdata  : in std_logic_vector(7 downto 0);
     answer_tvalid : in std_logic;
     answer_tlast  : in std_logic;

@@ -104,14 +104,14 @@ begin
       second => rx_ctl_second
     );
 
-  each_rx_bit : for bit in 0 to 3 generate
+  each_rx_bit : for index in 0 to 3 generate
 
     u_rxd : component firm_ddr_in
       port map (
         clk    => rgmii_rx_clk,
-        pin    => rgmii_rxd(bit),
-        first  => gmii_rxd(bit),
-        second => gmii_rxd(bit+4)
+        pin    => rgmii_rxd(index),
+        first  => gmii_rxd(index),
+        second => gmii_rxd(index+4)
       );
 
   end generate each_rx_bit;
@@ -137,14 +137,14 @@ begin
       pin    => rgmii_tx_ctl
     );
 
-  each_tx_bit : for bit in 0 to 3 generate
+  each_tx_bit : for index in 0 to 3 generate
 
     u_txd : component firm_ddr_out
       port map (
         clk    => clk,
-        first  => gmii_txd(bit),
-        second => gmii_txd(bit+4),
-        pin    => rgmii_txd(bit)
+        first  => gmii_txd(index),
+        second => gmii_txd(index+4),
+        pin    => rgmii_txd(index)
       );
 
   end generate each_tx_bit;

@@ -40,7 +40,7 @@ entity firm_rtps_endpoint is
     names_address : out std_logic_vector(9 downto 0);
     names_data    : in  std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
 
-    -- From seven cycles after the last word on.
+    -- From RTPS_JUDGED cycles after the last word on.
     matches      : out std_logic_vector(READERS+WRITERS-1 downto 0);
     differs      : out std_logic;  -- a topic of the node's in another type, hash, quality, partition or encoding
     is_known     : out std_logic;  -- the GUID was told, and is one of the sender
@@ -99,7 +99,7 @@ architecture rtl of firm_rtps_endpoint is
   signal at_r     : unsigned(15 downto 0) := (others => '0');
   signal last_r   : std_logic;
   signal place_r  : unsigned(1 downto 0) := (others => '0');
-  signal of_r     : ids_t;  -- of which parameter the byte before it is
+  signal of_r     : ids_t;  -- of which parameter the byte that comes is
   signal of_2_r   : ids_t;  -- and this one
   signal over_r   : std_logic;  -- the byte is after those that the first word counts
   signal final_r  : std_logic;  -- it is the last one of them

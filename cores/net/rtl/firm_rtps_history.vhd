@@ -37,7 +37,7 @@ entity firm_rtps_history is
     writer     : out std_logic_vector(2 downto 0);
     is_done    : in  std_logic;
 
-    -- Shows the payload of a slot, from two cycles after `shows` on, and its size one cycle later.
+    -- Shows the payload of a slot and its size, from two cycles after `shows` on.
     shows         : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
     payload_bytes : out std_logic_vector(15 downto 0);

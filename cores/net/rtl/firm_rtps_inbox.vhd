@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Holds the words of a packet until the packet is known to be good, then gives them one by one: bytes of the fields
--- that firm_rtps_walker finds, and of the payloads of the writers of discovery, with their parameters.
+-- that firm_rtps_walker finds, and of the payloads of the writers of discovery, with their parameters. A fragment of
+-- RTPS is not a list of parameters, so its payload is dropped.
 --
 -- After the last word of a submessage, its user may act on it before it takes the next word.
 library ieee;
@@ -26,6 +27,7 @@ entity firm_rtps_inbox is
     field_data    : in std_logic_vector(7 downto 0);
     payload_valid : in std_logic;
     payload_data  : in std_logic_vector(7 downto 0);
+    kind          : in std_logic_vector(7 downto 0);
     is_submessage : in std_logic;
     is_whole      : in std_logic;
     is_faulty     : in std_logic;
@@ -157,8 +159,8 @@ begin
         writer_r <= writer_r(23 downto 0) & field_data;
       end if;
       listens_r <= '0';
-      if writer_r = RTPS_PARTICIPANT_WRITER or writer_r = RTPS_PUBLICATIONS_WRITER
-         or writer_r = RTPS_SUBSCRIPTIONS_WRITER then
+      if kind = RTPS_DATA and (writer_r = RTPS_PARTICIPANT_WRITER or writer_r = RTPS_PUBLICATIONS_WRITER
+                               or writer_r = RTPS_SUBSCRIPTIONS_WRITER) then
         listens_r <= '1';
       end if;
       word_r(16)          <= is_submessage and mine;
@@ -226,8 +228,8 @@ begin
   show_word : process (clk)
   begin
     if rising_edge(clk) then
-      is_taken   <= takes;
-      has_field  <= '1';
+      is_taken  <= takes;
+      has_field <= '1';
       if shown = AT_PAYLOAD or shown = AT_NOTHING then
         has_field <= '0';
       end if;

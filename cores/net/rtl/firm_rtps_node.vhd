@@ -93,9 +93,6 @@ architecture rtl of firm_rtps_node is
   constant FIRST_READER : positive := 2;  -- 1 is the writer of ros_discovery_info
   constant ENDPOINTS    : positive := READERS+WRITERS;
 
-  -- Cycles from the last word of an announcement until it is known what it was.
-  constant JUDGED : positive := 7;
-
   signal field_valid   : std_logic;
   signal field_address : std_logic_vector(RECORD_BITS-1 downto 0);
   signal field_data    : std_logic_vector(7 downto 0);
@@ -129,7 +126,7 @@ architecture rtl of firm_rtps_node is
   signal is_last   : std_logic;
 
   signal is_cut          : std_logic;
-  signal announced_r     : std_logic_vector(JUDGED-1 downto 0);  -- an announcement ended some cycles ago
+  signal announced_r     : std_logic_vector(RTPS_JUDGED-1 downto 0);  -- an announcement ended some cycles ago
   signal differs         : std_logic;
   signal is_reader_r     : std_logic;
   signal matches         : std_logic_vector(ENDPOINTS-1 downto 0);
@@ -209,6 +206,7 @@ begin
       field_data    => field_data,
       payload_valid => payload_valid,
       payload_data  => payload_data,
+      kind          => kind,
       is_submessage => is_submessage,
       is_whole      => is_whole,
       is_faulty     => is_faulty,
@@ -251,7 +249,7 @@ begin
   note_announcement : process (clk)
   begin
     if rising_edge(clk) then
-      announced_r <= announced_r(JUDGED-2 downto 0) & '0';
+      announced_r <= announced_r(RTPS_JUDGED-2 downto 0) & '0';
       if writer = RTPS_PUBLICATIONS_WRITER or writer = RTPS_SUBSCRIPTIONS_WRITER then
         announced_r(0) <= take and has_word and is_end and not is_gone;
       end if;
@@ -261,7 +259,7 @@ begin
     end if;
   end process note_announcement;
 
-  is_endpoint_other <= announced_r(JUDGED-1) and differs;
+  is_endpoint_other <= announced_r(RTPS_JUDGED-1) and differs;
 
   u_locators : entity firm.firm_rtps_locators
     port map (

@@ -82,6 +82,9 @@ package firm_rtps_pkg is
 
   constant MOST_SET_BITS : positive := 256;
 
+  -- Cycles from the last word of an announcement until firm_rtps_endpoint tells what it was.
+  constant RTPS_JUDGED : positive := 7;
+
   -- Whether an address of the record is one of `bytes` addresses from `first` on; both are multiples of four.
   function is_in(address : std_logic_vector(RECORD_BITS-1 downto 0); first, bytes : natural) return std_logic;
 

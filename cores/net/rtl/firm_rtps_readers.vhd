@@ -372,14 +372,18 @@ begin
   end process write_sample;
 
   gather : process (clk)
-    variable place : place_t;
-    variable last  : count_t;
+    variable place  : place_t;
+    variable last   : count_t;
+    variable misses : std_logic;
+    variable parts  : std_logic;
   begin
     if rising_edge(clk) then
       is_lost   <= '0';
       is_parted <= '0';
       place     := sample_r;
       last      := last_r;
+      misses    := misses_r;
+      parts     := parts_r;
       if payload_valid = '1' then
         full_r <= full_r or not has_room;
         if has_room = '1' then
@@ -393,16 +397,17 @@ begin
         end if;
       end if;
       if submessage_r = '1' then
-        write_r  <= place;
-        full_r   <= '0';
-        misses_r <= misses_r or (is_sample and not pushes);
-        parts_r  <= parts_r or (is_sample and fragment_r);
+        write_r <= place;
+        full_r  <= '0';
+        misses  := misses_r or (is_sample and not pushes);
+        parts   := parts_r or (is_sample and fragment_r);
       end if;
       if ends_r = '1' then
-        is_lost   <= misses_r and not spoils_r;
-        is_parted <= parts_r and not spoils_r;
-        misses_r  <= '0';
-        parts_r   <= '0';
+        -- The packet may end with the submessage.
+        is_lost   <= misses and not spoils_r;
+        is_parted <= parts and not spoils_r;
+        misses    := '0';
+        parts     := '0';
         if spoils_r = '1' then
           place := start_r;
           last  := first_r;
@@ -414,13 +419,15 @@ begin
       end if;
       sample_r <= place;
       last_r   <= last;
+      misses_r <= misses;
+      parts_r  <= parts;
       if rst_n = '0' then
-        write_r  <= (others => '0');
-        start_r  <= (others => '0');
-        sample_r <= (others => '0');
-        first_r  <= (others => '0');
-        last_r   <= (others => '0');
-        full_r   <= '0';
+        write_r   <= (others => '0');
+        start_r   <= (others => '0');
+        sample_r  <= (others => '0');
+        first_r   <= (others => '0');
+        last_r    <= (others => '0');
+        full_r    <= '0';
         misses_r  <= '0';
         parts_r   <= '0';
         is_lost   <= '0';

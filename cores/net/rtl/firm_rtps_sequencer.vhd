@@ -35,9 +35,8 @@ entity firm_rtps_sequencer is
 
     -- Addresses 256 to 511 of the memory are outside. A read's data follow its address at once. While `hold` is high,
     -- everything waits.
-    -- What is written is known one cycle before.
     port_index         : out std_logic_vector(7 downto 0);  -- register E
-    port_next          : out std_logic;
+    port_next          : out std_logic;                     -- a byte is written one cycle later
     port_next_address  : out std_logic_vector(7 downto 0);
     port_write_address : out std_logic_vector(7 downto 0);
     port_write_data    : out std_logic_vector(7 downto 0);
@@ -476,8 +475,8 @@ begin
         if state_r = DESTINATION then
           computes_r <= '1';
         end if;
-        ends_r   <= computes_r;
-        writes_r <= has_result;
+        ends_r    <= computes_r;
+        writes_r  <= has_result;
         begins_r  <= is_first;
         place_2_r <= at_r;
         result_r  <= result;

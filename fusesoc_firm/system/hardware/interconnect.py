@@ -92,10 +92,11 @@ NETWORK_FAULTS = {
     "refused_nodes": "another node has no room",
     "refused_endpoints": "a publisher or subscriber of another node, of a topic of the board, has no room",
     "lost_messages": "a message of another node has no room, or comes in fragments of RTPS",
-    "refused_messages": "a message to send is too long",
+    "refused_messages": "a message to send is empty, too long or of no publisher",
     "taken_addresses": "another host has the address of the board",
     "broken_packets": "a packet of RTPS, or a list of parameters in it, is broken",
-    "other_endpoints": "a publisher or subscriber of a topic of the board has another type, hash, quality or encoding",
+    "other_endpoints": "a publisher or subscriber of a topic of the board has another type, hash, quality, partition"
+    " or encoding",
 }
 ADDRESS_FAULT = 8
 """The bit of an address that is taken."""
