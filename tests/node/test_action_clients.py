@@ -585,6 +585,8 @@ def test_too_many_goals_are_lost(peer: Make) -> None:
     until(lambda: server.run.node.statistics.actions["count"].goals == MOST_WAITING + 2)
     assert server.results() == []
     server.order_cancel()
+    # After the result, the next goal would be at the server.
+    until(server.canceled)
     server.finish(identity, SUCCEEDED[server.version], 5)
     until(lambda: len(server.results()) == MOST_WAITING + 2)
     server.run.stop()
