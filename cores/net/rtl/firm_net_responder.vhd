@@ -114,7 +114,7 @@ architecture rtl of firm_net_responder is
   signal overflows_r  : std_logic;  -- the byte at AHEAD overflows as the upper byte of a checksum
   signal overflowed_r : std_logic;  -- the one before it
   signal full_r       : std_logic;  -- the one after it is all ones
-  signal carry        : std_logic;
+  signal carried      : std_logic;
   signal increase     : unsigned(7 downto 0);  -- of a byte of the checksum
 
   signal reply_tdata   : byte_t;
@@ -379,8 +379,8 @@ begin
   end process decide;
 
   -- In ones' complement, a carry out of the upper byte enters the lower one, and may come back from there.
-  carry    <= (upper_r and overflows_r and full_r) or (lower_r and overflowed_r);
-  increase <= "0000" & upper_r & "00" & carry;
+  carried  <= (upper_r and overflows_r and full_r) or (lower_r and overflowed_r);
+  increase <= "0000" & upper_r & "00" & carried;
 
   reply_tdata <= delay_r(0) when origin_r = SOURCE else
                  delay_r(AHEAD+ARP_MOVE) when origin_r = ARP_MOVED else

@@ -51,9 +51,9 @@ end entity firm_rtps_sequencer;
 architecture rtl of firm_rtps_sequencer is
 
   -- The memory has 2048 bytes below the entries, and is a power of two.
-  function bits_of(entries : integer) return positive is
+  function bits_of(number : integer) return positive is
   begin
-    if entries > 64 then
+    if number > 64 then
       return 13;
     end if;
     return 12;
