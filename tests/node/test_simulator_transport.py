@@ -70,6 +70,13 @@ def model(tmp_path: Path) -> list[str]:
     return [sys.executable, str(path)]
 
 
+def received(transport: Transport) -> bytes:
+    """The next burst."""
+    burst = transport.receive(60)
+    assert burst
+    return burst.data
+
+
 def wait_until(condition: object) -> None:
     assert callable(condition)
     while not condition():
@@ -173,7 +180,9 @@ def test_at_rest_it_sleeps_and_is_woken(model: list[str]) -> None:
         assert transport.receive(0.2) is None
         assert simulator.cycle == cycle
         transport.send(b"wake")
-        assert (burst := transport.receive(60)) and burst.data == b"wake"
+        burst = transport.receive(60)
+        assert burst
+        assert burst.data == b"wake"
         assert events == [Taken(cycle, cycle), burst]
 
 
@@ -192,7 +201,7 @@ def test_a_sender_without_a_receiver_runs_it(transport: Transport) -> None:
     frames = [bytes([number]) * 10 for number in range(20)]
     for frame in frames:
         transport.send(frame)
-    assert [(burst := transport.receive(60)) and burst.data for _ in frames] == frames
+    assert [received(transport) for _ in frames] == frames
 
 
 def test_a_simulator_that_hangs_keeps_nobody(transport: Transport) -> None:
@@ -223,7 +232,7 @@ def test_a_frame_begins_the_run_that_brings_its_answer(model: list[str]) -> None
         begun.clear()
         transport.send(b"frame")
         assert [runs for _, runs in begun] == [2]
-        assert (burst := transport.receive(60)) and burst.data == b"frame"
+        assert received(transport) == b"frame"
         assert len(begun) == 1
         wait_until(lambda: transport.receive(0.01) is None and transport.is_at_rest())
         # The second run may have ended without a burst, which doubles the next one.
@@ -291,7 +300,7 @@ def test_bursts_that_nobody_takes_hold_the_simulator(model: list[str]) -> None:
         wait_until(lambda: transport.waiting_bytes == 1200)
         time.sleep(0.1)
         assert transport.waiting_bytes == 1200
-        assert [(burst := transport.receive(60)) and burst.data[0] for _ in range(120)] == list(range(120))
+        assert [received(transport)[0] for _ in range(120)] == list(range(120))
         sender.join()
 
 
@@ -313,7 +322,7 @@ def test_the_end_of_the_simulator_is_told_to_both_sides(model: list[str]) -> Non
     transport.send(b"right")
     transport.send(b"die")
     # What came before is there before it.
-    assert (burst := transport.receive(60)) and burst.data == b"right"
+    assert received(transport) == b"right"
     with pytest.raises(TransportError, match="status 3; it printed:\nthe model dies"):
         transport.receive(60)
     with pytest.raises(TransportError, match="status 3"):
@@ -329,7 +338,7 @@ def test_another_simulator_takes_its_place_on_request(model: list[str]) -> None:
         with pytest.raises(TransportResetError, match="killed by signal 9"):
             transport.receive(60)
         transport.send(b"whole")
-        assert (burst := transport.receive(60)) and burst.data == b"whole"
+        assert received(transport) == b"whole"
         transport.send(b"die")
         with pytest.raises(TransportError, match="status 3") as caught:
             transport.receive(60)

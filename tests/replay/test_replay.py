@@ -323,6 +323,9 @@ def test_the_summary_as_json(tmp_path: Path, capsys: Captured) -> None:
         "requests": [],
         "feedback": [],
         "results": [],
+        "goals": [],
+        "cancellations": [],
+        "warnings": [],
         "errors": 1,
         "messages_with_errors": 1,
         "first_errors": [
