@@ -433,7 +433,7 @@ class LingeringHardware(FakeHardware):
 
 
 def test_bursts_that_arrived_before_a_failure_are_published(tmp_path: Path) -> None:
-    """The first one is for software, whose answer is dropped, as there is no hardware to take it."""
+    """Software takes the first one and answers; without hardware to take it, the answer is dropped."""
     blocks = converter("sub", "subscriber", "Point", "hard") + instance("hard", "hard", "soft", "pub")
     blocks += instance("soft", "soft", "end") + instance("end", "hard", "other")
     blocks += converter("pub", "publisher", "Point") + converter("other", "publisher", "Point")

@@ -5,8 +5,8 @@
 -- The reply is the request with the parties exchanged, and without a checksum of UDP, so the checksum of IPv4 holds.
 -- One request is under way at a time; others meanwhile are dropped, and their senders ask again.
 --
--- An answer always comes, so there is no time-out: a request has the only form that firm_status_frames takes, and the
--- registers answer an access to any address. A frame of the system that is under way delays the answer.
+-- There is no time-out, since an answer always comes: firm_status_frames takes every request that is sent here, and
+-- the registers answer an access to any address. A frame of the system that is under way delays the answer.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -346,7 +346,7 @@ begin
     end if;
   end process make_plan;
 
-  -- Of VALUE and SKIP, which may have one byte, there is no plan.
+  -- VALUE and SKIP may have one byte, so the step after them is not planned in advance.
   choose : process (step_r, kinds_r, flags_r, planned_r, plan_less_r, plan_done_r, has_payload_r, before_r, single_r,
                     less_r, set_r, zero_r, one_r, short_r, shorter_r, none_r, much_r, sentinel_r, free_r, double_r)
     variable has_value : std_logic;
