@@ -100,7 +100,7 @@ def _check_clock(project: Project, phy: Phy, clock: Fraction | None, faults: Dia
     elif clock is not None and project.clock.source is not None:
         megahertz = clock / _MEGAHERTZ
         if megahertz < least or (most is not None and megahertz > most):
-            message = f"'{phy.value}' is not possible with a clock of {project.clock}"
+            message = f"'{phy.value}' as 'phy' of 'network' is not possible with a clock of {project.clock}"
             faults.error(message, project.clock.source, f"legal here: {hint}")
 
 
