@@ -23,9 +23,9 @@ from fusesoc_firm.system.hardware.names import (
     FRAME_WORDS,
     LATE_WORDS,
     Names,
+    publishers_with_watchdog,
     queue_word,
     reset_of,
-    watched_publishers,
 )
 from fusesoc_firm.system.written.specification import Pin
 
@@ -80,7 +80,7 @@ def _memory(queue: Queue, lanes: int) -> dict[str, Any]:
 def publisher_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
     """Return the instance of a publisher, followed by its buffer if it stores whole frames."""
     ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
-    is_watched = converter in watched_publishers(system)
+    has_watchdog = converter in publishers_with_watchdog(system)
     return {
         **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
@@ -90,13 +90,13 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
         "late": _late(names, converter, system) if converter.late_bytes else None,
         "max_length": {"bytes": converter.max_length} if converter.max_length else None,
         "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
-        "error": error_of(converter, system) if converter.may_pause and not is_watched else None,
-        "watched": _watched(names, converter, system) if is_watched else None,
+        "error": error_of(converter, system) if converter.may_pause and not has_watchdog else None,
+        "own_error": _own_error(names, converter, system) if has_watchdog else None,
         "buffer": _buffer(names, converter, system) if converter.buffer else None,
     }
 
 
-def _watched(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+def _own_error(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
     """Return the errors of a publisher beside those that the watchdog finds."""
     return {
         "block": converter.block,

@@ -106,7 +106,8 @@ class Names:
             _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
         ]
         signals += [(block, "", word) for block in (*queued, *buffered) for word in FRAME_SIGNALS]
-        signals += [(item.block, "", f"frame_{word}") for item in watched_publishers(system) for word in ERROR_WORDS]
+        watched = publishers_with_watchdog(system)
+        signals += [(item.block, "", f"frame_{word}") for item in watched for word in ERROR_WORDS]
         signals += [(block, "", f"late_{word}") for block in late for word in LATE_WORDS]
         signals += [(*pin, "synced") for pin in synchronised]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
@@ -169,7 +170,7 @@ def queue_word(queue: Queue) -> str:
     return "watchdog" if queue.limit else "queue"
 
 
-def watched_publishers(system: DerivedSystem) -> list[Converter]:
+def publishers_with_watchdog(system: DerivedSystem) -> list[Converter]:
     """Return the publishers that the watchdog may cut off."""
     return [item for item in system.publishers if system.watchdog and item.may_pause]
 
