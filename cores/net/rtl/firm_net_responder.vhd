@@ -83,7 +83,6 @@ architecture rtl of firm_net_responder is
   signal delay_r     : bytes_t(0 to AHEAD+ARP_MOVE);
 
   signal place_r   : natural range 0 to END_PLACE;      -- of the request's byte
-  signal count_r   : unsigned(15 downto 0) := (others => '0');  -- bytes of the request so far
   signal shift     : std_logic;
   signal left_r    : natural range 0 to AHEAD;          -- shifts after the request's last byte
   signal early_r   : natural range 0 to AHEAD;          -- shifts before the reply's first byte
@@ -95,8 +94,8 @@ architecture rtl of firm_net_responder is
   signal echo_r      : std_logic;                       -- it is an echo request for this host
   -- Of the IPv4 header's words; the highest bit is a carry, which is added with the next word.
   signal sum_r       : unsigned(16 downto 0) := (others => '0');
-  signal length_r    : unsigned(15 downto 0) := (others => '0');  -- of the IPv4 packet
-  signal needed_r    : unsigned(16 downto 0) := (others => '0');  -- bytes of its frame before the last one
+  signal unseen_r    : unsigned(15 downto 0) := (others => '0');  -- bytes of the IPv4 packet to come, and four
+  signal enough_r    : std_logic;                       -- the packet has an ICMP header
   signal summed_r    : std_logic;                       -- the IPv4 header's checksum is right
   signal holds_r     : std_logic;                       -- the frame holds the IPv4 packet
   signal aborted_r   : std_logic;
@@ -226,13 +225,11 @@ begin
   begin
     if rising_edge(clk) then
       if s_axis_tvalid = '1' then
-        count_r <= count_r + 1;
         if place_r /= END_PLACE then
           place_r <= place_r + 1;
         end if;
         if s_axis_tlast = '1' then
           place_r <= 0;
-          count_r <= (others => '0');
           left_r  <= AHEAD;
         end if;
       elsif left_r /= 0 then
@@ -240,7 +237,6 @@ begin
       end if;
       if rst_n = '0' then
         place_r <= 0;
-        count_r <= (others => '0');
         left_r  <= 0;
       end if;
     end if;
@@ -302,30 +298,37 @@ begin
         carry(0) := sum_r(16);
         sum_r    <= resize(sum_r(15 downto 0), 17) + (unsigned(delay_r(0)) & unsigned(s_axis_tdata)) + carry;
       end if;
-      needed_r <= ('0' & length_r) + (ETHERNET_BYTES-1);
-      if place_r = LENGTH_PLACE or place_r = LENGTH_PLACE+1 then
-        length_r <= length_r(7 downto 0) & unsigned(s_axis_tdata);
+      -- The four bytes up to here are counted at the end.
+      if place_r = LENGTH_PLACE+1 then
+        unseen_r <= unsigned(delay_r(0)) & unsigned(s_axis_tdata);
+      elsif unseen_r /= 0 then
+        unseen_r <= unseen_r - 1;
       end if;
-      if s_axis_tlast = '1' then
-        holds_r <= '0';
+      if place_r = LENGTH_PLACE+2 then
+        enough_r <= '0';
         -- At least 28 bytes; a comparison of parts needs no adder.
-        if (length_r(15 downto 5) /= 0 or length_r(4 downto 2) = "111") and ('0' & count_r) >= needed_r then
-          holds_r <= '1';
+        if unseen_r(15 downto 5) /= 0 or unseen_r(4 downto 2) = "111" then
+          enough_r <= '1';
         end if;
       end if;
     end if;
   end process check_header;
 
-  -- The words and the carries add up to all ones. A register of its own: there is time until the end of the frame.
-  compare_sum : process (clk)
+  -- The words and the carries add up to all ones; the frame holds the packet. Registers of their own: there is time
+  -- until the reply ends.
+  judge : process (clk)
   begin
     if rising_edge(clk) then
       summed_r <= '0';
       if sum_r(15 downto 1) = "111111111111111" then
         summed_r <= sum_r(0) xor sum_r(16);
       end if;
+      holds_r <= '0';
+      if enough_r = '1' and unseen_r(15 downto 3) = 0 and (unseen_r(2) = '0' or unseen_r(1 downto 0) = 0) then
+        holds_r <= '1';
+      end if;
     end if;
-  end process compare_sum;
+  end process judge;
 
   -- ------------------------------------------------------------------ the reply
 
