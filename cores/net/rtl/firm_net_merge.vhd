@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends the frames of several sources, one frame at a time. Of sources that wait, the next one after the source of
--- the last frame is sent, so that none keeps the others from sending. Each byte leaves one cycle later.
+-- the last frame is sent, so that none keeps the others from sending. A source is chosen one cycle after it has begun
+-- to wait, and each byte leaves one cycle later.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -34,8 +35,7 @@ architecture rtl of firm_net_merge is
   signal later    : sources_t;  -- those of them that wait
   signal waiting  : sources_t;
   signal first    : sources_t;  -- the source to begin with, if one waits
-  signal begun_r  : sources_t;  -- the source of the frame that is under way
-  signal chosen   : sources_t;  -- the source of the byte
+  signal chosen_r : sources_t;  -- the source of the frame that is under way
   signal byte     : std_logic_vector(7 downto 0);
   signal valid    : std_logic;
   signal last     : std_logic;
@@ -67,24 +67,22 @@ begin
     end loop;
   end process find_first;
 
-  chosen <= first when begun_r = NO_SOURCE else begun_r;
-
-  show : process (chosen, s_axis_tdata)
+  show : process (chosen_r, s_axis_tdata)
     variable found : std_logic_vector(7 downto 0);
   begin
     found := x"00";
     for index in 0 to SOURCES-1 loop
-      if chosen(index) = '1' then
+      if chosen_r(index) = '1' then
         found := found or s_axis_tdata(8*index+7 downto 8*index);
       end if;
     end loop;
     byte <= found;
   end process show;
 
-  valid         <= '0' when (chosen and s_axis_tvalid) = NO_SOURCE else '1';
-  last          <= '0' when (chosen and s_axis_tlast) = NO_SOURCE else '1';
+  valid         <= '0' when (chosen_r and s_axis_tvalid) = NO_SOURCE else '1';
+  last          <= '0' when (chosen_r and s_axis_tlast) = NO_SOURCE else '1';
   takes         <= valid and not full_r;
-  s_axis_tready <= chosen when full_r = '0' else NO_SOURCE;
+  s_axis_tready <= chosen_r when full_r = '0' else NO_SOURCE;
   m_axis_tdata  <= byte_r;
   m_axis_tvalid <= valid_r;
   m_axis_tlast  <= last_r;
@@ -107,17 +105,18 @@ begin
         spare_r <= byte;
         final_r <= last;
       end if;
-      begun_r <= chosen;
-      if takes = '1' and last = '1' then
-        begun_r <= NO_SOURCE;
-        found   := '0';
+      if chosen_r = NO_SOURCE then
+        chosen_r <= first;
+      elsif takes = '1' and last = '1' then
+        chosen_r <= NO_SOURCE;
+        found    := '0';
         for index in 0 to SOURCES-1 loop
           after_r(index) <= found;
-          found          := found or chosen(index);
+          found          := found or chosen_r(index);
         end loop;
       end if;
       if rst_n = '0' then
-        begun_r  <= NO_SOURCE;
+        chosen_r <= NO_SOURCE;
         after_r  <= NO_SOURCE;
         valid_r  <= '0';
         full_r   <= '0';

@@ -6,6 +6,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_net_presence is
   port (
@@ -90,7 +92,7 @@ architecture rtl of firm_net_presence is
       return "000111111";
     elsif unsigned(tenths) = 2 then
       return "001111111";
-    elsif unsigned(tenths) >= 3 and unsigned(tenths) <= 5 then
+    elsif is_within(tenths, 3, 5) = '1' then
       return "011111111";
     end if;
     return "111111111";
@@ -139,7 +141,7 @@ begin
         if differs(place_r, s_axis_tdata, IPV4) then
           query_r <= '0';
         elsif place_r = IPV4_PLACE then
-          if s_axis_tdata(7 downto 4) /= VERSION or unsigned(s_axis_tdata(3 downto 0)) < SHORTEST_HEADER then
+          if s_axis_tdata(7 downto 4) /= VERSION or is_below(s_axis_tdata(3 downto 0), SHORTEST_HEADER) = '1' then
             query_r <= '0';
           end if;
         elsif place_r = PROTOCOL_PLACE and s_axis_tdata /= IGMP then
@@ -153,7 +155,7 @@ begin
         end if;
         if place_r = IPV4_PLACE then
           count_r <= '0' & unsigned(s_axis_tdata(3 downto 0)) & "00";
-        elsif place_r < IPV4_PLACE then
+        elsif is_below(std_logic_vector(place_r), IPV4_PLACE) = '1' then
           count_r <= to_unsigned(LAST_COUNT, 7);
         elsif count_r /= LAST_COUNT then
           count_r <= count_r - 1;
@@ -195,7 +197,7 @@ begin
         ms_r <= (ms_r + 1) mod SECOND;
         if ms_r = SECOND-1 then
           seconds_r <= seconds_r + 1;
-          if seconds_r < REPEATS then
+          if is_below(std_logic_vector(seconds_r), REPEATS) = '1' then
             report_r <= '1';
             probe_r  <= '1';
           end if;

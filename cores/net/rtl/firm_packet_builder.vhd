@@ -78,6 +78,7 @@ architecture rtl of firm_packet_builder is
   signal shown_r   : std_logic;  -- program_word is one of the packet
   signal address_r : unsigned(ADDRESS_BITS-1 downto 0) := (others => '0');
   signal bank_r    : std_logic_vector(BANK_BITS-1 downto 0) := (others => '0');
+  signal shows     : unsigned(ADDRESS_BITS-1 downto 0);  -- the address of the next program_word
   signal begins    : std_logic;
 
   -- The first stage: the word of the program. The word after it is shown by the memory.
@@ -139,7 +140,8 @@ begin
   source   <= word_r(9 downto 8);
   argument <= word_r(7 downto 0);
 
-  program_address <= entry when begins = '1' else std_logic_vector(address_r);
+  shows           <= unsigned(entry) when begins = '1' else address_r;
+  program_address <= std_logic_vector(shows);
   program_enable  <= begins or fetches;
 
   payload  <= '1' when source = FROM_PAYLOAD else '0';
@@ -157,13 +159,13 @@ begin
       if begins = '1' then
         busy_r    <= '1';
         shown_r   <= '1';
-        address_r <= unsigned(entry) + 1;
+        address_r <= shows + 1;
         bank_r    <= bank;
       elsif fetches = '1' then
         word_r    <= program_word;
         fetched_r <= '1';
         shown_r   <= not program_word(10);
-        address_r <= address_r + 1;
+        address_r <= shows + 1;
       elsif moves = '1' and is_final = '1' then
         fetched_r <= '0';
       end if;
@@ -193,7 +195,7 @@ begin
           spent_r <= '1';
           phase_r <= "11";
         end if;
-        if bytes <= 1 then
+        if bytes(NUMBER_BITS-1 downto 1) = 0 then
           single_r <= '1';
         end if;
       elsif moves = '1' and payload = '1' then

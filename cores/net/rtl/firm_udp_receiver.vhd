@@ -7,6 +7,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_udp_receiver is
   generic (
@@ -50,14 +52,17 @@ architecture rtl of firm_udp_receiver is
   constant MOST_PORTS : positive := 16;
 
   type section_t is (ETHERNET, HEADER, DATAGRAM, PAYLOAD);
-  constant MAC_BYTES      : natural := 6;
-  constant SOURCE_END     : natural := 12;  -- of the sender's MAC address
-  constant ETHERNET_LAST  : natural := 13;
-  constant HEADER_LAST    : natural := 19;  -- of a header without options
-  constant DATAGRAM_BYTES : natural := 8;
-  constant LENGTH_END     : natural := 6;   -- of the datagram's length, in its header
-  constant DATA_END       : natural := 6;   -- a datagram's bytes that are not counted down
-  constant LAST_PLACE     : natural := 63;
+  constant MAC_BYTES       : natural := 6;
+  constant SOURCE_END      : natural := 12;  -- of the sender's MAC address
+  constant ETHERNET_LAST   : natural := 13;
+  constant ADDRESSES       : natural := 12;  -- in the header of IPv4
+  constant HEADER_LAST     : natural := 19;  -- of a header without options
+  constant SHORTEST_HEADER : natural := 5;  -- in words
+  constant DATAGRAM_BYTES  : natural := 8;
+  constant LENGTH_END      : natural := 6;   -- of the datagram's length, in its header
+  constant DATA_END        : natural := 6;   -- a datagram's bytes that are not counted down
+  constant PLACE_BITS      : natural := 6;
+  constant LAST_PLACE      : natural := 2**PLACE_BITS-1;
   -- Of IPv4: high and low byte of its type, version, and the protocol.
   constant TYPE_HIGH : std_logic_vector(7 downto 0) := x"08";
   constant TYPE_LOW  : std_logic_vector(7 downto 0) := x"00";
@@ -70,6 +75,7 @@ architecture rtl of firm_udp_receiver is
 
   signal section_r : section_t;
   signal place_r   : natural range 0 to LAST_PLACE;  -- in the section
+  signal at        : std_logic_vector(PLACE_BITS-1 downto 0);  -- the same
   signal odd_r     : std_logic;                      -- the byte is the lower one of a word
 
   -- Of the frame so far.
@@ -145,6 +151,8 @@ begin
     report "firm_udp_receiver: PORTS is " & integer'image(PORTS) & "; legal: 1 to " & integer'image(MOST_PORTS)
     severity failure;
 
+  at <= std_logic_vector(to_unsigned(place_r, PLACE_BITS));
+
   follow : process (clk)
   begin
     if rising_edge(clk) then
@@ -156,7 +164,7 @@ begin
         if section_r = ETHERNET and place_r = ETHERNET_LAST then
           section_r <= HEADER;
           place_r   <= 0;
-        elsif section_r = HEADER and place_r >= HEADER_LAST and to_unsigned(place_r + 1, 7) = header_bytes_r then
+        elsif section_r = HEADER and is_below(at, HEADER_LAST) = '0' and to_unsigned(place_r + 1, 7) = header_bytes_r then
           section_r <= DATAGRAM;
           place_r   <= 0;
         elsif section_r = DATAGRAM and place_r = DATAGRAM_BYTES-1 then
@@ -210,7 +218,7 @@ begin
       elsif section_r = HEADER then
         if place_r = 0 then
           header_bytes_r <= unsigned(s_axis_tdata(3 downto 0)) & "00";
-          if s_axis_tdata(7 downto 4) /= VERSION or unsigned(s_axis_tdata(3 downto 0)) < 5 then
+          if s_axis_tdata(7 downto 4) /= VERSION or is_below(s_axis_tdata(3 downto 0), SHORTEST_HEADER) = '1' then
             mine_r <= '0';
           end if;
         elsif place_r = 6 and (s_axis_tdata and FRAGMENT) /= x"00" then
@@ -246,7 +254,7 @@ begin
         -- the datagram, when its length has come.
         if section_r = HEADER and place_r = 3 then
           packet_left_r <= unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata);
-        elsif section_r /= ETHERNET and packet_left_r /= 0 and not (section_r = DATAGRAM and place_r < 2) then
+        elsif section_r /= ETHERNET and packet_left_r /= 0 and not (section_r = DATAGRAM and is_below(at, 2) = '1') then
           packet_left_r <= packet_left_r - 1;
         end if;
       end if;
@@ -295,7 +303,7 @@ begin
       elsif section_r = ETHERNET then
         accepted_r <= '0';
       end if;
-      if (section_r = DATAGRAM and place_r >= LENGTH_END) or (section_r = PAYLOAD and has_data = '1') then
+      if (section_r = DATAGRAM and is_below(at, LENGTH_END) = '0') or (section_r = PAYLOAD and has_data = '1') then
         length_r <= length_r - 1;
       end if;
     end if;
@@ -309,7 +317,7 @@ begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if section_r = ETHERNET then
         sum_r <= resize(UDP, 17);
-      elsif section_r = HEADER and place_r >= 12 and place_r <= HEADER_LAST then
+      elsif section_r = HEADER and is_within(at, ADDRESSES, HEADER_LAST) = '1' then
         sum_r <= added(sum_r, s_axis_tdata, odd_r, false);
       elsif section_r = DATAGRAM then
         sum_r <= added(sum_r, s_axis_tdata, odd_r, place_r = 4 or place_r = 5);
@@ -340,7 +348,7 @@ begin
         if section_r = DATAGRAM or section_r = PAYLOAD then
           past_r  <= '1';
           named_r <= '1';
-        elsif section_r = HEADER and place_r >= HEADER_LAST then
+        elsif section_r = HEADER and is_below(at, HEADER_LAST) = '0' then
           named_r <= '1';
         end if;
       end if;
