@@ -27,7 +27,7 @@ byte. An operation may be followed by the number of its bytes, as in `copy.4 a, 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
