@@ -74,8 +74,8 @@ architecture rtl of firm_net_responder is
   constant ARP_REPLY    : byte_t            := x"02";
   -- The flag for more fragments, and the offset.
   constant FRAGMENT     : byte_t            := x"3f";
-  -- The reply's checksum is higher by the difference of the types, 8 in its upper byte, which overflows if these bits are
-  -- ones.
+  -- The reply's checksum is higher by the difference of the types, 8 in its upper byte, which overflows if these bits
+  -- are ones.
   constant OVERFLOWING : std_logic_vector(7 downto 3) := "11111";
 
   -- The newest byte first. A reply's byte of the same place is AHEAD bytes behind it: its first bytes are those of the

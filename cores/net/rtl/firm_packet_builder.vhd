@@ -21,9 +21,10 @@ entity firm_packet_builder is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of four bytes; its
-    -- size, from three cycles after the start up to the end, is 0 if the program has no payload, and only then. If it is
-    -- 0 nevertheless, one byte is sent in its place: the frame cannot be right, but it has neither a pause nor 64 KiB.
+    -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of four bytes. Its
+    -- size, from three cycles after the start up to the end, is 0 if the program has no payload, and only then. If it
+    -- is 0 nevertheless, one byte is sent in its place: the frame cannot be right, but it has neither a pause nor
+    -- 64 KiB.
     start         : in  std_logic;
     entry         : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
     bank          : in  std_logic_vector(BANK_BITS-1 downto 0);

@@ -32,14 +32,14 @@ entity firm_rtps_history is
     slot_next   : in std_logic_vector(7 downto 0);
 
     -- A sample of this writer comes, and has come from the next cycle on. The next one is not taken before `is_done`.
-    -- After a reset it is as if one had come: the program takes it when it has written the slots of all writers, so that
-    -- none comes before.
+    -- After a reset it is as if one had come: the program takes it when it has written the slots of all writers, so
+    -- that none comes before.
     comes      : out std_logic;
     has_sample : out std_logic;
     writer     : out std_logic_vector(2 downto 0);
     is_done    : in  std_logic;
 
-    -- Shows the payload of a slot, or of the sample that has come last, and its size, from two cycles after `shows` on.
+    -- Shows the payload of a slot, or of the last sample that has come, and its size, from two cycles after `shows` on.
     shows         : in  std_logic;
     shows_new     : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);

@@ -164,7 +164,8 @@ begin
         if section_r = ETHERNET and place_r = ETHERNET_LAST then
           section_r <= HEADER;
           place_r   <= 0;
-        elsif section_r = HEADER and is_below(at, HEADER_LAST) = '0' and to_unsigned(place_r + 1, 7) = header_bytes_r then
+        elsif section_r = HEADER and is_below(at, HEADER_LAST) = '0'
+              and to_unsigned(place_r + 1, 7) = header_bytes_r then
           section_r <= DATAGRAM;
           place_r   <= 0;
         elsif section_r = DATAGRAM and place_r = DATAGRAM_BYTES-1 then
@@ -250,8 +251,8 @@ begin
         elsif section_r = HEADER then
           header_sum_r <= added(header_sum_r, s_axis_tdata, odd_r, false);
         end if;
-        -- The four bytes up to here are counted at the end, and so are two of a datagram. So this is the packet's room for
-        -- the datagram, when its length has come.
+        -- The four bytes up to here are counted at the end, and so are two of a datagram. So this is the packet's room
+        -- for the datagram, when its length has come.
         if section_r = HEADER and place_r = 3 then
           packet_left_r <= unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata);
         elsif section_r /= ETHERNET and packet_left_r /= 0 and not (section_r = DATAGRAM and is_below(at, 2) = '1') then
