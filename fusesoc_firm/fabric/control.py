@@ -26,7 +26,8 @@ byte. An operation may be followed by the number of its bytes, as in `copy.4 a, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import struct
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -72,12 +73,17 @@ _PORTS = {
     "early_source": 0xAC,
     "frame_writer": 0xAD,
     "large": 0xAE,
+    "started": 0xAF,
     "peers": 0xB4,
     "sources": 0xB5,
     "sinks": 0xB6,
+    "bank": 0xB7,
+    "prepared": 0xB8,
 }
 # Tables of the node's own writers with frames, of the writer of ros_discovery_info, and of the readers.
 _GRAPH, _FIRST_READER = 15, 16
+# The bank of the builder's fields for all packets but those that are prepared, whose banks are their writers'.
+_OWN_BANK, _NO_PACKET = 15, 0
 _TIMES = {
     "AFTER_FAREWELL": 200,
     "SOON": 100,
@@ -91,7 +97,7 @@ _TIMES = {
     # Seconds, and one more: the first one may be short.
     "USUAL_LEASE": 101,
 }
-_FACTS = ("KNOWN", "RELIABLE", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
+_FACTS = ("RELIABLE", "KNOWN", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
 _OTHERS = {
     # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, whose fragments
     # a node without a reassembly drops.
@@ -102,6 +108,8 @@ _OTHERS = {
     "NOT_FINAL": 1,
     "FINAL_FLAG": 2,
     "GRAPH": _GRAPH,
+    "OWN_BANK": _OWN_BANK,
+    "NO_PACKET": _NO_PACKET,
     "FIRST_READER": _FIRST_READER,
     **{kind.name: int(kind) for kind in Kind},
     **{name: 1 << number for number, name in enumerate(_FACTS)},
@@ -227,10 +235,10 @@ def _tables(node: Node) -> str:
     """The part of the program that writes what is constant of the node's endpoints."""
     lines = ["begin_tables:"]
     for number, (item, ring) in enumerate(zip(node.writers[1:], rings_of(node), strict=True)):
-        lines += [*_endpoint(number, item), *_writer(item, 0)]
+        lines += [*_endpoint(number, item), *_writer(item)]
         lines += [f"copy W.base, {ring.base}", f"copy W.mask, {ring.size - 1}"]
         lines += [f"copy io.writer, {number}", f"copy io.next_slot, {ring.base + (1 & (ring.size - 1))}"]
-    lines += [*_endpoint(_GRAPH, node.writers[0]), *_writer(node.writers[0], 1)]
+    lines += [*_endpoint(_GRAPH, node.writers[0]), *_writer(node.writers[0]), "copy.4 W.number, 1"]
     for number, item in enumerate(node.readers, _FIRST_READER):
         lines += [*_endpoint(number, item), f"copy W.reliable, {int(item.quality.is_reliable)}"]
     return "\n".join([*lines, "return"])
@@ -238,17 +246,13 @@ def _tables(node: Node) -> str:
 
 def _endpoint(table: int, item: Endpoint) -> Iterator[str]:
     yield f"load W, {table}"
-    yield from (f"copy W.entity+{place}, {byte}" for place, byte in enumerate(item.entity))
+    first, second = struct.unpack("<2H", item.entity)
+    yield from (f"copy.2 W.entity, {first}", f"copy.2 W.entity+2, {second}")
 
 
-def _writer(item: Endpoint, samples: int) -> Sequence[str]:
-    quality = item.quality
-    return (
-        f"copy.4 W.number, {samples}",
-        "copy.4 W.first, 1",
-        f"copy W.depth, {kept_of(quality)}",
-        f"copy W.transient, {int(quality.is_transient_local)}",
-    )
+def _writer(item: Endpoint) -> Iterator[str]:
+    # Two bytes: `depth` and `transient`.
+    yield f"copy.2 W.depth, {kept_of(item.quality) | item.quality.is_transient_local << 8}"
 
 
 class _Assembler:

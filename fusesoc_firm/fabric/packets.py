@@ -24,9 +24,11 @@ FRAGMENT_BYTES = 1344
 
 _LAST = 1 << 10
 _FROM_FIELD, _FROM_PAYLOAD, _FROM_RESULT = 1 << 8, 2 << 8, 3 << 8
+# The arguments of the results that depend on what is before the payload, the low byte first.
+_DATA_BYTES = 6, 7
 _LITTLE, _INLINE, _DATA, _KEY = 1, 2, 4, 8
 _IP_BYTES, _UDP_BYTES = 20, 8
-_PRELUDE_WORDS = 9
+_PRELUDE_WORDS = 8
 # A header of IPv4 without options; its protocol.
 _IPV4, _TIME_TO_LIVE, _UDP, _DO_NOT_FRAGMENT = 0x45, 64, 17, 0x4000
 _TYPE_IPV4, _NO_CHECKSUM = b"\x08\x00", bytes(2)
@@ -77,7 +79,6 @@ class Result(Enum):
     PACKET_BYTES = 0, 1
     DATAGRAM_BYTES = 2, 3
     HEADER_CHECKSUM = 4, 5
-    DATA_BYTES = 6, 7
 
 
 class Payload(Enum):
@@ -86,7 +87,14 @@ class Payload(Enum):
     SAMPLE = 0
 
 
-Part = bytes | Field | Result | Payload
+@dataclass(frozen=True)
+class DataBytes:
+    """The bytes of the submessage with the payload: the hardware adds those of the payload to `before`."""
+
+    before: int
+
+
+Part = bytes | Field | Result | DataBytes | Payload
 
 
 @dataclass(frozen=True)
@@ -159,7 +167,7 @@ def program(node: Node, packet: Packet) -> Words:
     header = struct.pack(">BBH", _IPV4, 0, 0), struct.pack(">HHBB", 0, _DO_NOT_FRAGMENT, _TIME_TO_LIVE, _UDP)
     sum_ = sum_of_words(b"".join(header) + node.network.address.packed)
     length = _IP_BYTES + _UDP_BYTES + sum(map(_size, packet.parts))
-    prelude = struct.pack(">HHB", sum_, length, _before_payload(packet)), target
+    prelude = struct.pack(">HH", sum_, length), target
     ethernet = _GROUP_MAC if packet.to_group else Field.MAC, node.network.mac, _TYPE_IPV4
     ip = header[0][:2], Result.PACKET_BYTES, header[1], Result.HEADER_CHECKSUM, node.network.address.packed, target
     domain = node.network.domain
@@ -178,6 +186,8 @@ def _words(part: Part) -> Iterable[int]:
             return (_FROM_FIELD | part.address + place for place in range(part.size))
         case Result():
             return (_FROM_RESULT | argument for argument in part.value)
+        case DataBytes():
+            return (_FROM_RESULT | part.before // 4 << 3 | argument for argument in _DATA_BYTES)
         case Payload():
             return (_FROM_PAYLOAD,)
 
@@ -191,16 +201,10 @@ def _size(part: Part) -> int:
             return part.size
         case Result():
             return len(part.value)
+        case DataBytes():
+            return len(_DATA_BYTES)
         case Payload():
             return 0
-
-
-def _before_payload(packet: Packet) -> int:
-    """The bytes of the submessage with the payload, without the payload."""
-    if Payload.SAMPLE not in packet.parts:
-        return 0
-    start = packet.parts.index(Result.DATA_BYTES)
-    return sum(map(_size, packet.parts[start + 1 : packet.parts.index(Payload.SAMPLE)]))
 
 
 def sum_of_words(data: bytes) -> int:
@@ -269,16 +273,19 @@ def _endpoints(node: Node, name: str, items: Sequence[Endpoint], ends: tuple[byt
 
 def _sample() -> Submessage:
     head = struct.pack("<HH", 0, _TO_INLINE)
-    kind = bytes([Kind.DATA, _LITTLE | _DATA])
-    return kind, Result.DATA_BYTES, head, Field.READER, Field.WRITER, Field.NUMBER, Payload.SAMPLE
+    return _with_payload(Kind.DATA, _LITTLE | _DATA, head, Field.READER, Field.WRITER, Field.NUMBER)
 
 
 def _fragment() -> Submessage:
     head = struct.pack("<HH", 0, _TO_INLINE_OF_FRAGMENT)
-    kind = bytes([Kind.DATA_FRAG, _LITTLE])
     one = struct.pack("<HH", 1, FRAGMENT_BYTES)
     fields = Field.READER, Field.WRITER, Field.NUMBER, Field.FRAGMENT, one, Field.SAMPLE_BYTES
-    return kind, Result.DATA_BYTES, head, *fields, Payload.SAMPLE
+    return _with_payload(Kind.DATA_FRAG, _LITTLE, head, *fields)
+
+
+def _with_payload(kind: Kind, flags: int, *parts: Part) -> Submessage:
+    """A submessage of `parts`, whose size is a multiple of four bytes, and the payload."""
+    return bytes([kind, flags]), DataBytes(sum(map(_size, parts))), *parts, Payload.SAMPLE
 
 
 def _heartbeat() -> Submessage:

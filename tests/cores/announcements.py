@@ -49,6 +49,7 @@ SAMPLE = 64  # bytes of the longest payload that the node sends
 _IDLE = -1  # an event that waits until the node has nothing to do
 _GAP = 12  # cycles between two packets, at least
 _ETHERNET, _UDP = 14, 42  # bytes before the header of IPv4, and before the payload of UDP
+_RTPS_HEADER = 20  # bytes
 Inline = tuple[tuple[int, bytes], ...]
 Sent = tuple[Address, bytes]
 
@@ -141,6 +142,28 @@ def _publish(participant: Participant, frame: bytes, results: Results, now: int)
 def sent(frame: bytes) -> Sent:
     """The address and the message of a frame that a node sent."""
     return Address(str(IPv4Address(frame[30:34])), int.from_bytes(frame[36:38])), frame[_UDP:]
+
+
+def without_counts(packets: Sequence[Sent]) -> list[Sent]:
+    """The same packets without the counts of heartbeats and requests, each of which has to be above the one before.
+
+    A packet that the hardware has prepared may get its count before others that are sent earlier.
+    """
+    last: dict[tuple[Address, bytes], int] = {}
+    results = []
+    for address, packet in packets:
+        content, place = bytearray(packet), _RTPS_HEADER
+        while place < len(packet):
+            kind, size = packet[place], int.from_bytes(packet[place + 2 : place + 4], "little")
+            ends, end = packet[place + 4 : place + 12], place + 4 + size
+            if kind in (rtps.Kind.HEARTBEAT, rtps.Kind.ACKNACK):
+                count = int.from_bytes(packet[end - 4 : end], "little")
+                assert count > last.get((address, ends), 0), f"count {count} of {ends.hex()} comes again"
+                last[address, ends] = count
+                content[end - 4 : end] = bytes(4)
+            place = end
+        results.append((address, bytes(content)))
+    return results
 
 
 @dataclass

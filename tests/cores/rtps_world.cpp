@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Events from the standard input at a node, and its results on the standard output: see firm_rtps_node_tb. The
 // numbers of peers, sources and sinks, `entries`, the `cycles` until the node had nothing to do after milliseconds, and
-// a line `done` follow the results of each event. The arguments are the address of the program's loop, and of 100 cycles
+// a line `done` follow the results of each event. `latency` is the number of cycles from the last byte of a frame to the
+// first one that is sent after it. The arguments are the address of the program's loop, and of 100 cycles
 // those in which the host takes nothing.
 #include <cstdlib>
 #include <iostream>
@@ -53,6 +54,8 @@ class World {
       step();
     }
     top_.sample_tvalid = 0;
+    since_frame_ = 0;
+    awaits_ = sent_.empty();
   }
   void wait() {
     for (idle_ = 0; idle_ < IDLE_LOOPS;) step();
@@ -75,6 +78,7 @@ class World {
   void watch() {
     ++since_main_;
     ++cycles_;
+    ++since_frame_;
     if (top_.packet_tvalid || top_.tick || top_.sample_tvalid || top_.is_busy || top_.frame_tvalid) {
       idle_ = 0;
     } else if (top_.program_enable && top_.program_address == main_) {
@@ -83,6 +87,8 @@ class World {
       since_main_ = 0;
     }
     if (top_.frame_tvalid && top_.frame_tready) collect("frame", frame_, top_.frame_tdata, top_.frame_tlast);
+    if (top_.sent_tvalid && awaits_) std::printf("latency %u\n", since_frame_);
+    if (top_.sent_tvalid) awaits_ = false;
     if (top_.sent_tvalid) collect("sent", sent_, top_.sent_tdata, top_.sent_tlast);
     if (top_.is_frame_refused) std::puts("refused");
     if (top_.is_sample_lost || top_.is_discovery_lost) std::puts("lost");
@@ -98,7 +104,8 @@ class World {
 
   Vrtps_world top_;
   const unsigned main_, stall_;
-  unsigned since_main_ = 0, idle_ = 0, cycles_ = 0, busy_ = 0;
+  unsigned since_main_ = 0, since_frame_ = 0, idle_ = 0, cycles_ = 0, busy_ = 0;
+  bool awaits_ = false;
   std::string frame_, sent_;
   std::mt19937 random_{20261127};
 };

@@ -52,6 +52,7 @@ class World:
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match
         self.cycles = 0  # of the last event, until the node had nothing to do
+        self.latency = 0  # cycles from the last frame's end to the first byte of a packet
 
     def __enter__(self) -> World:
         return self
@@ -74,6 +75,8 @@ class World:
                 self.entries = numbers
             elif kind == "cycles":
                 (self.cycles,) = numbers
+            elif kind == "latency":
+                (self.latency,) = numbers
             elif kind == "frame":
                 found.frames.append(bytes(numbers))
             elif kind == "sent":

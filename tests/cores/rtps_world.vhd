@@ -4,6 +4,7 @@ library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
+use firm.firm_rtps_pkg.all;
 
 entity rtps_world is
   generic (
@@ -71,10 +72,12 @@ architecture rtl of rtps_world is
   signal packets_word    : std_logic_vector(10 downto 0);
 
   signal start          : std_logic;
+  signal bank           : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal packet         : std_logic_vector(7 downto 0);
   signal entry          : std_logic_vector(PROGRAM_BITS-1 downto 0);
   signal busy           : std_logic;
   signal build_valid    : std_logic;
+  signal build_bank     : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal build_address  : std_logic_vector(6 downto 0);
   signal build_data     : std_logic_vector(7 downto 0);
   signal payload_bytes  : std_logic_vector(15 downto 0);
@@ -156,9 +159,11 @@ begin
       sample_tready       => sample_tready,
       start               => start,
       packet              => packet,
+      bank                => bank,
       payload_bytes       => payload_bytes,
       is_busy             => busy,
       build_field_valid   => build_valid,
+      build_field_bank    => build_bank,
       build_field_address => build_address,
       build_field_data    => build_data,
       payload_tdata       => payload_tdata,
@@ -179,16 +184,19 @@ begin
 
   u_builder : entity firm.firm_packet_builder
     generic map (
-      ADDRESS_BITS => PROGRAM_BITS
+      ADDRESS_BITS => PROGRAM_BITS,
+      BANK_BITS    => RTPS_BANK_BITS
     )
     port map (
       clk             => clk,
       rst_n           => rst_n,
       start           => start,
       entry           => entry,
+      bank            => bank,
       payload_bytes   => payload_bytes,
       is_busy         => busy,
       field_valid     => build_valid,
+      field_bank      => build_bank,
       field_address   => build_address,
       field_data      => build_data,
       program_enable  => packets_enable,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 import struct
 from collections.abc import Iterator
@@ -29,6 +30,9 @@ FEW_TOPICS = 2
 CYCLES = 125_000
 # Of the time of the timers, a packet waits for that of one packet at most; it takes its own time, too.
 FEW = 6
+
+# From the end of a frame to the first byte of its packet; the MAC and the pins are not counted.
+LATENCY = 12
 
 # Milliseconds without a packet of the node, after which nothing is repeated.
 QUIET = 110
@@ -132,6 +136,22 @@ def test_the_timers_leave_time(net: Net) -> None:
     print(f"{max(due)} cycles and packets at most")
     assert max(count for _, count in due) >= MOST_PEERS * TOPICS
     assert max(cycles for cycles, _ in due) < CYCLES
+
+
+def test_a_message_leaves_at_once_while_the_program_looks_at_the_timers(net: Net) -> None:
+    seed = 20261127
+    print(f"seed {seed}")
+    chance, payload = random.Random(seed), rtps.XCDR1 + bytes(4)
+    latencies = []
+    for turn in range(3 * TOPICS):
+        _come_to_rest(net)
+        net.world.do(Event(Kind.RUSHED, count=1))
+        before, packets = chance.randrange(2500), net.sent
+        frame = struct.pack("<BI", turn % TOPICS, len(payload)) + payload
+        net.do(Event(Kind.FRAME, frame, before=before))
+        assert net.sent == packets + MOST_PEERS
+        latencies.append(net.world.latency)
+    assert latencies == [LATENCY] * len(latencies)
 
 
 def _idle_cycles(net: Net) -> int:

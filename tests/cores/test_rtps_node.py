@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.fabric.control import main_of
-from tests.cores.announcements import SURE, WRITTEN, Event, Kind, Peers, Results, a_node, expected, sent
+from tests.cores.announcements import SURE, WRITTEN, Event, Kind, Peers, Results, a_node, expected, sent, without_counts
 from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
 from tests.fabric.memories import bits
@@ -63,7 +63,8 @@ def test_the_data_of_the_core_are_those_of_the_program(tmp_path: Path) -> None:
 
 
 def _check(found: Results, wanted: Results) -> None:
-    for place, (ours, theirs) in enumerate(zip(found.sent, wanted.sent, strict=False)):
+    both = zip(without_counts(found.sent), without_counts(wanted.sent), strict=False)
+    for place, (ours, theirs) in enumerate(both):
         assert ours == theirs, f"packet {place}: {ours[0]} {parse(ours[1])} instead of {theirs[0]} {parse(theirs[1])}"
     assert len(found.sent) == len(wanted.sent)
     assert found.frames == wanted.frames
@@ -152,7 +153,7 @@ def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
         assert world.pulses["lost"] > 5
     assert 5 < len(found.frames) < len(wanted.frames)
     assert all(any(frame[5:] in event.data for event in events) for frame in found.frames)
-    assert found.sent == wanted.sent
+    assert without_counts(found.sent) == without_counts(wanted.sent)
 
 
 @pytest.mark.check

@@ -10,7 +10,7 @@ from fusesoc_firm.fabric.packets import Field, Programs
 from tests.cores.ethernet import checksum
 
 PORT = 7411
-_LAST, _PRELUDE = 1 << 10, 9
+_LAST, _PRELUDE = 1 << 10, 8
 
 
 @dataclass(frozen=True)
@@ -92,17 +92,15 @@ def run(programs: Programs, name: str, fields: Fields, payload: bytes = b"") -> 
     words = list(_words(programs, programs.entries[name]))
     prelude = bytes(_constant(word, memory) for word in words[:_PRELUDE])
     total = int.from_bytes(prelude[2:4]) + len(padded)
-    header = prelude[:2] + total.to_bytes(2, "big") + prelude[5:9]
-    before = prelude[4] + len(padded)
+    header = prelude[:2] + total.to_bytes(2, "big") + prelude[4:8]
     results = b"".join(number.to_bytes(2, "big") for number in (total, total - 20, checksum(header)))
-    results += before.to_bytes(2, "little")
     frame = b""
     for word in words[_PRELUDE:]:
         source = word >> 8 & 3
         frame += (
             (padded or b"\0")
             if source == 2
-            else results[word & 7 :][:1]
+            else (results + ((word >> 3 & 31) * 4 + len(padded)).to_bytes(2, "little"))[word & 7 :][:1]
             if source == 3
             else bytes([_constant(word, memory)])
         )

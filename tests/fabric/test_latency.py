@@ -25,8 +25,8 @@ from tests.hdl.ghdl import REPOSITORY, Library, core_files
 
 HERE = Path(__file__).parent
 QUATERNION = rtps.XCDR1 + bytes(32)
-# Cycles, from the last byte of the line to the Manager's first beat.
-MOST_IN = 16
+# Cycles, from the last byte of the line to the Manager's first beat, and from its last beat to the line.
+MOST_IN = MOST_OUT = 16
 _PAGE = REPOSITORY / "docs" / "reference" / "network.md"
 
 
@@ -81,6 +81,7 @@ def test_a_sample_comes_and_leaves_in_time(tmp_path: Path, phase: int) -> None:
     found = dict(row.split() for row in (tmp_path / "latency.txt").read_text(encoding="ascii").splitlines())
     print(found)
     assert int(found["in"]) <= MOST_IN
+    assert int(found["out"]) <= MOST_OUT
     told = re.findall(r"\| (\d+) cycles \|", _PAGE.read_text(encoding="utf-8"))
     assert len(told) == 2
     assert int(told[0]) - 1 <= int(found["in"]) <= int(told[0])

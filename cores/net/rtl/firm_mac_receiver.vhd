@@ -6,7 +6,9 @@
 -- Nothing stalls the line, so `m_axis` has no `tready`: the sink takes each beat at once.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_mac_receiver is
   generic (
@@ -41,6 +43,7 @@ architecture rtl of firm_mac_receiver is
   constant START_BYTE    : std_logic_vector(7 downto 0) := x"d5";
   constant FCS_BYTES     : positive := 4;
   constant SHORTEST      : positive := 64;  -- with FCS
+  constant COUNT_BITS    : positive := clog2(LONGEST+FCS_BYTES+1);
 
   -- SKIPPED lasts to the end of the burst, which has had its pulse.
   type state_t is (IDLE, PREAMBLE, FRAME, SKIPPED);
@@ -50,6 +53,7 @@ architecture rtl of firm_mac_receiver is
   type delay_t is array (0 to FCS_BYTES) of std_logic_vector(7 downto 0);
   signal delay_r : delay_t;
   signal count_r : natural range 0 to LONGEST+FCS_BYTES;  -- bytes so far
+  signal count   : std_logic_vector(COUNT_BITS-1 downto 0);
   signal error_r : std_logic;                             -- the PHY reported an error in the frame
 
   signal takes_byte : std_logic;  -- a byte of the frame arrives
@@ -69,8 +73,9 @@ begin
   takes_byte <= rx_step and rx_dv when state_r = FRAME else '0';
   ends       <= rx_step and not rx_dv when state_r = FRAME else '0';
   overflows  <= takes_byte when count_r = LONGEST+FCS_BYTES else '0';
-  has_byte   <= '1' when count_r > FCS_BYTES else '0';
-  is_whole   <= is_right and not error_r when count_r >= SHORTEST else '0';
+  count      <= std_logic_vector(to_unsigned(count_r, COUNT_BITS));
+  has_byte   <= not is_below(count, FCS_BYTES+1);
+  is_whole   <= is_right and not (error_r or is_below(count, SHORTEST));
   clear      <= '0' when state_r = FRAME else '1';
 
   u_crc : entity firm.firm_crc32

@@ -5,7 +5,9 @@
 -- for a source that pauses within a frame, and for a frame that is longer than LONGEST.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_mac_transmitter is
   generic (
@@ -43,6 +45,7 @@ architecture rtl of firm_mac_transmitter is
   constant FCS_BYTES      : positive := 4;
   constant GAP_BYTES      : positive := 12;
   constant SHORTEST       : positive := 60;  -- without FCS
+  constant COUNT_BITS     : positive := clog2(LONGEST+1);
 
   type state_t is (IDLE, PREAMBLE, FRAME, PADDING, FCS, GAP);
   signal state_r : state_t;
@@ -73,7 +76,7 @@ begin
 
   taken     <= s_axis_tvalid and tx_step when state_r = FRAME else '0';
   is_final  <= '1' when s_axis_tlast = '1' or count_r = LONGEST-1 else '0';
-  is_padded <= '1' when count_r >= SHORTEST-1 else '0';
+  is_padded <= not is_below(std_logic_vector(to_unsigned(count_r, COUNT_BITS)), SHORTEST-1);
 
   -- A byte that equals the register's lowest one shifts the register by a byte.
   sum_data  <= s_axis_tdata when state_r = FRAME else

@@ -8,6 +8,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
+use firm.firm_rtps_pkg.all;
 
 entity firm_net_link is
   generic (
@@ -179,15 +180,16 @@ architecture rtl of firm_net_link is
   -- Packets of the node, and of its presence.
   signal node_start    : std_logic;
   signal node_packet   : std_logic_vector(7 downto 0);
-  signal node_bytes    : std_logic_vector(15 downto 0);
   signal wants_report  : std_logic;
   signal wants_probe   : std_logic;
   signal is_sent       : std_logic;
   signal start         : std_logic;
   signal payload_bytes : std_logic_vector(15 downto 0);
+  signal bank          : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal is_busy       : std_logic;
 
   signal field_valid    : std_logic;
+  signal field_bank     : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal field_address  : std_logic_vector(6 downto 0);
   signal field_data     : std_logic_vector(7 downto 0);
   signal payload_tdata  : std_logic_vector(7 downto 0);
@@ -404,9 +406,11 @@ begin
       sample_tready       => frame_tready,
       start               => node_start,
       packet              => node_packet,
-      payload_bytes       => node_bytes,
+      bank                => bank,
+      payload_bytes       => payload_bytes,
       is_busy             => is_busy,
       build_field_valid   => field_valid,
+      build_field_bank    => field_bank,
       build_field_address => field_address,
       build_field_data    => field_data,
       payload_tdata       => payload_tdata,
@@ -554,25 +558,27 @@ begin
 
   -- The node starts a packet only while the builder is not busy. Its presence has constant frames, which neither need
   -- nor change the fields and the payload that the node has prepared; so they may leave between any two packets.
-  start         <= node_start or ((wants_report or wants_probe) and not is_busy);
-  is_sent       <= not node_start and (wants_report or wants_probe) and not is_busy;
-  packet        <= node_packet when node_start = '1' else
-                   number_of(REPORT_PACKET) when wants_report = '1' else
-                   number_of(PROBE_PACKET);
-  payload_bytes <= node_bytes when node_start = '1' else (others => '0');
+  start   <= node_start or ((wants_report or wants_probe) and not is_busy);
+  is_sent <= not node_start and (wants_report or wants_probe) and not is_busy;
+  packet  <= node_packet when node_start = '1' else
+             number_of(REPORT_PACKET) when wants_report = '1' else
+             number_of(PROBE_PACKET);
 
   u_builder : entity firm.firm_packet_builder
     generic map (
-      ADDRESS_BITS => PROGRAM_BITS
+      ADDRESS_BITS => PROGRAM_BITS,
+      BANK_BITS    => RTPS_BANK_BITS
     )
     port map (
       clk             => clk,
       rst_n           => rst_n,
       start           => start,
       entry           => entry,
+      bank            => bank,
       payload_bytes   => payload_bytes,
       is_busy         => is_busy,
       field_valid     => field_valid,
+      field_bank      => field_bank,
       field_address   => field_address,
       field_data      => field_data,
       program_enable  => program_enable,

@@ -6,6 +6,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_net_presence is
   port (
@@ -44,9 +46,13 @@ architecture rtl of firm_net_presence is
   constant SENDER_PLACE    : natural := 22;  -- of ARP: a MAC address and an IPv4 address
   constant MAC_BYTES       : natural := 6;
   constant ADDRESS_BYTES   : natural := 4;
-  constant QUERY_BYTES     : natural := 8;
   constant SHORTEST_HEADER : natural := 5;  -- of IPv4, in words
-  constant LAST_PLACE      : natural := 127;
+  constant LAST_PLACE      : natural := 63;
+  -- Counts of the bytes before IGMP, of which there is one more at the first byte of IGMP, and then downwards.
+  constant TYPE_COUNT  : natural := 1;
+  constant DELAY_COUNT : natural := 0;
+  constant GROUP_COUNT : natural := 122;  -- of the last byte of the group
+  constant LAST_COUNT  : natural := 121;
 
   subtype byte_t is std_logic_vector(7 downto 0);
   type bytes_t is array (natural range <>) of byte_t;
@@ -59,8 +65,8 @@ architecture rtl of firm_net_presence is
   constant NO_GROUP : std_logic_vector(31 downto 0) := (others => '0');
 
   -- Of the frame so far.
-  signal place_r  : unsigned(6 downto 0) := (others => '0');
-  signal igmp_r   : unsigned(6 downto 0) := (others => '0');  -- the place after the header of IPv4
+  signal place_r  : unsigned(5 downto 0) := (others => '0');
+  signal count_r  : unsigned(6 downto 0) := (others => '0');
   signal recent_r : std_logic_vector(47 downto 0) := (others => '0');  -- the last six bytes
   signal arp_r    : std_logic;
   signal other_r  : std_logic;  -- the ARP packet is of another host
@@ -86,7 +92,7 @@ architecture rtl of firm_net_presence is
       return "000111111";
     elsif unsigned(tenths) = 2 then
       return "001111111";
-    elsif unsigned(tenths) >= 3 and unsigned(tenths) <= 5 then
+    elsif is_within(tenths, 3, 5) = '1' then
       return "011111111";
     end if;
     return "111111111";
@@ -135,19 +141,24 @@ begin
         if differs(place_r, s_axis_tdata, IPV4) then
           query_r <= '0';
         elsif place_r = IPV4_PLACE then
-          igmp_r <= to_unsigned(IPV4_PLACE, 7) + (unsigned(s_axis_tdata(3 downto 0)) & "00");
-          if s_axis_tdata(7 downto 4) /= VERSION or unsigned(s_axis_tdata(3 downto 0)) < SHORTEST_HEADER then
+          if s_axis_tdata(7 downto 4) /= VERSION or is_below(s_axis_tdata(3 downto 0), SHORTEST_HEADER) = '1' then
             query_r <= '0';
           end if;
         elsif place_r = PROTOCOL_PLACE and s_axis_tdata /= IGMP then
           query_r <= '0';
-        elsif place_r > PROTOCOL_PLACE and place_r = igmp_r and s_axis_tdata /= QUERY then
+        elsif count_r = TYPE_COUNT and s_axis_tdata /= QUERY then
           query_r <= '0';
-        elsif place_r > PROTOCOL_PLACE and place_r = igmp_r + 1 then
+        elsif count_r = DELAY_COUNT then
           limit_r <= limit_of(s_axis_tdata);
-        elsif place_r > PROTOCOL_PLACE and place_r = igmp_r + (QUERY_BYTES-1)
-              and (recent(31 downto 0) = NO_GROUP or recent(31 downto 0) = group_ip) then
+        elsif count_r = GROUP_COUNT and (recent(31 downto 0) = NO_GROUP or recent(31 downto 0) = group_ip) then
           meant_r <= '1';
+        end if;
+        if place_r = IPV4_PLACE then
+          count_r <= '0' & unsigned(s_axis_tdata(3 downto 0)) & "00";
+        elsif is_below(std_logic_vector(place_r), IPV4_PLACE) = '1' then
+          count_r <= to_unsigned(LAST_COUNT, 7);
+        elsif count_r /= LAST_COUNT then
+          count_r <= count_r - 1;
         end if;
         if place_r /= LAST_PLACE then
           place_r <= place_r + 1;
@@ -186,7 +197,7 @@ begin
         ms_r <= (ms_r + 1) mod SECOND;
         if ms_r = SECOND-1 then
           seconds_r <= seconds_r + 1;
-          if seconds_r < REPEATS then
+          if is_below(std_logic_vector(seconds_r), REPEATS) = '1' then
             report_r <= '1';
             probe_r  <= '1';
           end if;

@@ -10,6 +10,7 @@ library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_net_responder is
   generic (
@@ -60,7 +61,8 @@ architecture rtl of firm_net_responder is
   constant ETHERNET_BYTES    : natural := 14;
   constant IPV4_BYTES        : natural := 20;
   -- The place from which nothing more is decided; counts of places stop there.
-  constant END_PLACE         : natural := 63;
+  constant PLACE_BITS        : natural := 6;
+  constant END_PLACE         : natural := 2**PLACE_BITS-1;
 
   -- Of ARP: Ethernet for IPv4, a request.
   constant ARP_REQUEST  : bytes_t(12 to 21) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04", x"00", x"01");
@@ -72,8 +74,9 @@ architecture rtl of firm_net_responder is
   constant ARP_REPLY    : byte_t            := x"02";
   -- The flag for more fragments, and the offset.
   constant FRAGMENT     : byte_t            := x"3f";
-  -- The reply's checksum is higher by the difference of the types, 8 in its upper byte, which overflows from here on.
-  constant OVERFLOWING : unsigned(7 downto 0) := x"f8";
+  -- The reply's checksum is higher by the difference of the types, 8 in its upper byte, which overflows if these bits
+  -- are ones.
+  constant OVERFLOWING : std_logic_vector(7 downto 3) := "11111";
 
   -- The newest byte first. A reply's byte of the same place is AHEAD bytes behind it: its first bytes are those of the
   -- request's source.
@@ -83,7 +86,7 @@ architecture rtl of firm_net_responder is
   signal delay_r     : bytes_t(0 to AHEAD+ARP_MOVE);
 
   signal place_r   : natural range 0 to END_PLACE;      -- of the request's byte
-  signal count_r   : unsigned(15 downto 0) := (others => '0');  -- bytes of the request so far
+  signal at        : std_logic_vector(PLACE_BITS-1 downto 0);  -- the same
   signal shift     : std_logic;
   signal left_r    : natural range 0 to AHEAD;          -- shifts after the request's last byte
   signal early_r   : natural range 0 to AHEAD;          -- shifts before the reply's first byte
@@ -95,8 +98,8 @@ architecture rtl of firm_net_responder is
   signal echo_r      : std_logic;                       -- it is an echo request for this host
   -- Of the IPv4 header's words; the highest bit is a carry, which is added with the next word.
   signal sum_r       : unsigned(16 downto 0) := (others => '0');
-  signal length_r    : unsigned(15 downto 0) := (others => '0');  -- of the IPv4 packet
-  signal needed_r    : unsigned(16 downto 0) := (others => '0');  -- bytes of its frame before the last one
+  signal unseen_r    : unsigned(15 downto 0) := (others => '0');  -- bytes of the IPv4 packet to come, and four
+  signal enough_r    : std_logic;                       -- the packet has an ICMP header
   signal summed_r    : std_logic;                       -- the IPv4 header's checksum is right
   signal holds_r     : std_logic;                       -- the frame holds the IPv4 packet
   signal aborted_r   : std_logic;
@@ -144,15 +147,6 @@ architecture rtl of firm_net_responder is
     return '0';
   end function differs;
 
-  -- Whether the upper byte of a request's checksum overflows in the reply.
-  function carries(byte : byte_t) return std_logic is
-  begin
-    if unsigned(byte) >= OVERFLOWING then
-      return '1';
-    end if;
-    return '0';
-  end function carries;
-
   -- The bytes of a word as they are in a frame from `place` on.
   function placed(word : std_logic_vector; place : natural) return bytes_t is
     variable bytes : bytes_t(place to place+word'length/8-1);
@@ -165,20 +159,21 @@ architecture rtl of firm_net_responder is
 
   -- What the byte at `place` of a reply is.
   function origin_of(place : natural; is_arp : std_logic) return origin_t is
+    constant BITS : std_logic_vector(PLACE_BITS-1 downto 0) := std_logic_vector(to_unsigned(place, PLACE_BITS));
   begin
-    if place < MAC_BYTES then
+    if is_below(BITS, MAC_BYTES) = '1' then
       return SOURCE;
-    elsif place < 2*MAC_BYTES then
+    elsif is_below(BITS, 2*MAC_BYTES) = '1' then
       return GIVEN;
     elsif is_arp = '1' then
-      if place > OPCODE_PLACE and place < TARGET_PLACE then
+      if is_within(BITS, OPCODE_PLACE+1, TARGET_PLACE-1) = '1' then
         return GIVEN;
-      elsif place >= TARGET_PLACE and place < TARGET_PLACE+ARP_MOVE then
+      elsif is_within(BITS, TARGET_PLACE, TARGET_PLACE+ARP_MOVE-1) = '1' then
         return ARP_MOVED;
       end if;
-    elsif place >= SOURCE_PLACE and place < DESTINATION_PLACE then
+    elsif is_within(BITS, SOURCE_PLACE, DESTINATION_PLACE-1) = '1' then
       return GIVEN;
-    elsif place >= DESTINATION_PLACE and place < DESTINATION_PLACE+IPV4_MOVE then
+    elsif is_within(BITS, DESTINATION_PLACE, DESTINATION_PLACE+IPV4_MOVE-1) = '1' then
       return IPV4_MOVED;
     elsif place = ICMP_PLACE then
       return GIVEN;
@@ -204,6 +199,7 @@ architecture rtl of firm_net_responder is
 
 begin
 
+  at    <= std_logic_vector(to_unsigned(place_r, PLACE_BITS));
   shift <= '1' when s_axis_tvalid = '1' or left_r /= 0 else '0';
 
   delay : process (clk)
@@ -211,9 +207,12 @@ begin
     if rising_edge(clk) and shift = '1' then
       delay_r(0)                 <= s_axis_tdata;
       delay_r(1 to delay_r'high) <= delay_r(0 to delay_r'high-1);
-      overflows_r                <= carries(delay_r(AHEAD-1));
+      overflows_r                <= '0';
       overflowed_r               <= overflows_r;
       full_r                     <= '0';
+      if delay_r(AHEAD-1)(OVERFLOWING'range) = OVERFLOWING then
+        overflows_r <= '1';
+      end if;
       if delay_r(AHEAD-2) = x"ff" then
         full_r <= '1';
       end if;
@@ -226,13 +225,11 @@ begin
   begin
     if rising_edge(clk) then
       if s_axis_tvalid = '1' then
-        count_r <= count_r + 1;
         if place_r /= END_PLACE then
           place_r <= place_r + 1;
         end if;
         if s_axis_tlast = '1' then
           place_r <= 0;
-          count_r <= (others => '0');
           left_r  <= AHEAD;
         end if;
       elsif left_r /= 0 then
@@ -240,7 +237,6 @@ begin
       end if;
       if rst_n = '0' then
         place_r <= 0;
-        count_r <= (others => '0');
         left_r  <= 0;
       end if;
     end if;
@@ -257,7 +253,7 @@ begin
         arp_r       <= '1';
         echo_r      <= '1';
       end if;
-      if place_r < MAC_BYTES then
+      if is_below(at, MAC_BYTES) = '1' then
         if differs(place_r, s_axis_tdata, placed(mac, 0)) = '1' then
           direct_r <= '0';
         end if;
@@ -298,34 +294,41 @@ begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if place_r = 0 then
         sum_r <= (others => '0');
-      elsif place_r >= ETHERNET_BYTES and place_r < ETHERNET_BYTES+IPV4_BYTES and place_r mod 2 = 1 then
+      elsif is_within(at, ETHERNET_BYTES, ETHERNET_BYTES+IPV4_BYTES-1) = '1' and place_r mod 2 = 1 then
         carry(0) := sum_r(16);
         sum_r    <= resize(sum_r(15 downto 0), 17) + (unsigned(delay_r(0)) & unsigned(s_axis_tdata)) + carry;
       end if;
-      needed_r <= ('0' & length_r) + (ETHERNET_BYTES-1);
-      if place_r = LENGTH_PLACE or place_r = LENGTH_PLACE+1 then
-        length_r <= length_r(7 downto 0) & unsigned(s_axis_tdata);
+      -- The four bytes up to here are counted at the end.
+      if place_r = LENGTH_PLACE+1 then
+        unseen_r <= unsigned(delay_r(0)) & unsigned(s_axis_tdata);
+      elsif unseen_r /= 0 then
+        unseen_r <= unseen_r - 1;
       end if;
-      if s_axis_tlast = '1' then
-        holds_r <= '0';
+      if place_r = LENGTH_PLACE+2 then
+        enough_r <= '0';
         -- At least 28 bytes; a comparison of parts needs no adder.
-        if (length_r(15 downto 5) /= 0 or length_r(4 downto 2) = "111") and ('0' & count_r) >= needed_r then
-          holds_r <= '1';
+        if unseen_r(15 downto 5) /= 0 or unseen_r(4 downto 2) = "111" then
+          enough_r <= '1';
         end if;
       end if;
     end if;
   end process check_header;
 
-  -- The words and the carries add up to all ones. A register of its own: there is time until the end of the frame.
-  compare_sum : process (clk)
+  -- The words and the carries add up to all ones; the frame holds the packet. Registers of their own: there is time
+  -- until the reply ends.
+  judge : process (clk)
   begin
     if rising_edge(clk) then
       summed_r <= '0';
       if sum_r(15 downto 1) = "111111111111111" then
         summed_r <= sum_r(0) xor sum_r(16);
       end if;
+      holds_r <= '0';
+      if enough_r = '1' and unseen_r(15 downto 3) = 0 and (unseen_r(2) = '0' or unseen_r(1 downto 0) = 0) then
+        holds_r <= '1';
+      end if;
     end if;
-  end process compare_sum;
+  end process judge;
 
   -- ------------------------------------------------------------------ the reply
 

@@ -4,31 +4,36 @@
 -- checksum of their own (RFC 768 allows that). One byte leaves in every cycle.
 --
 -- A word of a program is one byte of the frame, or the payload: bit 10 marks the last one, bits 9 to 8 are the source,
--- and bits 7 to 0 the argument. A program begins with nine words that are not sent: the sum of the header's constant
--- words, the length of the packet without the payload, and the length of the submessage before it, all with the high
--- byte first, and the destination's address.
+-- and bits 7 to 0 the argument. A program begins with eight words that are not sent: the sum of the header's constant
+-- words, the length of the packet without the payload, both with the high byte first, and the destination's address.
+--
+-- There are several banks of fields. So a packet may be ready in one of them while others are written and sent.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 
 entity firm_packet_builder is
   generic (
-    ADDRESS_BITS : integer := 12  -- of the programs' memory
+    ADDRESS_BITS : integer := 12; -- of the programs' memory
+    BANK_BITS    : integer := 4   -- of the number of a bank, 1 to 8
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of four bytes; its
-    -- size is 0 if the program has no payload, and only then. If it is 0 nevertheless, one byte is sent in its place:
-    -- the frame cannot be right, but it has neither a pause nor 64 KiB.
+    -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of four bytes. Its
+    -- size, from three cycles after the start up to the end, is 0 if the program has no payload, and only then. If it
+    -- is 0 nevertheless, one byte is sent in its place: the frame cannot be right, but it has neither a pause nor
+    -- 64 KiB.
     start         : in  std_logic;
     entry         : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
+    bank          : in  std_logic_vector(BANK_BITS-1 downto 0);
     payload_bytes : in  std_logic_vector(15 downto 0);
     is_busy       : out std_logic;
 
     -- Fields, written while `is_busy` is low.
     field_valid   : in std_logic;
+    field_bank    : in std_logic_vector(BANK_BITS-1 downto 0);
     field_address : in std_logic_vector(6 downto 0);
     field_data    : in std_logic_vector(7 downto 0);
 
@@ -53,25 +58,28 @@ architecture rtl of firm_packet_builder is
 
   constant FIELD_BITS     : positive := 7;
   constant HEADER_BYTES   : positive := 20;  -- of IPv4
-  constant PRELUDE_WORDS  : positive := 9;   -- that are not sent
-  constant DATA_WORD      : positive := 4;   -- the one with the length of the submessage
+  constant PRELUDE_WORDS  : positive := 8;   -- that are not sent
 
   subtype source_t is std_logic_vector(1 downto 0);
   constant FROM_WORD    : source_t := "00";  -- the argument itself
   constant FROM_FIELD   : source_t := "01";  -- its address
   constant FROM_PAYLOAD : source_t := "10";
-  constant FROM_RESULT  : source_t := "11";  -- bits 2 to 1: which number; bit 0: which byte
+  -- Bits 2 to 1: which number; bit 0: which byte. If it is the length of a submessage, bits 7 to 3 are the words of
+  -- four bytes before the payload.
+  constant FROM_RESULT  : source_t := "11";
 
   -- No frame has 2048 bytes.
   constant NUMBER_BITS : positive := 11;
   subtype number_t is unsigned(NUMBER_BITS-1 downto 0);
 
-  type fields_t is array (natural range 0 to 2**FIELD_BITS-1) of std_logic_vector(7 downto 0);
+  type fields_t is array (natural range 0 to 2**(BANK_BITS+FIELD_BITS)-1) of std_logic_vector(7 downto 0);
   signal fields : fields_t;
 
   signal busy_r    : std_logic;
   signal shown_r   : std_logic;  -- program_word is one of the packet
   signal address_r : unsigned(ADDRESS_BITS-1 downto 0) := (others => '0');
+  signal bank_r    : std_logic_vector(BANK_BITS-1 downto 0) := (others => '0');
+  signal shows     : unsigned(ADDRESS_BITS-1 downto 0);  -- the address of the next program_word
   signal begins    : std_logic;
 
   -- The first stage: the word of the program. The word after it is shown by the memory.
@@ -81,7 +89,7 @@ architecture rtl of firm_packet_builder is
   signal source     : source_t;
   signal argument   : std_logic_vector(7 downto 0);
   signal payload    : std_logic;  -- it is the payload
-  signal bytes_r    : number_t := (others => '0');              -- of the payload
+  signal bytes      : number_t;                                 -- of the payload
   signal real_r     : number_t := (others => '0');              -- of them that are to come
   signal spent_r    : std_logic;                                -- none of them
   signal single_r   : std_logic;                                -- at most one of them
@@ -89,6 +97,7 @@ architecture rtl of firm_packet_builder is
   signal has_byte   : std_logic;
   signal moves      : std_logic;  -- a byte goes to the second stage
   signal is_final   : std_logic;  -- it is the word's last one
+  signal data_bytes : number_t;   -- of the submessage
   signal result     : std_logic_vector(7 downto 0);
 
   -- The second stage: the byte.
@@ -100,13 +109,13 @@ architecture rtl of firm_packet_builder is
   signal byte      : std_logic_vector(7 downto 0);
   signal prelude_r : natural range 0 to PRELUDE_WORDS-1;
   signal sent_r    : std_logic;  -- the prelude is over
+  signal closes_r  : std_logic;  -- since this cycle
   signal advance   : std_logic;
 
   -- Numbers of the packet.
   signal extra_r  : number_t := (others => '0');  -- bytes of the payload, with padding
   signal total_r  : number_t := (others => '0');  -- of the packet
   signal udp_r    : number_t := (others => '0');  -- of the datagram
-  signal data_r   : number_t := (others => '0');  -- of the submessage
   -- Its highest bit is a carry, which is added with the next word.
   signal sum_r    : unsigned(16 downto 0) := (others => '0');
 
@@ -120,6 +129,9 @@ begin
   assert ADDRESS_BITS >= 4 and ADDRESS_BITS <= 16
     report "firm_packet_builder: ADDRESS_BITS is " & integer'image(ADDRESS_BITS) & "; legal: 4 to 16"
     severity failure;
+  assert BANK_BITS >= 1 and BANK_BITS <= 8
+    report "firm_packet_builder: BANK_BITS is " & integer'image(BANK_BITS) & "; legal: 1 to 8"
+    severity failure;
 
   is_busy <= busy_r;
   begins  <= start and not busy_r;
@@ -129,7 +141,8 @@ begin
   source   <= word_r(9 downto 8);
   argument <= word_r(7 downto 0);
 
-  program_address <= entry when begins = '1' else std_logic_vector(address_r);
+  shows           <= unsigned(entry) when begins = '1' else address_r;
+  program_address <= std_logic_vector(shows);
   program_enable  <= begins or fetches;
 
   payload  <= '1' when source = FROM_PAYLOAD else '0';
@@ -147,12 +160,13 @@ begin
       if begins = '1' then
         busy_r    <= '1';
         shown_r   <= '1';
-        address_r <= unsigned(entry) + 1;
+        address_r <= shows + 1;
+        bank_r    <= bank;
       elsif fetches = '1' then
         word_r    <= program_word;
         fetched_r <= '1';
         shown_r   <= not program_word(10);
-        address_r <= address_r + 1;
+        address_r <= shows + 1;
       elsif moves = '1' and is_final = '1' then
         fetched_r <= '0';
       end if;
@@ -167,20 +181,22 @@ begin
     end if;
   end process fetch;
 
+  bytes <= unsigned(payload_bytes(NUMBER_BITS-1 downto 0));
+
   count_payload : process (clk)
   begin
     if rising_edge(clk) then
       if sent_r = '0' then
-        real_r   <= bytes_r;
+        real_r   <= bytes;
         spent_r  <= '0';
         single_r <= '0';
         phase_r  <= "00";
-        if bytes_r = 0 then
+        if bytes = 0 then
           -- One byte is sent.
           spent_r <= '1';
           phase_r <= "11";
         end if;
-        if bytes_r <= 1 then
+        if bytes(NUMBER_BITS-1 downto 1) = 0 then
           single_r <= '1';
         end if;
       elsif moves = '1' and payload = '1' then
@@ -193,11 +209,10 @@ begin
         end if;
         spent_r <= single_r;
       end if;
-      if begins = '1' then
-        bytes_r <= unsigned(payload_bytes(NUMBER_BITS-1 downto 0));
-      end if;
     end if;
   end process count_payload;
+
+  data_bytes <= extra_r + (unsigned(argument(7 downto 3)) & "00");
 
   result <= high_byte(total_r) when argument(2 downto 0) = "000" else
             std_logic_vector(total_r(7 downto 0)) when argument(2 downto 0) = "001" else
@@ -205,8 +220,8 @@ begin
             std_logic_vector(udp_r(7 downto 0)) when argument(2 downto 0) = "011" else
             not std_logic_vector(sum_r(15 downto 8)) when argument(2 downto 0) = "100" else
             not std_logic_vector(sum_r(7 downto 0)) when argument(2 downto 0) = "101" else
-            std_logic_vector(data_r(7 downto 0)) when argument(2 downto 0) = "110" else
-            high_byte(data_r);
+            std_logic_vector(data_bytes(7 downto 0)) when argument(2 downto 0) = "110" else
+            high_byte(data_bytes);
 
   -- ------------------------------------------------------------------ the byte
 
@@ -214,10 +229,10 @@ begin
   begin
     if rising_edge(clk) then
       if field_valid = '1' then
-        fields(to_integer(unsigned(field_address))) <= field_data;
+        fields(to_integer(unsigned(field_bank) & unsigned(field_address))) <= field_data;
       end if;
       if advance = '1' then
-        field_r <= fields(to_integer(unsigned(argument(FIELD_BITS-1 downto 0))));
+        field_r <= fields(to_integer(unsigned(bank_r) & unsigned(argument(FIELD_BITS-1 downto 0))));
       end if;
     end if;
   end process access_fields;
@@ -260,27 +275,29 @@ begin
     variable carry : unsigned(0 downto 0);
   begin
     if rising_edge(clk) then
-      word := (others => '0');
+      word     := (others => '0');
+      closes_r <= '0';
       if valid_r = '1' and sent_r = '0' then
         if prelude_r = PRELUDE_WORDS-1 then
-          sent_r <= '1';
+          sent_r   <= '1';
+          closes_r <= '1';
         else
           prelude_r <= prelude_r + 1;
         end if;
-        if prelude_r = 0 or prelude_r = 2 or prelude_r = 5 or prelude_r = 7 then
+        if prelude_r mod 2 = 0 then
           word(15 downto 8) := unsigned(byte);
-        elsif prelude_r = DATA_WORD then
-          data_r  <= extra_r + unsigned(byte);
-          total_r <= total_r + extra_r;
-          word    := resize(extra_r, 16);
         else
           word(7 downto 0) := unsigned(byte);
         end if;
         if prelude_r = 2 or prelude_r = 3 then
           total_r <= total_r(NUMBER_BITS-9 downto 0) & unsigned(byte);
         end if;
+      elsif closes_r = '1' then
+        -- Long before its first use.
+        total_r <= total_r + extra_r;
+        word    := resize(extra_r, 16);
       end if;
-      extra_r             <= bytes_r + 3;
+      extra_r             <= bytes + 3;
       extra_r(1 downto 0) <= "00";
       udp_r               <= total_r - HEADER_BYTES;
       carry(0)            := sum_r(16);

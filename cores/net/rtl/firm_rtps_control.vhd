@@ -65,14 +65,17 @@ entity firm_rtps_control is
     has_sample  : in  std_logic;
     writer      : in  std_logic_vector(2 downto 0);
     is_done     : out std_logic;
-    shows       : out std_logic;
 
-    -- To firm_packet_builder. `packet` is a number of fusesoc_firm.fabric.packets.
-    start               : out std_logic;
-    packet              : out std_logic_vector(7 downto 0);
-    has_payload         : out std_logic;
-    is_busy             : in  std_logic;
+    -- Of firm_rtps_sender; `slot_writer` is the writer whose packet is prepared.
+    prepare_valid : out std_logic;
+    payload_valid : out std_logic;  -- the slot of the payload
+    send_valid    : out std_logic;
+    waits         : in  std_logic;
+    is_started    : in  std_logic;
+
+    -- To firm_packet_builder.
     build_field_valid   : out std_logic;
+    build_field_bank    : out std_logic_vector(RTPS_BANK_BITS-1 downto 0);
     build_field_address : out std_logic_vector(6 downto 0);
     build_field_data    : out std_logic_vector(7 downto 0);
 
@@ -110,8 +113,10 @@ architecture rtl of firm_rtps_control is
   constant AT_PEERS     : address_t := x"b4";
   constant AT_SOURCES   : address_t := x"b5";
   constant AT_SINKS     : address_t := x"b6";
+  constant AT_BANK      : address_t := x"b7";  -- of the fields that are written
+  constant AT_PREPARED  : address_t := x"b8";  -- the packet of this writer's next sample
   -- Words that are read, from x"a0" on; of the last one, the bytes are the early sample's source, the writer of the
-  -- sample to send, and whether numbers are large.
+  -- sample to send, whether numbers are large, and whether the packet of the sample was prepared.
   constant WORD_OF_FACTS  : std_logic_vector(1 downto 0) := "00";
   constant WORD_OF_ENTITY : std_logic_vector(1 downto 0) := "01";
   constant WORD_OF_EARLY  : std_logic_vector(1 downto 0) := "10";
@@ -144,6 +149,8 @@ architecture rtl of firm_rtps_control is
   signal at_peers_r   : std_logic;
   signal at_sources_r : std_logic;
   signal at_sinks_r   : std_logic;
+  signal at_bank_r    : std_logic;
+  signal at_prepare_r : std_logic;
   signal builds_r     : std_logic;  -- one of the builder's, or of the payload's
 
   signal ticks_r   : unsigned(TICK_BITS-1 downto 0);  -- that the program has not taken
@@ -151,12 +158,7 @@ architecture rtl of firm_rtps_control is
   signal work_r    : std_logic;                        -- there was something for the program
   signal ends_tick : std_logic;
   signal locked_r  : std_logic;
-  signal payload_r : std_logic;
-  signal start_r   : std_logic;
-  signal packet_r  : std_logic_vector(7 downto 0) := (others => '0');
-  signal starts    : std_logic;
-  signal slots     : std_logic;  -- the payload is chosen
-  signal waits     : std_logic;  -- a packet leaves, or is about to
+  signal bank_r    : std_logic_vector(RTPS_BANK_BITS-1 downto 0) := RTPS_OWN_BANK;
   signal writer_r  : std_logic_vector(2 downto 0) := (others => '0');
   signal peers_r   : std_logic_vector(7 downto 0);
   signal sources_r : std_logic_vector(7 downto 0);
@@ -213,10 +215,9 @@ begin
       conditions         => conditions
     );
 
-  -- The builder's fields and the payload stay until its packet has left, and no slot is given to a new sample before;
-  -- numbers of samples stay while one is judged.
-  waits <= is_busy or start_r;
-  hold  <= (builds_r and waits) or (at_lock_r and data(0) and is_judging);
+  -- The builder's fields, packets that are prepared and the payload stay until a packet has left, and no slot is given
+  -- to a new sample before; numbers of samples stay while one is judged.
+  hold <= (builds_r and waits) or (at_lock_r and data(0) and is_judging);
 
   find_place : process (clk)
   begin
@@ -242,8 +243,11 @@ begin
         at_peers_r   <= is_at(coming, next_address, AT_PEERS);
         at_sources_r <= is_at(coming, next_address, AT_SOURCES);
         at_sinks_r   <= is_at(coming, next_address, AT_SINKS);
+        at_bank_r    <= is_at(coming, next_address, AT_BANK);
+        at_prepare_r <= is_at(coming, next_address, AT_PREPARED);
         builds_r     <= coming and not next_address(7);
-        if next_address = AT_SLOT or next_address = AT_NEXT_SLOT or next_address = AT_START then
+        if next_address = AT_SLOT or next_address = AT_NEXT_SLOT or next_address = AT_START
+           or next_address = AT_PREPARED then
           builds_r <= coming;
         end if;
       end if;
@@ -262,6 +266,8 @@ begin
         at_peers_r   <= '0';
         at_sources_r <= '0';
         at_sinks_r   <= '0';
+        at_bank_r    <= '0';
+        at_prepare_r <= '0';
         builds_r     <= '0';
       end if;
     end if;
@@ -269,8 +275,6 @@ begin
 
   -- ------------------------------------------------------------------ what is written
 
-  starts    <= at_start_r and not waits;
-  slots     <= at_slot_r and not waits;
   ends_tick <= at_taken_r and data(0);
   has_tick  <= '0' when ticks_r = 0 else '1';
 
@@ -280,6 +284,9 @@ begin
       work_r <= has_word or has_sample or has_early or has_tick;
       if at_writer_r = '1' then
         writer_r <= data(2 downto 0);
+      end if;
+      if at_bank_r = '1' then
+        bank_r <= data(RTPS_BANK_BITS-1 downto 0);
       end if;
       if at_peers_r = '1' then
         peers_r <= data;
@@ -293,17 +300,6 @@ begin
       if at_lock_r = '1' and hold = '0' then
         locked_r <= data(0);
       end if;
-      if slots = '1' then
-        payload_r <= '1';
-      elsif start_r = '1' and is_busy = '0' then
-        payload_r <= '0';
-      end if;
-      if starts = '1' then
-        start_r  <= '1';
-        packet_r <= data;
-      elsif is_busy = '0' then
-        start_r <= '0';
-      end if;
       if tick = '1' and ends_tick = '0' and ticks_r /= MOST_TICKS then
         ticks_r <= ticks_r + 1;
       elsif tick = '0' and ends_tick = '1' then
@@ -312,8 +308,6 @@ begin
       if rst_n = '0' then
         ticks_r   <= (others => '0');
         locked_r  <= '0';
-        payload_r <= '0';
-        start_r   <= '0';
         peers_r   <= (others => '0');
         sources_r <= (others => '0');
         sinks_r   <= (others => '0');
@@ -334,13 +328,13 @@ begin
   is_done     <= at_taken_r and data(2);
   slot_valid  <= at_next_r and not waits;
   slot_writer <= writer_r;
-  shows       <= slots;
 
-  -- Another packet may have begun meanwhile: then this one begins after it.
-  start               <= start_r;
-  packet              <= packet_r;
-  has_payload         <= payload_r;
+  prepare_valid <= at_prepare_r and not waits;
+  payload_valid <= at_slot_r and not waits;
+  send_valid    <= at_start_r and not waits;
+
   build_field_valid   <= at_field_r and not waits;
+  build_field_bank    <= bank_r;
   build_field_address <= write_address(6 downto 0);
   build_field_data    <= data;
 
@@ -362,10 +356,11 @@ begin
     end loop;
   end process pad;
 
-  facts <= has_lease & is_gone & has_default & has_metatraffic & has_unicast & is_transient & is_reliable & is_known;
+  facts <= has_lease & is_gone & has_default & has_metatraffic & has_unicast & is_transient & is_known & is_reliable;
 
   -- Entities have their first byte highest.
-  choose_word : process (read_address, facts, padded, entity_id, early_number, is_large, writer, early_source)
+  choose_word : process (read_address, facts, padded, entity_id, early_number, is_started, is_large, writer,
+                         early_source)
   begin
     if read_address(3 downto 2) = WORD_OF_FACTS then
       word <= facts & padded;
@@ -374,7 +369,7 @@ begin
     elsif read_address(3 downto 2) = WORD_OF_EARLY then
       word <= early_number;
     else
-      word <= x"00" & "0000000" & is_large & "00000" & writer & "00" & early_source;
+      word <= "0000000" & is_started & "0000000" & is_large & "00000" & writer & "00" & early_source;
     end if;
   end process choose_word;
 

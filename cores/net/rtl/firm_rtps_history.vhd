@@ -31,14 +31,17 @@ entity firm_rtps_history is
     slot_writer : in std_logic_vector(2 downto 0);
     slot_next   : in std_logic_vector(7 downto 0);
 
-    -- A sample of this writer has come. The next one is not taken before `is_done`. After a reset it is as if one had
-    -- come: the program takes it when it has written the slots of all writers, so that none comes before.
+    -- A sample of this writer comes, and has come from the next cycle on. The next one is not taken before `is_done`.
+    -- After a reset it is as if one had come: the program takes it when it has written the slots of all writers, so
+    -- that none comes before.
+    comes      : out std_logic;
     has_sample : out std_logic;
     writer     : out std_logic_vector(2 downto 0);
     is_done    : in  std_logic;
 
-    -- Shows the payload of a slot and its size, from two cycles after `shows` on.
+    -- Shows the payload of a slot, or of the last sample that has come, and its size, from two cycles after `shows` on.
     shows         : in  std_logic;
+    shows_new     : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
     payload_bytes : out std_logic_vector(15 downto 0);
     m_axis_tdata  : out std_logic_vector(7 downto 0);
@@ -79,6 +82,7 @@ architecture rtl of firm_rtps_history is
   signal new_size  : unsigned(BYTE_BITS downto 0);
   signal next_slot : slot_t;
   signal is_good   : std_logic;
+  signal ends      : std_logic;
 
   -- The payload that leaves.
   signal slot_r    : slot_t := (others => '0');
@@ -110,6 +114,7 @@ begin
   new_size      <= size_r + 1 when writes = '1' else size_r;
   next_slot     <= nexts(to_integer(writer_r));
   is_good       <= not (is_head or wrong_r or is_full or s_axis_tuser(0));
+  ends          <= moves and s_axis_tlast;
 
   write_payload : process (clk)
   begin
@@ -148,7 +153,7 @@ begin
             end if;
           end if;
         end if;
-        if s_axis_tlast = '1' then
+        if ends = '1' then
           head_r     <= (others => '0');
           size_r     <= (others => '0');
           wrong_r    <= '0';
@@ -166,6 +171,7 @@ begin
     end if;
   end process take_frame;
 
+  comes      <= ends and is_good;
   has_sample <= has_r;
   writer     <= std_logic_vector(writer_r);
 
@@ -183,6 +189,9 @@ begin
       if shows = '1' then
         slot_r  <= unsigned(slot(SLOT_BITS-1 downto 0));
         place_r <= (others => '0');
+        if shows_new = '1' then
+          slot_r <= next_slot;
+        end if;
       end if;
     end if;
   end process read_payload;

@@ -62,9 +62,11 @@ entity firm_rtps_node is
     -- To firm_packet_builder. `packet` is a number of fusesoc_firm.fabric.packets.
     start               : out std_logic;
     packet              : out std_logic_vector(7 downto 0);
+    bank                : out std_logic_vector(RTPS_BANK_BITS-1 downto 0);
     payload_bytes       : out std_logic_vector(15 downto 0);
     is_busy             : in  std_logic;
     build_field_valid   : out std_logic;
+    build_field_bank    : out std_logic_vector(RTPS_BANK_BITS-1 downto 0);
     build_field_address : out std_logic_vector(6 downto 0);
     build_field_data    : out std_logic_vector(7 downto 0);
     payload_tdata       : out std_logic_vector(7 downto 0);
@@ -159,12 +161,21 @@ architecture rtl of firm_rtps_node is
 
   signal slot_valid  : std_logic;
   signal slot_writer : std_logic_vector(2 downto 0);
+  signal comes       : std_logic;
   signal has_sample  : std_logic;
   signal sender      : std_logic_vector(2 downto 0);
   signal is_done     : std_logic;
   signal shows       : std_logic;
+  signal shows_new   : std_logic;
+  signal slot        : std_logic_vector(7 downto 0);
   signal has_payload : std_logic;
   signal slot_bytes  : std_logic_vector(15 downto 0);
+
+  signal prepare_valid : std_logic;
+  signal payload_given : std_logic;
+  signal send_valid    : std_logic;
+  signal waits         : std_logic;
+  signal is_started    : std_logic;
 
 begin
 
@@ -378,11 +389,13 @@ begin
       slot_valid    => slot_valid,
       slot_writer   => slot_writer,
       slot_next     => write_data,
+      comes         => comes,
       has_sample    => has_sample,
       writer        => sender,
       is_done       => is_done,
       shows         => shows,
-      slot          => write_data,
+      shows_new     => shows_new,
+      slot          => slot,
       payload_bytes => slot_bytes,
       m_axis_tdata  => payload_tdata,
       m_axis_tready => payload_tready,
@@ -391,6 +404,29 @@ begin
 
   payload_tvalid <= '1';
   payload_bytes  <= gated(slot_bytes, has_payload);
+
+  u_sender : entity firm.firm_rtps_sender
+    port map (
+      clk            => clk,
+      rst_n          => rst_n,
+      prepare_valid  => prepare_valid,
+      prepare_writer => slot_writer,
+      slot_valid     => payload_given,
+      send_valid     => send_valid,
+      data           => write_data,
+      waits          => waits,
+      comes          => comes,
+      writer         => sender,
+      is_started     => is_started,
+      shows          => shows,
+      shows_new      => shows_new,
+      slot           => slot,
+      start          => start,
+      packet         => packet,
+      bank           => bank,
+      has_payload    => has_payload,
+      is_busy        => is_busy
+    );
 
   u_control : entity firm.firm_rtps_control
     generic map (
@@ -441,12 +477,13 @@ begin
       has_sample          => has_sample,
       writer              => sender,
       is_done             => is_done,
-      shows               => shows,
-      start               => start,
-      packet              => packet,
-      has_payload         => has_payload,
-      is_busy             => is_busy,
+      prepare_valid       => prepare_valid,
+      payload_valid       => payload_given,
+      send_valid          => send_valid,
+      waits               => waits,
+      is_started          => is_started,
       build_field_valid   => build_field_valid,
+      build_field_bank    => build_field_bank,
       build_field_address => build_field_address,
       build_field_data    => build_field_data,
       peer_count          => peer_count,

@@ -82,6 +82,10 @@ package firm_rtps_pkg is
 
   constant MOST_SET_BITS : positive := 256;
 
+  -- Banks of the builder's fields: one for each writer with frames, and one for all other packets.
+  constant RTPS_BANK_BITS : positive := 4;
+  constant RTPS_OWN_BANK  : std_logic_vector(RTPS_BANK_BITS-1 downto 0) := x"f";
+
   -- Cycles from the last word of an announcement until firm_rtps_endpoint tells what it was.
   constant RTPS_JUDGED : positive := 7;
 

@@ -122,6 +122,7 @@ architecture rtl of firm_rtps_sequencer is
   signal is_number : std_logic;
   signal size      : unsigned(4 downto 0);  -- bytes, less one
   signal chosen    : unsigned(1 downto 0);  -- register: P, E, W, X
+  signal held      : unsigned(7 downto 0);  -- what it holds
   signal stepped   : unsigned(7 downto 0);
   signal flag      : std_logic;
   signal is_true   : std_logic;
@@ -176,6 +177,12 @@ architecture rtl of firm_rtps_sequencer is
     return place;
   end function address_of;
 
+  -- The next byte of a number, none of which crosses a multiple of 256.
+  function following(place : address_t) return address_t is
+  begin
+    return place(ADDRESS_BITS-1 downto 8) & (place(7 downto 0) + 1);
+  end function following;
+
   -- Byte `place` of a set of the first `count` of 32 numbers; the first one is the highest bit of the last byte.
   function set_byte(count : unsigned(7 downto 0); place : unsigned(1 downto 0)) return byte_t is
     variable whole : unsigned(5 downto 0);
@@ -222,10 +229,11 @@ begin
     end if;
   end process choose_size;
 
-  stepped <= resize(peer_r, 8) + 1 when chosen = 0 else
-             entry_r + 1 when chosen = 1 else
-             resize(table_r, 8) + 1 when chosen = 2 else
-             index_r + 1;
+  held    <= resize(peer_r, 8) when chosen = 0 else
+             entry_r when chosen = 1 else
+             resize(table_r, 8) when chosen = 2 else
+             index_r;
+  stepped <= held + 1;
 
   -- ------------------------------------------------------------------ the order of things
 
@@ -386,7 +394,7 @@ begin
           if outside_r = '1' then
             left_r <= port_read_data;
           end if;
-          to_r    <= to_r + 1;
+          to_r    <= following(to_r);
           place_r <= place_r + 1;
           at_r    <= to_r;
           count_r <= place_r;
@@ -395,7 +403,7 @@ begin
             last_r <= '1';
           end if;
           if kind /= OP_MASK then
-            from_r <= from_r + 1;
+            from_r <= following(from_r);
           end if;
         elsif state_r = DESTINATION then
           if is_held = '1' then

@@ -7,6 +7,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_udp_receiver is
   generic (
@@ -50,12 +52,17 @@ architecture rtl of firm_udp_receiver is
   constant MOST_PORTS : positive := 16;
 
   type section_t is (ETHERNET, HEADER, DATAGRAM, PAYLOAD);
-  constant MAC_BYTES      : natural := 6;
-  constant SOURCE_END     : natural := 12;  -- of the sender's MAC address
-  constant ETHERNET_LAST  : natural := 13;
-  constant HEADER_LAST    : natural := 19;  -- of a header without options
-  constant DATAGRAM_BYTES : natural := 8;
-  constant LAST_PLACE     : natural := 63;
+  constant MAC_BYTES       : natural := 6;
+  constant SOURCE_END      : natural := 12;  -- of the sender's MAC address
+  constant ETHERNET_LAST   : natural := 13;
+  constant ADDRESSES       : natural := 12;  -- in the header of IPv4
+  constant HEADER_LAST     : natural := 19;  -- of a header without options
+  constant SHORTEST_HEADER : natural := 5;  -- in words
+  constant DATAGRAM_BYTES  : natural := 8;
+  constant LENGTH_END      : natural := 6;   -- of the datagram's length, in its header
+  constant DATA_END        : natural := 6;   -- a datagram's bytes that are not counted down
+  constant PLACE_BITS      : natural := 6;
+  constant LAST_PLACE      : natural := 2**PLACE_BITS-1;
   -- Of IPv4: high and low byte of its type, version, and the protocol.
   constant TYPE_HIGH : std_logic_vector(7 downto 0) := x"08";
   constant TYPE_LOW  : std_logic_vector(7 downto 0) := x"00";
@@ -68,6 +75,7 @@ architecture rtl of firm_udp_receiver is
 
   signal section_r : section_t;
   signal place_r   : natural range 0 to LAST_PLACE;  -- in the section
+  signal at        : std_logic_vector(PLACE_BITS-1 downto 0);  -- the same
   signal odd_r     : std_logic;                      -- the byte is the lower one of a word
 
   -- Of the frame so far.
@@ -76,18 +84,18 @@ architecture rtl of firm_udp_receiver is
   signal mine_r         : std_logic;
   signal fragment_r     : std_logic;
   signal header_bytes_r : unsigned(5 downto 0) := (others => '0');
-  signal total_r        : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet
-  signal packet_left_r  : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet to come, and four
-  signal room_r         : unsigned(15 downto 0) := (others => '0');  -- bytes of the packet after its header
+  -- Bytes of the packet to come, and four; from the third byte of a datagram on, and six.
+  signal packet_left_r  : unsigned(15 downto 0) := (others => '0');
   signal short_r        : std_logic;  -- the packet has no room for a datagram
   signal header_sum_r   : unsigned(16 downto 0) := (others => '0');
   signal header_right_r : std_logic;
   signal port_r         : std_logic_vector(PORTS-1 downto 0);
-  signal length_r       : unsigned(15 downto 0) := (others => '0');  -- bytes of the datagram
+  -- Bytes of the datagram after its length: those to come, and six.
+  signal length_r       : unsigned(15 downto 0) := (others => '0');
+  signal has_data       : std_logic;  -- bytes of the payload are to come
   signal misfit_r       : std_logic;  -- the datagram does not fit into the packet
   signal unsummed_r     : std_logic;  -- the datagram has no checksum
   signal sum_r          : unsigned(16 downto 0) := (others => '0');
-  signal data_left_r    : unsigned(15 downto 0) := (others => '0');  -- bytes of the payload to come
   signal accepted_r     : std_logic;
 
   signal held_r       : std_logic_vector(7 downto 0);
@@ -103,6 +111,7 @@ architecture rtl of firm_udp_receiver is
   signal aborted_r   : std_logic;
   signal past_r      : std_logic;  -- it went on after the header
   signal named_r     : std_logic;  -- it reached the end of the addresses
+  signal full_r      : std_logic;  -- it holds the header of a datagram
   signal whole       : std_logic;  -- it holds the packet
   signal whole_r     : std_logic;
   signal summed      : std_logic;  -- the datagram's checksum is right, or there is none
@@ -142,6 +151,8 @@ begin
     report "firm_udp_receiver: PORTS is " & integer'image(PORTS) & "; legal: 1 to " & integer'image(MOST_PORTS)
     severity failure;
 
+  at <= std_logic_vector(to_unsigned(place_r, PLACE_BITS));
+
   follow : process (clk)
   begin
     if rising_edge(clk) then
@@ -153,7 +164,8 @@ begin
         if section_r = ETHERNET and place_r = ETHERNET_LAST then
           section_r <= HEADER;
           place_r   <= 0;
-        elsif section_r = HEADER and place_r >= HEADER_LAST and to_unsigned(place_r + 1, 7) = header_bytes_r then
+        elsif section_r = HEADER and is_below(at, HEADER_LAST) = '0'
+              and to_unsigned(place_r + 1, 7) = header_bytes_r then
           section_r <= DATAGRAM;
           place_r   <= 0;
         elsif section_r = DATAGRAM and place_r = DATAGRAM_BYTES-1 then
@@ -207,11 +219,9 @@ begin
       elsif section_r = HEADER then
         if place_r = 0 then
           header_bytes_r <= unsigned(s_axis_tdata(3 downto 0)) & "00";
-          if s_axis_tdata(7 downto 4) /= VERSION or unsigned(s_axis_tdata(3 downto 0)) < 5 then
+          if s_axis_tdata(7 downto 4) /= VERSION or is_below(s_axis_tdata(3 downto 0), SHORTEST_HEADER) = '1' then
             mine_r <= '0';
           end if;
-        elsif place_r = 3 then
-          total_r <= unsigned(recent(15 downto 0));
         elsif place_r = 6 and (s_axis_tdata and FRAGMENT) /= x"00" then
           fragment_r <= '1';
         elsif place_r = 7 and s_axis_tdata /= x"00" then
@@ -231,16 +241,9 @@ begin
   end process match;
 
   check_header : process (clk)
-    variable room : unsigned(16 downto 0);  -- the highest bit is a borrow
   begin
     if rising_edge(clk) then
       header_right_r <= is_right(header_sum_r);
-      room           := resize(total_r, 17) - header_bytes_r;
-      room_r         <= room(15 downto 0);
-      short_r        <= room(16);
-      if room(15 downto 3) = 0 then
-        short_r <= '1';
-      end if;
       if s_axis_tvalid = '1' then
         if section_r = ETHERNET then
           header_sum_r  <= (others => '0');
@@ -248,10 +251,11 @@ begin
         elsif section_r = HEADER then
           header_sum_r <= added(header_sum_r, s_axis_tdata, odd_r, false);
         end if;
-        -- The four bytes up to here are counted at the end.
+        -- The four bytes up to here are counted at the end, and so are two of a datagram. So this is the packet's room
+        -- for the datagram, when its length has come.
         if section_r = HEADER and place_r = 3 then
           packet_left_r <= unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata);
-        elsif section_r /= ETHERNET and packet_left_r /= 0 then
+        elsif section_r /= ETHERNET and packet_left_r /= 0 and not (section_r = DATAGRAM and is_below(at, 2) = '1') then
           packet_left_r <= packet_left_r - 1;
         end if;
       end if;
@@ -277,14 +281,17 @@ begin
           end loop;
         elsif place_r = 5 then
           length_r <= unsigned(recent);
-        elsif place_r = 6 then
+        elsif place_r = LENGTH_END then
           misfit_r <= '0';
-          if length_r(15 downto 3) = 0 or length_r > room_r then
+          short_r  <= '0';
+          if length_r(15 downto 3) = 0 or length_r > packet_left_r then
             misfit_r <= '1';
           end if;
+          if packet_left_r(15 downto 3) = 0 then
+            short_r <= '1';
+          end if;
         elsif place_r = 7 then
-          data_left_r <= length_r - DATAGRAM_BYTES;
-          unsummed_r  <= '0';
+          unsummed_r <= '0';
           if recent = x"0000" then
             unsummed_r <= '1';
           end if;
@@ -294,13 +301,16 @@ begin
             accepted_r <= '1';
           end if;
         end if;
-      elsif section_r = PAYLOAD and data_left_r /= 0 then
-        data_left_r <= data_left_r - 1;
       elsif section_r = ETHERNET then
         accepted_r <= '0';
       end if;
+      if (section_r = DATAGRAM and is_below(at, LENGTH_END) = '0') or (section_r = PAYLOAD and has_data = '1') then
+        length_r <= length_r - 1;
+      end if;
     end if;
   end process read_datagram;
+
+  has_data <= '0' when length_r = DATA_END else '1';
 
   -- The checksum covers both addresses, the protocol, the datagram, and once more its length.
   add_datagram : process (clk)
@@ -308,11 +318,11 @@ begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if section_r = ETHERNET then
         sum_r <= resize(UDP, 17);
-      elsif section_r = HEADER and place_r >= 12 and place_r <= HEADER_LAST then
+      elsif section_r = HEADER and is_within(at, ADDRESSES, HEADER_LAST) = '1' then
         sum_r <= added(sum_r, s_axis_tdata, odd_r, false);
       elsif section_r = DATAGRAM then
         sum_r <= added(sum_r, s_axis_tdata, odd_r, place_r = 4 or place_r = 5);
-      elsif section_r = PAYLOAD and data_left_r /= 0 then
+      elsif section_r = PAYLOAD and has_data = '1' then
         sum_r <= added(sum_r, s_axis_tdata, odd_r, false);
       end if;
     end if;
@@ -320,8 +330,7 @@ begin
 
   -- ------------------------------------------------------------------ the end
 
-  whole  <= '1' when packet_left_r(15 downto 3) = 0 and (packet_left_r(2) = '0' or packet_left_r(1 downto 0) = 0) else
-            '0';
+  whole  <= '1' when packet_left_r(15 downto 3) = 0 and packet_left_r(2 downto 0) /= "111" else '0';
   summed <= unsummed_r or is_right(sum_r);
 
   judge : process (clk)
@@ -333,10 +342,14 @@ begin
         aborted_r <= s_axis_tuser(0);
         past_r    <= '0';
         named_r   <= '0';
+        full_r    <= '0';
+        if section_r = PAYLOAD or (section_r = DATAGRAM and place_r = DATAGRAM_BYTES-1) then
+          full_r <= '1';
+        end if;
         if section_r = DATAGRAM or section_r = PAYLOAD then
           past_r  <= '1';
           named_r <= '1';
-        elsif section_r = HEADER and place_r >= HEADER_LAST then
+        elsif section_r = HEADER and is_below(at, HEADER_LAST) = '0' then
           named_r <= '1';
         end if;
       end if;
@@ -360,7 +373,7 @@ begin
           is_broken <= '1';
         elsif fragment_r = '1' then
           is_fragment <= '1';
-        elsif short_r = '1' or whole_r = '0' then
+        elsif full_r = '0' or short_r = '1' or whole_r = '0' then
           is_broken <= '1';
         elsif unsigned(port_r) /= 0 and (misfit_r = '1' or summed_r = '0') then
           is_broken <= '1';
@@ -380,7 +393,7 @@ begin
       m_axis_tlast  <= '0';
       m_axis_tuser  <= "0";
       m_axis_tdata  <= held_r;
-      if s_axis_tvalid = '1' and section_r = PAYLOAD and accepted_r = '1' and data_left_r /= 0 then
+      if s_axis_tvalid = '1' and section_r = PAYLOAD and accepted_r = '1' and has_data = '1' then
         m_axis_tvalid <= has_held_r;
         held_r        <= s_axis_tdata;
         has_held_r    <= '1';

@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Runs programs in the builder. A row of the file with programs is a word, from address 0 on. A row of the file with
--- jobs is a packet: the program's entry, the 128 bytes of the fields, the number of the payload's bytes, and these. A
--- row of the result is a frame: its number of bytes, and the bytes. If STALL_PERCENT is 0, a pause in a frame is a
--- fault, and so are more cycles from the start to the first byte than MOST_CYCLES.
+-- jobs is a packet: the program's entry, the 128 bytes of the fields, the number of the payload's bytes, and these. The
+-- fields of each packet are in the bank after that of the last one, and the next bank has other bytes. A row of the
+-- result is a frame: its number of bytes, and the bytes. If STALL_PERCENT is 0, a pause in a frame is a fault, and so
+-- are more cycles from the start to the first byte than MOST_CYCLES.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -27,7 +28,8 @@ end entity firm_packet_builder_tb;
 architecture simulation of firm_packet_builder_tb is
 
   constant FIELD_BYTES : positive := 128;
-  constant MOST_CYCLES : positive := 13;
+  constant BANK_BITS   : positive := 4;
+  constant MOST_CYCLES : positive := 12;
 
   type memory_t is array (natural range 0 to 2**ADDRESS_BITS-1) of std_logic_vector(10 downto 0);
 
@@ -37,10 +39,12 @@ architecture simulation of firm_packet_builder_tb is
 
   signal start         : std_logic := '0';
   signal entry         : std_logic_vector(ADDRESS_BITS-1 downto 0) := (others => '0');
+  signal bank          : unsigned(BANK_BITS-1 downto 0) := (others => '0');
   signal payload_bytes : std_logic_vector(15 downto 0) := (others => '0');
   signal is_busy       : std_logic;
 
   signal field_valid   : std_logic := '0';
+  signal field_bank    : unsigned(BANK_BITS-1 downto 0) := (others => '0');
   signal field_address : std_logic_vector(6 downto 0) := (others => '0');
   signal field_data    : std_logic_vector(7 downto 0) := (others => '0');
 
@@ -62,16 +66,19 @@ begin
 
   u_builder : entity firm.firm_packet_builder
     generic map (
-      ADDRESS_BITS => ADDRESS_BITS
+      ADDRESS_BITS => ADDRESS_BITS,
+      BANK_BITS    => BANK_BITS
     )
     port map (
       clk             => clk,
       rst_n           => rst_n,
       start           => start,
       entry           => entry,
+      bank            => std_logic_vector(bank),
       payload_bytes   => payload_bytes,
       is_busy         => is_busy,
       field_valid     => field_valid,
+      field_bank      => std_logic_vector(field_bank),
       field_address   => field_address,
       field_data      => field_data,
       program_enable  => program_enable,
@@ -128,9 +135,14 @@ begin
         read(row, number);
         field_valid   <= '1';
         field_address <= std_logic_vector(to_unsigned(address, 7));
+        field_bank    <= bank + 1;
         field_data    <= std_logic_vector(to_unsigned(number, 8));
         wait until rising_edge(clk);
+        field_bank    <= bank + 2;
+        field_data    <= not field_data;
+        wait until rising_edge(clk);
       end loop;
+      bank        <= bank + 1;
       field_valid <= '0';
       read(row, size);
       payload_bytes <= std_logic_vector(to_unsigned(size, 16));

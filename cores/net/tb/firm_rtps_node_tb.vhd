@@ -14,6 +14,7 @@ use ieee.numeric_std.all;
 use ieee.math_real.all;
 use std.textio.all;
 library firm;
+use firm.firm_rtps_pkg.all;
 use firm.firm_sim_pkg.all;
 
 entity firm_rtps_node_tb is
@@ -27,7 +28,7 @@ entity firm_rtps_node_tb is
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;              -- the chance, each cycle, that the host takes nothing
-    MAIN          : integer := 30;             -- the address of the program's loop
+    MAIN          : integer := 38;             -- the address of the program's loop
     WRITERS       : integer := 4;
     READERS       : integer := 3;
     SOURCES       : integer := 8;
@@ -86,10 +87,12 @@ architecture simulation of firm_rtps_node_tb is
   signal m_tready : std_logic;
 
   signal start          : std_logic;
+  signal bank           : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal number         : std_logic_vector(7 downto 0);
   signal entry          : std_logic_vector(12 downto 0) := (others => '0');
   signal is_busy        : std_logic;
   signal build_valid    : std_logic;
+  signal build_bank     : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal build_address  : std_logic_vector(6 downto 0);
   signal build_data     : std_logic_vector(7 downto 0);
   signal payload_bytes  : std_logic_vector(15 downto 0);
@@ -180,9 +183,11 @@ begin
       sample_tready       => sample_tready,
       start               => start,
       packet              => number,
+      bank                => bank,
       payload_bytes       => payload_bytes,
       is_busy             => is_busy,
       build_field_valid   => build_valid,
+      build_field_bank    => build_bank,
       build_field_address => build_address,
       build_field_data    => build_data,
       payload_tdata       => payload_tdata,
@@ -210,9 +215,11 @@ begin
       rst_n           => rst_n,
       start           => start,
       entry           => entry,
+      bank            => bank,
       payload_bytes   => payload_bytes,
       is_busy         => is_busy,
       field_valid     => build_valid,
+      field_bank      => build_bank,
       field_address   => build_address,
       field_data      => build_data,
       program_enable  => packets_enable,
