@@ -68,6 +68,11 @@ _PORTS = {
     "matches": 0xA0,
     "facts": 0xA3,
     "entity": 0xA4,
+    # These share their addresses with others, which are only written.
+    "next_fragment": 0x98,
+    "left_bytes": 0x9A,
+    "fragment_bytes": 0x9C,
+    "has_parts": 0x9E,
     "early_number": 0xA8,
     "early_source": 0xAC,
     "frame_writer": 0xAD,
@@ -98,6 +103,7 @@ _OTHERS = {
     "WINDOW": 2,
     "BEYOND_WINDOW": 3,
     "MOST_REQUESTED": 8,
+    "MOST_FRAGMENTS": 32,
     "FINAL": 3,
     "NOT_FINAL": 1,
     "FINAL_FLAG": 2,
@@ -238,7 +244,7 @@ def _tables(node: Node) -> str:
 
 def _endpoint(table: int, item: Endpoint) -> Iterator[str]:
     yield f"load W, {table}"
-    yield from (f"copy W.entity+{place}, {byte}" for place, byte in enumerate(item.entity))
+    yield from (f"copy.2 W.entity+{at}, {int.from_bytes(item.entity[at : at + 2], 'little')}" for at in (0, 2))
 
 
 def _writer(item: Endpoint, samples: int) -> Sequence[str]:
