@@ -68,11 +68,8 @@ _PORTS = {
     "matches": 0xA0,
     "facts": 0xA3,
     "entity": 0xA4,
-    # These share their addresses with others, which are only written.
+    # Eight bytes that are read, at addresses of others that are only written.
     "next_fragment": 0x98,
-    "left_bytes": 0x9A,
-    "fragment_bytes": 0x9C,
-    "has_parts": 0x9E,
     "early_number": 0xA8,
     "early_source": 0xAC,
     "frame_writer": 0xAD,
@@ -103,7 +100,6 @@ _OTHERS = {
     "WINDOW": 2,
     "BEYOND_WINDOW": 3,
     "MOST_REQUESTED": 8,
-    "MOST_FRAGMENTS": 32,
     "FINAL": 3,
     "NOT_FINAL": 1,
     "FINAL_FLAG": 2,
@@ -252,8 +248,8 @@ def _writer(item: Endpoint, samples: int) -> Sequence[str]:
     return (
         f"copy.4 W.number, {samples}",
         "copy.4 W.first, 1",
-        f"copy W.depth, {kept_of(quality)}",
-        f"copy W.transient, {int(quality.is_transient_local)}",
+        # And `transient`, the byte after it.
+        f"copy.2 W.depth, {kept_of(quality) | quality.is_transient_local << 8}",
     )
 
 

@@ -50,7 +50,7 @@ DISCOVERY_REQUEST, DISCOVERY_HEARTBEAT = 200, 500
 USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
 ASSEMBLY = 1000
 WINDOW = 2
-MOST_REQUESTED, MOST_FRAGMENTS = 8, 32
+MOST_REQUESTED = 8
 FRAGMENT_BYTES = 1344
 XCDR1 = 0
 # The reader of each of the two writers of discovery.
@@ -166,11 +166,10 @@ class Assembly:
         """Whether all has come."""
         return len(self.data) == self.size
 
-    @property
-    def missing(self) -> Numbers:
-        """The next fragments, as many as a set of one word has."""
+    def missing(self, most: int) -> Numbers:
+        """The next fragments."""
         left = -(-(self.size - len(self.data)) // self.fragment_bytes)
-        return Numbers.of(range(self.fragment, self.fragment + min(left, MOST_FRAGMENTS)), self.fragment)
+        return Numbers.of(range(self.fragment, self.fragment + min(left, most)), self.fragment)
 
 
 @dataclass
@@ -186,6 +185,7 @@ class Source:
     last: int = 0
     is_heard: bool = False
     requested: int = 0
+    asked: int = 0  # the fragment after those that were asked for, its lowest byte; or 0
     next_request: int = 0
 
     @property
@@ -402,14 +402,18 @@ class Participant:
         source.requested = source.expected
         source.next_request = self._now + (USER_REQUEST if source.is_heard else UNHEARD_REQUEST)
         ends = source.endpoint.entity, source.entity
-        if source.is_heard and self.assembly and self.assembly.is_of(source, source.expected):
+        if source.is_heard and (part := self._part_of(source)):
+            missing = part.missing(MOST_REQUESTED if self._has_come(source, part) else most)
+            source.asked = (part.fragment + missing.size) % 256
             self._send_to(
                 source.peer,
                 source.address,
                 AckNack(*ends, Numbers(source.expected), self._next_count(), is_final=True),
-                NackFrag(*ends, source.expected, self.assembly.missing, self._next_count()),
+                NackFrag(*ends, source.expected, missing, self._next_count()),
             )
             return
+        if source.is_heard:
+            source.asked = 0
         wanted = range(source.expected, min(source.last + 1, source.expected + most))
         numbers = Numbers.of(wanted, source.expected) if source.is_heard else Numbers(source.expected)
         request = AckNack(*ends, numbers, self._next_count(), is_final=source.is_heard)
@@ -609,7 +613,18 @@ class Participant:
         return False
 
     def _may_request(self, source: Source) -> bool:
-        return source.requested != source.expected or self._now >= source.next_request
+        part = self._part_of(source)
+        has_news = source.requested != source.expected or (part is not None and self._has_come(source, part))
+        return has_news or self._now >= source.next_request
+
+    def _has_come(self, source: Source, part: Assembly) -> bool:
+        """Whether all fragments that were asked for have come."""
+        return source.asked in (0, part.fragment % 256)
+
+    def _part_of(self, source: Source) -> Assembly | None:
+        """The sample to take next, if some of its fragments have come."""
+        part = self.assembly
+        return part if part and part.is_of(source, source.expected) else None
 
     def _sample(self, source: Source, item: Data) -> None:
         if self._is_next(source, item.number):
@@ -663,7 +678,7 @@ class Participant:
         if not source.is_reliable:
             return
         source.last = max(source.last, item.number)
-        part = self.assembly if self.assembly and self.assembly.is_of(source, item.number) else None
+        part = self._part_of(source)
         is_behind = item.number > source.expected or part is None or item.last >= part.fragment
         if item.number >= source.expected and is_behind and self._may_request(source):
             self._request(source)
