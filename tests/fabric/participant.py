@@ -655,8 +655,9 @@ class Participant:
             if self._has_assembled or (part and part.source is not source) or not is_sound:
                 self.counts["samples without room"] += 1
                 return
-            part = self.assembly = Assembly(source, item.number, item.size, item.fragment_bytes, self._now)
+            part = Assembly(source, item.number, item.size, item.fragment_bytes, self._now)
         part.take(item, self._now)
+        self.assembly = part if part.data else None
         if part.is_whole:
             self.assembly, self._has_assembled = None, True
             if is_taken:

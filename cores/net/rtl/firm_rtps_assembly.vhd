@@ -328,6 +328,9 @@ begin
         if spoils = '1' then
           counts := kept_r;
           gives  := gives or began;
+        elsif began = '1' and counts.place = 0 then
+          -- The first fragment was cut.
+          gives := '1';
         else
           whole_r <= whole_r or ended;
           if fed = '1' then
