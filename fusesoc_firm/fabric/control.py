@@ -69,6 +69,8 @@ _PORTS = {
     "matches": 0xA0,
     "facts": 0xA3,
     "entity": 0xA4,
+    # Eight bytes that are read, at addresses of others that are only written.
+    "next_fragment": 0x98,
     "early_number": 0xA8,
     "early_source": 0xAC,
     "frame_writer": 0xAD,

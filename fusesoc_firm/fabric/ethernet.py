@@ -12,7 +12,13 @@ from fusesoc_firm.fabric.packets import memory_of, programs_of
 from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.system.derived.ethernet import reassembled_bytes, slot_bytes, waiting_bytes
+from fusesoc_firm.system.derived.ethernet import (
+    assembled_bytes,
+    discovery_bytes,
+    reassembled_bytes,
+    slot_bytes,
+    waiting_bytes,
+)
 from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entity
 from fusesoc_firm.text.diagnostics import fail
@@ -70,10 +76,10 @@ def history_bytes(system: DerivedSystem, node: Node) -> int:
 
 def fragment_bytes(system: DerivedSystem, node: Node) -> int:
     """Return the bytes of the memories for messages in several packets, which are in use until they have left."""
-    longest = reassembled_bytes(system.subscribers)
+    longest = reassembled_bytes(system)
     places = 1 << (_PLACES * node.network.reassemblies - 1).bit_length()
-    waiting = waiting_bytes(system.subscribers) * (8 + _DISCOVERY_BITS) // 8
-    return longest * places + waiting if longest else 0
+    waiting = waiting_bytes(system) + discovery_bytes(system) * _DISCOVERY_BITS // 8
+    return longest * places + assembled_bytes(system) + waiting if longest else 0
 
 
 def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:
@@ -109,9 +115,11 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "sample": slot_bytes(system.publishers),
         "report_packet": numbers[REPORT],
         "probe_packet": numbers[PROBE],
-        "waiting": waiting_bytes(system.subscribers),
-        "reassemblies": node.network.reassemblies if reassembled_bytes(system.subscribers) else 0,
-        "reassembled": reassembled_bytes(system.subscribers) or _LEAST_REASSEMBLED,
+        "discovery": discovery_bytes(system),
+        "waiting": waiting_bytes(system),
+        "assembled": assembled_bytes(system),
+        "reassemblies": node.network.reassemblies if reassembled_bytes(system) else 0,
+        "reassembled": reassembled_bytes(system) or _LEAST_REASSEMBLED,
         "has_status": str(bool(system.status)).lower(),
     }
 

@@ -21,6 +21,7 @@ from tests.fabric.messages import (
     DataFrag,
     Gap,
     Heartbeat,
+    HeartbeatFrag,
     InfoDestination,
     Numbers,
     Submessage,
@@ -46,6 +47,7 @@ WRITTEN = (
 SURE = 2  # the reader that is reliable
 ROOM = Sizes(sources=8, sinks=8)  # in the tables; less than for eight peers
 SAMPLE = 64  # bytes of the longest payload that the node sends
+ASSEMBLED = 4096  # bytes of the longest one that it puts together, if it does
 _IDLE = -1  # an event that waits until the node has nothing to do
 _GAP = 12  # cycles between two packets, at least
 _ETHERNET, _UDP = 14, 42  # bytes before the header of IPv4, and before the payload of UDP
@@ -103,15 +105,15 @@ class Results:
     refused: int = 0
 
 
-def expected(events: Sequence[Event]) -> Results:
-    """What the reference does."""
+def expected(events: Sequence[Event], assembled: int = 0) -> Results:
+    """What the reference does; samples in fragments have up to so many bytes."""
     node, results, now = a_node(), Results(), 0
 
     def take(endpoint: Endpoint, payload: bytes) -> None:
         results.frames.append(struct.pack("<BI", node.readers.index(endpoint), len(payload)) + payload)
 
-    # Fragments are not put together: a sample that needs them is too long.
-    participant = Participant(node, take, Limits(sources=ROOM.sources, sinks=ROOM.sinks, longest=1344))
+    limits = Limits(sources=ROOM.sources, sinks=ROOM.sinks, longest=max(1344, assembled), assembled=assembled)
+    participant = Participant(node, take, limits)
     participant.start(now)
     for event in events:
         match event.kind:
@@ -198,13 +200,21 @@ class Peers:
     """Some peers that announce, end, send and leave at random.
 
     If they exaggerate, so do their lists of encodings. Unless `is_sure`, no writer matches the reliable reader. `burst`
-    is the largest number of packets for best effort that are sent one after the other.
+    is the largest number of packets for best effort that are sent one after the other. If it `is_long`, they also send
+    samples in fragments.
     """
 
     def __init__(
-        self, count: int, seed: int, *, exaggerate: bool = False, is_sure: bool = True, burst: int = 5
+        self,
+        count: int,
+        seed: int,
+        *,
+        exaggerate: bool = False,
+        is_sure: bool = True,
+        burst: int = 5,
+        is_long: bool = False,
     ) -> None:
-        self._is_sure, self._burst = is_sure, burst
+        self._is_sure, self._burst, self._is_long = is_sure, burst, is_long
         self._exaggerates = exaggerate
         self._chance, self._node = random.Random(seed), a_node()
         self._peers = [self._peer(number) for number in range(count)]
@@ -240,6 +250,8 @@ class Peers:
             self._leave: 1,
             self._skip: 1,
         }
+        if self._is_long:
+            ways[self._long_sample] = 40
         for _ in range(count):
             self._chance.choices(list(ways), list(ways.values()))[0](self._chance.choice(self._peers))
         return self.events
@@ -530,6 +542,77 @@ class Peers:
             elif way == 1:
                 item = DataFrag(item.reader, item.writer, item.number, 1, 1, 1024, 4096, chance.randbytes(1024))
             self._send(peer, self._destination(), item)
+
+    def _long_sample(self, peer: _Peer) -> None:
+        """A sample in fragments, some of which are lost, damaged, repeated, or beside those of another writer."""
+        chance, other = self._chance, self._chance.choice(self._peers)
+        parts = self._parts(peer)
+        others = self._parts(other) if chance.random() < 0.3 else []
+        while parts:
+            items = [parts.pop(0)]
+            if parts and chance.random() < 0.3:
+                items.append(parts.pop(0))
+            way = chance.randrange(14)
+            if way == 0:
+                items[0] = self._damaged(items[0])
+            elif way == 1:
+                self._send(peer, self._destination(), self._told_of(items[0]))
+            elif way == 2:
+                self.events.append(Event(Kind.TICKS, count=chance.choice([1, 20, 1000])))
+            elif way == 3 and others:
+                self._send(other, self._destination(), others.pop(0))
+            for _ in range({4: 0, 5: 2}.get(way, 1)):
+                self._send(peer, self._destination(), *items)
+            if way == 6:
+                event = self.events[-1]
+                self.events[-1] = replace(event, data=event.data[: chance.randrange(20, len(event.data))])
+        for item in others:
+            self._send(other, self._destination(), item)
+
+    def _parts(self, peer: _Peer) -> list[DataFrag]:
+        """The fragments of a sample, some of them twice, as if they had been asked for."""
+        chance = self._chance
+        writer = chance.choice([item for item in peer.writers if not item.is_sure] or [_Writer(b"none")])
+        if chance.random() < 0.7:
+            writer = self._sure(peer)
+        number = max(0, writer.number + chance.choice([1, 1, 1, 1, 1, 1, 0, 2]))
+        writer.number = max(writer.number, number)
+        size = chance.choice([*range(90, 100), 1000, 2047, ASSEMBLED - 1, ASSEMBLED, ASSEMBLED + 1])
+        each = chance.choice([8, 50, 256, 1000, ASSEMBLED]) if size < 300 else chance.choice([256, 1000, 2000])
+        payload = rtps.XCDR1 + chance.randbytes(size - 4)
+        found, first = [], 1
+        while (start := (first - 1) * each) < size:
+            count = chance.choice([1, 1, 1, 2, 3])
+            count = min(count, -(-(size - start) // each))
+            content = payload[start : start + count * each]
+            # The last submessage may be padded.
+            content += bytes(chance.choice([0, -len(content) % 4])) if start + count * each >= size else b""
+            found.append(DataFrag(rtps.NO_ENTITY, writer.entity, number, first, count, each, size, content))
+            first += count
+        again = chance.randrange(len(found)) if chance.random() < 0.4 else len(found)
+        return [*found, *found[again:]]
+
+    def _damaged(self, part: DataFrag) -> DataFrag:
+        chance, is_short = self._chance, part.size <= ASSEMBLED
+        return chance.choice(
+            [
+                replace(part, fragment_bytes=chance.choice([0, part.fragment_bytes - 1, 65535])),
+                replace(part, first=chance.choice([0, part.first + 1, 65536 + part.first, 1 << 31])),
+                replace(part, count=chance.choice([0, part.count + 1, 65535])),
+                replace(part, size=chance.choice([0, part.size - 1, part.size + 65536, 1 << 31, 65535])),
+                replace(part, payload=part.payload[: chance.randrange(len(part.payload))]),
+                replace(part, payload=part.payload + chance.randbytes(chance.randrange(1, 40))),
+                # The program knows the lower 32 bits of numbers only.
+                replace(part, number=part.number + chance.choice([1, 1 << 32, 1 << 48][: 1 + 2 * is_short])),
+                replace(part, is_key=True),
+            ]
+        )
+
+    def _told_of(self, part: DataFrag) -> Heartbeat | HeartbeatFrag:
+        if self._chance.random() < 0.5:
+            last = max(0, part.first + self._chance.choice([-2, -1, 0, 5]))
+            return HeartbeatFrag(rtps.NO_ENTITY, part.writer, part.number, last, 3)
+        return Heartbeat(rtps.NO_ENTITY, part.writer, 1, part.number, 4, self._chance.random() < 0.5)
 
     def _user_told(self, peer: _Peer) -> None:
         writer, chance = self._sure(peer), self._chance

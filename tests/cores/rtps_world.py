@@ -25,18 +25,18 @@ HERE = Path(__file__).parent
 HARDWARE = ("axis/package", "axis/axis", "net/mac", "net/builder", "net/rtps")
 
 
-def program(node: Node, sizes: Sizes) -> Path:
+def program(node: Node, sizes: Sizes, assembled: int = 0) -> Path:
     """The program, which is compiled once; without Verilator, the test is skipped."""
     if not shutil.which("verilator"):
         pytest.skip("verilator is not installed")
-    name = f"rtps_world_{len(node.endpoints)}_{sizes.sources}_{sizes.sinks}"
-    return made_once(name, partial(_build, node, sizes)) / "model" / "Vrtps_world"
+    name = f"rtps_world_{len(node.endpoints)}_{sizes.sources}_{sizes.sinks}_{assembled}"
+    return made_once(name, partial(_build, node, sizes, assembled)) / "model" / "Vrtps_world"
 
 
-def _build(node: Node, sizes: Sizes, folder: Path) -> Path:
+def _build(node: Node, sizes: Sizes, assembled: int, folder: Path) -> Path:
     """GHDL's netlist of the hardware, translated by Verilator."""
     files = [*memories(node, "rtps_world", folder, sizes), HERE / "rtps_world.vhd"]
-    given = {**generics(node, sizes), "PROGRAM_BITS": programs_of(node).address_bits}
+    given = {**generics(node, sizes), "ASSEMBLED": assembled, "PROGRAM_BITS": programs_of(node).address_bits}
     verilog = netlist("rtps_world", folder, files, core_files(*HARDWARE), (), **given)
     bench = (HERE / "rtps_world.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "rtps_world", bench, folder, [HERE])
@@ -45,9 +45,9 @@ def _build(node: Node, sizes: Sizes, folder: Path) -> Path:
 class World:
     """A node that runs, of whose host's cycles so many of 100 take nothing."""
 
-    def __init__(self, stall: int = 0, node: Node | None = None, sizes: Sizes = ROOM) -> None:
+    def __init__(self, stall: int = 0, node: Node | None = None, sizes: Sizes = ROOM, assembled: int = 0) -> None:
         own = node or a_node()
-        words = [str(program(own, sizes)), str(main_of(own)), str(stall)]
+        words = [str(program(own, sizes, assembled)), str(main_of(own)), str(stall)]
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match

@@ -15,6 +15,7 @@ entity rtps_world is
     SLOTS        : integer := 16;
     RELIABLE     : integer := 0; -- a bit for each endpoint
     TRANSIENT    : integer := 0;
+    ASSEMBLED    : integer := 0;
     PROGRAM_BITS : integer := 13 -- of an address in the memory of packets
   );
   port (
@@ -121,15 +122,16 @@ begin
 
   u_node : entity firm.firm_rtps_node
     generic map (
-      WRITERS => WRITERS,
-      READERS => READERS,
-      SOURCES => SOURCES,
-      SINKS   => SINKS,
-      SAMPLE  => 64,
-      SLOTS   => SLOTS,
-      DEPTH   => 4096,
-      BYTES   => 4096,
-      SAMPLES => 16
+      WRITERS   => WRITERS,
+      READERS   => READERS,
+      SOURCES   => SOURCES,
+      SINKS     => SINKS,
+      SAMPLE    => 64,
+      SLOTS     => SLOTS,
+      DEPTH     => 4096,
+      BYTES     => 4096,
+      SAMPLES   => 16,
+      ASSEMBLED => ASSEMBLED
     )
     port map (
       clk                 => clk,

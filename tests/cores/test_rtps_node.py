@@ -9,11 +9,23 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.fabric.control import main_of
-from tests.cores.announcements import SURE, WRITTEN, Event, Kind, Peers, Results, a_node, expected, sent, without_counts
+from tests.cores.announcements import (
+    ASSEMBLED,
+    SURE,
+    WRITTEN,
+    Event,
+    Kind,
+    Peers,
+    Results,
+    a_node,
+    expected,
+    sent,
+    without_counts,
+)
 from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
 from tests.fabric.memories import bits
-from tests.fabric.messages import AckNack, parse
+from tests.fabric.messages import AckNack, NackFrag, parse
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
@@ -144,6 +156,21 @@ def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: 
 
 
 @pytest.mark.check
+@pytest.mark.parametrize(("peers", "stall", "seed"), [(2, 0, SEED), (4, 30, SEED + 1), (1, 10, SEED + 2)])
+def test_samples_in_fragments_are_put_together(peers: int, stall: int, seed: int) -> None:
+    print(f"seed {seed}")
+    events = Peers(peers, seed, is_long=True).run(3000)
+    wanted = expected(events, ASSEMBLED)
+    sizes = [len(frame) - 5 for frame in wanted.frames]
+    items = [item for _, packet in wanted.sent if (message := parse(packet)) for item in message.submessages]
+    requests = [item for item in items if isinstance(item, NackFrag)]
+    print(Counter(sizes), len(requests))
+    assert sizes.count(ASSEMBLED) >= 3 and len(requests) >= 5
+    with World(stall, assembled=ASSEMBLED) as world:
+        _check(world.all(events), wanted)
+
+
+@pytest.mark.check
 def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
     """Whole samples are lost: those that come are unchanged. One that comes late counts if later ones were lost."""
     events = Peers(4, SEED, is_sure=False, burst=60).run(600)
@@ -192,7 +219,7 @@ def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
         ("firm_rtps_history", "SLOTS", 512, "powers of two, 2 to 256"),
         ("firm_rtps_readers", "READERS", 9, "0 to 8"),
         ("firm_rtps_readers", "FIRST", 256, "0 to 256-READERS"),
-        ("firm_rtps_readers", "BYTES", 1000, "powers of two, 4 to 65536"),
+        ("firm_rtps_readers", "BYTES", 1000, "powers of two, 4 to 131072"),
         ("firm_rtps_readers", "SAMPLES", 3, "powers of two, 2 or more"),
         ("firm_rtps_sequencer", "ENTRIES", 193, "1 to 192"),
     ],

@@ -32,6 +32,7 @@ from tests.fabric.messages import (
     DataFrag,
     Gap,
     Heartbeat,
+    HeartbeatFrag,
     InfoDestination,
     NackFrag,
     Numbers,
@@ -47,7 +48,7 @@ AFTER_FAREWELL = 200
 DISCOVERY_REQUEST, DISCOVERY_HEARTBEAT = 200, 500
 # A writer that has written nothing may not answer.
 USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
-REASSEMBLY = 1000
+ASSEMBLY = 1000
 WINDOW = 2
 MOST_REQUESTED = 8
 FRAGMENT_BYTES = 1344
@@ -58,13 +59,16 @@ DISCOVERY = {PUBLICATIONS_WRITER: PUBLICATIONS_READER, SUBSCRIPTIONS_WRITER: SUB
 
 @dataclass(frozen=True)
 class Limits:
-    """The sizes of a node's tables: peers, their writers and readers that match, samples in reassembly, and bytes."""
+    """The sizes of a node's tables: peers, their writers and readers that match, and bytes of a sample.
+
+    `assembled` are those of a sample in fragments; longer ones are skipped.
+    """
 
     peers: int = 8
     sources: int = 32
     sinks: int = 32
-    reassemblies: int = 2
     longest: int = 65536
+    assembled: int = 65535
 
 
 @dataclass
@@ -130,15 +134,42 @@ class Peer:
 
 
 @dataclass
-class Reassembly:
-    """The fragments of a sample that have come."""
+class Assembly:
+    """A sample whose fragments come in order: the next one is `fragment`."""
 
+    source: Source
     number: int
     size: int
     fragment_bytes: int
     touched: int
-    data: bytearray
-    missing: set[int]
+    data: bytearray = field(default_factory=bytearray)
+    fragment: int = 1
+
+    def is_of(self, source: Source, number: int) -> bool:
+        """Whether it is the sample of this writer with this number."""
+        return self.source is source and self.number == number
+
+    def take(self, item: DataFrag, now: int) -> None:
+        """Take fragments that are the next ones, and end with a whole one."""
+        if (item.first, item.fragment_bytes, item.size) != (self.fragment, self.fragment_bytes, self.size):
+            return
+        left = self.size - len(self.data)
+        part = item.payload[: min(item.count * item.fragment_bytes, left)]
+        count, more = divmod(len(part), self.fragment_bytes)
+        if part and (not more or len(part) == left):
+            self.data += part
+            self.fragment += count + bool(more)
+            self.touched = now
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all has come."""
+        return len(self.data) == self.size
+
+    def missing(self, most: int) -> Numbers:
+        """The next fragments."""
+        left = -(-(self.size - len(self.data)) // self.fragment_bytes)
+        return Numbers.of(range(self.fragment, self.fragment + min(left, most)), self.fragment)
 
 
 @dataclass
@@ -154,8 +185,8 @@ class Source:
     last: int = 0
     is_heard: bool = False
     requested: int = 0
+    asked: int = 0  # the fragment after those that were asked for, its lowest byte; or 0
     next_request: int = 0
-    reassembly: Reassembly | None = None
 
     @property
     def is_reliable(self) -> bool:
@@ -163,10 +194,8 @@ class Source:
         return self.endpoint.quality.is_reliable
 
     def advance(self, expected: int) -> None:
-        """Expect a higher number, and forget the fragments of a lower one."""
+        """Expect a higher number."""
         self.expected = max(self.expected, expected)
-        if self.reassembly and self.reassembly.number < self.expected:
-            self.reassembly = None
 
 
 @dataclass
@@ -240,6 +269,8 @@ class Participant:
         self.peers: dict[bytes, Peer] = {}
         self.sources: list[Source] = []
         self.sinks: list[Sink] = []
+        self.assembly: Assembly | None = None
+        self._has_assembled = False  # in this packet
         self.histories = {item.entity: History(item) for item in node.writers}
         self._announced = {
             PUBLICATIONS_WRITER: [node.endpoint_data(item) for item in node.writers],
@@ -296,6 +327,8 @@ class Participant:
                 self._forget(peer)
             else:
                 self._tick_peer(peer)
+        if self.assembly and now - self.assembly.touched >= ASSEMBLY:
+            self.assembly = None
         for source in self.sources:
             self._tick_source(source)
         for sink in self.sinks:
@@ -317,8 +350,6 @@ class Participant:
                     self._send_to(peer, peer.metatraffic, self._discovery_heartbeat(writer))
 
     def _tick_source(self, source: Source) -> None:
-        if source.reassembly and self._now - source.reassembly.touched > REASSEMBLY:
-            source.reassembly = None
         is_behind = not source.is_heard or source.last >= source.expected
         if source.is_reliable and is_behind and self._now >= source.next_request:
             self._request(source)
@@ -371,15 +402,18 @@ class Participant:
         source.requested = source.expected
         source.next_request = self._now + (USER_REQUEST if source.is_heard else UNHEARD_REQUEST)
         ends = source.endpoint.entity, source.entity
-        if source.reassembly:
-            missing = Numbers.of(source.reassembly.missing, min(source.reassembly.missing))
+        if source.is_heard and (part := self._part_of(source)):
+            missing = part.missing(MOST_REQUESTED if self._has_come(source, part) else most)
+            source.asked = (part.fragment + missing.size) % 256
             self._send_to(
                 source.peer,
                 source.address,
                 AckNack(*ends, Numbers(source.expected), self._next_count(), is_final=True),
-                NackFrag(*ends, source.reassembly.number, missing, self._next_count()),
+                NackFrag(*ends, source.expected, missing, self._next_count()),
             )
             return
+        if source.is_heard:
+            source.asked = 0
         wanted = range(source.expected, min(source.last + 1, source.expected + most))
         numbers = Numbers.of(wanted, source.expected) if source.is_heard else Numbers(source.expected)
         request = AckNack(*ends, numbers, self._next_count(), is_final=source.is_heard)
@@ -395,6 +429,7 @@ class Participant:
             self.counts["packets of others"] += 1
             return
         self.counts["faulty packets"] += not message.is_whole
+        self._has_assembled = False
         if peer := self.peers.get(message.prefix):
             peer.left = peer.lease
         is_mine = True
@@ -417,7 +452,7 @@ class Participant:
                     self._discovery_asked(peer, item)
                 case Gap() if item.writer in DISCOVERY:
                     self._discovery_gap(peer, item)
-                case Data() | DataFrag() | Heartbeat() | Gap():
+                case Data() | DataFrag() | Heartbeat() | HeartbeatFrag() | Gap():
                     self._from_writer(peer, item)
                 case AckNack() | NackFrag():
                     self._from_reader(peer, item)
@@ -446,6 +481,12 @@ class Participant:
         del self.peers[peer.prefix]
         self.sources = [item for item in self.sources if item.peer is not peer]
         self.sinks = [item for item in self.sinks if item.peer is not peer]
+        self._give_up()
+
+    def _give_up(self) -> None:
+        """Give up the sample in fragments of a writer that is forgotten."""
+        if self.assembly and self.assembly.source not in self.sources:
+            self.assembly = None
 
     def _discovery_told(self, peer: Peer, item: Heartbeat) -> None:
         window = peer.windows[item.writer]
@@ -490,6 +531,7 @@ class Participant:
         if item.status & (rtps.DISPOSED | rtps.UNREGISTERED):
             self.sources = [other for other in self.sources if not _is(other, peer, guid[12:])]
             self.sinks = [other for other in self.sinks if not _is(other, peer, guid[12:])]
+            self._give_up()
             return
         is_writer = item.writer == PUBLICATIONS_WRITER
         name = facts.string(Parameter.TOPIC_NAME)
@@ -546,7 +588,7 @@ class Participant:
 
     # --- samples that come -----------------------------------------------------------------------------------------
 
-    def _from_writer(self, peer: Peer, item: Data | DataFrag | Heartbeat | Gap) -> None:
+    def _from_writer(self, peer: Peer, item: Data | DataFrag | Heartbeat | HeartbeatFrag | Gap) -> None:
         for source in self.sources:
             if _is(source, peer, item.writer) and item.reader in (rtps.NO_ENTITY, source.endpoint.entity):
                 match item:
@@ -556,6 +598,8 @@ class Participant:
                         self._fragments(source, item)
                     case Heartbeat():
                         self._told(source, item)
+                    case HeartbeatFrag():
+                        self._fragments_told(source, item)
                     case Gap():
                         self._gap(source, item)
 
@@ -569,7 +613,18 @@ class Participant:
         return False
 
     def _may_request(self, source: Source) -> bool:
-        return source.requested != source.expected or self._now >= source.next_request
+        part = self._part_of(source)
+        has_news = source.requested != source.expected or (part is not None and self._has_come(source, part))
+        return has_news or self._now >= source.next_request
+
+    def _has_come(self, source: Source, part: Assembly) -> bool:
+        """Whether all fragments that were asked for have come."""
+        return source.asked in (0, part.fragment % 256)
+
+    def _part_of(self, source: Source) -> Assembly | None:
+        """The sample to take next, if some of its fragments have come."""
+        part = self.assembly
+        return part if part and part.is_of(source, source.expected) else None
 
     def _sample(self, source: Source, item: Data) -> None:
         if self._is_next(source, item.number):
@@ -584,26 +639,30 @@ class Participant:
             self._take(source.endpoint, payload)
 
     def _fragments(self, source: Source, item: DataFrag) -> None:
-        if not self._is_next(source, item.number) or not _is_sound(item):
+        if item.is_key:
             return
-        if item.size > self._limits.longest:
+        if item.size > self._limits.assembled:
             self.counts["payloads that are too long"] += 1
-            source.advance(item.number + 1)
+            if self._is_next(source, item.number):
+                source.advance(item.number + 1)
             return
-        part = source.reassembly
-        if part is None or part.number != item.number:
-            others = sum(other.reassembly is not None for other in self.sources if other is not source)
-            if others >= self._limits.reassemblies:
+        is_taken = item.number == source.expected if source.is_reliable else item.number >= source.expected
+        part = self.assembly
+        if part is None or not part.is_of(source, item.number):
+            if not is_taken:
+                return
+            is_sound = item.first == 1 and item.count and item.fragment_bytes and item.size and item.payload
+            if self._has_assembled or (part and part.source is not source) or not is_sound:
                 self.counts["samples without room"] += 1
                 return
-            missing = set(range(1, 1 - (-item.size // item.fragment_bytes)))
-            part = Reassembly(item.number, item.size, item.fragment_bytes, self._now, bytearray(item.size), missing)
-            source.reassembly = part
-        if (part.size, part.fragment_bytes) == (item.size, item.fragment_bytes):
-            _place(part, item, self._now)
-        if not part.missing:
-            source.advance(item.number + 1)
-            self._give(source, bytes(part.data))
+            part = Assembly(source, item.number, item.size, item.fragment_bytes, self._now)
+        part.take(item, self._now)
+        self.assembly = part if part.data else None
+        if part.is_whole:
+            self.assembly, self._has_assembled = None, True
+            if is_taken:
+                source.advance(item.number + 1)
+                self._give(source, bytes(part.data))
 
     def _told(self, source: Source, item: Heartbeat) -> None:
         if source.is_reliable and 1 <= item.first <= item.last + 1:
@@ -615,6 +674,15 @@ class Participant:
             is_behind = source.last >= source.expected
             if self._may_request(source) if is_behind else not item.is_final:
                 self._request(source)
+
+    def _fragments_told(self, source: Source, item: HeartbeatFrag) -> None:
+        if not source.is_reliable:
+            return
+        source.last = max(source.last, item.number)
+        part = self._part_of(source)
+        is_behind = item.number > source.expected or part is None or item.last >= part.fragment
+        if item.number >= source.expected and is_behind and self._may_request(source):
+            self._request(source)
 
     def _gap(self, source: Source, item: Gap) -> None:
         if item.start <= source.expected:
@@ -684,25 +752,6 @@ def _fragment(ends: tuple[bytes, bytes, int], payload: bytes, place: int) -> Dat
     """The fragment at a place, from 1."""
     start = (place - 1) * FRAGMENT_BYTES
     return DataFrag(*ends, place, 1, FRAGMENT_BYTES, len(payload), payload[start : start + FRAGMENT_BYTES])
-
-
-def _is_sound(item: DataFrag) -> bool:
-    """Whether its fragments are part of the sample and all there."""
-    if not item.fragment_bytes or item.first < 1 or item.is_key:
-        return False
-    end = (item.first - 1 + item.count) * item.fragment_bytes
-    start = (item.first - 1) * item.fragment_bytes
-    return (
-        start < item.size and end < item.size + item.fragment_bytes and len(item.payload) >= min(end, item.size) - start
-    )
-
-
-def _place(part: Reassembly, item: DataFrag, now: int) -> None:
-    start = (item.first - 1) * part.fragment_bytes
-    end = min(start + item.count * part.fragment_bytes, part.size)
-    part.data[start:end] = item.payload[: end - start]
-    part.missing -= set(range(item.first, item.first + item.count))
-    part.touched = now
 
 
 def _type_hash(facts: ParameterList) -> str:

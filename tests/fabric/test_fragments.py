@@ -197,7 +197,7 @@ def test_its_memory_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     path = tmp_path / "turtle.yaml"
     path.write_text(SPECIFICATION.format(reassemblies=2, longest=7936), encoding="utf-8")
     assert main(["system", "check", str(path)]) == 0
-    assert "the node needs 83968 bytes of memory for messages in several packets\n" in capsys.readouterr().out
+    assert "the node needs 92160 bytes of memory for messages in several packets\n" in capsys.readouterr().out
 
 
 def test_a_node_for_short_messages_has_no_reassembly(tmp_path: Path) -> None:

@@ -299,11 +299,11 @@ def test_a_node_that_restarts_has_the_same_name_and_is_found_at_once() -> None:
     assert peer.took[1] == ("rt/a", b"after")
 
 
-def test_two_long_samples_at_once_need_two_places() -> None:
+def test_long_samples_of_several_writers_wait_for_each_other() -> None:
     """The second one waits for the place of the first, and then arrives as well."""
     network = Ether()
     writers = [network.add(a_node(number, {"a": RELIABLE}, {})) for number in (1, 2, 3)]
-    reader = network.add(a_node(4, {}, {"a": RELIABLE}), Limits(reassemblies=1))
+    reader = network.add(a_node(4, {}, {"a": RELIABLE}), DEFAULT)
     network.run(is_matched(reader, count=3))
     network.loss = 0.3
     for writer in writers:

@@ -27,6 +27,7 @@ entity firm_net_link is
     HAS_STATUS    : boolean := false; -- the system has a status, which is read by UDP
     DISCOVERY     : integer := 4096;  -- bytes of discovery and of payloads that wait, see firm_rtps_node
     PAYLOADS      : integer := 4096;
+    ASSEMBLED     : integer := 0;     -- bytes of the longest message in fragments of RTPS, see firm_rtps_node
     -- Packets whose fragments may be interleaved, 0 to 4, and the bytes of the longest one; without them, fragments
     -- are dropped.
     REASSEMBLIES : integer := 0;
@@ -90,7 +91,7 @@ entity firm_net_link is
     --   3  a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room
     --   4  another node has no room
     --   5  a publisher or subscriber of another node, of a topic of the board, has no room
-    --   6  a message of another node has no room, or comes in fragments of RTPS
+    --   6  a message of another node has no room, or comes in fragments of RTPS and is too long
     --   7  a message to send is empty, too long or of no publisher
     --   8  another host has the address of the board
     --   9  a packet of RTPS, or a list of parameters in it, is broken
@@ -369,14 +370,15 @@ begin
 
   u_node : entity firm.firm_rtps_node
     generic map (
-      WRITERS => WRITERS,
-      READERS => READERS,
-      SOURCES => SOURCES,
-      SINKS   => SINKS,
-      SAMPLE  => SAMPLE,
-      SLOTS   => SLOTS,
-      DEPTH   => DISCOVERY,
-      BYTES   => PAYLOADS
+      WRITERS   => WRITERS,
+      READERS   => READERS,
+      SOURCES   => SOURCES,
+      SINKS     => SINKS,
+      SAMPLE    => SAMPLE,
+      SLOTS     => SLOTS,
+      DEPTH     => DISCOVERY,
+      BYTES     => PAYLOADS,
+      ASSEMBLED => ASSEMBLED
     )
     port map (
       clk                 => clk,

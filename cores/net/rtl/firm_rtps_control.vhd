@@ -50,7 +50,7 @@ entity firm_rtps_control is
     number_write : out std_logic;
     write_place  : out std_logic_vector(3 downto 0);
     write_data   : out std_logic_vector(7 downto 0);
-    read_place   : out std_logic_vector(2 downto 0);
+    read_place   : out std_logic_vector(3 downto 0);
     number_byte  : in  std_logic_vector(7 downto 0);
     is_locked    : out std_logic;
     is_judging   : in  std_logic;
@@ -321,7 +321,7 @@ begin
   note_write   <= at_note_r;
   write_place  <= write_address(3 downto 0);
   write_data   <= data;
-  read_place   <= read_address(2 downto 0);
+  read_place   <= read_address(3 downto 0);
   is_locked    <= locked_r;
 
   takes_early <= at_taken_r and data(1);
@@ -373,7 +373,7 @@ begin
     end if;
   end process choose_word;
 
-  -- Numbers of sources are at the lower addresses.
+  -- Numbers of sources, and what has come of a sample in fragments, are at the lower addresses.
   read_data <= number_byte when read_address(5) = '0' else
                word(7 downto 0) when read_address(1 downto 0) = "00" else
                word(15 downto 8) when read_address(1 downto 0) = "01" else

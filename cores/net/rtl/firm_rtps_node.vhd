@@ -16,8 +16,10 @@ entity firm_rtps_node is
     SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 1024
     SLOTS   : integer := 16;   -- for the last samples of all writers, a power of two, 2 to 256
     DEPTH   : integer := 2048; -- bytes of waiting discovery, a power of two, 4 to 65536
-    BYTES   : integer := 2048; -- of waiting payloads, a power of two, 4 to 65536
-    SAMPLES : integer := 16    -- that wait for the host, a power of two, 2 or more
+    BYTES   : integer := 2048; -- of waiting payloads, a power of two, 4 to 131072
+    SAMPLES : integer := 16;   -- that wait for the host, a power of two, 2 or more
+    -- Bytes of the longest sample in fragments of RTPS, a power of two, 1024 to 65536; 0 if all of them are skipped.
+    ASSEMBLED : integer := 0
   );
   port (
     clk   : in std_logic;
@@ -84,7 +86,7 @@ entity firm_rtps_node is
     is_endpoint_refused : out std_logic;  -- one that matches
     is_frame_refused    : out std_logic;  -- a frame to send: without a payload, too long, or of another id
     -- Pulses: something was wrong, or another than it should be.
-    is_sample_parted    : out std_logic;  -- a packet with a sample in fragments
+    is_sample_parted    : out std_logic;  -- a packet with a sample in fragments that is skipped
     is_packet_broken    : out std_logic;  -- a packet, or the list of parameters in it
     is_endpoint_other   : out std_logic   -- the announcement of a topic of the node's that differs from it
   );
@@ -150,7 +152,7 @@ architecture rtl of firm_rtps_node is
   signal number_write : std_logic;
   signal write_place  : std_logic_vector(3 downto 0);
   signal write_data   : std_logic_vector(7 downto 0);
-  signal read_place   : std_logic_vector(2 downto 0);
+  signal read_place   : std_logic_vector(3 downto 0);
   signal number_byte  : std_logic_vector(7 downto 0);
   signal is_locked    : std_logic;
   signal is_judging   : std_logic;
@@ -328,15 +330,17 @@ begin
 
   u_readers : entity firm.firm_rtps_readers
     generic map (
-      READERS => READERS,
-      FIRST   => FIRST_READER,
-      SOURCES => SOURCES,
-      BYTES   => BYTES,
-      SAMPLES => SAMPLES
+      READERS   => READERS,
+      FIRST     => FIRST_READER,
+      SOURCES   => SOURCES,
+      BYTES     => BYTES,
+      SAMPLES   => SAMPLES,
+      ASSEMBLED => ASSEMBLED
     )
     port map (
       clk           => clk,
       rst_n         => rst_n,
+      tick          => tick,
       field_valid   => field_valid,
       field_address => field_address,
       field_data    => field_data,

@@ -27,6 +27,7 @@ package firm_rtps_pkg is
   constant RTPS_INLINE       : natural := 1;  -- of DATA and DATA_FRAG
   constant RTPS_PAYLOAD      : natural := 2;  -- of DATA
   constant RTPS_KEY          : natural := 3;  -- of DATA
+  constant RTPS_FRAGMENT_KEY : natural := 2;  -- of DATA_FRAG
 
   constant RTPS_SENTINEL    : std_logic_vector(15 downto 0) := x"0001";
   constant RTPS_KEY_HASH    : std_logic_vector(15 downto 0) := x"0070";

@@ -5,7 +5,8 @@
 --
 -- The writer of a sample is looked up while the packet arrives. When the packet is known to be good, the sample's
 -- number is compared with the next one of its writer: a reliable reader takes that one only, and another one takes
--- any later one as well. A sample that is taken waits for the host.
+-- any later one as well. A sample that is taken waits for the host. One that comes in fragments is put together
+-- elsewhere (firm_rtps_assembly), and takes its turn among the others when it is whole.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -18,12 +19,15 @@ entity firm_rtps_readers is
     READERS : integer := 1;    -- of the node, 0 to 8
     FIRST   : integer := 2;    -- the number in the entity id of the first one; those of the others follow
     SOURCES : integer := 8;    -- matched writers, 1 to 64
-    BYTES   : integer := 2048; -- of payloads that wait, a power of two, 4 to 65536
-    SAMPLES : integer := 16    -- that wait, a power of two, 2 or more
+    BYTES   : integer := 2048; -- of payloads that wait, a power of two, 4 to 131072
+    SAMPLES : integer := 16;   -- that wait, a power of two, 2 or more
+    -- Bytes of the longest sample in fragments, see firm_rtps_assembly; 0 if all of them are skipped.
+    ASSEMBLED : integer := 0
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
+    tick  : in std_logic;  -- a pulse each millisecond
 
     -- From firm_rtps_walker.
     field_valid   : in std_logic;
@@ -50,10 +54,12 @@ entity firm_rtps_readers is
     number_write : in  std_logic;
     write_place  : in  std_logic_vector(3 downto 0);
     write_data   : in  std_logic_vector(7 downto 0);
-    read_place   : in  std_logic_vector(2 downto 0);
-    number_byte  : out std_logic_vector(7 downto 0);
+    -- A byte of the next number; from place 8 on, of a sample in fragments that is not whole: its next fragment (two
+    -- bytes), the bytes to come (two), those of a fragment (two), and whether it is the writer's next sample.
+    read_place  : in  std_logic_vector(3 downto 0);
+    number_byte : out std_logic_vector(7 downto 0);
     -- While `is_locked` is high, no number changes but by the program. It may rise while `is_judging` is low.
-    -- `number_byte` is right from two cycles later on.
+    -- `number_byte` is right from three cycles later on, and stays.
     is_locked  : in  std_logic;
     is_judging : out std_logic;
 
@@ -71,7 +77,7 @@ entity firm_rtps_readers is
 
     -- A pulse for each good packet with a sample:
     is_lost   : out std_logic; -- without room
-    is_parted : out std_logic  -- in fragments
+    is_parted : out std_logic  -- in fragments that are skipped
   );
 end entity firm_rtps_readers;
 
@@ -142,6 +148,16 @@ architecture rtl of firm_rtps_readers is
   signal data_r       : std_logic;  -- it is a sample for this node
   signal filled_r     : std_logic;  -- with a payload that is whole
   signal fragment_r   : std_logic;  -- with a part of one
+  -- Of the assembly.
+  signal is_complete  : std_logic;  -- the part completes a sample
+  signal is_long      : std_logic;  -- the part is skipped with its sample
+  signal is_unplaced  : std_logic;  -- the part is dropped
+  signal whole_size   : std_logic_vector(SIZE_BITS-1 downto 0);
+  signal has_whole    : std_logic;  -- a sample that was put together waits
+  signal whole_r      : count_t := (others => '0');  -- which one
+  signal whole_data   : std_logic_vector(7 downto 0);
+  signal part_byte    : std_logic_vector(7 downto 0);
+  signal wanted       : number_t;   -- the next number of its writer
   signal ends_r       : std_logic;
   signal spoils_r     : std_logic;
 
@@ -150,9 +166,10 @@ architecture rtl of firm_rtps_readers is
   signal write_r   : place_t := (others => '0');
   signal read_r    : place_t := (others => '0');
   signal has_room  : std_logic;
+  signal is_wanted : std_logic;  -- the submessage that arrives is of a writer that matches
   signal is_sample : std_logic;
   signal misses_r  : std_logic;  -- a sample of the packet found no room
-  signal parts_r   : std_logic;  -- a sample of the packet is a fragment
+  signal skips_r   : std_logic;  -- a sample of the packet is a fragment that is skipped
   signal pushes    : std_logic;
   signal size      : size_t;
   signal spare_r   : std_logic;
@@ -198,6 +215,8 @@ architecture rtl of firm_rtps_readers is
   signal state_r   : state_t;
   signal shown     : std_logic_vector(SAMPLE_BITS-1 downto 0);
   signal keeps_r   : std_logic;
+  signal parts_r   : std_logic;  -- it was put together
+  signal is_left   : std_logic;  -- so it was, and has left
   signal size_r    : size_t := (others => '0');
   signal left_r    : size_t := (others => '0');
   signal host_id_r : unsigned(ID_BITS-1 downto 0) := (others => '0');
@@ -236,8 +255,8 @@ begin
   assert FIRST >= 0 and FIRST + READERS <= 256
     report "firm_rtps_readers: FIRST is " & integer'image(FIRST) & "; legal: 0 to 256-READERS"
     severity failure;
-  assert BYTES >= 4 and BYTES <= 65536 and 2**clog2(BYTES) = BYTES
-    report "firm_rtps_readers: BYTES is " & integer'image(BYTES) & "; legal: powers of two, 4 to 65536"
+  assert BYTES >= 4 and BYTES <= 131072 and 2**clog2(BYTES) = BYTES
+    report "firm_rtps_readers: BYTES is " & integer'image(BYTES) & "; legal: powers of two, 4 to 131072"
     severity failure;
   assert SAMPLES >= 2 and 2**clog2(SAMPLES) = SAMPLES
     report "firm_rtps_readers: SAMPLES is " & integer'image(SAMPLES) & "; legal: powers of two, 2 or more"
@@ -315,18 +334,18 @@ begin
     end if;
   end process note_sample;
 
-  -- A sample without a payload, or in fragments, is only counted.
+  -- A sample without a payload, or in fragments that are skipped, is only counted.
   delay : process (clk)
   begin
     if rising_edge(clk) then
       submessage_r <= is_submessage;
       data_r       <= '0';
-      if kind = RTPS_DATA or kind = RTPS_DATA_FRAG then
+      if kind = RTPS_DATA then
         data_r <= is_submessage and is_mine;
       end if;
       fragment_r <= '0';
       if kind = RTPS_DATA_FRAG then
-        fragment_r <= '1';
+        fragment_r <= is_mine and not flags(RTPS_FRAGMENT_KEY);
       end if;
       filled_r <= '0';
       if kind = RTPS_DATA then
@@ -345,9 +364,12 @@ begin
   has_room  <= '0' when write_r(PLACE_BITS) /= read_r(PLACE_BITS)
                         and write_r(PLACE_BITS-1 downto 0) = read_r(PLACE_BITS-1 downto 0) else
                '1';
-  is_sample <= data_r and known_r and for_it_r and not large_r;
+  is_wanted <= known_r and for_it_r and not large_r;
+  is_sample <= is_wanted and (data_r or (fragment_r and (is_complete or is_long)));
   -- The payload's last byte came before: the next submessage has a head first.
-  size      <= resize(write_r - sample_r, SIZE_BITS) when filled_r = '1' else (others => '0');
+  size      <= unsigned(whole_size) when is_complete = '1' else
+               resize(write_r - sample_r, SIZE_BITS) when filled_r = '1' else
+               (others => '0');
   pushes    <= is_sample and spare_r and not (full_r and filled_r);
 
   write_payload : process (clk)
@@ -365,7 +387,7 @@ begin
     if rising_edge(clk) then
       if pushes = '1' then
         entries(to_integer(last_r(QUEUE_BITS-1 downto 0)))
-          <= filled_r & std_logic_vector(id_r) & std_logic_vector(sender_r)
+          <= (filled_r or is_complete) & std_logic_vector(id_r) & std_logic_vector(sender_r)
              & std_logic_vector(marks(to_integer(sender_r))) & number_r & std_logic_vector(size);
       end if;
     end if;
@@ -375,7 +397,7 @@ begin
     variable place  : place_t;
     variable last   : count_t;
     variable misses : std_logic;
-    variable parts  : std_logic;
+    variable skips  : std_logic;
   begin
     if rising_edge(clk) then
       is_lost   <= '0';
@@ -383,7 +405,7 @@ begin
       place     := sample_r;
       last      := last_r;
       misses    := misses_r;
-      parts     := parts_r;
+      skips     := skips_r;
       if payload_valid = '1' then
         full_r <= full_r or not has_room;
         if has_room = '1' then
@@ -399,15 +421,15 @@ begin
       if submessage_r = '1' then
         write_r <= place;
         full_r  <= '0';
-        misses  := misses_r or (is_sample and not pushes);
-        parts   := parts_r or (is_sample and fragment_r);
+        misses  := misses_r or (is_sample and not pushes) or (is_wanted and fragment_r and is_unplaced);
+        skips   := skips_r or (is_sample and is_long);
       end if;
       if ends_r = '1' then
         -- The packet may end with the submessage.
         is_lost   <= misses and not spoils_r;
-        is_parted <= parts and not spoils_r;
+        is_parted <= skips and not spoils_r;
         misses    := '0';
-        parts     := '0';
+        skips     := '0';
         if spoils_r = '1' then
           place := start_r;
           last  := first_r;
@@ -420,7 +442,7 @@ begin
       sample_r <= place;
       last_r   <= last;
       misses_r <= misses;
-      parts_r  <= parts;
+      skips_r  <= skips;
       if rst_n = '0' then
         write_r   <= (others => '0');
         start_r   <= (others => '0');
@@ -429,12 +451,138 @@ begin
         last_r    <= (others => '0');
         full_r    <= '0';
         misses_r  <= '0';
-        parts_r   <= '0';
+        skips_r   <= '0';
         is_lost   <= '0';
         is_parted <= '0';
       end if;
     end if;
   end process gather;
+
+  -- ------------------------------------------------------------------ samples in fragments
+
+  without_assembly : if ASSEMBLED = 0 generate
+    is_complete <= '0';
+    is_unplaced <= '0';
+    is_long     <= submessage_r;
+    whole_size  <= (others => '0');
+    has_whole   <= '0';
+    whole_data  <= x"00";
+    part_byte   <= x"00";
+  end generate without_assembly;
+
+  with_assembly : if ASSEMBLED /= 0 generate
+
+    signal is_mine_too    : std_logic;
+    signal wanted_r       : number_t := (others => '0');
+    signal is_strict_r    : std_logic;
+    signal is_next_r      : std_logic;
+    signal is_sending     : std_logic;
+    signal is_open        : std_logic;
+    signal open_source    : source_t;
+    signal open_number    : std_logic_vector(NUMBER_BITS-1 downto 0);
+    signal next_fragment  : std_logic_vector(15 downto 0);
+    signal left_bytes     : std_logic_vector(15 downto 0);
+    signal fragment_bytes : std_logic_vector(15 downto 0);
+    -- What the program sees: it stays while the program reads it.
+    signal next_fragment_r : std_logic_vector(15 downto 0);
+    signal left_bytes_r    : std_logic_vector(15 downto 0);
+    signal is_open_r       : std_logic;
+    signal is_its_r        : std_logic;
+
+  begin
+
+    -- Bytes of the fragment follow its number by twelve or more others.
+    compare_number : process (clk)
+    begin
+      if rising_edge(clk) then
+        wanted_r    <= wanted;
+        is_strict_r <= reliable_r(to_integer(sender_r));
+        is_next_r   <= '0';
+        if unsigned(number_r) = wanted_r or (is_strict_r = '0' and unsigned(number_r) > wanted_r) then
+          is_next_r <= '1';
+        end if;
+      end if;
+    end process compare_number;
+
+    is_mine_too <= is_wanted and is_mine;
+    is_sending  <= parts_r when state_r = SENDING else '0';
+
+    u_assembly : entity firm.firm_rtps_assembly
+      generic map (
+        BYTES       => ASSEMBLED,
+        SOURCE_BITS => SOURCE_BITS
+      )
+      port map (
+        clk            => clk,
+        rst_n          => rst_n,
+        tick           => tick,
+        field_valid    => field_valid,
+        field_address  => field_address,
+        field_data     => field_data,
+        payload_valid  => payload_valid,
+        payload_data   => payload_data,
+        kind           => kind,
+        flags          => flags,
+        is_wanted      => is_mine_too,
+        is_next        => is_next_r,
+        source         => sender_r,
+        number         => number_r,
+        submessage     => submessage_r,
+        ends           => ends_r,
+        spoils         => spoils_r,
+        has_place      => spare_r,
+        is_complete    => is_complete,
+        is_long        => is_long,
+        is_dropped     => is_unplaced,
+        size           => whole_size,
+        is_sending     => is_sending,
+        moves          => moves,
+        data           => whole_data,
+        is_left        => is_left,
+        is_whole       => has_whole,
+        renews         => note_write,
+        renewed        => chosen,
+        is_open        => is_open,
+        open_source    => open_source,
+        open_number    => open_number,
+        next_fragment  => next_fragment,
+        left_bytes     => left_bytes,
+        fragment_bytes => fragment_bytes
+      );
+
+    note_whole : process (clk)
+    begin
+      if rising_edge(clk) then
+        if is_complete = '1' and pushes = '1' then
+          whole_r <= last_r;
+        end if;
+      end if;
+    end process note_whole;
+
+    show_part : process (clk)
+    begin
+      if rising_edge(clk) then
+        if is_locked = '0' then
+          next_fragment_r <= next_fragment;
+          left_bytes_r    <= left_bytes;
+          is_open_r       <= is_open;
+        end if;
+        is_its_r <= '0';
+        if open_source = chosen and unsigned(open_number) = next_r then
+          is_its_r <= is_open_r;
+        end if;
+      end if;
+    end process show_part;
+
+    part_byte <= next_fragment_r(7 downto 0) when read_place(2 downto 0) = "000" else
+                 next_fragment_r(15 downto 8) when read_place(2 downto 0) = "001" else
+                 left_bytes_r(7 downto 0) when read_place(2 downto 0) = "010" else
+                 left_bytes_r(15 downto 8) when read_place(2 downto 0) = "011" else
+                 fragment_bytes(7 downto 0) when read_place(2 downto 0) = "100" else
+                 fragment_bytes(15 downto 8) when read_place(2 downto 0) = "101" else
+                 "0000000" & is_its_r;
+
+  end generate with_assembly;
 
   -- ------------------------------------------------------------------ samples that are judged
 
@@ -521,17 +669,21 @@ begin
     end process write_number;
 
     number(8*index+7 downto 8*index) <= unsigned(digits(to_integer(judge_place)));
+    wanted(8*index+7 downto 8*index) <= unsigned(digits(to_integer(sender_r)));
 
   end generate all_bytes;
 
-  show_number : process (next_r, read_place)
+  show_number : process (next_r, read_place, part_byte)
   begin
     number_byte <= (others => '0');
     for index in 0 to NUMBER_BYTES-1 loop
-      if unsigned(read_place) = index then
+      if unsigned(read_place(2 downto 0)) = index then
         number_byte <= std_logic_vector(next_r(8*index+7 downto 8*index));
       end if;
     end loop;
+    if ASSEMBLED /= 0 and read_place(3) = '1' then
+      number_byte <= part_byte;
+    end if;
   end process show_number;
 
   -- ------------------------------------------------------------------ samples that come too early
@@ -578,7 +730,8 @@ begin
   shown     <= entries(to_integer(oldest_r(QUEUE_BITS-1 downto 0)));
   moves     <= m_axis_tready when state_r /= IDLE else '0';
   -- One that is not kept is skipped.
-  read_next <= read_r + resize(size_r, PLACE_BITS+1) when state_r = HEADING and keeps_r = '0' else
+  read_next <= read_r when parts_r = '1' else
+               read_r + resize(size_r, PLACE_BITS+1) when state_r = HEADING and keeps_r = '0' else
                read_r + 1 when state_r = SENDING and moves = '1' else
                read_r;
 
@@ -588,11 +741,13 @@ begin
     begin
       state_r  <= IDLE;
       oldest_r <= oldest_r + 1;
+      is_left  <= parts_r;
     end procedure finish;
 
   begin
     if rising_edge(clk) then
-      read_r <= read_next;
+      read_r  <= read_next;
+      is_left <= '0';
       if state_r = IDLE then
         size_r    <= unsigned(shown(SIZE_BITS-1 downto 0));
         left_r    <= unsigned(shown(SIZE_BITS-1 downto 0));
@@ -600,6 +755,10 @@ begin
         keeps_r   <= kept(to_integer(oldest_r(QUEUE_BITS-1 downto 0)))(0);
         if oldest_r = judged_r then
           keeps_r <= is_taken and shows;
+        end if;
+        parts_r <= '0';
+        if oldest_r = whole_r then
+          parts_r <= has_whole;
         end if;
         place_r   <= (others => '0');
         -- The oldest one was judged, or is judged now.
@@ -626,6 +785,8 @@ begin
       end if;
       if rst_n = '0' then
         state_r  <= IDLE;
+        parts_r  <= '0';
+        is_left  <= '0';
         read_r   <= (others => '0');
         oldest_r <= (others => '0');
       end if;
@@ -636,7 +797,8 @@ begin
   m_axis_tlast  <= '1' when (state_r = SENDING and left_r = 1)
                             or (state_r = HEADING and place_r = HEAD_BYTES-1 and left_r = 0) else
                    '0';
-  m_axis_tdata  <= payload_r when state_r = SENDING else
+  m_axis_tdata  <= whole_data when state_r = SENDING and parts_r = '1' else
+                   payload_r when state_r = SENDING else
                    std_logic_vector(resize(host_id_r, 8)) when place_r = 0 else
                    std_logic_vector(size_r(7 downto 0)) when place_r = 1 else
                    std_logic_vector(size_r(15 downto 8)) when place_r = 2 else

@@ -11,12 +11,12 @@ from fusesoc_firm.system.written.specification import Block, Project, Specificat
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 MOST_SUBSCRIBERS = MOST_PUBLISHERS = 8
-# Bytes of the longest payload: of a sample in one frame, of one whose frame is reassembled, and of a slot of the
-# history.
-LONGEST_IN_FRAME, LONGEST_TAKEN, LONGEST_SENT = 1344, 16128, 1024
+# Bytes of the longest payload: of a sample in one frame, of one that comes in several, and of a slot of the history.
+LONGEST_IN_FRAME, LONGEST_TAKEN, LONGEST_SENT = 1344, 65280, 1024
 # Bytes of the headers beside a payload in a packet of IPv4, with further submessages before it.
 _HEADERS_BYTES = 256
-_LEAST_WAITING = 4096
+_LEAST_WAITING, _MOST_DISCOVERY = 4096, 32768
+_LEAST_REASSEMBLED, _LEAST_ASSEMBLED = 2048, 1024
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
 MOST_DEPTH, MOST_SLOTS = 127, 256
 _SHORTEST_SLOT = 2
@@ -57,19 +57,31 @@ def slot_bytes(publishers: Iterable[Converter]) -> int:
     return max(_SHORTEST_SLOT, 1 << (longest - 1).bit_length())
 
 
-def reassembled_bytes(subscribers: Iterable[Converter]) -> int:
+def reassembled_bytes(system: DerivedSystem) -> int:
     """Return the bytes of the longest packet that is reassembled, a power of two; 0 if none needs to be."""
-    longest = max(map(_longest, subscribers), default=0)
-    return 0 if longest <= LONGEST_IN_FRAME else 1 << (longest + _HEADERS_BYTES - 1).bit_length()
+    longest, given = _longest_of_several(system), system.network.reassembly if system.network else 0
+    needed = max(given, longest + _HEADERS_BYTES if longest else 0)
+    return max(_LEAST_REASSEMBLED, _power(needed)) if needed else 0
 
 
-def waiting_bytes(subscribers: Iterable[Converter]) -> int:
-    """Return the bytes of payloads that wait, and of discovery, a power of two.
+def assembled_bytes(system: DerivedSystem) -> int:
+    """Return the bytes of the longest sample in fragments of RTPS, a power of two; 0 if none is taken."""
+    longest = _longest_of_several(system)
+    return max(_LEAST_ASSEMBLED, _power(longest)) if longest else 0
 
-    One payload comes while one leaves. Peers also announce all their endpoints in one packet, with whose payloads the
-    fields of its submessages wait.
+
+def waiting_bytes(system: DerivedSystem) -> int:
+    """Return the bytes of payloads that wait, a power of two: the longest one comes while one leaves."""
+    longest = _longest_of_several(system)
+    return max(_LEAST_WAITING, 2 * _power(longest + _HEADERS_BYTES))
+
+
+def discovery_bytes(system: DerivedSystem) -> int:
+    """Return the bytes of discovery that wait, a power of two.
+
+    Peers announce all their endpoints in one packet, with whose payloads the fields of its submessages wait.
     """
-    return max(_LEAST_WAITING, 2 * reassembled_bytes(subscribers))
+    return min(_MOST_DISCOVERY, max(_LEAST_WAITING, 2 * reassembled_bytes(system)))
 
 
 def kept_of(quality: Quality) -> int:
@@ -80,6 +92,17 @@ def kept_of(quality: Quality) -> int:
 def ring_slots(quality: Quality) -> int:
     """Return the number of a writer's slots, a power of two: one of them is for the sample that comes."""
     return 1 << kept_of(quality).bit_length()
+
+
+def _longest_of_several(system: DerivedSystem) -> int:
+    """Return the bytes of the longest payload that a node takes, if it comes in several frames; otherwise 0."""
+    longest = max(map(_longest, system.subscribers), default=0)
+    return longest if longest > LONGEST_IN_FRAME else 0
+
+
+def _power(size: int) -> int:
+    """Return the next power of two from a size on."""
+    return 1 << (size - 1).bit_length()
 
 
 def _longest(item: Converter) -> int:

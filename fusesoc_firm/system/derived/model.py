@@ -351,7 +351,8 @@ class Network:
     """The place of a system that is a node itself: its MAC address (six bytes), IPv4 addresses and names.
 
     `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port, and knows the
-    names of `hosts`. `reassemblies` are the messages in several packets that may arrive at the same time.
+    names of `hosts`. `reassemblies` are the messages in several packets that may arrive at the same time, and
+    `reassembly` the bytes of the longest one, if the topics need fewer.
     """
 
     mac: bytes
@@ -366,6 +367,7 @@ class Network:
     hosts: tuple[Host, ...] = ()
     phy: Phy = Phy.GMII
     reassemblies: int = 1
+    reassembly: int = 0
 
 
 class StatusAccess(Enum):

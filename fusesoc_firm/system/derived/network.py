@@ -37,7 +37,7 @@ _VERSIONS = {ETHERNET: ("ROS2", 2), **dict.fromkeys(CHIPS, ("ROS", 1))}
 _MAC = re.compile(r"[0-9A-Fa-f]{2}(:[0-9A-Fa-f]{2}){5}")
 _GROUP_BIT = 1
 # Half of those of firm_ipv4_reassembly: as many may wait until they leave.
-_MOST_REASSEMBLIES = 4
+_MOST_REASSEMBLIES, _LONGEST_PACKET = 4, 65535
 # The limit of rmw (RMW_NODE_NAME_MAX_NAME_LENGTH).
 _LONGEST_NAME = 255
 _WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
@@ -155,6 +155,9 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     if not 1 <= section.reassemblies <= _MOST_REASSEMBLIES:
         hint = f"legal here: 1 to {_MOST_REASSEMBLIES}"
         faults.error(f"'reassemblies: {section.reassemblies}' is not possible", section.place("reassemblies"), hint)
+    if not 0 <= section.reassembly <= _LONGEST_PACKET:
+        hint = f"legal here: 0 to {_LONGEST_PACKET}"
+        faults.error(f"'reassembly: {section.reassembly}' is not possible", section.place("reassembly"), hint)
     if not section.is_sound or mac is None or network is None:
         return None
     address, netmask, gateway = network
@@ -162,7 +165,7 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
         _check_reachable(section, address, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
     kind = NetworkKind(project.interconnect) if project.interconnect in NETWORKS else NetworkKind.ETHERNET
     namespace, domain, phy = str(section.namespace), section.domain, Phy(section.phy)
-    others = (kind, master, hosts, phy, section.reassemblies)
+    others = (kind, master, hosts, phy, section.reassemblies, section.reassembly)
     return Network(mac, address, netmask, gateway, name, namespace, domain, *others)
 
 

@@ -95,7 +95,8 @@ def _way(network: Network) -> dict[str, Any]:
     if network.master:
         hosts = {host.name: str(host.address) for host in network.hosts}
         return {"master": "{}:{}".format(*network.master), **({"hosts": hosts} if hosts else {})}
-    return {"domain": network.domain, "phy": network.phy.value, "reassemblies": network.reassemblies}
+    sizes = {"reassemblies": network.reassemblies, **({"reassembly": network.reassembly} if network.reassembly else {})}
+    return {"domain": network.domain, "phy": network.phy.value, **sizes}
 
 
 def default_lengths(system: DerivedSystem) -> list[str]:

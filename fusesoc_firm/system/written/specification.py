@@ -146,6 +146,12 @@ class NodeNetwork(Section):
         form="integer",
         default=1,
     )
+    reassembly: int = key(
+        "bytes of the longest packet that others send in fragments, up to 65535, if it is longer than the topics need;"
+        " only used with ethernet",
+        form="integer",
+        default=0,
+    )
 
 
 @dataclass(frozen=True)

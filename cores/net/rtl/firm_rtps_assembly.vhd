@@ -1,0 +1,395 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Puts a sample together that comes in fragments of RTPS (OMG DDSI-RTPS 2.5, section 8.3.8.3): one sample at a time.
+--
+-- Fragments of one writer come in order, as hosts send them and an Ethernet keeps them. So the state of a sample is the
+-- number of its next fragment, whatever their number; after a lost one, the others are asked for again. Fragments of
+-- another sample are dropped meanwhile. A sample that its reader no longer wants makes room for its successor, and one
+-- without a new fragment for a while makes room for others.
+--
+-- A fragment counts when its submessage ends with a whole one, and when its packet is known to be good. Until then, its
+-- bytes are where no byte counts.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_rtps_pkg.all;
+
+entity firm_rtps_assembly is
+  generic (
+    BYTES       : integer := 4096; -- of the longest sample, a power of two, 1024 to 65536; of these, 65535 are used
+    SOURCE_BITS : integer := 3;    -- of the number of a writer
+    TICKS       : integer := 1000  -- without a fragment, after which a sample is given up, 1 to 65535
+  );
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+    tick  : in std_logic;  -- a pulse each millisecond
+
+    -- From firm_rtps_walker.
+    field_valid   : in std_logic;
+    field_address : in std_logic_vector(RECORD_BITS-1 downto 0);
+    field_data    : in std_logic_vector(7 downto 0);
+    payload_valid : in std_logic;
+    payload_data  : in std_logic_vector(7 downto 0);
+    kind          : in std_logic_vector(7 downto 0);
+    flags         : in std_logic_vector(7 downto 0);
+
+    -- Of the submessage that arrives, from the first byte of its payload on.
+    is_wanted : in std_logic;  -- it is a sample for a reader of the node
+    is_next   : in std_logic;  -- the reader takes a sample with this number
+    source    : in unsigned(SOURCE_BITS-1 downto 0);
+    number    : in std_logic_vector(47 downto 0);
+
+    -- One cycle after a submessage, and after the last one of a packet, nothing of which counts if it is spoilt.
+    submessage  : in  std_logic;
+    ends        : in  std_logic;
+    spoils      : in  std_logic;
+    has_place   : in  std_logic;                      -- for a sample among those that wait
+    is_complete : out std_logic;                      -- with `submessage`: it ends the sample
+    is_long     : out std_logic;                      -- with `submessage`: it belongs to a sample that is too long
+    is_dropped  : out std_logic;                      -- with `submessage`: it belongs to a sample without room
+    size        : out std_logic_vector(15 downto 0);  -- of the sample that ends
+
+    -- The sample leaves from its first byte on, one after the other; then there is room for another one.
+    is_sending : in  std_logic;
+    moves      : in  std_logic;
+    data       : out std_logic_vector(7 downto 0);
+    is_left    : in  std_logic;
+    is_whole   : out std_logic;                       -- until then
+
+    -- The writer of this source is another one from now on.
+    renews  : in std_logic;
+    renewed : in unsigned(SOURCE_BITS-1 downto 0);
+
+    -- What has come of the sample that is not whole.
+    is_open        : out std_logic;
+    open_source    : out unsigned(SOURCE_BITS-1 downto 0);
+    open_number    : out std_logic_vector(47 downto 0);
+    next_fragment  : out std_logic_vector(15 downto 0);
+    left_bytes     : out std_logic_vector(15 downto 0);
+    fragment_bytes : out std_logic_vector(15 downto 0)
+  );
+end entity firm_rtps_assembly;
+
+architecture rtl of firm_rtps_assembly is
+
+  constant PLACE_BITS   : positive := max(1, clog2(BYTES));
+  constant MOST_BYTES   : positive := 65536;
+  -- In the field with the numbers of fragments and sizes.
+  constant FIRST_PLACE  : natural  := RECORD_FRAGMENTS;
+  constant COUNT_PLACE  : natural  := RECORD_FRAGMENTS+4;
+  constant EACH_PLACE   : natural  := RECORD_FRAGMENTS+6;
+  constant SIZE_PLACE   : natural  := RECORD_FRAGMENTS+8;
+
+  subtype half_t is unsigned(15 downto 0);
+  subtype place_t is unsigned(16 downto 0);
+  -- The next byte, and the number of the next fragment.
+  type spot_t is record
+    place    : place_t;
+    fragment : half_t;
+  end record spot_t;
+  constant BEGINNING : spot_t := ((others => '0'), to_unsigned(1, 16));
+
+  type memory_t is array (natural range 0 to BYTES-1) of std_logic_vector(7 downto 0);
+  signal memory : memory_t;
+
+  -- ------------------------------------------------------------------ the fragment that arrives
+  signal kind_r     : std_logic;                      -- it is one, and not of a key
+  signal other_r    : std_logic;                      -- the sample's number differs from that of the assembly
+  signal differs_r  : std_logic;                      -- so do a size, or the number of the next fragment
+  signal later_r    : std_logic;                      -- it is not the first one of its sample
+  signal size_r     : half_t := (others => '0');
+  signal high_r     : std_logic;                      -- the size has more than 16 bits
+  signal each_r     : half_t := (others => '0');
+  signal count_r    : half_t := (others => '0');
+  signal fits       : std_logic;
+  signal has_bytes  : std_logic;                      -- neither a size nor the number of fragments is zero
+  signal is_holder  : std_logic;                      -- its writer is that of the assembly
+  signal is_same    : std_logic;                      -- and so is its sample
+  signal is_free    : std_logic;                      -- the assembly is not whole
+  signal continues  : std_logic;
+  signal begins     : std_logic;
+  signal inside_r   : std_logic;                      -- a byte of the payload has come
+  signal taken_r    : std_logic;                      -- its bytes are taken
+  signal closed_r   : std_logic;                      -- so far as the sample and the count go
+  signal between_r  : std_logic;                      -- the bytes so far are whole fragments
+  signal byte_r     : std_logic_vector(7 downto 0) := (others => '0');
+  signal valid_r    : std_logic;
+  signal writes     : std_logic;
+  signal ends_part  : std_logic;                      -- this is the last byte of a fragment
+  signal ends_all   : std_logic;                      -- and of the sample
+  signal is_end     : std_logic;                      -- all of the sample has come
+  signal part_r     : half_t := (others => '0');      -- bytes of the fragment to come
+  signal parts_r    : half_t := (others => '0');      -- fragments to come
+
+  -- ------------------------------------------------------------------ the sample
+  signal used_r   : std_logic;
+  signal began_r  : std_logic;                        -- in this packet
+  signal ended_r  : std_logic;                        -- in this packet
+  signal whole_r  : std_logic;
+  signal fed_r    : std_logic;                        -- it got a fragment in this packet
+  signal source_r : unsigned(SOURCE_BITS-1 downto 0) := (others => '0');
+  signal number_r : std_logic_vector(47 downto 0) := (others => '0');
+  signal bytes_r  : half_t := (others => '0');
+  signal length_r : half_t := (others => '0');        -- of each fragment
+  signal spot_r   : spot_t := BEGINNING;              -- as far as bytes have come
+  signal counts_r : spot_t := BEGINNING;              -- with the last submessage
+  signal kept_r   : spot_t := BEGINNING;              -- with the last packet
+  signal age_r    : natural range 0 to 65535;
+
+  signal read_r : unsigned(PLACE_BITS-1 downto 0) := (others => '0');
+  signal read   : unsigned(PLACE_BITS-1 downto 0);
+
+  -- A byte of a number, the lowest at place 0.
+  function byte_of(value : unsigned; place : natural) return std_logic_vector is
+  begin
+    return std_logic_vector(value(8*place+7 downto 8*place));
+  end function byte_of;
+
+begin
+
+  assert BYTES >= 1024 and BYTES <= MOST_BYTES and 2**clog2(BYTES) = BYTES
+    report "firm_rtps_assembly: BYTES is " & integer'image(BYTES) & "; legal: powers of two, 1024 to 65536"
+    severity failure;
+  assert TICKS >= 1 and TICKS <= 65535
+    report "firm_rtps_assembly: TICKS is " & integer'image(TICKS) & "; legal: 1 to 65535"
+    severity failure;
+
+  -- ------------------------------------------------------------------ the fields
+
+  read_fields : process (clk)
+    variable compared : std_logic_vector(7 downto 0);
+  begin
+    if rising_edge(clk) then
+      kind_r <= '0';
+      if kind = RTPS_DATA_FRAG then
+        kind_r <= not flags(RTPS_FRAGMENT_KEY);
+      end if;
+      if field_valid = '1' then
+        if unsigned(field_address) = RECORD_KIND then
+          other_r   <= '0';
+          differs_r <= '0';
+          later_r   <= '0';
+          high_r    <= '0';
+        end if;
+        for place in 0 to 5 loop
+          if unsigned(field_address) = RECORD_NUMBER+place and field_data /= byte_of(unsigned(number_r), place) then
+            other_r <= '1';
+          end if;
+        end loop;
+        for place in 0 to 1 loop
+          if unsigned(field_address) = COUNT_PLACE+place then
+            count_r(8*place+7 downto 8*place) <= unsigned(field_data);
+          elsif unsigned(field_address) = EACH_PLACE+place then
+            each_r(8*place+7 downto 8*place) <= unsigned(field_data);
+          elsif unsigned(field_address) = SIZE_PLACE+place then
+            size_r(8*place+7 downto 8*place) <= unsigned(field_data);
+          end if;
+        end loop;
+        if is_in(field_address, SIZE_PLACE, 4) = '1' and field_address(1) = '1' and field_data /= x"00" then
+          high_r <= '1';
+        end if;
+        if unsigned(field_address) = FIRST_PLACE and field_data /= x"01" then
+          later_r <= '1';
+        elsif is_in(field_address, FIRST_PLACE, 4) = '1' and field_address(1 downto 0) /= "00"
+              and field_data /= x"00" then
+          later_r <= '1';
+        end if;
+        compared := x"00";
+        for place in 0 to 1 loop
+          if unsigned(field_address) = FIRST_PLACE+place then
+            compared := byte_of(counts_r.fragment, place);
+          elsif unsigned(field_address) = EACH_PLACE+place then
+            compared := byte_of(length_r, place);
+          elsif unsigned(field_address) = SIZE_PLACE+place then
+            compared := byte_of(bytes_r, place);
+          end if;
+        end loop;
+        if is_in(field_address, RECORD_FRAGMENTS, 12) = '1' and unsigned(field_address) /= COUNT_PLACE
+           and unsigned(field_address) /= COUNT_PLACE+1 and field_data /= compared then
+          differs_r <= '1';
+        end if;
+      end if;
+    end if;
+  end process read_fields;
+
+  fits      <= '1' when high_r = '0' and size_r <= BYTES else '0';
+  has_bytes <= '1' when size_r /= 0 and each_r /= 0 and count_r /= 0 else '0';
+  is_holder <= '1' when source = source_r else '0';
+  is_free   <= not (whole_r or ended_r);
+  is_same   <= used_r and is_holder and not other_r;
+  continues <= is_free and is_same and has_bytes and not differs_r;
+  begins    <= is_free and is_next and fits and has_bytes and not later_r and (not used_r or (is_holder and other_r));
+
+  -- ------------------------------------------------------------------ the bytes
+
+  writes    <= valid_r and taken_r and not closed_r;
+  ends_all  <= '1' when writes = '1' and spot_r.place + 1 = bytes_r else '0';
+  ends_part <= '1' when writes = '1' and (part_r = 1 or ends_all = '1') else '0';
+  is_end    <= '1' when taken_r = '1' and (ends_all = '1' or spot_r.place = bytes_r) else '0';
+
+  write_byte : process (clk)
+  begin
+    if rising_edge(clk) then
+      if writes = '1' then
+        memory(to_integer(spot_r.place(PLACE_BITS-1 downto 0))) <= byte_r;
+      end if;
+      data <= memory(to_integer(read));
+    end if;
+  end process write_byte;
+
+  read <= (others => '0') when is_sending = '0' else
+          read_r + 1 when moves = '1' else
+          read_r;
+
+  take_fragment : process (clk)
+    variable spot    : spot_t;
+    variable counts  : spot_t;
+    variable gives   : std_logic;  -- the sample is given up
+    variable used    : std_logic;
+    variable began   : std_logic;
+    variable fed     : std_logic;
+    variable ended   : std_logic;
+    variable between : std_logic;
+  begin
+    if rising_edge(clk) then
+      read_r  <= read;
+      byte_r  <= payload_data;
+      valid_r <= payload_valid;
+      spot    := spot_r;
+      counts  := counts_r;
+      used    := used_r;
+      began   := began_r;
+      fed     := fed_r;
+      ended   := ended_r;
+      between := between_r;
+      gives   := '0';
+
+      -- A byte.
+      if writes = '1' then
+        spot.place := spot_r.place + 1;
+        part_r     <= part_r - 1;
+        between    := ends_part;
+        if ends_part = '1' then
+          spot.fragment := spot_r.fragment + 1;
+          part_r        <= length_r;
+          parts_r       <= parts_r - 1;
+        end if;
+        if ends_all = '1' or (ends_part = '1' and parts_r = 1) then
+          closed_r <= '1';
+        end if;
+      end if;
+
+      -- The end of a submessage.
+      if submessage = '1' then
+        if taken_r = '1' and between = '1' then
+          counts := spot;
+          fed    := '1';
+          ended  := is_end and has_place;
+          gives  := is_end and not has_place;
+        end if;
+        taken_r  <= '0';
+        inside_r <= '0';
+      end if;
+
+      -- The first byte of a payload.
+      if payload_valid = '1' and inside_r = '0' then
+        inside_r  <= '1';
+        taken_r   <= kind_r and is_wanted and (continues or begins);
+        closed_r  <= '0';
+        between   := '1';
+        part_r    <= each_r;
+        parts_r   <= count_r;
+        spot      := counts_r;
+        if kind_r = '1' and is_wanted = '1' and begins = '1' then
+          used     := '1';
+          began    := '1';
+          age_r    <= 0;
+          source_r <= source;
+          number_r <= number;
+          bytes_r  <= size_r;
+          length_r <= each_r;
+          spot     := BEGINNING;
+          counts   := BEGINNING;
+        end if;
+      end if;
+
+      -- A sample that is whole is known to be one of the writer before.
+      if renews = '1' and renewed = source_r and whole_r = '0' then
+        began := began or ended;
+        gives := gives or not ended;
+      end if;
+
+      -- The end of a packet.
+      if ends = '1' then
+        taken_r  <= '0';
+        inside_r <= '0';
+        if spoils = '1' then
+          counts := kept_r;
+          gives  := gives or began;
+        elsif began = '1' and counts.place = 0 then
+          -- The first fragment was cut.
+          gives := '1';
+        else
+          whole_r <= whole_r or ended;
+          if fed = '1' then
+            age_r <= 0;
+          end if;
+        end if;
+        kept_r <= counts;
+        ended  := '0';
+        began  := '0';
+        fed    := '0';
+      elsif tick = '1' and used_r = '1' and is_free = '1' then
+        if age_r /= TICKS-1 then
+          age_r <= age_r + 1;
+        elsif taken_r = '0' and began = '0' and fed = '0' then
+          gives := '1';
+        end if;
+      end if;
+      if is_left = '1' then
+        whole_r <= '0';
+        gives   := '1';
+      end if;
+      if gives = '1' then
+        used    := '0';
+        began   := '0';
+        taken_r <= '0';
+        age_r   <= 0;
+      end if;
+      spot_r    <= spot;
+      counts_r  <= counts;
+      used_r    <= used;
+      began_r   <= began;
+      fed_r     <= fed;
+      ended_r   <= ended;
+      between_r <= between;
+      if rst_n = '0' then
+        valid_r  <= '0';
+        inside_r <= '0';
+        taken_r  <= '0';
+        used_r   <= '0';
+        began_r  <= '0';
+        ended_r  <= '0';
+        whole_r  <= '0';
+        fed_r    <= '0';
+        age_r    <= 0;
+      end if;
+    end if;
+  end process take_fragment;
+
+  is_complete <= submessage and is_end and (between_r or ends_part);
+  is_long     <= submessage and kind_r and not fits;
+  is_dropped  <= submessage and kind_r and is_next and fits and not (taken_r or is_same);
+  size        <= std_logic_vector(bytes_r);
+  is_whole    <= whole_r;
+
+  is_open        <= used_r and is_free and not began_r;
+  open_source    <= source_r;
+  open_number    <= number_r;
+  next_fragment  <= std_logic_vector(kept_r.fragment);
+  left_bytes     <= std_logic_vector(bytes_r - kept_r.place(15 downto 0));
+  fragment_bytes <= std_logic_vector(length_r);
+
+end architecture rtl;
