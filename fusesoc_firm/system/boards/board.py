@@ -223,11 +223,11 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
         twin = seen.setdefault(pin.port.lower(), pin.port)
         if twin is not pin.port:
             faults.error(f"port '{pin.port}' already has a pin, at {twin.source}", pin.port.source)
-    if other := seen.get({_CLOCK: _OSCILLATOR, _OSCILLATOR: _CLOCK}[board.clock_port]):
-        hint = f"use '{board.clock_port}'; the key 'oscillator' tells a pin '{_OSCILLATOR}' from a pin '{_CLOCK}'"
-        faults.error(f"the board's clock has no pin '{other}'", other.source, hint)
-    if board.phy is None and (reset := seen.get(_PHY_RESET)):
-        faults.error(f"the pin '{reset}' needs the key 'phy'", reset.source)
+    for port, value, name in (_OSCILLATOR, board.oscillator, "oscillator"), (_PHY_RESET, board.phy, "phy"):
+        if value is None and (unused := seen.get(port)):
+            faults.error(f"the pin '{port}' needs the key '{name}'", unused.source)
+    if board.oscillator and (clock := seen.get(_CLOCK)):
+        faults.error(f"a PLL makes '{_CLOCK}', so it has no pin", clock.source, f"the pin is '{_OSCILLATOR}'")
     source = board.pins[-1].source if board.pins else board.source
     names = [name for name, _, _ in board.host_pins]
     if board.phy:
