@@ -223,17 +223,22 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
         twin = seen.setdefault(pin.port.lower(), pin.port)
         if twin is not pin.port:
             faults.error(f"port '{pin.port}' already has a pin, at {twin.source}", pin.port.source)
+    _check_ports(board, seen, faults)
+
+
+def _check_ports(board: Board, pins: Mapping[str, Text], faults: Diagnostics) -> None:
+    """Note missing pins, and those of ports that the board does not have; `pins` are the ports with a pin."""
     for port, value, name in (_OSCILLATOR, board.oscillator, "oscillator"), (_PHY_RESET, board.phy, "phy"):
-        if value is None and (unused := seen.get(port)):
+        if value is None and (unused := pins.get(port)):
             faults.error(f"the pin '{port}' needs the key '{name}'", unused.source)
-    if board.oscillator and (clock := seen.get(_CLOCK)):
+    if board.oscillator and (clock := pins.get(_CLOCK)):
         faults.error(f"a PLL makes '{_CLOCK}', so it has no pin", clock.source, f"the pin is '{_OSCILLATOR}'")
     source = board.pins[-1].source if board.pins else board.source
     names = [name for name, _, _ in board.host_pins]
     if board.phy:
         names = [bit for name, _, bits in PHY_PINS[Phy(str(board.phy))] for bit in _bits(name, bits)]
     needed = {board.clock_port, *names} - _OPTIONAL
-    for port in sorted(needed - seen.keys()):
+    for port in sorted(needed - pins.keys()):
         faults.error(
             f"the board has no pin for '{port}'", source, f"interconnect '{board.interconnect}' needs this pin"
         )
