@@ -16,7 +16,7 @@ from tests.hdl.ghdl import REPOSITORY
 TITLE = "Whole systems by Ethernet on boards, MHz"
 _COLUMNS = ("system", "board", "MHz", "LUT4", "FF", "block RAMs", "bar", "result")
 # Systems of specs, and their boards.
-_BUILDS = (("quat2euler_ethernet", "ecp5_versa"), ("quat2euler_ethernet", "ulx3s_lan8720"))
+_BUILDS = (("quat2euler_ethernet", "ecp5_versa"),)
 # nextpnr's names of the cells of an ECP5, in the order of the columns.
 _CELLS = ("TRELLIS_COMB", "TRELLIS_FF", "DP16KD")
 _NOTE = """Bitstreams as `make bitstream` builds them, with Debian's Yosys and the seed of the board. The bar is the
