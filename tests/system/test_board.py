@@ -148,9 +148,9 @@ def test_a_pll_makes_the_clock(tmp_path: Path) -> None:
     assert clocks == ['FREQUENCY PORT "oscillator" 100 MHZ;']
 
 
-@pytest.mark.parametrize("pair", [(100, 15), (12, 125), (100, 401), (9, 18), (500, 125)])
+@pytest.mark.parametrize("pair", [(100, 15), (12, 125), (100, 500), (9, 18), (500, 125)])
 def test_a_pll_has_limits(pair: tuple[int, int]) -> None:
-    """It compares at 5 and 4 MHz, its output or its input is too fast, and its input too slow."""
+    """It compares at 5 and 1 MHz, its output or its input is too fast, and its input too slow."""
     assert pll_of(*(Fraction(megahertz * 10**6) for megahertz in pair)) is None
 
 
