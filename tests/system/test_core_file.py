@@ -17,7 +17,7 @@ from tests.system.systems import accelerator, converter, derived, instance, spec
 SPECS = Path(__file__).resolve().parents[2] / "specs"
 CORES = sorted(SPECS.glob("*/*.core"))
 # Boards with a network are for systems that are nodes.
-NETWORK_BOARDS = {"icebreaker_w5500", "ulx3s_lan8720", "ulx3s_w5500"}
+NETWORK_BOARDS = {"ecp5_versa", "icebreaker_w5500", "ulx3s_lan8720", "ulx3s_w5500"}
 SYNTHESIS = {*(f"synth_{family}" for family in ("xilinx", "ecp5", "ice40", "gowin")), *boards()} - NETWORK_BOARDS
 SIMULATION = {"sim", "sim_icarus", "sim_verilator", "live", "live_verilator", "emulate"}
 

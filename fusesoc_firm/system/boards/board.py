@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.system.boards.pll import PLL_TEMPLATES, Pll, megahertz, pll_configuration, pll_of
 from fusesoc_firm.system.boards.processor import MOST_CLOCKS, PROCESSORS
 from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind, Phy
+from fusesoc_firm.system.derived.timing import frequency
 from fusesoc_firm.system.hardware.configuration import top_level_pins
 from fusesoc_firm.system.hardware.interconnect import (
     ADDRESS_FAULT,
@@ -43,14 +45,16 @@ _DDR_FLAGS = {"trellis": "ddr_ecp5"}
 VIVADO, QUARTUS = "vivado", "quartus"
 # The keys of a board that each tool requires.
 _NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
-_CLOCK = "clk"
+_CLOCK, _OSCILLATOR = "clk", "oscillator"
+_PHY_RESET = "phy_rst_n"
 _PORTS = (
-    _CLOCK,
+    *(_CLOCK, _OSCILLATOR, _PHY_RESET),
     *dict.fromkeys(name for pins in (*LINK_PINS.values(), CHIP_PINS) for name, _, _ in pins),
     *(name for pins in PHY_PINS.values() for name, _, _ in pins),
     *("led", "led_n", "reset", "reset_n"),
 )
-# Contacts bounce for up to some 10 ms; the cycles are at least those that firm_debounce takes.
+# Contacts bounce for up to some 10 ms, and PHYs need a reset of 10 ms; the cycles are at least those that firm_debounce
+# takes.
 _DEBOUNCE_SECONDS = 0.01
 _SHORTEST_DEBOUNCE = 4
 # The optional keys of a board.
@@ -89,6 +93,7 @@ class Board(Section):
     description: Text = key("maker, board and FPGA", is_required=True)
     flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=(*FLOWS, *_NEEDED))
     clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
+    oscillator: Text | None = key("frequency of the pin oscillator, if a PLL makes clk of it")
     interconnect: Text = key(
         "the connection to the host or to a network", is_required=True, choices=(AXI_STREAM, *_PINS, ETHERNET)
     )
@@ -112,6 +117,11 @@ class Board(Section):
     def is_linked(self) -> bool:
         """Whether pins connect the host or the network to the system."""
         return self.flow in FLOWS
+
+    @property
+    def clock_port(self) -> str:
+        """The port of the pin with the board's clock."""
+        return _OSCILLATOR if self.oscillator else _CLOCK
 
     @property
     def ddr_flag(self) -> str | None:
@@ -164,12 +174,32 @@ def read_board(name: str, folder: Path = Path()) -> Board:
         faults.raise_if_any()
         fail(f"{name} is empty; a board needs the keys 'description', 'flow', 'clock' and 'interconnect'")
     board = read(Board, text.root, text, faults, "a board")
+    if board.is_sound:
+        _pll(board, faults)
     if board.is_sound and board.is_linked:
         _check_pins(board, faults)
     elif board.is_sound:
         _check_streams(board, faults)
     faults.raise_if_any()
     return replace(board, name=identifier(path.stem).lower())
+
+
+def _pll(board: Board, faults: Diagnostics) -> Pll | None:
+    """Return the PLL that makes clk, or None if the board has none; note its faults."""
+    if board.oscillator is None:
+        return None
+    if board.flow not in PLL_TEMPLATES:
+        message = f"boards with flow '{board.flow}' have no known PLL"
+        faults.error(message, board.oscillator.source, f"'oscillator' is legal with flow {', '.join(PLL_TEMPLATES)}")
+        return None
+    oscillator, clock = frequency("oscillator", board.oscillator, faults), frequency("clock", board.clock, faults)
+    if oscillator is None or clock is None:
+        return None
+    pll = pll_of(oscillator, clock)
+    if pll is None:
+        message = f"no PLL makes 'clock: {board.clock}' from an oscillator of {board.oscillator}"
+        faults.error(message, board.clock.source, "use a frequency with a simple ratio to the oscillator's")
+    return pll
 
 
 def _check_pins(board: Board, faults: Diagnostics) -> None:
@@ -193,12 +223,22 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
         twin = seen.setdefault(pin.port.lower(), pin.port)
         if twin is not pin.port:
             faults.error(f"port '{pin.port}' already has a pin, at {twin.source}", pin.port.source)
+    _check_ports(board, seen, faults)
+
+
+def _check_ports(board: Board, pins: Mapping[str, Text], faults: Diagnostics) -> None:
+    """Note missing pins, and those of ports that the board does not have; `pins` are the ports with a pin."""
+    for port, value, name in (_OSCILLATOR, board.oscillator, "oscillator"), (_PHY_RESET, board.phy, "phy"):
+        if value is None and (unused := pins.get(port)):
+            faults.error(f"the pin '{port}' needs the key '{name}'", unused.source)
+    if board.oscillator and (clock := pins.get(_CLOCK)):
+        faults.error(f"a PLL makes '{_CLOCK}', so it has no pin", clock.source, f"the pin is '{_OSCILLATOR}'")
     source = board.pins[-1].source if board.pins else board.source
     names = [name for name, _, _ in board.host_pins]
     if board.phy:
         names = [bit for name, _, bits in PHY_PINS[Phy(str(board.phy))] for bit in _bits(name, bits)]
-    needed = {_CLOCK, *names} - _OPTIONAL
-    for port in sorted(needed - seen.keys()):
+    needed = {board.clock_port, *names} - _OPTIONAL
+    for port in sorted(needed - pins.keys()):
         faults.error(
             f"the board has no pin for '{port}'", source, f"interconnect '{board.interconnect}' needs this pin"
         )
@@ -278,17 +318,18 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
     """Return the configuration of the top level and of its constraints."""
     assert system.clock is not None
     clock_hz = int(system.clock)
+    entity, pll = board_entity(system, board), _pll(board, Diagnostics())
     ports = {pin.port.lower().partition("[")[0] for pin in board.pins}
     pins = _accelerator_pins(system)
     link = [(name, direction) for name, direction, _ in board.host_pins if name in ports]
     types = {name: type_.partition(" :=")[0] for name, _, type_ in board.host_pins}
     is_spi = board.interconnect == LinkKind.SPI.value
-    own = [(name, "out" if name.startswith("led") else "in") for name in ("led", "led_n", "reset", "reset_n")]
-    declared = [(_CLOCK, "in"), *link, *((name, direction) for name, direction in own if name in ports)]
+    own = [*((name, "out") for name in (_PHY_RESET, "led", "led_n")), *((name, "in") for name in ("reset", "reset_n"))]
+    declared = [(board.clock_port, "in"), *link, *((name, direction) for name, direction in own if name in ports)]
     typed = [(name, direction, types.get(name, vhdl_type(None))) for name, direction in declared]
     typed += [(pin.name, pin.direction, vhdl_type(pin.width)) for pin in pins]
     return {
-        "entity": board_entity(system, board),
+        "entity": entity,
         "system": system.entity,
         "description": str(board.description),
         "clock_hz": clock_hz,
@@ -297,6 +338,8 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
         # The pad of spi_miso is at the top level.
         "handed_on": [*(name for name, _ in link if not (is_spi and name == "spi_miso")), *(pin.name for pin in pins)],
         "has_button": bool(ports & {"reset", "reset_n"}),
+        "is_timed": bool(ports & {"reset", "reset_n", _PHY_RESET}),
+        "pll": pll_configuration(pll, f"{entity}_pll") if pll else None,
         "debounce": max(_SHORTEST_DEBOUNCE, round(clock_hz * _DEBOUNCE_SECONDS)),
         **{name: name in ports for name, _ in own},
         "is_uart": board.interconnect == LinkKind.UART.value,
@@ -304,7 +347,7 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
         "has_link": system.link is not None,
         "network": {"fault_count": len(NETWORK_FAULTS), "address_fault": ADDRESS_FAULT} if board.phy else None,
         "clocks": [
-            {"port": _CLOCK, "mhz": f"{clock_hz / 10**6:g}"},
+            {"port": board.clock_port, "mhz": megahertz(pll.oscillator if pll else system.clock)},
             *({"port": name, "mhz": mhz} for name, mhz in _line_clocks(board).items()),
         ],
         "pins": [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,8 +13,8 @@ import pytest
 
 from fusesoc_firm.tools import manifest
 from fusesoc_firm.tools.programs import missing
-from tests.hdl.ghdl import REPOSITORY, Library
-from tests.system.simulated.systems import build, call
+from tests.hdl.ghdl import REPOSITORY, Library, core_files
+from tests.system.simulated.systems import build, call, generate_system
 
 OBSTACLE = REPOSITORY / "specs" / "obstacle"
 
@@ -74,11 +75,23 @@ def test_a_bitstream_is_the_same_again(tmp_path: Path, board: str) -> None:
         assert all(clock["achieved"] >= clock["constraint"] for clock in report["fmax"].values())
 
 
-def _build(folder: Path, board: str) -> Path:
-    """The work folder of obstacle's bitstream."""
+@pytest.mark.thorough
+@_needs("yosys", "nextpnr-ecp5", "ecppack")
+def test_a_node_by_ethernet_meets_its_clocks(tmp_path: Path) -> None:
+    """Those of the system, which a PLL makes, and of the line."""
+    work = _build(tmp_path, "ecp5_versa", "quat2euler_ethernet")
+    clocks = json.loads((work / "report.json").read_text(encoding="utf-8"))["fmax"]
+    limits = {name: round(clock["constraint"]) for name, clock in clocks.items()}
+    assert limits == {"$glbnet$clk": 125, "$glbnet$rgmii_rx_clk$TRELLIS_IO_IN": 125}
+    assert all(clock["achieved"] >= clock["constraint"] for clock in clocks.values())
+    assert len(_bitstream(work)) > 100_000
+
+
+def _build(folder: Path, board: str, system: str = "obstacle") -> Path:
+    """The work folder of a bitstream of one of the systems in specs."""
     command = [sys.executable, "-m", "fusesoc.main", "run", "--setup", "--build", f"--build-root={folder}"]
     done = subprocess.run(
-        [*command, f"--target={board}", "robot:sys:obstacle"],
+        [*command, f"--target={board}", f"robot:sys:{system}"],
         cwd=REPOSITORY,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY), "FUSESOC_FIRM_CACHE": str(folder.parent / "store")},
         stdout=subprocess.PIPE,
@@ -94,6 +107,113 @@ def _build(folder: Path, board: str) -> Path:
 def _bitstream(work: Path) -> bytes:
     (stream,) = (path for path in work.iterdir() if path.suffix in (".bin", ".bit", ".fs"))
     return stream.read_bytes()
+
+
+# A PLL that locks after 1 us, and the system without its inside.
+STARTING_BOARD = """\
+library ieee;
+use ieee.std_logic_1164.all;
+
+entity quat2euler_ethernet_ecp5_versa_pll is
+  port (
+    oscillator : in  std_logic;
+    clk        : out std_logic := '0';
+    locked     : out std_logic := '0'
+  );
+end entity quat2euler_ethernet_ecp5_versa_pll;
+
+architecture simulation of quat2euler_ethernet_ecp5_versa_pll is
+
+  signal clk_r : std_logic := '0';
+
+begin
+
+  clk_r  <= not clk_r after 4 ns when now < 9 us else '0';
+  clk    <= clk_r;
+  locked <= '1' after 1 us;
+
+end architecture simulation;
+
+library ieee;
+use ieee.std_logic_1164.all;
+
+entity quat2euler_ethernet_system is
+  port (
+    clk, rst_n                               : in  std_logic;
+    rgmii_rx_clk, rgmii_rx_ctl               : in  std_logic;
+    rgmii_rxd                                : in  std_logic_vector(3 downto 0);
+    rgmii_tx_clk, rgmii_tx_ctl               : out std_logic;
+    rgmii_txd                                : out std_logic_vector(3 downto 0);
+    network_error                            : out std_logic_vector(10 downto 0);
+    id_error                                 : out std_logic;
+    frame_error                              : out std_logic_vector(0 downto 0);
+    frame_error_code                         : out std_logic_vector(7 downto 0)
+  );
+end entity quat2euler_ethernet_system;
+
+architecture simulation of quat2euler_ethernet_system is
+begin
+
+  rgmii_tx_ctl  <= rst_n;
+  network_error <= (others => '0');
+  id_error      <= '0';
+  frame_error   <= "0";
+
+end architecture simulation;
+"""
+STARTING_BENCH = """\
+library ieee;
+use ieee.std_logic_1164.all;
+
+entity starting_tb is
+end entity starting_tb;
+
+architecture simulation of starting_tb is
+
+  signal reset_n   : std_logic := '1';
+  signal rst_n     : std_logic;
+  signal phy_rst_n : std_logic;
+
+begin
+
+  u_board : entity work.quat2euler_ethernet_ecp5_versa
+    generic map (DEBOUNCE => 50)
+    port map (
+      oscillator => '0', rgmii_rx_clk => '0', rgmii_rx_ctl => '0', rgmii_rxd => "0000", rgmii_tx_clk => open,
+      rgmii_tx_ctl => rst_n, rgmii_txd => open, phy_rst_n => phy_rst_n, led_n => open, reset_n => reset_n);
+
+  reset_n <= '0' after 5 us, '1' after 6 us;
+
+  tell : process (rst_n, phy_rst_n)
+  begin
+    report "system " & std_logic'image(rst_n) & " phy " & std_logic'image(phy_rst_n) & " at " & time'image(now);
+  end process tell;
+
+end architecture simulation;
+"""
+
+
+def test_a_phy_leaves_its_reset_after_the_clock_is_stable(tmp_path: Path) -> None:
+    """The PLL locks at 1 us, and the button is pressed from 5 to 6 us; cycles of 8 ns."""
+    top = "quat2euler_ethernet_ecp5_versa"
+    generate_system(REPOSITORY / "specs" / "quat2euler" / "quat2euler_ethernet.yaml", tmp_path, "ecp5_versa")
+    file = tmp_path / f"{top}.vhd"
+    file.write_text(file.read_text(encoding="utf-8").replace(": component", ": entity work."), encoding="utf-8")
+    (tmp_path / "parts.vhd").write_text(STARTING_BOARD, encoding="ascii")
+    (tmp_path / "bench.vhd").write_text(STARTING_BENCH, encoding="ascii")
+    Library("firm", tmp_path).analyse(core_files("cdc/sync", "cdc/debounce"))
+    work = Library("work", tmp_path)
+    work.analyse([tmp_path / f"{name}.vhd" for name in ("parts", top, "bench")])
+    result = work.run("starting_tb")
+    seen = re.findall(r"system '(.)' phy '(.)' at ([1-9]\d*)000000 fs", result.output)
+    assert [f"{system}{phy}" for system, phy, _ in seen] == ["10", "11", "01", "00", "10", "11"], result.output
+    started, phy_started, stopped, phy_stopped, again, phy_again = (int(time) for *_, time in seen)
+    synchroniser, start, debounce = 3 * 8, 16 * 8, 50 * 8
+    assert 0 <= started - (1000 + start) <= synchroniser
+    assert 0 <= stopped - (5000 + debounce) <= 2 * synchroniser
+    assert 0 <= again - (6000 + debounce + start) <= 2 * synchroniser
+    for system, phy in (started, phy_started), (stopped, phy_stopped), (again, phy_again):
+        assert 0 <= phy - (system + debounce) <= synchroniser
 
 
 SPI_BOARD = """\
