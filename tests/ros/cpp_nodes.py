@@ -310,6 +310,20 @@ class Peer:
         self.kill()
 
 
+def roscpp_peer(name: str, *packages: str) -> Path:
+    """`<name>.cpp`, a peer of roscpp, compiled once in a run; `packages` of ROS are those that it needs besides."""
+
+    def make(folder: Path) -> None:
+        words = ["pkg-config", "--cflags", "--libs", *packages, "roscpp"]
+        libraries = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+        source = str(HERE / f"{name}.cpp")
+        subprocess.run(
+            ["g++", "-std=c++17", "-pthread", source, "-o", name, *libraries, "-lboost_thread"], cwd=folder, check=True
+        )
+
+    return made_once(f"roscpp/{name}", make) / name
+
+
 class Client:
     """A client of a service or an action, which prints that it is ready, begins after a line, and prints results."""
 
