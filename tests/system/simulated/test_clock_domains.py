@@ -158,7 +158,7 @@ def test_an_image_goes_to_several_domains(tmp_path: Path, width: int) -> None:
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("width", [8, 16])
+@pytest.mark.parametrize("width", [8, pytest.param(16, marks=pytest.mark.thorough)])
 def test_every_path_between_the_clocks_of_a_system_is_synchronised(tmp_path: Path, width: int) -> None:
     """The top level with all that it holds, as a netlist; that does the same, too."""
     shutil.copy(DATA / "invert.vhd", tmp_path)
