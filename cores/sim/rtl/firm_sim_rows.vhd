@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Plays the rows of a file as frames: the cycles before the frame, in addition to GAP_CYCLES, whether it is aborted (0 or
--- 1), the number of bytes, and the bytes. Ends the reset before. Without m_axis_tready, there is no back-pressure, as
--- behind a MAC's receiver.
+-- Plays the rows of a file as frames: the cycles before the frame, in addition to GAP_CYCLES, whether it is aborted
+-- (0 or 1), the number of bytes, and the bytes. Ends the reset before. Without m_axis_tready, there is no
+-- back-pressure, as after a MAC's receiver.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
