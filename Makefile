@@ -75,7 +75,7 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 
 test: TOOLS = $(TEST_TOOLS)
 check: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS) $(NETWORK_TOOLS)
-test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTIONS='...'
+test: setup ros ## Run the tests, every rule once; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
 check: setup ros lint studio ## Run the longer tests: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'

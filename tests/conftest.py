@@ -70,6 +70,13 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
 
 
+# Absent without pytest-xdist.
+@pytest.hookimpl(optionalhook=True, tryfirst=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One process more than processors: tests of nodes wait for a part of their time, in which another one works."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 def pytest_make_parametrize_id(val: object) -> str | None:
     """A middleware is called by its number in the names of tests."""
     return str(val.number) if isinstance(val, Middleware) else None

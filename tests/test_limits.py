@@ -79,6 +79,26 @@ def test_a_run_that_inherits_an_ignored_interrupt(tmp_path: Path) -> None:
     assert "neither the test nor a process below it has done anything for 2 s" in done.stdout
 
 
+def test_a_run_has_a_process_more_than_processors_and_tells_its_time(tmp_path: Path) -> None:
+    (tmp_path / "test_passing.py").write_text("def test_passing():\n    pass\n")
+    options = ["-p", "tests.conftest", "-p", "no:cacheprovider", "-n", "auto"]
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = thorough\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *options],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    processors = len(os.sched_getaffinity(0))
+    expected = (
+        rf"^\d+ s by the clock; processes: {processors + 1}, which had tests for \d+% of it; "
+        rf"processors: {processors}, which worked for \d+% of it$"
+    )
+    assert re.search(expected, done.stdout, re.MULTILINE), done.stdout
+
+
 def test_a_group_of_tests_stays_in_one_process(tmp_path: Path) -> None:
     """What a module makes for a version of ROS, such as nodes in C++, is made once."""
     source = """

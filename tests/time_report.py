@@ -1,12 +1,14 @@
 """Where the time of a test run goes: the seconds of each room of tests and of its slowest tests, the longest first.
 
 A test has the seconds of the processor that its process and the ended processes below it take, which say the same on
-a busy machine as on an idle one, and those of the clock.
+a busy machine as on an idle one, and those of the clock. The last line tells the whole run: what its processes had no
+tests for, and what the processors did not work for, is time that the run could do without.
 """
 
 from __future__ import annotations
 
 import os
+import time
 from collections import defaultdict
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ import pytest
 from _pytest.terminal import TerminalReporter
 
 _SLOWEST = 10
+_BEGUN = time.monotonic()
 
 
 @dataclass
@@ -63,7 +66,7 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
     return report
 
 
-def pytest_terminal_summary(terminalreporter: TerminalReporter) -> None:
+def pytest_terminal_summary(terminalreporter: TerminalReporter, config: pytest.Config) -> None:
     rooms: dict[str, Seconds] = defaultdict(Seconds)
     tests: dict[str, Seconds] = defaultdict(Seconds)
     total = Seconds()
@@ -75,6 +78,16 @@ def pytest_terminal_summary(terminalreporter: TerminalReporter) -> None:
                     seconds.clock += report.duration
     _write(terminalreporter, f"the {_SLOWEST} slowest tests", dict(_longest(tests)[:_SLOWEST]))
     _write(terminalreporter, "the rooms", {**dict(_longest(rooms)), "in all": total})
+    terminalreporter.line(_run(total, getattr(config.option, "numprocesses", None) or 1))
+
+
+def _run(total: Seconds, processes: int) -> str:
+    clock, processors = time.monotonic() - _BEGUN, len(os.sched_getaffinity(0))
+    had_tests, worked = total.clock / (processes * clock), total.processor / (processors * clock)
+    return (
+        f"{clock:.0f} s by the clock; processes: {processes}, which had tests for {had_tests:.0%} of it; "
+        f"processors: {processors}, which worked for {worked:.0%} of it"
+    )
 
 
 def _longest(seconds: dict[str, Seconds]) -> list[tuple[str, Seconds]]:

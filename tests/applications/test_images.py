@@ -58,7 +58,7 @@ def to_camera(messages: Sequence[Message]) -> list[tuple[str, Message]]:
     return [("camera", message) for message in messages]
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("ros", ["ROS", "ROS2"])
 @pytest.mark.parametrize("name", ["image_pipeline", "sobel", "multi_type"])
 def test_one_word_makes_it_a_system_of_ros_2(tmp_path: Path, name: str, ros: str) -> None:
@@ -71,7 +71,7 @@ def test_one_word_makes_it_a_system_of_ros_2(tmp_path: Path, name: str, ros: str
     check(built(copy, stimuli), 0, 60)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("width", [8, 64, 128])
 @pytest.mark.parametrize("name", ["image_pipeline", "sobel"])
 def test_images_of_all_kinds(tmp_path: Path, name: str, width: int) -> None:

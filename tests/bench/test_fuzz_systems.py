@@ -192,7 +192,7 @@ def test_a_broken_beat_at_every_place_costs_its_frame_alone(tmp_path: Path, widt
 
 
 # A program of a wide system takes minutes to compile.
-_SAMPLE = ((8, 1), (32, 1), (256, 1), (16, 2))
+_SAMPLE = ((8, 1), (32, 1), (16, 2))
 
 
 def _mark(system: System) -> pytest.MarkDecorator:

@@ -28,7 +28,7 @@ FIELDS = {
 }
 
 
-@pytest.mark.one_in(30, 10)
+@pytest.mark.one_in(30, 30)
 @pytest.mark.parametrize("is_part", [False, True], ids=["whole", "part"])
 @pytest.mark.parametrize("tool", ["ghdl", "icarus", "verilator"])
 @pytest.mark.parametrize("message", FIELDS)

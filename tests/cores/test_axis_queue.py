@@ -49,7 +49,7 @@ def _run(library: Library, directory: Path, overflow: str, **generics: Generic) 
     return model, cycles
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("overflow", OVERFLOWS)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("stops", [(0, 0), (60, 0), (0, 60), (30, 40)])
@@ -61,7 +61,7 @@ def test_nothing_is_lost_but_what_is_counted(
     assert (model.dropped > 0) == (overflow != "block")
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(4, 3)
 @pytest.mark.parametrize("number", range(24))
 def test_any_size(library: Library, tmp_path: Path, number: int) -> None:
     source = random.Random(SEED + number)
@@ -132,7 +132,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, width: int, overflow: str) ->
     _run(library, tmp_path, overflow, **size, SINK_PERCENT=40, STOP_PERCENT=2)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("frames", [2, 5, 16])
 @pytest.mark.parametrize("overflow", OVERFLOWS)

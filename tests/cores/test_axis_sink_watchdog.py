@@ -100,7 +100,7 @@ def _longest_wait(cycles: list[Cycle]) -> int:
     return max(len([*run]) if waiting else 0 for waiting, run in groupby(waits))
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("limit", [1, 20])
 @pytest.mark.parametrize("stops", [(0, 0), (60, 0), (0, 60), (30, 40)])
@@ -114,7 +114,7 @@ def test_nothing_is_lost_but_what_is_counted(
     assert _longest_wait(cycles) == limit
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(4, 3)
 @pytest.mark.parametrize("number", range(12))
 def test_any_limit(library: Library, tmp_path: Path, number: int) -> None:
     source = random.Random(SEED + number)

@@ -59,7 +59,7 @@ def passes(library: Library, bench: str, **generics: Generic) -> bool:
 # --- streams -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(("s_width", "m_width"), WIDTHS)
 def test_a_stream_keeps_its_bytes(library: Library, s_width: int, m_width: int, ratio: float) -> None:
@@ -71,7 +71,7 @@ def test_a_stream_keeps_its_bytes(library: Library, s_width: int, m_width: int, 
         assert passes(library, STREAM, **widths, **clocks, SEED=seed, STALL_PERCENT=percent, STREAMS=60)
 
 
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(9, 3)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(("s_width", "m_width"), WIDTHS)
 def test_a_stream_goes_at_the_pace_of_the_slower_end(
@@ -92,7 +92,7 @@ def test_a_fifo_of_any_depth(library: Library, depth: int) -> None:
         assert passes(library, STREAM, DEPTH=depth, SEED=seed, STALL_PERCENT=percent, STREAMS=60, **clocks)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(3, 3)
 @pytest.mark.parametrize(("s_width", "m_width"), [*WIDTHS, (8, 16), (16, 8), (8, 512), (512, 8)])
 def test_the_resizer_loses_no_cycle(library: Library, s_width: int, m_width: int) -> None:
     generics: dict[str, Generic] = {"PART": "resizer", "S_WIDTH": s_width, "M_WIDTH": m_width}
@@ -104,7 +104,7 @@ def test_the_resizer_loses_no_cycle(library: Library, s_width: int, m_width: int
 # --- messages ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(("s_width", "m_width"), [(8, 8), (8, 64), (64, 8)])
 def test_messages_cross_in_their_order(library: Library, s_width: int, m_width: int, ratio: float) -> None:
@@ -134,7 +134,7 @@ def test_a_withdrawn_message_leaves_nothing_behind(library: Library, ratio: floa
         assert passes(library, MESSAGE, **generics, **periods(ratio, source), WITHDRAW_PERCENT=50)
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("is_at_sink", [False, True])
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_a_reset_of_one_cycle_meets_messages(library: Library, ratio: float, is_at_sink: bool) -> None:

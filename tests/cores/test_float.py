@@ -296,7 +296,7 @@ def test_a_pid_controller_is_its_model(library: Library, tmp_path: Path, name: s
 FIXED = [(32, 0, True), (64, 0, True), (64, 0, False), (8, 0, False), (16, 8, True), (40, 30, True), (128, 100, True)]
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(3, 3)
 @pytest.mark.parametrize("name", SIZES)
 @pytest.mark.parametrize(("width", "fraction", "is_signed"), FIXED)
 def test_conversions_from_fixed_point(
@@ -320,7 +320,7 @@ def test_conversions_from_fixed_point(
         check(numbers, rows, found, integers.astype(TYPES[name]))
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(3, 3)
 @pytest.mark.parametrize("truncates", [False, True])
 @pytest.mark.parametrize("name", SIZES)
 @pytest.mark.parametrize(("width", "fraction", "is_signed"), FIXED)

@@ -94,7 +94,7 @@ def _pack(library: Library, directory: Path, frames: list[bytes], generics: Gene
     return report
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize(("source_stall", "reader_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_window_shows_every_byte(
@@ -115,7 +115,7 @@ def test_the_window_leaves_void_lanes_out(library: Library, tmp_path: Path, void
     _window(library, tmp_path, frames, {"WIDTH": 64, "VOID_LANES": void, "SEED": SEED, "SOURCE_STALL_PERCENT": 20})
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize(("source_stall", "reader_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_window_skips_the_rest_of_a_frame(
@@ -159,7 +159,7 @@ def test_the_window_gives_whole_windows_at_any_offset(library: Library, tmp_path
     assert waits <= len(frames)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize(("source_stall", "sink_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_keeps_every_byte(
@@ -186,7 +186,7 @@ def test_the_packer_shows_a_beat_before_it_is_asked(library: Library, tmp_path: 
     _pack(library, tmp_path, frames, {"WIDTH": width, "SEED": SEED, "LATE_READY": True})
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("pieces", ["random", "shifted", "full"])
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_never_holds_its_input_up(library: Library, tmp_path: Path, width: int, pieces: str) -> None:
@@ -209,7 +209,7 @@ def test_the_packer_gives_a_beat_a_cycle_at_any_offset(library: Library, tmp_pat
     assert gaps <= len(frames)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("stall", [0, 20, 50])
 def test_the_packer_joins_what_the_window_cuts(library: Library, tmp_path: Path, width: int, stall: int) -> None:

@@ -45,7 +45,7 @@ def _write_files(directory: Path, number: int, longest: int, seed: int = SEED) -
     return sum(len(coded(frame.to_bytes())) for frame in frames)
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("link", LINKS)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("stall", [0, 30])
@@ -131,7 +131,7 @@ BREAK = ["break  0"]
 BROKEN = ["error", "12"]
 
 
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(9, 3)
 @pytest.mark.parametrize("width", [8, 16, 64])
 @pytest.mark.parametrize("sent", range(len(CODED)))
 def test_a_break_drops_a_frame_that_has_begun(library: Library, tmp_path: Path, width: int, sent: int) -> None:
@@ -144,7 +144,7 @@ def test_a_pause_is_no_fault(library: Library, tmp_path: Path) -> None:
     assert _played(library, tmp_path, script) == [WHOLE.hex()]
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(4, 3)
 @pytest.mark.parametrize("place", range(len(CODED)))
 def test_a_low_stop_bit_costs_its_frame(library: Library, tmp_path: Path, place: int) -> None:
     """And the next one if it was in the zero between them."""

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
 from tests.links import decoded, faulty_row, right_row
 from tests.node.drivers import HEADERS
+from tests.shared import made_once
 
 pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 SEED = 20261123
@@ -66,17 +68,25 @@ def _strings(data: bytes) -> list[bytes]:
     return found
 
 
-@pytest.fixture(scope="module", params=_GENERICS)
-def link(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Link:
-    folder = tmp_path_factory.mktemp(request.param)
-    entity = f"firm_{request.param}_link"
-    is_uart = request.param == "uart"
+@pytest.fixture(params=_GENERICS)
+def link(request: pytest.FixtureRequest) -> Link:
+    made = made_once(f"link_pins_{request.param}", partial(_build, request.param))
+    return Link(made / "model" / f"V{_entity(request.param)}")
+
+
+def _entity(kind: str) -> str:
+    return f"firm_{kind}_link"
+
+
+def _build(kind: str, folder: Path) -> Path:
+    """The link, translated by Verilator, with a bench."""
+    entity, is_uart = _entity(kind), kind == "uart"
     values = {"entity": entity, "is_uart": is_uart, "is_spi": not is_uart, "bit_cycles": BIT_CYCLES}
     bench = render("link_pins.cpp", values, Path(__file__).parent)
     (top,) = [path for path in core_files("board/link") if path.stem == entity]
     cores = core_files("axis/package", "axis/axis", "cdc/sync", "board/link")
-    verilog = netlist(entity, folder, [top], cores, (), WIDTH=8, **_GENERICS[request.param]).read_text(encoding="utf-8")
-    return Link(compiled(verilog, entity, bench, folder, [HEADERS]))
+    verilog = netlist(entity, folder, [top], cores, (), WIDTH=8, **_GENERICS[kind]).read_text(encoding="utf-8")
+    return compiled(verilog, entity, bench, folder, [HEADERS])
 
 
 PIECES_OF_ALL = [pytest.param(500, 0, marks=pytest.mark.check)]

@@ -33,7 +33,7 @@ def _write_files(directory: Path, frames: list[Frame], subscribers: int, publish
     return len(answers)
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(4, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("channels", CHANNELS)
 def test_every_frame_comes_back_under_stalls(library: Library, tmp_path: Path, channels: int, width: int) -> None:
@@ -53,7 +53,7 @@ def test_every_frame_comes_back_under_stalls(library: Library, tmp_path: Path, c
         assert result.output.splitlines()[-1] == f"PASS {answers}/{answers}"
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(4, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("channels", CHANNELS)
 def test_no_cycle_is_lost_without_stalls(library: Library, tmp_path: Path, channels: int, width: int) -> None:
@@ -109,7 +109,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, width: int, subscribers: int,
         assert result.output.splitlines()[-1] == f"PASS {answers}/{answers}"
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize(("subscribers", "publishers"), [(1, 1), (2, 2), (3, 5), (16, 16), (256, 256)])
 def test_it_is_latch_free(library: Library, width: int, subscribers: int, publishers: int) -> None:

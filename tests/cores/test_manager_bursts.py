@@ -82,7 +82,7 @@ def _check(outcome: Outcome, publishers: int, frames: int, width: int) -> int:
     return resumed
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("publishers", FRAMES)
 def test_every_frame_is_joined_again(library: Library, tmp_path: Path, publishers: int, width: int) -> None:
@@ -102,7 +102,7 @@ def test_every_frame_is_joined_again(library: Library, tmp_path: Path, publisher
         assert (resumed > 0) == (publishers > 1)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("move", [0, 20, 50, 100])
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("publishers", [2, 5, 16])
@@ -172,7 +172,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, width: int, publishers: int) 
         assert (resumed > 0) == (publishers > 1)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("publishers", FRAMES)
 def test_it_is_latch_free(library: Library, width: int, publishers: int) -> None:

@@ -48,7 +48,7 @@ def _check(library: Library, folder: Path, **generics: Generic) -> tuple[list[by
     chance = random.Random(SEED)
     sources = [[chance.randbytes(chance.choice((1, 2, 3, 60, 200))) for _ in range(150)] for _ in range(2)]
     for name, frames in zip(("first", "second"), sources, strict=True):
-        rows = [" ".join(map(str, (len(frame), *frame))) for frame in frames]
+        rows = [" ".join(map(str, (0, 0, len(frame), *frame))) for frame in frames]
         (folder / f"{name}.txt").write_text("\n".join(rows) + "\n", encoding="ascii")
     result = library.run("firm_net_merge_tb", {"SEED": SEED, **generics}, directory=folder)
     assert result.exit_code == 0, result.output

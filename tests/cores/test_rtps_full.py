@@ -40,7 +40,8 @@ QUIET = 110
 PAGE = REPOSITORY / "docs" / "reference" / "network.md"
 README = REPOSITORY / "cores" / "net" / "README.md"
 
-pytestmark = pytest.mark.check
+# The eight peers are matched in one process.
+pytestmark = [pytest.mark.check, pytest.mark.xdist_group("rtps_full")]
 
 
 @contextmanager

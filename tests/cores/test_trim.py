@@ -71,7 +71,7 @@ def _run(library: Library, directory: Path, width: int, **generics: Generic) -> 
     return result.output
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize("slack", [0, 3])
 @pytest.mark.parametrize(("source_stall", "sink_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)

@@ -145,7 +145,7 @@ def problem(checker: Checker, answer: Answer) -> str:
     return ""
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @every_specification
 def test_a_key_that_is_left_out(checker: Checker) -> None:
     problems = []
@@ -171,7 +171,7 @@ def _names_what_lacks(fault: Fault, site: KeySite) -> bool:
     return (is_near or is_meant) and f"'{site.name}'" in fault.words
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @every_specification
 def test_a_key_that_is_misspelt(checker: Checker) -> None:
     print(f"seed {SEED}")
@@ -212,7 +212,7 @@ def _sections(section: type[Section]) -> set[type[Section]]:
     return {section}.union(*(_sections(each) for each in inner))
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @every_specification
 @pytest.mark.parametrize("shift", [1, -1])
 def test_a_key_that_is_indented_otherwise(checker: Checker, shift: int) -> None:
@@ -226,7 +226,7 @@ def test_a_key_that_is_indented_otherwise(checker: Checker, shift: int) -> None:
     assert not problems, "\n".join(problems)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @every_specification
 @pytest.mark.parametrize("shift", [0, 1, -1])
 def test_a_file_that_ends_behind_a_key(checker: Checker, shift: int) -> None:

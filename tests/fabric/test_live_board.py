@@ -34,7 +34,8 @@ READS, WRITES = {"euler": "Point", "point": "Point"}, {"quaternion": "Quaternion
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
 
-@pytest.fixture(scope="module", params=["rmii", "rgmii"])
+# The boards of test_network_status.py have RGMII.
+@pytest.fixture(scope="module", params=["rmii", pytest.param("rgmii", marks=pytest.mark.thorough)])
 def specification(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The demo with other names, an address and `POINTS`; its simulator is built beside it, once."""
     folder = tmp_path_factory.mktemp("board")

@@ -58,7 +58,8 @@ LONG_SPECIFICATION = f"""\
   - {{name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, qos: {{profile: sensor_data}}}}
 """
 
-pytestmark = [pytest.mark.check]
+# One process builds and plays the board.
+pytestmark = [pytest.mark.check, pytest.mark.xdist_group("network_status")]
 
 
 class Board(SimulatedBoard):

@@ -18,8 +18,15 @@ from tests.node.test_cpp_node import puts, run
 
 pytestmark = pytest.mark.check
 SEED = 20261126
+# Each simulator is built in one process.
 TOOLS = [
-    pytest.param(tool, marks=pytest.mark.skipif(shutil.which(tool) is None, reason=f"{tool} is not installed"))
+    pytest.param(
+        tool,
+        marks=[
+            pytest.mark.skipif(shutil.which(tool) is None, reason=f"{tool} is not installed"),
+            pytest.mark.xdist_group(f"cpp_node_live_{tool}"),
+        ],
+    )
     for tool in ("ghdl", "verilator")
 ]
 

@@ -158,14 +158,16 @@ class Run:
         settings: NodeSettings | None = None,
         software: NodeSoftware | None = None,
         trace: Trace | None = None,
+        settle: float = 0.0,
     ) -> None:
+        """`FakeHardware` answers while it takes a frame, so no silence is needed to know that it has answered all."""
         self.carrier = FakeCarrier()
         self.reports: list[str] = []
         self.error: Exception | None = None
         self.is_complete: bool | None = None
         given = settings or NodeSettings()
-        parts = {name: getattr(given, name) for name in ("depth", "overflow", "settle", "drain", "restarts", "watch")}
-        settings = NodeSettings(**parts, report=self.reports.append)
+        parts = {name: getattr(given, name) for name in ("depth", "overflow", "drain", "restarts", "watch")}
+        settings = NodeSettings(**parts, settle=settle, report=self.reports.append)
         self.node = Node(description, open_transport, settings, software, trace)
         self._ros = min(description.versions, default=1)
         self._thread = threading.Thread(target=self._run, daemon=True)

@@ -143,7 +143,7 @@ def test_the_end_loses_nothing(tmp_path: Path, knows_rest: bool) -> None:
     """What was received before the end is sent, and what it leads to is published; the hardware needs its time."""
     gate = threading.Event()
     bench = Bench(gate=gate)
-    run = Run(describe(pairs(tmp_path)), bench.open, NodeSettings(depth=100, settle=0.2))
+    run = Run(describe(pairs(tmp_path)), bench.open, NodeSettings(depth=100), settle=0.2)
     bench.hardware.knows_rest = knows_rest
     run.carrier.give(0, *POINTS)
     until(lambda: run.node.statistics.inputs["a0"].received == len(POINTS))

@@ -200,7 +200,14 @@ def _refused(id_: int, source: random.Random) -> bytes:
     return pack_frame(id_, ENCODING + len(text).to_bytes(4, "little") + text)
 
 
-@pytest.fixture(scope="module", params=[1, 2], ids=["ids of one byte", "ids of two bytes"])
+# Each hardware is built, and gets its faults, in one process.
+ID_BYTES = [
+    pytest.param(number, marks=pytest.mark.xdist_group(f"status_counters_{number}"), id=name)
+    for number, name in ((1, "ids of one byte"), (2, "ids of two bytes"))
+]
+
+
+@pytest.fixture(scope="module", params=ID_BYTES)
 def id_bytes(request: pytest.FixtureRequest) -> int:
     return int(request.param)
 

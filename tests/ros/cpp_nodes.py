@@ -24,13 +24,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from tests.node.drivers import HEADERS
 from tests.processes import IGNORING_INTERRUPTS
+from tests.shared import made_once
 
 HERE = Path(__file__).resolve().parent
 DEBIAN_PYTHON = "/usr/bin/python3"
 # A venv with ROS 2 from wheels.
 ROS2 = Path(os.environ.get("FIRM_ROS2") or Path(sys.prefix) / "ros2")
 _OPTIONS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-pthread"]
+# What all nodes include.
+_HEADER = "nodes.hpp"
 _ROS1_MODULES = ("rospy", "geometry_msgs", "sensor_msgs", "std_msgs")
 _ROS2_LIBRARIES = (
     "rcl",
@@ -53,26 +57,23 @@ class Ros:
     libraries: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
 
-    def compile(self, package: Path, program: Path | None, header: Path | None = None) -> None:
-        """Compile a node's package to `program`, or look only whether it would; `header` is a precompiled one."""
+    def compile(self, package: Path, program: Path | None) -> None:
+        """Compile a node's package to `program`, or look only whether it would."""
         output = ["-fsyntax-only"] if program is None else ["-o", str(program)]
-        included = ["-include", str(header)] if header else []
         sources = [str(path) for path in sorted((package / "src").glob("*.cpp"))]
         libraries = [] if program is None else self.libraries
-        self._compile([*included, *self._includes(package), *sources, *output, *libraries])
+        header = made_once(f"ros{self.version}_nodes", self._precompile) / _HEADER
+        self._compile(package / "include", ["-include", str(header), *sources, *output, *libraries])
 
-    def precompile(self, package: Path, folder: Path) -> Path:
-        """What all nodes include, compiled once: the header to hand to `compile`."""
-        header = folder / f"ros{self.version}_nodes.hpp"
+    def _precompile(self, folder: Path) -> None:
+        """Compile what all nodes include, the longest part of each."""
+        header = folder / _HEADER
         header.write_text(f"#include <firm/ros{self.version}.hpp>\n#include <firm/ros_node.hpp>\n", encoding="utf-8")
-        self._compile([*self._includes(package), "-x", "c++-header", str(header), "-o", f"{header}.gch"])
-        return header
+        self._compile(HEADERS, ["-x", "c++-header", str(header), "-o", f"{header}.gch"])
 
-    def _includes(self, package: Path) -> list[str]:
-        return ["-I", str(package / "include"), *self.includes]
-
-    def _compile(self, arguments: Sequence[str]) -> None:
-        done = subprocess.run(["g++", *_OPTIONS, *arguments], capture_output=True, text=True, check=False)
+    def _compile(self, headers: Path, arguments: Sequence[str]) -> None:
+        command = ["g++", *_OPTIONS, "-I", str(headers), *self.includes, *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[-4000:]
 
 
@@ -307,6 +308,20 @@ class Peer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.kill()
+
+
+def roscpp_peer(name: str, *packages: str) -> Path:
+    """`<name>.cpp`, a peer of roscpp, compiled once in a run; `packages` of ROS are those that it needs besides."""
+
+    def make(folder: Path) -> None:
+        words = ["pkg-config", "--cflags", "--libs", *packages, "roscpp"]
+        libraries = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+        source = str(HERE / f"{name}.cpp")
+        subprocess.run(
+            ["g++", "-std=c++17", "-pthread", source, "-o", name, *libraries, "-lboost_thread"], cwd=folder, check=True
+        )
+
+    return made_once(f"roscpp/{name}", make) / name
 
 
 class Client:

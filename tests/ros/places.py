@@ -43,11 +43,8 @@ class Place:
             package = self.folder / f"{spec.stem}_package"
             command = ["system", "node", str(spec), "--language", "cpp", "--ros", str(self.version)]
             assert main([*command, "-o", str(package)]) == 0
-            # What all nodes include is compiled once.
-            header = self.folder / f"ros{self.version}_nodes.hpp"
-            header = header if header.exists() else self.ros.precompile(package, self.folder)
             self.programs[spec] = self.folder / f"{spec.stem}_node"
-            self.ros.compile(package, self.programs[spec], header)
+            self.ros.compile(package, self.programs[spec])
         return self.programs[spec]
 
     def simulator(self, spec: Path) -> str:

@@ -22,7 +22,7 @@ from fusesoc_firm.cli import main
 from tests.replay.goals import what_is_told
 from tests.ros.action_server_peer import HELD, Kind
 from tests.ros.action_simulator import in_ros2
-from tests.ros.cpp_nodes import Client, NodeProcess, Peer
+from tests.ros.cpp_nodes import Client, NodeProcess, Peer, roscpp_peer
 from tests.ros.places import Place, diagnoses, running, versions
 from tests.ros.test_actions import MODULES
 
@@ -67,22 +67,14 @@ class Planner(Place):
     def server(self, *kind: str) -> Iterator[Client]:
         """A server of rospy or rclpy, or one in C++; `--simple` is SimpleActionServer."""
         command = [self.ros.python, str(HERE / "action_server_peer.py"), str(self.version), ACTION, *kind]
-        server = Client(self.ros, [str(self.cpp_server()), ACTION] if kind == ("cpp",) else command)
+        server = Client(
+            self.ros, [str(roscpp_peer("action_server", "actionlib")), ACTION] if kind == ("cpp",) else command
+        )
         try:
             assert server.line() == "ready\n"
             yield server
         finally:
             server.end()
-
-    def cpp_server(self) -> Path:
-        program = self.folder / "server"
-        if not program.exists():
-            words = subprocess.run(
-                ["pkg-config", "--cflags", "--libs", "actionlib", "roscpp"], capture_output=True, text=True, check=True
-            )
-            options = ["-std=c++17", "-pthread", str(HERE / "action_server.cpp"), "-o", str(program)]
-            subprocess.run(["g++", *options, *words.stdout.split(), "-lboost_thread"], check=True)
-        return program
 
     @contextmanager
     def recording(self, bag: Path) -> Iterator[None]:

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from tests.ros.action_simulator import HELD, Goal, in_ros2
-from tests.ros.cpp_nodes import Client, NodeProcess
+from tests.ros.cpp_nodes import Client, NodeProcess, roscpp_peer
 from tests.ros.live_nodes import REPOSITORY
 from tests.ros.places import Place, diagnoses, running, versions, wait_until_reached
 
@@ -63,15 +63,7 @@ class Arm(Place):
 
     def cpp_client(self, goals: int, seed: int) -> Client:
         """A client of actionlib for roscpp."""
-        program = self.folder / "client"
-        if not program.exists():
-            words = subprocess.run(
-                ["pkg-config", "--cflags", "--libs", "actionlib", "roscpp"], capture_output=True, text=True, check=True
-            )
-            source = str(HERE / "action_client.cpp")
-            libraries = [*words.stdout.split(), "-lboost_thread"]
-            subprocess.run(["g++", "-std=c++17", "-pthread", source, "-o", str(program), *libraries], check=True)
-        return Client(self.ros, [str(program), "/count", str(goals), str(seed)])
+        return Client(self.ros, [str(roscpp_peer("action_client", "actionlib")), "/count", str(goals), str(seed)])
 
     def client(self, *words: str) -> Client:
         script = [self.ros.python, str(HERE / "action_peer.py"), str(self.version), "/count"]

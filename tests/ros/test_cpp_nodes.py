@@ -58,7 +58,6 @@ class Workshop:
 
     ros: Ros
     folder: Path
-    header: Path | None = None
     programs: dict[str, Path] = field(default_factory=dict)
 
     def specification(self, name: str) -> Path:
@@ -94,16 +93,12 @@ class Workshop:
 
     def check(self, name: str) -> None:
         """Compile a node, and drop what comes of it."""
-        package = self.package(name)
-        self.header = self.header or self.ros.precompile(package, self.folder)
-        self.ros.compile(package, None, self.header)
+        self.ros.compile(self.package(name), None)
 
     def program(self, name: str) -> Path:
         """A node that is compiled and linked."""
         if name not in self.programs:
-            package = self.package(name)
-            self.header = self.header or self.ros.precompile(package, self.folder)
-            self.ros.compile(package, self.folder / name, self.header)
+            self.ros.compile(self.package(name), self.folder / name)
             self.programs[name] = self.folder / name
         return self.programs[name]
 
@@ -413,8 +408,7 @@ def test_a_message_that_is_installed_with_another_definition_is_refused(workshop
     text = source.read_text(encoding="utf-8")
     source.write_text(re.sub(r"RIHS01_\w{4}", "RIHS01_beef", text), encoding="utf-8")
     program = workshop.folder / "other_node"
-    workshop.program("echo")
-    workshop.ros.compile(package, program, workshop.header)
+    workshop.ros.compile(package, program)
     done = run(workshop, program, "--transport", simulator())
     assert done.returncode == 1
     assert "is installed in a version that differs from the hardware's (RIHS01_beef" in done.stderr

@@ -50,7 +50,7 @@ class Place:
             return [sys.executable, str(script)]
         program = self.folder / "program"
         if not program.exists():
-            self.ros.compile(package, program, None)
+            self.ros.compile(package, program)
         return [str(program)]
 
     def started(self, language: str, parameters: dict[str, Any], *options: str) -> NodeProcess:

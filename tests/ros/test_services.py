@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from tests.ros.cpp_nodes import Client, NodeProcess, Peer
+from tests.ros.cpp_nodes import Client, NodeProcess, Peer, roscpp_peer
 from tests.ros.live_nodes import REPOSITORY
 from tests.ros.places import Place, diagnoses, running, versions, wait_until_reached
 
@@ -64,13 +64,9 @@ class Camera(Place):
             return Client(
                 self.ros, [*script, *words, *(["--texts", *texts] if texts else []), *(["--always"] if always else [])]
             )
-        program = self.folder / "client"
-        if not program.exists():
-            options = ["-std=c++17", "-O1", "-pthread", str(HERE / "service_client.cpp"), "-o", str(program)]
-            subprocess.run(["g++", *options, *self.ros.libraries], check=True)
         code = "from sensor_msgs.srv import SetCameraInfo as s; print(s._md5sum)"
         done = subprocess.run([self.ros.python, "-c", code], capture_output=True, text=True, check=True)
-        return Client(self.ros, [str(program), *words, done.stdout.strip()])
+        return Client(self.ros, [str(roscpp_peer("service_client")), *words, done.stdout.strip()])
 
     @property
     def model(self) -> str:

@@ -120,7 +120,7 @@ class Project:
         return done.stderr
 
 
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(9, 3)
 @pytest.mark.parametrize("board", ZYNQ)
 @pytest.mark.parametrize("core", CORES)
 def test_every_system_beside_a_processor(tmp_path: Path, core: str, board: str) -> None:

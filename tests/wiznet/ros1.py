@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from ipaddress import IPv4Address
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -26,6 +27,7 @@ from fusesoc_firm.system.derived.model import Host, Network
 from tests.bench.model import compiled
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
+from tests.shared import made_once
 from tests.wiznet.sequencer import ABORTED, ACCESSES, LAST, Sequencer
 
 HERE = Path(__file__).parent
@@ -219,11 +221,13 @@ class Frame:
     answered: bytearray = field(default_factory=bytearray)
 
 
-def hardware(chip_number: int, folder: Path, half_bit: int = 1) -> Path:
-    """The program of firm_wiznet_node's netlist, and its bench."""
-    verilog = netlist(
-        "firm_wiznet_node", folder, _HARDWARE[-1:], _HARDWARE[:-1], (), CHIP=chip_number, HALF_BIT=half_bit
-    )
+def hardware(chip_number: int) -> Path:
+    """The program of firm_wiznet_node's netlist, and its bench, which is compiled once in a run."""
+    return made_once(f"wiznet_node_{chip_number}", partial(_build, chip_number)) / "model" / "Vfirm_wiznet_node"
+
+
+def _build(chip_number: int, folder: Path) -> Path:
+    verilog = netlist("firm_wiznet_node", folder, _HARDWARE[-1:], _HARDWARE[:-1], (), CHIP=chip_number, HALF_BIT=1)
     bench = (HERE / "node.cpp").read_text(encoding="ascii")
     return compiled(verilog.read_text(encoding="utf-8"), "firm_wiznet_node", bench, folder, (HERE,))
 
@@ -246,7 +250,8 @@ def clocked(
     log: list[Frame],
 ) -> Board:
     """A board whose program the hardware runs; each of its SPI frames is logged."""
-    rom = program.parent / "rom"
+    # Other processes of the run use the same program.
+    rom = program.with_name(f"rom_{os.getpid()}")
     rom.write_bytes(image(board, chip_number))
     command = [str(program), str(rom), "0", "1", "0", str(stalls.percent), str(stalls.seed)]
     command += ["strict"] * stalls.is_strict

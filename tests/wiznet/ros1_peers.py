@@ -20,7 +20,6 @@ from tests.wiznet.peers import free_port
 from tests.wiznet.ros1 import Board, Manager, Stalls, clocked, endpoint, interpreted, node
 
 _SEED = 20261126  # of the stalls
-_ROS = Path(__file__).parent.parent / "ros"
 # Services of the running node: one that has time, and one of which the hardware must answer soon.
 ASK = Server("/ask", "std_srvs/Ask", 32 * "a", 2, 2, 100)
 SOON = Server("/ask/soon", "std_srvs/Ask", 32 * "a", 3, 3, 1)
@@ -107,16 +106,6 @@ def header_of(peer: socket.socket) -> dict[str, str]:
 def pause() -> None:
     """Let the other side see what was sent as a part of its own."""
     time.sleep(0.002)
-
-
-def service_client(folder: Path) -> Path:
-    """Compile the client of roscpp for a service of cameras."""
-    words = ["pkg-config", "--cflags", "--libs", "roscpp"]
-    libraries = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
-    program = folder / "client"
-    options = ["-std=c++17", "-O1", "-pthread", str(_ROS / "service_client.cpp"), "-o", str(program)]
-    subprocess.run(["g++", *options, *libraries], check=True)
-    return program
 
 
 def service_sum() -> str:

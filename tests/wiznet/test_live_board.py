@@ -17,9 +17,9 @@ from pathlib import Path
 import pytest
 
 from tests.fabric.hosts import Host, missing, switched
-from tests.ros.cpp_nodes import DEBIAN_PYTHON, missing_ros1
+from tests.ros.cpp_nodes import DEBIAN_PYTHON, missing_ros1, roscpp_peer
 from tests.ros.live_nodes import PACED_PEER
-from tests.wiznet.ros1_peers import service_client, service_sum
+from tests.wiznet.ros1_peers import service_sum
 
 ROS = Path(__file__).parent.parent / "ros"
 CAMERA, SERVICE_PEER = ROS / "camera", ROS / "service_peer.py"
@@ -191,7 +191,7 @@ def test_a_simulated_board_serves_calls_of_rospy_and_roscpp(tmp_path: Path, chip
         assert text.count(old) == 1
         text = text.replace(old, new)
     specification.write_text(text, encoding="utf-8")
-    client = service_client(tmp_path)
+    client = roscpp_peer("service_client")
     name, calls = "/lab/set_camera_info", "10"
     # Each begins with the end of a line at its input.
     rospy = f"echo | {DEBIAN_PYTHON} {SERVICE_PEER} 1 {name} {calls} 1"

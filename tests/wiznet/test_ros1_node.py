@@ -81,8 +81,8 @@ class Clocked:
 
 
 @pytest.fixture(scope="module", params=[pytest.param(5200, marks=pytest.mark.thorough), 5500], ids="w{}".format)
-def program(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path]:
-    return request.param, hardware(request.param, tmp_path_factory.mktemp("hardware"))
+def program(request: pytest.FixtureRequest) -> tuple[int, Path]:
+    return request.param, hardware(request.param)
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ import struct
 import xmlrpc.client
 from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,18 +22,13 @@ QUATERNION = "a779879fadf0160734f906b8c19c7004"
 POINT = "4a842b65f413084dc2b10fb484ea7f17"
 
 
-@pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return hardware(HARDWARE, tmp_path_factory.mktemp("hardware"))
-
-
 @pytest.fixture(params=[*MODELS, pytest.param(None, marks=pytest.mark.thorough)], ids=str)
 def running(request: pytest.FixtureRequest) -> Iterator[Running]:
     """Interpreted on each chip; None is the hardware, on one of them."""
     if request.param:
         yield from running_node(request.param)
     else:
-        yield from running_node(HARDWARE, request.getfixturevalue("program"))
+        yield from running_node(HARDWARE, hardware(HARDWARE))
 
 
 def _rospy(method: str, *parameters: Any) -> bytes:

@@ -18,7 +18,7 @@ from fusesoc_firm.fabric.ros1 import Server
 from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.frame.codec import decode, encode
 from tests.ros.camera.model import respond
-from tests.ros.cpp_nodes import Client, Ros, missing_ros1, ros1
+from tests.ros.cpp_nodes import Client, Ros, missing_ros1, ros1, roscpp_peer
 from tests.ros.service_simulator import frames
 from tests.wiznet.ros1 import Manager, Stalls, clocked, framed, hardware, interpreted, node
 from tests.wiznet.ros1_peers import (
@@ -30,7 +30,6 @@ from tests.wiznet.ros1_peers import (
     pause,
     read,
     running_node,
-    service_client,
     service_sum,
 )
 
@@ -42,18 +41,13 @@ ROS = Path(__file__).parent.parent / "ros"
 CAMERA = "/set_camera_info"
 
 
-@pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return hardware(HARDWARE, tmp_path_factory.mktemp("hardware"))
-
-
 @pytest.fixture(params=[*MODELS, pytest.param(None, marks=pytest.mark.check)], ids=str)
 def running(request: pytest.FixtureRequest) -> Iterator[Running]:
     """Interpreted on each chip; None is the hardware, on one of them."""
     if request.param:
         yield from running_node(request.param)
     else:
-        yield from running_node(HARDWARE, request.getfixturevalue("program"))
+        yield from running_node(HARDWARE, hardware(HARDWARE))
 
 
 def _caller(running: Running, stack: ExitStack, service: Server) -> socket.socket:
@@ -263,10 +257,10 @@ def _camera(_number: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
     yield 0, encode(response, answer)
 
 
-def _clients(ros: Ros, folder: Path, calls: int) -> list[Client]:
+def _clients(ros: Ros, calls: int) -> list[Client]:
     """Two of rospy, two of roscpp."""
     rospy = [ros.python, str(ROS / "service_peer.py"), "1", CAMERA, str(calls)]
-    roscpp = [str(service_client(folder)), CAMERA, str(calls)]
+    roscpp = [str(roscpp_peer("service_client")), CAMERA, str(calls)]
     seeds = [str(SEED + number) for number in range(4)]
     return [
         *(Client(ros, [*rospy, seed]) for seed in seeds[:2]),
@@ -277,7 +271,7 @@ def _clients(ros: Ros, folder: Path, calls: int) -> list[Client]:
 @pytest.mark.check
 @pytest.mark.skipif(bool(missing_ros1()), reason=missing_ros1())
 @pytest.mark.parametrize("kind", ["interpreted", "hardware"])
-def test_clients_of_rospy_and_roscpp_at_once(tmp_path: Path, kind: str, request: pytest.FixtureRequest) -> None:
+def test_clients_of_rospy_and_roscpp_at_once(tmp_path: Path, kind: str) -> None:
     print(f"seed {SEED}")
     with ros1(tmp_path) as ros:
         master = urlsplit(ros.environment["ROS_MASTER_URI"])
@@ -287,10 +281,9 @@ def test_clients_of_rospy_and_roscpp_at_once(tmp_path: Path, kind: str, request:
         if kind == "interpreted":
             board = interpreted(made, 5200, manager)
         else:
-            program = request.getfixturevalue("program")
-            board = clocked(made, HARDWARE, manager, program, Stalls(SEED, is_strict=True), [])
+            board = clocked(made, HARDWARE, manager, hardware(HARDWARE), Stalls(SEED, is_strict=True), [])
         with closing(board):
-            clients = _clients(ros, tmp_path, 20)
+            clients = _clients(ros, 20)
             try:
                 assert [client.line() for client in clients] == ["ready\n"] * len(clients)
                 for client in clients:

@@ -4,10 +4,7 @@
 -- same form without the cycles; or `dropped`, or `lost`.
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.numeric_std.all;
-use std.textio.all;
 library firm;
-use firm.firm_sim_pkg.all;
 
 entity firm_ipv4_reassembly_tb is
   generic (
@@ -104,52 +101,38 @@ begin
     end if;
   end process keep_time;
 
-  record_frames : process
-    file results     : text open write_mode is RESULT_FILE;
-    file expected    : text open read_mode is existing(EXPECTED_FILE);
-    variable row     : line;
-    variable content : line;
-    variable size    : natural := 0;
+  u_record : entity firm.firm_sim_record
+    generic map (
+      RESULT_FILE   => RESULT_FILE,
+      EXPECTED_FILE => EXPECTED_FILE,
+      SHOWS_USER    => true
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      over          => over,
+      s_axis_tdata  => m_tdata,
+      s_axis_tuser  => m_tuser,
+      s_axis_tvalid => m_tvalid,
+      s_axis_tlast  => m_tlast,
+      s_axis_tready => open,
+      is_dropped    => is_dropped,
+      is_lost       => is_lost
+    );
+
+  check_gaps : process (clk)
+    variable is_open : boolean := false;
     variable idle    : natural := GAP;
-
-    procedure note(what : in string) is
-    begin
-      write(row, what);
-      write_result(results, expected, EXPECTED_FILE, row);
-    end procedure note;
-
   begin
-    while not over loop
-      wait until rising_edge(clk) or over;
-      next when over or rst_n = '0';
-      if is_dropped = '1' then
-        note("dropped");
+    if rising_edge(clk) and rst_n = '1' then
+      idle := idle + 1;
+      if m_tvalid = '1' then
+        assert is_open or idle > GAP
+          report "two frames without a gap" severity failure;
+        idle    := 0;
+        is_open := m_tlast = '0';
       end if;
-      if is_lost = '1' then
-        note("lost");
-      end if;
-      if m_tvalid = '0' then
-        idle := idle + 1;
-        next;
-      end if;
-      assert size /= 0 or idle >= GAP
-        report "two frames without a gap" severity failure;
-      idle := 0;
-      size := size + 1;
-      write(content, ' ' & integer'image(to_integer(unsigned(m_tdata))));
-      if m_tlast = '1' then
-        write(row, integer'image(to_integer(unsigned(m_tuser))) & ' ' & integer'image(size) & content.all);
-        write_result(results, expected, EXPECTED_FILE, row);
-        deallocate(content);
-        size := 0;
-      end if;
-    end loop;
-    assert size = 0
-      report "a frame without an end" severity failure;
-    assert endfile(expected)
-      report EXPECTED_FILE & " has more lines than there are frames" severity failure;
-    print("PASS");
-    wait;
-  end process record_frames;
+    end if;
+  end process check_gaps;
 
 end architecture simulation;

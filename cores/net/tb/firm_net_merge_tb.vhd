@@ -1,13 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Sends the frames of two sources through firm_net_merge. A row of a file, and of the results, is a frame: the number
--- of bytes, and the bytes.
+-- Sends the frames of two sources through firm_net_merge. A row of a file is a frame as firm_sim_rows plays it, without
+-- a pause before it; one of the results is the number of bytes, and the bytes.
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.numeric_std.all;
-use ieee.math_real.all;
-use std.textio.all;
 library firm;
-use firm.firm_sim_pkg.all;
 
 entity firm_net_merge_tb is
   generic (
@@ -24,22 +20,22 @@ end entity firm_net_merge_tb;
 
 architecture simulation of firm_net_merge_tb is
 
-  constant LAST_CYCLES : positive := 8;
+  type two_t is array (0 to 1) of boolean;
 
-  signal clk    : std_logic := '0';
-  signal rst_n  : std_logic := '0';
-  signal done   : std_logic_vector(1 downto 0) := "00";
-  signal over   : boolean   := false;
+  signal clk     : std_logic := '0';
+  signal rst_n   : std_logic_vector(1 downto 0);
+  signal is_over : two_t;
+  signal over    : boolean;
 
   signal s_tdata  : std_logic_vector(15 downto 0);
-  signal s_tvalid : std_logic_vector(1 downto 0) := "00";
-  signal s_tlast  : std_logic_vector(1 downto 0) := "00";
+  signal s_tvalid : std_logic_vector(1 downto 0);
+  signal s_tlast  : std_logic_vector(1 downto 0);
   signal s_tready : std_logic_vector(1 downto 0);
 
   signal tdata  : std_logic_vector(7 downto 0);
   signal tvalid : std_logic;
   signal tlast  : std_logic;
-  signal tready : std_logic := '0';
+  signal tready : std_logic;
 
   function file_of(stream : natural) return string is
   begin
@@ -51,43 +47,28 @@ architecture simulation of firm_net_merge_tb is
 
 begin
 
-  clk <= not clk after 4 ns when not over else '0';
+  clk  <= not clk after 4 ns when not over else '0';
+  over <= is_over(0) and is_over(1);
 
   streams : for stream in 0 to 1 generate
 
-    play : process
-      file frames       : text open read_mode is file_of(stream);
-      variable row      : line;
-      variable size     : integer;
-      variable byte     : integer;
-      variable random_1 : positive := SEED;
-      variable random_2 : positive := 3 + stream;
-      variable draw     : real;
-    begin
-      wait until rising_edge(clk) and rst_n = '1';
-      while not endfile(frames) loop
-        readline(frames, row);
-        read(row, size);
-        for place in 1 to size loop
-          read(row, byte);
-          uniform(random_1, random_2, draw);
-          while 100.0 * draw < real(SLOW_PERCENT) loop
-            wait until rising_edge(clk);
-            uniform(random_1, random_2, draw);
-          end loop;
-          s_tdata(8*stream+7 downto 8*stream) <= std_logic_vector(to_unsigned(byte, 8));
-          s_tvalid(stream) <= '1';
-          if place = size then
-            s_tlast(stream) <= '1';
-          end if;
-          wait until rising_edge(clk) and s_tready(stream) = '1';
-          s_tvalid(stream) <= '0';
-          s_tlast(stream)  <= '0';
-        end loop;
-      end loop;
-      done(stream) <= '1';
-      wait;
-    end process play;
+    u_rows : entity firm.firm_sim_rows
+      generic map (
+        FRAME_FILE   => file_of(stream),
+        SEED         => SEED + stream,
+        SLOW_PERCENT => SLOW_PERCENT,
+        GAP_CYCLES   => 0
+      )
+      port map (
+        clk           => clk,
+        rst_n         => rst_n(stream),
+        m_axis_tdata  => s_tdata(8*stream+7 downto 8*stream),
+        m_axis_tuser  => open,
+        m_axis_tvalid => s_tvalid(stream),
+        m_axis_tlast  => s_tlast(stream),
+        m_axis_tready => s_tready(stream),
+        over          => is_over(stream)
+      );
 
   end generate streams;
 
@@ -97,7 +78,7 @@ begin
     )
     port map (
       clk           => clk,
-      rst_n         => rst_n,
+      rst_n         => rst_n(0),
       s_axis_tdata  => s_tdata,
       s_axis_tvalid => s_tvalid,
       s_axis_tlast  => s_tlast,
@@ -108,60 +89,21 @@ begin
       m_axis_tready => tready
     );
 
-  take : process (clk)
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 7;
-    variable draw     : real;
-  begin
-    if rising_edge(clk) then
-      uniform(random_1, random_2, draw);
-      tready <= '1';
-      if 100.0 * draw < real(STALL_PERCENT) then
-        tready <= '0';
-      end if;
-    end if;
-  end process take;
-
-  run : process
-  begin
-    for cycle in 1 to 4 loop
-      wait until rising_edge(clk);
-    end loop;
-    rst_n <= '1';
-    wait until done = "11";
-    for cycle in 1 to LAST_CYCLES loop
-      wait until rising_edge(clk);
-    end loop;
-    over <= true;
-    wait;
-  end process run;
-
-  record_frames : process
-    file results     : text open write_mode is RESULT_FILE;
-    file expected    : text open read_mode is existing(EXPECTED_FILE);
-    variable row     : line;
-    variable content : line;
-    variable size    : natural := 0;
-  begin
-    while not over loop
-      wait until rising_edge(clk) or over;
-      next when over or rst_n = '0';
-      next when tvalid = '0' or tready = '0';
-      size := size + 1;
-      write(content, ' ' & integer'image(to_integer(unsigned(tdata))));
-      if tlast = '1' then
-        write(row, integer'image(size) & content.all);
-        write_result(results, expected, EXPECTED_FILE, row);
-        deallocate(content);
-        size := 0;
-      end if;
-    end loop;
-    assert size = 0
-      report "a frame without an end" severity failure;
-    assert endfile(expected)
-      report EXPECTED_FILE & " has more lines than there are frames" severity failure;
-    print("PASS");
-    wait;
-  end process record_frames;
+  u_record : entity firm.firm_sim_record
+    generic map (
+      RESULT_FILE   => RESULT_FILE,
+      EXPECTED_FILE => EXPECTED_FILE,
+      SEED          => SEED,
+      STALL_PERCENT => STALL_PERCENT
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n(0),
+      over          => over,
+      s_axis_tdata  => tdata,
+      s_axis_tvalid => tvalid,
+      s_axis_tlast  => tlast,
+      s_axis_tready => tready
+    );
 
 end architecture simulation;

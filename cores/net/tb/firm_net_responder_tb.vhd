@@ -4,11 +4,7 @@
 -- the number of bytes, and the bytes; or `lost`.
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.numeric_std.all;
-use ieee.math_real.all;
-use std.textio.all;
 library firm;
-use firm.firm_sim_pkg.all;
 
 entity firm_net_responder_tb is
   generic (
@@ -40,7 +36,7 @@ architecture simulation of firm_net_responder_tb is
   signal m_tdata  : std_logic_vector(7 downto 0);
   signal m_tvalid : std_logic;
   signal m_tlast  : std_logic;
-  signal m_tready : std_logic := '0';
+  signal m_tready : std_logic;
   signal is_lost  : std_logic;
 
 begin
@@ -84,50 +80,22 @@ begin
       over          => over
     );
 
-  take : process (clk)
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 5;
-    variable draw     : real;
-  begin
-    if rising_edge(clk) then
-      uniform(random_1, random_2, draw);
-      m_tready <= '1';
-      if 100.0 * draw < real(STALL_PERCENT) then
-        m_tready <= '0';
-      end if;
-    end if;
-  end process take;
-
-  record_replies : process
-    file replies     : text open write_mode is RESULT_FILE;
-    file expected    : text open read_mode is existing(EXPECTED_FILE);
-    variable row     : line;
-    variable content : line;
-    variable size    : natural := 0;
-  begin
-    while not over loop
-      wait until rising_edge(clk) or over;
-      next when over or rst_n = '0';
-      if is_lost = '1' then
-        write(row, string'("lost"));
-        write_result(replies, expected, EXPECTED_FILE, row);
-      end if;
-      next when m_tvalid = '0' or m_tready = '0';
-      size := size + 1;
-      write(content, ' ' & integer'image(to_integer(unsigned(m_tdata))));
-      if m_tlast = '1' then
-        write(row, integer'image(size) & content.all);
-        write_result(replies, expected, EXPECTED_FILE, row);
-        deallocate(content);
-        size := 0;
-      end if;
-    end loop;
-    assert size = 0
-      report "a reply without an end" severity failure;
-    assert endfile(expected)
-      report EXPECTED_FILE & " has more lines than there are replies" severity failure;
-    print("PASS");
-    wait;
-  end process record_replies;
+  u_record : entity firm.firm_sim_record
+    generic map (
+      RESULT_FILE   => RESULT_FILE,
+      EXPECTED_FILE => EXPECTED_FILE,
+      SEED          => SEED,
+      STALL_PERCENT => STALL_PERCENT
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      over          => over,
+      s_axis_tdata  => m_tdata,
+      s_axis_tvalid => m_tvalid,
+      s_axis_tlast  => m_tlast,
+      s_axis_tready => m_tready,
+      is_lost       => is_lost
+    );
 
 end architecture simulation;

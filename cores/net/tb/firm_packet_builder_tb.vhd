@@ -10,7 +10,6 @@ use ieee.numeric_std.all;
 use ieee.math_real.all;
 use std.textio.all;
 library firm;
-use firm.firm_sim_pkg.all;
 
 entity firm_packet_builder_tb is
   generic (
@@ -58,7 +57,7 @@ architecture simulation of firm_packet_builder_tb is
   signal m_tdata  : std_logic_vector(7 downto 0);
   signal m_tvalid : std_logic;
   signal m_tlast  : std_logic;
-  signal m_tready : std_logic := '0';
+  signal m_tready : std_logic;
 
 begin
 
@@ -176,58 +175,40 @@ begin
     wait;
   end process send;
 
-  stall : process (clk)
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 5;
-    variable draw     : real;
-  begin
-    if rising_edge(clk) then
-      uniform(random_1, random_2, draw);
-      m_tready <= '1';
-      if 100.0 * draw < real(STALL_PERCENT) then
-        m_tready <= '0';
-      end if;
-    end if;
-  end process stall;
+  u_record : entity firm.firm_sim_record
+    generic map (
+      RESULT_FILE   => RESULT_FILE,
+      EXPECTED_FILE => EXPECTED_FILE,
+      SEED          => SEED,
+      STALL_PERCENT => STALL_PERCENT
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      over          => over,
+      s_axis_tdata  => m_tdata,
+      s_axis_tvalid => m_tvalid,
+      s_axis_tlast  => m_tlast,
+      s_axis_tready => m_tready
+    );
 
-  record_frames : process
-    file results     : text open write_mode is RESULT_FILE;
-    file expected    : text open read_mode is existing(EXPECTED_FILE);
-    variable row     : line;
-    variable content : line;
-    variable size    : natural := 0;
+  check_times : process (clk)
+    variable is_open : boolean := false;
     variable cycles  : natural := 0;  -- since the start
   begin
-    while not over loop
-      wait until rising_edge(clk) or over;
-      next when over or rst_n = '0';
+    if rising_edge(clk) and STALL_PERCENT = 0 and SLOW_PERCENT = 0 then
       cycles := cycles + 1;
       if start = '1' then
         cycles := 0;
       end if;
-      if STALL_PERCENT = 0 and SLOW_PERCENT = 0 then
-        assert m_tvalid = '1' or size = 0
-          report "a pause in a frame" severity failure;
-        assert m_tvalid = '0' or size /= 0 or cycles <= MOST_CYCLES
+      assert m_tvalid = '1' or not is_open
+        report "a pause in a frame" severity failure;
+      if m_tvalid = '1' then
+        assert is_open or cycles <= MOST_CYCLES
           report integer'image(cycles) & " cycles before the first byte" severity failure;
+        is_open := m_tlast = '0';
       end if;
-      if m_tvalid = '1' and m_tready = '1' then
-        size := size + 1;
-        write(content, ' ' & integer'image(to_integer(unsigned(m_tdata))));
-        if m_tlast = '1' then
-          write(row, integer'image(size) & content.all);
-          write_result(results, expected, EXPECTED_FILE, row);
-          deallocate(content);
-          size := 0;
-        end if;
-      end if;
-    end loop;
-    assert size = 0
-      report "a frame without an end" severity failure;
-    assert endfile(expected)
-      report EXPECTED_FILE & " has more lines than there are frames" severity failure;
-    print("PASS");
-    wait;
-  end process record_frames;
+    end if;
+  end process check_times;
 
 end architecture simulation;

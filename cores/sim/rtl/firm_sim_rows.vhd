@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Plays the rows of a file as frames without back-pressure, as a MAC's receiver does: the cycles before the frame, in
--- addition to GAP_CYCLES, whether it is aborted (0 or 1), the number of bytes, and the bytes. Ends the reset before.
+-- Plays the rows of a file as frames: the cycles before the frame, in addition to GAP_CYCLES, whether it is aborted
+-- (0 or 1), the number of bytes, and the bytes. Ends the reset before. Without m_axis_tready, there is no
+-- back-pressure, as after a MAC's receiver.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -23,6 +24,7 @@ entity firm_sim_rows is
     m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic := '1';
 
     over : out boolean
   );
@@ -84,7 +86,7 @@ begin
             m_axis_tuser <= "1";
           end if;
         end if;
-        wait until rising_edge(clk);
+        wait until rising_edge(clk) and m_axis_tready = '1';
         m_axis_tvalid <= '0';
         m_axis_tdata  <= (others => 'X');
       end loop;

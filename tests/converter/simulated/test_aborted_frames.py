@@ -35,7 +35,7 @@ def aborted(subscriber: Subscriber, frame: bytes, place: int) -> list[Beat]:
     return [*before, replace(last, is_aborted=True)]
 
 
-@pytest.mark.one_in(7, 2)
+@pytest.mark.one_in(7, 6)
 @pytest.mark.parametrize(
     ("ros", "name", "width"),
     [

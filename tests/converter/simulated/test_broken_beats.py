@@ -51,7 +51,7 @@ def broken(beats: Sequence[Beat], place: int, lanes: int, chance: random.Random)
         yield [*before, replace(beat, keep=full >> chance.randrange(1, lanes)), *after]
 
 
-@pytest.mark.one_in(6, 2)
+@pytest.mark.one_in(6, 6)
 @pytest.mark.parametrize(
     ("ros", "name", "width"),
     [

@@ -77,7 +77,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> ConverterBench:
     return ConverterBench(tmp_path_factory.mktemp("converters"))
 
 
-@pytest.mark.one_in(5, 3)
+@pytest.mark.one_in(5, 6)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_messages_come_through_under_stalls(
     bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int
@@ -92,7 +92,7 @@ def test_messages_come_through_under_stalls(
     assert [int(digits, 16) for digits in printed(result, "fields")] == [pair.field_bits(value) for value in values]
 
 
-@pytest.mark.one_in(7, 3)
+@pytest.mark.one_in(7, 6)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_no_cycle_is_lost_without_stalls(
     bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int
@@ -109,7 +109,7 @@ def test_no_cycle_is_lost_without_stalls(
     assert found.cycles <= beats + pair.beats(frames[-1]) + PIPELINE_CYCLES
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_a_message_that_waits_loses_nothing(
     bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int
@@ -122,7 +122,7 @@ def test_a_message_that_waits_loses_nothing(
     assert printed(result, "beats behind a message:") == ["1"] * 19 + ["0"]
 
 
-@pytest.mark.one_in(11, 3)
+@pytest.mark.one_in(11, 6)
 @pytest.mark.parametrize("flow", FLOWS)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_broken_frames_hurt_no_other(
@@ -138,7 +138,7 @@ def test_broken_frames_hurt_no_other(
     pair.run(tmp_path, frames, SEED=SEED, **FLOWS[flow])
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_every_length_of_a_frame(bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     """Cut behind each byte, and longer by up to five; with the length of the whole message, and with its own.
@@ -196,7 +196,7 @@ def test_a_lie_in_each_byte_of_the_length(bench: ConverterBench, tmp_path: Path,
     pair.run(tmp_path, frames, SEED=SEED, STALL_PERCENT=10)
 
 
-@pytest.mark.one_in(7, 3)
+@pytest.mark.one_in(7, 6)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_they_are_latch_free(bench: ConverterBench, ros: Middleware, name: str, width: int) -> None:
     pair = bench.pair(ros, name, width)

@@ -30,7 +30,7 @@ TYPES = [
 ]
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), [case(ros, name, width) for ros, name in TYPES for width in WIDTHS])
 def test_a_lying_length_is_refused(
     subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int

@@ -31,7 +31,7 @@ CASES = [(ROS2, name, width) for name in NAMES for width in (64, 8)] + [(ROS1, n
 pytestmark = pytest.mark.skipif(not shutil.which("yosys"), reason="yosys is not installed")
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), CASES)
 def test_no_ready_reaches_an_output_of_a_subscriber(tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     frame = ORACLES[ros].frame(name)
@@ -40,7 +40,7 @@ def test_no_ready_reaches_an_output_of_a_subscriber(tmp_path: Path, ros: Middlew
     _look(tmp_path, netlist, subscriber_entity(frame), _no_output_behind(ready))
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), CASES)
 def test_what_takes_the_frame_reaches_no_output_of_a_publisher(
     tmp_path: Path, ros: Middleware, name: str, width: int
@@ -50,7 +50,7 @@ def test_what_takes_the_frame_reaches_no_output_of_a_publisher(
     _look(tmp_path, netlist, publisher_entity(frame), _no_output_behind(["m_axis_tready"]))
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), CASES)
 def test_a_message_that_is_passed_through_makes_no_loop(tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     frame = ORACLES[ros].frame(name)
@@ -58,7 +58,7 @@ def test_a_message_that_is_passed_through_makes_no_loop(tmp_path: Path, ros: Mid
     _look(tmp_path, "\n".join(netlists), "top", "scc -expect 0")
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(4, 3)
 @pytest.mark.parametrize("width", [64, 8])
 @pytest.mark.parametrize("name", ["sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray"])
 def test_with_slices_no_ready_reaches_the_window(tmp_path: Path, name: str, width: int) -> None:

@@ -42,7 +42,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReque
     return SubscriberBench(tmp_path_factory.mktemp("subscribers"), request.param)
 
 
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(6, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), CASES)
 def test_messages_come_through(bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
@@ -53,7 +53,7 @@ def test_messages_come_through(bench: SubscriberBench, tmp_path: Path, ros: Midd
     assert subscriber.library.latches(subscriber.entity) == []
 
 
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(6, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), CASES)
 def test_broken_frames_hurt_no_other(
     bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int

@@ -69,7 +69,7 @@ NETLISTS = [
 ]
 
 
-@pytest.mark.one_in(7, 3)
+@pytest.mark.one_in(7, 6)
 @pytest.mark.parametrize("stall", [0, 40])
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_messages_come_through_under_stalls(
@@ -97,7 +97,7 @@ SELECTIONS = [
 ]
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize(("ros", "name", "include", "exclude"), SELECTIONS)
 def test_what_is_not_used_is_skipped(
@@ -120,7 +120,7 @@ def test_what_is_not_used_is_skipped(
     assert subscriber.run(tmp_path, frames[::2], SEED=1) == expected
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("stall", [0, 35])
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_broken_frames_hurt_no_other(
@@ -146,7 +146,7 @@ def test_broken_frames_hurt_no_other(
     assert set(codes(events)) >= ({1, 2, 3, 4} if ros is ROS2 else {1, 2, 3})
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_every_length_of_a_frame(
     subscribers: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
@@ -224,7 +224,7 @@ def test_a_count_takes_one_cycle(subscribers: SubscriberBench, tmp_path: Path, w
     assert cycles[1] - cycles[0] <= 10 * most
 
 
-@pytest.mark.one_in(7, 3)
+@pytest.mark.one_in(7, 6)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_they_are_latch_free(subscribers: SubscriberBench, ros: Middleware, name: str, width: int) -> None:
     subscriber = subscribers.subscriber(ORACLES[ros].frame(name), width)

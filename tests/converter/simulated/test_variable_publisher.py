@@ -75,7 +75,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> PublisherBench:
     return PublisherBench(tmp_path_factory.mktemp("publishers"))
 
 
-@pytest.mark.one_in(9, 3)
+@pytest.mark.one_in(9, 6)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_frames_are_those_of_rosbags(
     bench: PublisherBench, tmp_path: Path, ros: Middleware, name: str, width: int
@@ -87,7 +87,7 @@ def test_frames_are_those_of_rosbags(
     publisher.run(tmp_path, messages, SEED=SEED, LATE_READY=True)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_faults_hurt_no_other_frame(
     bench: PublisherBench, tmp_path: Path, ros: Middleware, name: str, width: int
@@ -102,7 +102,7 @@ def test_faults_hurt_no_other_frame(
     publisher.run(tmp_path, messages, SEED=SEED, STALL_PERCENT=30, SINK_STALL_PERCENT=40)
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("width", [8, 32, 64, 512])
 @pytest.mark.parametrize("name", ["sensor_msgs/PointCloud2", "sensor_msgs/JointState"])
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
@@ -133,7 +133,7 @@ def test_a_message_goes_in_its_long_block(
     publisher.run(tmp_path, [each for message in withdrawn for each in (message, second)], SEED=SEED)
 
 
-@pytest.mark.one_in(11)
+@pytest.mark.one_in(11, 3)
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 @pytest.mark.parametrize("length", [2**32 - 1, 2**31, 2**29, 300])
@@ -169,7 +169,7 @@ def test_padding_ends_in_what_is_given_up(bench: PublisherBench, tmp_path: Path,
     publisher.run(tmp_path, messages, SEED=SEED)
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 def test_a_stream_moves_a_beat_a_cycle(bench: PublisherBench, tmp_path: Path, ros: Middleware, width: int) -> None:
@@ -215,7 +215,7 @@ def test_a_long_block_moves_a_beat_a_cycle(
     assert all(end - start <= most for start, end in pairwise(taken))
 
 
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(9, 3)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 @pytest.mark.parametrize(

@@ -109,7 +109,7 @@ def test_parts_of_messages_meet_from_several_domains(tmp_path: Path, own: str, o
 # --- messages of variable size -------------------------------------------------------------------------------------
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(7, 3)
 @pytest.mark.parametrize(("own", "other"), [(SAME, SAME), *CLOCKS])
 @pytest.mark.parametrize(("width", "other_width"), [(8, 64), (64, 8), (32, 32), (128, 512)])
 def test_an_image_streams_through(tmp_path: Path, own: str, other: str, width: int, other_width: int) -> None:
@@ -158,7 +158,7 @@ def test_an_image_goes_to_several_domains(tmp_path: Path, width: int) -> None:
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("width", [8, 16])
+@pytest.mark.parametrize("width", [8, pytest.param(16, marks=pytest.mark.thorough)])
 def test_every_path_between_the_clocks_of_a_system_is_synchronised(tmp_path: Path, width: int) -> None:
     """The top level with all that it holds, as a netlist; that does the same, too."""
     shutil.copy(DATA / "invert.vhd", tmp_path)
@@ -227,7 +227,7 @@ ELEMENTS = (
 )
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize(("width", "other_width", "own", "other"), [(8, 32, *CLOCKS[0]), (64, 16, *CLOCKS[2])])
 @pytest.mark.parametrize("message", ELEMENTS)
 def test_elements_go_through(tmp_path: Path, message: str, width: int, other_width: int, own: str, other: str) -> None:

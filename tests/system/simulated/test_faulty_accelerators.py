@@ -144,6 +144,13 @@ def _text(source: random.Random) -> bytes:
 
 
 HEALTHY = "none"
+# The width of the stream, and the bytes of an id.
+SHAPES = [
+    (8, 1),
+    (8, 2),
+    pytest.param(64, 1, marks=pytest.mark.check),
+    pytest.param(64, 2, marks=pytest.mark.thorough),
+]
 # Each response to such a number is faulty.
 SICK = [number for number in range(20, 60) if number % 8 == 7]
 WELL = [number for number in range(20, 60) if number % 8 != 7]
@@ -225,8 +232,7 @@ def _run(
     return traffic(result.output).cycles
 
 
-@pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
-@pytest.mark.parametrize("id_bytes", [1, 2])
+@pytest.mark.parametrize(("width", "id_bytes"), SHAPES)
 @pytest.mark.parametrize("fault", ["pauses", "ends early", "goes on"])
 def test_an_accelerator_whose_response_is_faulty_now_and_then(
     tmp_path: Path, width: int, fault: str, id_bytes: int
@@ -248,8 +254,7 @@ def test_an_accelerator_whose_response_is_faulty_now_and_then(
     assert 99 * cycles <= 100 * healthy
 
 
-@pytest.mark.parametrize("width", [8, pytest.param(64, marks=pytest.mark.check)])
-@pytest.mark.parametrize("id_bytes", [1, 2])
+@pytest.mark.parametrize(("width", "id_bytes"), SHAPES)
 @pytest.mark.parametrize("fault", ["stops", "is silent"])
 def test_an_accelerator_that_answers_no_more(tmp_path: Path, width: int, fault: str, id_bytes: int) -> None:
     """The other channel keeps 99 % of the rate that it has alone; the host's stream also carries the dropped frames."""

@@ -73,7 +73,7 @@ def many_system(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPat
     return build(call(spec, stimuli, DATA / "many_model.py"), folder / "work")
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(3, 3)
 @pytest.mark.parametrize(("seed", "stall_percent"), [(1, 0), (2, 25), (3, 60), (4, 90)])
 def test_chains_forks_and_joins(many_system: GeneratedSystem, seed: int, stall_percent: int) -> None:
     assert many_system.passes(SEED=seed, STALL_PERCENT=stall_percent)
@@ -110,7 +110,7 @@ def poses(count: int) -> Iterator[tuple[str, Message]]:
             yield block, {"position": numbers(source, "x", "y", "z"), "orientation": numbers(source, *"xyzw")}
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(3, 3)
 @pytest.mark.parametrize(("seed", "stall_percent"), [(1, 0), (2, 25), (3, 60), (4, 90)])
 def test_messages_of_which_blocks_use_parts(parts_system: GeneratedSystem, seed: int, stall_percent: int) -> None:
     assert parts_system.passes(SEED=seed, STALL_PERCENT=stall_percent)
