@@ -101,7 +101,7 @@ def _layers() -> list[Callable[[random.Random], Any]]:
     """What makes a packet, for each protocol that a node speaks."""
     pytest.importorskip("scapy", reason="scapy is not installed")
     from scapy.contrib import rtps
-    from scapy.contrib.igmp import IGMP
+    from scapy.layers import igmp
     from scapy.layers.inet import ICMP, IP, UDP
     from scapy.layers.l2 import ARP, Ether
     from scapy.packet import Raw, fuzz
@@ -120,7 +120,7 @@ def _layers() -> list[Callable[[random.Random], Any]]:
         packet = UDP(sport=7411, dport=chance.choice((*PORTS, 7399)))
         return fuzz(packet) if chance.random() < 0.2 else packet
 
-    submessages = [
+    submessages: list[Any] = [
         rtps.RTPSSubMessage_DATA,
         rtps.RTPSSubMessage_DATA_FRAG,
         rtps.RTPSSubMessage_HEARTBEAT,
@@ -140,7 +140,7 @@ def _layers() -> list[Callable[[random.Random], Any]]:
         lambda chance: ether(chance) / fuzz(ARP()),
         lambda chance: ether(chance) / fuzz(ARP(pdst=address)),
         lambda chance: ether(chance) / ip(chance) / fuzz(ICMP()) / Raw(chance.randbytes(chance.randrange(64))),
-        lambda chance: ether(chance) / ip(chance) / fuzz(IGMP()),
+        lambda chance: ether(chance) / ip(chance) / fuzz(igmp.IGMP()),
         lambda chance: ether(chance) / ip(chance) / udp(chance) / Raw(chance.randbytes(chance.randrange(1400))),
         lambda chance: fuzz(ether(chance)) / Raw(chance.randbytes(chance.randrange(1500))),
         message,

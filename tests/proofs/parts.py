@@ -283,7 +283,9 @@ _RECEIVED = Proof(
         Mutation(_RECEIVER, "(ends and not is_whole) or overflows", "overflows", ("good_if_right",)),
         Mutation(_RECEIVER, "(takes_byte or ends) and has_byte", "takes_byte and has_byte", ("begun_frames_end",)),
         Mutation(_RECEIVER, "m_axis_tlast    <= ends or overflows;", "m_axis_tlast    <= takes_byte;", ("one_end",)),
-        Mutation(_RECEIVER, "m_axis_tdata    <= delay_r(FCS_BYTES)", "m_axis_tdata    <= delay_r(0)", ("bytes_unchanged",)),
+        Mutation(
+            _RECEIVER, "m_axis_tdata    <= delay_r(FCS_BYTES)", "m_axis_tdata    <= delay_r(0)", ("bytes_unchanged",)
+        ),
         Mutation(_RECEIVER, "is_broken <= ends and not is_whole;", "is_broken <= '0';", ("one_verdict",)),
     ),
     trace=14,
@@ -332,13 +334,34 @@ _READ = Proof(
         Mutation(_READERS, "is_locked = '0' and queued_r = '1'", "queued_r = '1'", ("nothing_judged_under_lock",)),
         Mutation(_READERS, "chosen when is_locked = '1' else from;", "from;", ("window_is_shown",)),
         Mutation(_READERS, "if judged_r = first_r then", "if judged_r = last_r then", ("each_once",)),
-        Mutation(_READERS, "        first_r <= last;", "      end if;\n      if submessage_r = '1' then\n        first_r <= last;", ("one_commit_a_packet",)),
+        Mutation(
+            _READERS, "  first_r <= last;\n      end if;", "end if;\n      first_r <= last;", ("one_commit_a_packet",)
+        ),
         Mutation(_READERS, "        first_r <= last;", "        first_r <= first_r;", ("all_of_a_good_packet",)),
         Mutation(_READERS, "          last  := first_r;", "          null;", ("nothing_of_a_bad_packet",)),
-        Mutation(_READERS, "<= keeps_r when state_r /= IDLE", "<= '1' when state_r /= IDLE", ("only_taken_ones_leave",)),
-        Mutation(_READERS, "if left_r = 1 then\n          finish;", "if left_r = 2 then\n          finish;", ("each_leaves_once",)),
+        Mutation(
+            _READERS, "<= keeps_r when state_r /= IDLE", "<= '1' when state_r /= IDLE", ("only_taken_ones_leave",)
+        ),
+        Mutation(
+            _READERS,
+            "if left_r = 1 then\n          finish;",
+            "if left_r = 2 then\n          finish;",
+            ("each_leaves_once",),
+        ),
     ),
     trace=18,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _WATCHED_TREE, _WATCHED_TREE_LIMITS, _STORED, _RECEIVED, _WALKED, _READ)
+PROOFS = (
+    _QUEUED,
+    _WATCHED,
+    _WATCHED_SINK,
+    _REFUSED,
+    _TREE_TO_HOST,
+    _WATCHED_TREE,
+    _WATCHED_TREE_LIMITS,
+    _STORED,
+    _RECEIVED,
+    _WALKED,
+    _READ,
+)
