@@ -57,7 +57,7 @@ class Lab:
         """Begin to write what the switch passes on."""
         words = ("dumpcap", "-q", "-i", "switch", "-w", str(path))
         recorder = subprocess.Popen(self.switch.command(*words), stderr=subprocess.PIPE, text=True)
-        self._stack.callback(_end, recorder)
+        self._stack.callback(_finish, recorder)
         assert recorder.stderr
         while not recorder.stderr.readline().startswith("File:"):
             assert recorder.poll() is None
@@ -99,6 +99,12 @@ class Lab:
 
 def _end(process: subprocess.Popen[str]) -> None:
     process.kill()
+    process.communicate()
+
+
+def _finish(process: subprocess.Popen[str]) -> None:
+    """End a program that still has something to write."""
+    process.terminate()
     process.communicate()
 
 

@@ -61,6 +61,7 @@ def test_eight_peers_exchange_all_topics_and_a_ninth_waits_for_room(lab: Lab) ->
         assert board.poll() is None
     exchange(peers, _round(peers, next(numbers)))
     ninth = lab.cyclone(TYPES, TYPES)
+    ninth.wait_until_started()
     for _ in range(3):
         exchange(peers, _round(peers, next(numbers)))
     assert ninth.is_quiet
