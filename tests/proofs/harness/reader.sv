@@ -174,7 +174,7 @@ always @* if (running) begin
 
     one_commit_a_packet: assert (!was_running || \dut.first_r == committed_before || good_end[1]);
     all_of_a_good_packet: assert (!(was_running && good_end[1]) || \dut.first_r == \dut.last_r );
-    nothing_of_a_bad_packet: assert (!(was_running && bad_end[1]) || \dut.last_r == \dut.first_r );
+    nothing_of_a_bad_packet: assert (!(was_running && bad_end[1]) || \dut.last_r == committed_before);
     only_taken_ones_leave: assert (!m_axis_tvalid || (judged != 0 && taken[\dut.oldest_r [0]]));
     each_leaves_once: assert (!was_running || \dut.oldest_r == oldest_before + left
                               || (skipped && \dut.oldest_r == oldest_before + 1'b1));
