@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Two generated nodes with a GMII each, connected to each other. The system of the one sends a frame of FRAME_BYTES again
--- and again; the system of the other one takes what comes. When both know each other, the results are, for each of COUNT
--- frames, the cycles from its last beat at the one system to the first beat at the other.
+-- Two generated nodes with a GMII each, connected to each other. The system of the one sends a frame of FRAME_BYTES
+-- again and again; the system of the other one takes what comes. When both know each other, the results are, for each
+-- of COUNT frames, the cycles from its last beat at the one system to the first beat at the other.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -32,9 +32,17 @@ architecture simulation of one_way is
   signal rst_n : std_logic := '0';
   signal over  : boolean   := false;
 
-  signal en, rx_step, rx_dv, rx_er, tx_step, tx_en, tx_er : pair_t;
-
-  signal line_d, rxd, txd : beats_t;
+  signal rx_step : pair_t;
+  signal rx_dv   : pair_t;
+  signal rx_er   : pair_t;
+  signal rxd     : beats_t;
+  signal tx_step : pair_t;
+  signal tx_en   : pair_t;
+  signal tx_er   : pair_t;
+  signal txd     : beats_t;
+  -- The lines, by the board that sends.
+  signal line_en : pair_t;
+  signal line_d  : beats_t;
 
   signal s_tdata  : beat_t    := x"00";
   signal s_tvalid : std_logic := '0';
@@ -55,10 +63,10 @@ begin
         clk         => clks(board),
         rst_n       => rst_n,
         gmii_rx_clk => clks(1-board),
-        gmii_rx_dv  => en(1-board),
+        gmii_rx_dv  => line_en(1-board),
         gmii_rx_er  => '0',
         gmii_rxd    => line_d(1-board),
-        gmii_tx_en  => en(board),
+        gmii_tx_en  => line_en(board),
         gmii_tx_er  => open,
         gmii_txd    => line_d(board),
         rx_step     => rx_step(board),
