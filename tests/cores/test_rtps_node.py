@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -22,10 +23,12 @@ from tests.cores.announcements import (
     sent,
     without_counts,
 )
+from tests.cores.ethernet import fcs, udp_frame, write_capture
 from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
+from tests.fabric.dissection import dissect, fields_of
 from tests.fabric.memories import bits
-from tests.fabric.messages import AckNack, NackFrag, parse
+from tests.fabric.messages import AckNack, Data, Gap, Heartbeat, InfoDestination, NackFrag, parse
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
@@ -153,6 +156,24 @@ def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: 
     _check_kinds(wanted)
     with World(stall) as world:
         _check(world.all(events), wanted)
+
+
+@pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
+def test_tshark_reads_the_same_in_all_packets_of_the_node(tmp_path: Path) -> None:
+    """They are those of the netlist in the test before."""
+    seed = SEED + 2
+    print(f"seed {seed}")
+    packets = [packet for _, packet in expected(Peers(9, seed).run(2000)).sent]
+    frames = [udp_frame(packet) for packet in packets]
+    write_capture(tmp_path / "node.pcap", [frame + fcs(frame) for frame in frames])
+    kinds: set[type] = set()
+    for packet, (payload, fields) in zip(packets, dissect(tmp_path / "node.pcap"), strict=True):
+        message = parse(packet)
+        assert message is not None and message.is_whole
+        assert payload == packet
+        assert fields == [fields_of(item) for item in message.submessages], packet.hex()
+        kinds |= {type(item) for item in message.submessages}
+    assert kinds == {AckNack, Data, Gap, Heartbeat, InfoDestination}
 
 
 @pytest.mark.check

@@ -53,6 +53,15 @@ class Lab:
         assert board.stdout.readline() == _BOARD
         return board
 
+    def capture(self, path: Path) -> None:
+        """Begin to write what the switch passes on."""
+        words = ("dumpcap", "-q", "-i", "switch", "-w", str(path))
+        recorder = subprocess.Popen(self.switch.command(*words), stderr=subprocess.PIPE, text=True)
+        self._stack.callback(_finish, recorder)
+        assert recorder.stderr
+        while not recorder.stderr.readline().startswith("File:"):
+            assert recorder.poll() is None
+
     def members(self) -> list[tuple[str, str]]:
         """Port and group of each membership that the switch knows."""
         command = self.switch.command("bridge", "-json", "mdb", "show", "dev", "switch")
@@ -90,6 +99,12 @@ class Lab:
 
 def _end(process: subprocess.Popen[str]) -> None:
     process.kill()
+    process.communicate()
+
+
+def _finish(process: subprocess.Popen[str]) -> None:
+    """End a program that still has something to write."""
+    process.terminate()
     process.communicate()
 
 

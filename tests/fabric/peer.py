@@ -3,10 +3,10 @@
     python ros_peer.py|cyclone_peer.py RELIABILITY TYPES [listen]
 
 TYPES is `{topic: type}`; the peer publishes on `<topic>_in` and subscribes to `<topic>_out`. Types are `Point`,
-`Quaternion`, `String` and `UInt32`. With `listen`, it publishes nothing. The first line on its output,
-`{"matched": seconds}`, says after which time all topics had a match. A line `[topic, values]` on its input is
-published, `"graph"` asks for what the peer's graph knows, and `"farewell"` ends it. What comes is `[topic, values]`. It
-needs nothing but its own middleware.
+`Quaternion`, `String` and `UInt32`. With `listen`, it publishes nothing. The first line on its output is
+`{"started": true}`; the second one, `{"matched": seconds}`, says after which time all topics had a match. A line
+`[topic, values]` on its input is published, `"graph"` asks for what the peer's graph knows, and `"farewell"` ends it.
+What comes is `[topic, values]`. It needs nothing but its own middleware.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ def run(make: Callable[[dict[str, str], dict[str, str], bool], Peer]) -> None:
     reliability, reads, *others = sys.argv[1:]
     writes = others[0] if others else reads
     peer = make(json.loads(reads), json.loads(writes), reliability == "reliable")
+    say({"started": True})
     begun = time.monotonic()
     while not peer.is_matched():
         peer.poll()

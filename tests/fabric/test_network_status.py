@@ -68,6 +68,7 @@ class Board(SimulatedBoard):
     def __init__(self, command: Sequence[str], folder: Path) -> None:
         super().__init__(command, folder, 1)
         self.frames: list[bytes] = []
+        self.cycles = 0  # so far
         self._sent = bytearray()
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
@@ -88,7 +89,7 @@ class Board(SimulatedBoard):
                 assert report == b"e"
                 frame, self._sent = bytes(self._sent[len(PREAMBLE) : -FCS_BYTES]), bytearray()
                 self.frames.append(frame)
-        self.read(4)
+        self.cycles += int.from_bytes(self.read(4), "little")
         self.write(len(line).to_bytes(2, "little") + line)
 
     # --- the status, as a transport

@@ -102,8 +102,17 @@ AnyProcess = TypeVar("AnyProcess", bound=Process)
 class Peer(Process):
     """A peer of rclpy or of Cyclone DDS."""
 
+    _is_started = False
+
+    def wait_until_started(self) -> None:
+        """Wait until it has all its publishers and subscribers."""
+        if not self._is_started:
+            assert self.line() == {"started": True}
+            self._is_started = True
+
     def wait_until_matched(self) -> float:
         """The seconds that it took."""
+        self.wait_until_started()
         return float(self.line()["matched"])
 
     def send(self, samples: Sequence[Sample]) -> None:

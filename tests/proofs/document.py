@@ -24,6 +24,8 @@ _SHORT = {
     "WATCHDOG": "L",
     "MAX_LENGTH": "M",
     "DEPTH": "D",
+    "LONGEST": "B",
+    "SAMPLES": "S",
 }
 # Generics that a table says if they are true.
 _CHOICES = {"DROP_OLDEST": "drop_oldest", "DROP_NEWEST": "drop_newest"}

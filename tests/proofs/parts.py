@@ -269,4 +269,99 @@ _STORED = Proof(
     is_bounded=True,
 )
 
-PROOFS = (_QUEUED, _WATCHED, _WATCHED_SINK, _REFUSED, _TREE_TO_HOST, _WATCHED_TREE, _WATCHED_TREE_LIMITS, _STORED)
+_RECEIVER = "firm_mac_receiver.vhd"
+
+_RECEIVED = Proof(
+    "frame_receiver",
+    "firm_mac_receiver",
+    ("axis/package", "axis/axis", "net/mac"),
+    sizes=({"LONGEST": 60}, {"LONGEST": 1514}),
+    depth=3,
+    mutations=(
+        # A trace with a good frame has 64 bytes, for which a search takes too long.
+        Mutation(_RECEIVER, "count_r >= SHORTEST", "count_r > FCS_BYTES", ("good_if_right",)),
+        Mutation(_RECEIVER, "(ends and not is_whole) or overflows", "overflows", ("good_if_right",)),
+        Mutation(_RECEIVER, "(takes_byte or ends) and has_byte", "takes_byte and has_byte", ("begun_frames_end",)),
+        Mutation(_RECEIVER, "m_axis_tlast    <= ends or overflows;", "m_axis_tlast    <= takes_byte;", ("one_end",)),
+        Mutation(
+            _RECEIVER, "m_axis_tdata    <= delay_r(FCS_BYTES)", "m_axis_tdata    <= delay_r(0)", ("bytes_unchanged",)
+        ),
+        Mutation(_RECEIVER, "is_broken <= ends and not is_whole;", "is_broken <= '0';", ("one_verdict",)),
+    ),
+    trace=14,
+)
+
+_WALKER = "firm_rtps_walker.vhd"
+
+_WALKED = Proof(
+    "packet_walker",
+    "firm_rtps_walker",
+    ("axis/package", "axis/axis", "net/mac", "net/rtps"),
+    sizes=({},),
+    depth=3,
+    mutations=(
+        # A trace with a submessage has 36 bytes or more, for which a search takes too long.
+        Mutation(_WALKER, "is_foreign <= strange and not abort_r;", "is_foreign <= strange;", ("one_verdict",)),
+        Mutation(_WALKER, "is_aborted <= abort_r;", "is_aborted <= '0';", ("aborts_are_told",)),
+        Mutation(_WALKER, "<= written and valid_r and rst_n;", "<= written and rst_n;", ("nothing_between",)),
+        Mutation(_WALKER, "if step_r(PAYLOAD) = '1' then", "if step_r(PROTOCOL) = '1' then", ("only_of_rtps_2",)),
+        Mutation(
+            _WALKER,
+            "if in_body = '1' then\n        is_submessage <= valid_r and ends_body and is_done and known_r",
+            "if in_body = '0' then\n        is_submessage <= valid_r and last_r",
+            ("submessages_end_in_time",),
+        ),
+    ),
+    trace=14,
+)
+
+_READERS = "firm_rtps_readers.vhd"
+_RTPS_CORES = ("axis/package", "axis/axis", "net/mac", "net/rtps")
+_READER_SIZE: Size = {"READERS": 1, "SOURCES": 2, "BYTES": 4, "SAMPLES": 2}
+
+_TAKEN = "(equal_r or (later_r and not strict_r))"
+_READ = Proof(
+    "reader",
+    "firm_rtps_readers",
+    _RTPS_CORES,
+    sizes=(_READER_SIZE,),
+    depth=3,
+    mutations=(
+        Mutation(_READERS, _TAKEN, "(equal_r or later_r)", ("no_gap_if_reliable",)),
+        Mutation(_READERS, _TAKEN, "(equal_r or not strict_r)", ("once_and_in_order",)),
+        Mutation(_READERS, f"same_r and {_TAKEN}", _TAKEN, ("only_of_the_writer_that_sent",)),
+        Mutation(_READERS, _TAKEN, "(later_r and not strict_r)", ("nothing_refused_that_is_next",)),
+        Mutation(_READERS, "is_locked = '0' and queued_r = '1'", "queued_r = '1'", ("nothing_judged_under_lock",)),
+        Mutation(_READERS, "chosen when is_locked = '1' else from;", "from;", ("window_is_shown",)),
+        Mutation(_READERS, "if judged_r = first_r then", "if judged_r = last_r then", ("each_once",)),
+        Mutation(
+            _READERS, "  first_r <= last;\n      end if;", "end if;\n      first_r <= last;", ("one_commit_a_packet",)
+        ),
+        Mutation(_READERS, "        first_r <= last;", "        first_r <= first_r;", ("all_of_a_good_packet",)),
+        Mutation(_READERS, "          last  := first_r;", "          null;", ("nothing_of_a_bad_packet",)),
+        Mutation(
+            _READERS, "<= keeps_r when state_r /= IDLE", "<= '1' when state_r /= IDLE", ("only_taken_ones_leave",)
+        ),
+        Mutation(
+            _READERS,
+            "if left_r = 1 then\n          finish;",
+            "if left_r = 2 then\n          finish;",
+            ("each_leaves_once",),
+        ),
+    ),
+    trace=18,
+)
+
+PROOFS = (
+    _QUEUED,
+    _WATCHED,
+    _WATCHED_SINK,
+    _REFUSED,
+    _TREE_TO_HOST,
+    _WATCHED_TREE,
+    _WATCHED_TREE_LIMITS,
+    _STORED,
+    _RECEIVED,
+    _WALKED,
+    _READ,
+)

@@ -437,19 +437,26 @@ begin
 
   count_body : process (clk)
   begin
-    if rising_edge(clk) and valid_r = '1' then
-      final_r <= '0';
-      if step_r(HEAD) = '1' then
-        body_r  <= half_r;
-        final_r <= last_r and one_r;
-        open_r  <= last_r and zero_r;
-      elsif in_body = '1' then
-        body_r <= body_r - 1;
-        if body_r = 2 then
-          final_r <= not open_r;
+    if rising_edge(clk) then
+      if valid_r = '1' then
+        final_r <= '0';
+        if step_r(HEAD) = '1' then
+          body_r  <= half_r;
+          final_r <= last_r and one_r;
+          open_r  <= last_r and zero_r;
+        elsif in_body = '1' then
+          body_r <= body_r - 1;
+          if body_r = 2 then
+            final_r <= not open_r;
+          end if;
+        end if;
+        if end_r = '1' then
+          final_r <= '0';
+          open_r  <= '0';
         end if;
       end if;
-      if end_r = '1' then
+      -- A reset may come within a submessage.
+      if rst_n = '0' then
         final_r <= '0';
         open_r  <= '0';
       end if;
