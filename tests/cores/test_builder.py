@@ -79,8 +79,16 @@ def test_it_has_no_combinational_loop(tmp_path: Path) -> None:
     assert loops("firm_packet_builder", tmp_path, core_files("net/builder"), []) == []
 
 
-@pytest.mark.parametrize("value", [3, 17])
-def test_a_bad_generic_is_reported(library: Library, value: int) -> None:
-    result = library.run("firm_packet_builder", {"ADDRESS_BITS": value})
+@pytest.mark.parametrize(
+    ("generic", "value", "legal"),
+    [
+        ("ADDRESS_BITS", 3, "4 to 16"),
+        ("ADDRESS_BITS", 17, "4 to 16"),
+        ("BANK_BITS", 0, "1 to 8"),
+        ("BANK_BITS", 9, "1 to 8"),
+    ],
+)
+def test_a_bad_generic_is_reported(library: Library, generic: str, value: int, legal: str) -> None:
+    result = library.run("firm_packet_builder", {generic: value})
     assert result.exit_code != 0
-    assert f"firm_packet_builder: ADDRESS_BITS is {value}; legal: 4 to 16" in result.output
+    assert f"firm_packet_builder: {generic} is {value}; legal: {legal}" in result.output
