@@ -158,7 +158,7 @@ def without_counts(packets: Sequence[Sent]) -> list[Sent]:
         while place < len(packet):
             kind, size = packet[place], int.from_bytes(packet[place + 2 : place + 4], "little")
             ends, end = packet[place + 4 : place + 12], place + 4 + size
-            if kind in (rtps.Kind.HEARTBEAT, rtps.Kind.ACKNACK):
+            if kind in (rtps.Kind.HEARTBEAT, rtps.Kind.ACKNACK, rtps.Kind.NACK_FRAG):
                 count = int.from_bytes(packet[end - 4 : end], "little")
                 assert count > last.get((address, ends), 0), f"count {count} of {ends.hex()} comes again"
                 last[address, ends] = count
