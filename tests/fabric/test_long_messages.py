@@ -1,0 +1,151 @@
+"""Long messages of live peers to a simulated board: packets in fragments of IPv4, and samples in fragments of RTPS."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import string
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import reduce
+from pathlib import Path
+
+import pytest
+
+from tests.fabric.dissection import dissect, fields_of
+from tests.fabric.live import Lab, skip_without_peers
+from tests.fabric.messages import DataFrag, NackFrag, parse
+from tests.fabric.test_peers import HERE, Peer
+
+SEED = 20261127
+LONGEST = 16000
+# A payload has an encoding, a length and a zero besides the text.
+BESIDES = 9
+SIZES = (1, 1335, 1336, 1337, 4000, 5376, LONGEST - BESIDES)
+# Without MaxMessageSize, Cyclone DDS puts samples of up to 14,720 bytes into one packet.
+CYCLONE = "<CycloneDDS><Domain><General><MaxMessageSize>{size}</MaxMessageSize></General></Domain></CycloneDDS>"
+SPECIFICATION = f"""\
+project:
+  name: board
+  clock: 125 MHz
+  interconnect: ethernet
+  network: {{mac: "02:00:00:00:00:09", address: 192.0.2.9, phy: rgmii, reassembly: 65507}}
+accelerators:
+  - name: digest
+    type: VHDL
+    sources: digest.vhd
+    interface:
+      input: [{{middleware: ROS2, message: std_msgs/String}}]
+      output: [{{middleware: ROS2, message: std_msgs/UInt32}}]
+blocks:
+  - {{name: text, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /text_in, maxLength: {LONGEST},
+     outgoing: [{{name: digest}}]}}
+  - {{name: digest, type: digest, outgoing: [{{name: sum}}]}}
+  - {{name: sum, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /sum_out}}
+"""
+
+pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
+
+
+@pytest.fixture(scope="module")
+def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A board that answers each text with a number; its simulator is built beside it, once."""
+    folder = tmp_path_factory.mktemp("board")
+    shutil.copy(HERE / "digest.vhd", folder)
+    (folder / "board.yaml").write_text(SPECIFICATION, encoding="utf-8")
+    return folder / "board.yaml"
+
+
+@pytest.fixture
+def lab(specification: Path, tmp_path: Path) -> Iterator[Lab]:
+    skip_without_peers()
+    with ExitStack() as stack:
+        yield Lab(specification, tmp_path, stack)
+
+
+def _digest(text: str) -> int:
+    """What digest.vhd computes."""
+    return reduce(lambda digest, byte: (31 * digest + byte) & 0xFFFFFFFF, text.encode(), 0)
+
+
+def _text(chance: random.Random, size: int) -> str:
+    return "".join(chance.choices(string.ascii_letters, k=size))
+
+
+def _answered(peer: Peer, texts: Sequence[str]) -> None:
+    """Each text is answered once, and in order."""
+    peer.send([("text", [text]) for text in texts])
+    assert peer.take(len(texts)) == [("sum", [_digest(text)]) for text in texts]
+
+
+def _settle(peer: Peer) -> None:
+    """Wait until a text is answered: a peer does not know whether the board has matched its reader."""
+    print(peer.wait_until_matched())
+    number = 0
+    while True:
+        number += 1
+        peer.send([("text", [str(number)])])
+        while sample := peer.next_sample(5):
+            if sample == ("sum", [_digest(str(number))]):
+                return
+
+
+@contextmanager
+def _captured(lab: Lab, path: Path) -> Iterator[None]:
+    """Write what passes the switch."""
+    words = lab.switch.command("dumpcap", "-q", "-i", "switch", "-w", str(path))
+    recorder = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    assert recorder.stderr
+    while not recorder.stderr.readline().startswith("File:"):
+        assert recorder.poll() is None
+    try:
+        yield
+    finally:
+        recorder.terminate()
+        recorder.communicate()
+
+
+@pytest.mark.parametrize("size", ["1456B", "14720B"])
+def test_cyclone_sends_long_messages_in_fragments_of_rtps(
+    lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: str
+) -> None:
+    """With one fragment in a packet, and with up to ten, all of a burst are answered, also those that are repeated."""
+    print(f"seed {SEED}")
+    monkeypatch.setenv("CYCLONEDDS_URI", CYCLONE.format(size=size))
+    chance, capture = random.Random(SEED), tmp_path / "capture.pcapng"
+    with _captured(lab, capture):
+        lab.board()
+        peer = lab.cyclone({"sum": "UInt32"}, {"text": "String"})
+        _settle(peer)
+        for length in SIZES:
+            _answered(peer, [_text(chance, length)])
+        _answered(peer, [_text(chance, SIZES[-1]) for _ in range(6)])
+    kinds = set()
+    for payload, fields in dissect(capture):
+        message = parse(payload)
+        assert message is not None and message.is_whole
+        assert fields == [fields_of(item) for item in message.submessages], payload.hex()
+        kinds |= {type(item) for item in message.submessages}
+    # Of the burst, some come while another one leaves.
+    assert kinds >= {DataFrag, NackFrag}
+
+
+def test_fast_dds_repeats_long_messages_in_long_packets(lab: Lab, tmp_path: Path) -> None:
+    """What was sent while the cable was out is asked for, and comes together."""
+    print(f"seed {SEED}")
+    chance, capture = random.Random(SEED), tmp_path / "capture.pcapng"
+    lab.board()
+    peer = lab.rclpy({"sum": "UInt32"}, {"text": "String"})
+    _settle(peer)
+    for length in SIZES:
+        _answered(peer, [_text(chance, length)])
+    texts = [_text(chance, 4000) for _ in range(12)]
+    with _captured(lab, capture):
+        lab.switch.run("ip", "link", "set", "port1", "down")
+        peer.send([("text", [text]) for text in texts[:-1]])
+        assert peer.next_sample(2) is None
+        lab.switch.run("ip", "link", "set", "port1", "up")
+        peer.send([("text", [texts[-1]])])
+        assert peer.take(len(texts)) == [("sum", [_digest(text)]) for text in texts]
+    assert max(len(payload) for payload, _ in dissect(capture)) > 2 * LONGEST
