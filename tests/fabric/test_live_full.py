@@ -31,7 +31,7 @@ TOPIC = """\
      qos: {{depth: 20}}}}
 """
 
-pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
+pytestmark = [pytest.mark.thorough, pytest.mark.xdist_group("fabric")]
 
 
 @pytest.fixture
