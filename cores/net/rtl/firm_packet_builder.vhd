@@ -110,6 +110,12 @@ architecture rtl of firm_packet_builder is
   signal prelude_r : natural range 0 to PRELUDE_WORDS-1;
   signal sent_r    : std_logic;  -- the prelude is over
   signal closes_r  : std_logic;  -- since this cycle
+
+  -- The third stage: a byte of the prelude. The memory of fields is slow, so it is added one cycle later.
+  signal adds_r    : std_logic;
+  signal added_r   : std_logic_vector(7 downto 0) := (others => '0');
+  signal number_r  : natural range 0 to PRELUDE_WORDS-1;  -- of the word
+  signal ends_r    : std_logic;                           -- the prelude was over before
   signal advance   : std_logic;
 
   -- Numbers of the packet.
@@ -284,15 +290,21 @@ begin
         else
           prelude_r <= prelude_r + 1;
         end if;
-        if prelude_r mod 2 = 0 then
-          word(15 downto 8) := unsigned(byte);
+      end if;
+      adds_r   <= valid_r and not sent_r;
+      added_r  <= byte;
+      number_r <= prelude_r;
+      ends_r   <= closes_r;
+      if adds_r = '1' then
+        if number_r mod 2 = 0 then
+          word(15 downto 8) := unsigned(added_r);
         else
-          word(7 downto 0) := unsigned(byte);
+          word(7 downto 0) := unsigned(added_r);
         end if;
-        if prelude_r = 2 or prelude_r = 3 then
-          total_r <= total_r(NUMBER_BITS-9 downto 0) & unsigned(byte);
+        if number_r = 2 or number_r = 3 then
+          total_r <= total_r(NUMBER_BITS-9 downto 0) & unsigned(added_r);
         end if;
-      elsif closes_r = '1' then
+      elsif ends_r = '1' then
         -- Long before its first use.
         total_r <= total_r + extra_r;
         word    := resize(extra_r, 16);
