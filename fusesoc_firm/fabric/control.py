@@ -39,7 +39,7 @@ from fusesoc_firm.system.derived.ethernet import MOST_DEPTH, MOST_SLOTS, kept_of
 from fusesoc_firm.text.render import Rendering
 
 PROGRAM = Path(__file__).with_name("ros2_node.seq")
-MOST_WORDS = 1024
+MOST_WORDS = 2048
 WORD_BITS = 36
 MOST_PEERS = 8
 

@@ -37,7 +37,7 @@ LATENCY = 12
 # Milliseconds without a packet of the node, after which nothing is repeated.
 QUIET = 110
 
-PAGE = REPOSITORY / "docs" / "reference" / "network.md"
+PAGE = REPOSITORY / "docs" / "reference" / "ethernet.md"
 README = REPOSITORY / "cores" / "net" / "README.md"
 
 # The eight peers are matched in one process.

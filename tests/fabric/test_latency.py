@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 QUATERNION = rtps.XCDR1 + bytes(32)
 # Cycles, from the last byte of the line to the Manager's first beat, and from its last beat to the line.
 MOST_IN = MOST_OUT = 16
-_PAGE = REPOSITORY / "docs" / "reference" / "network.md"
+_PAGE = REPOSITORY / "docs" / "reference" / "ethernet.md"
 
 
 @dataclass(frozen=True)

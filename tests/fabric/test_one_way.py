@@ -14,7 +14,7 @@ from tests.fabric.test_generated_node import PARTS
 from tests.hdl.ghdl import REPOSITORY, Library, core_files
 
 HERE = Path(__file__).parent
-_PAGE = REPOSITORY / "docs" / "reference" / "network.md"
+_PAGE = REPOSITORY / "docs" / "reference" / "ethernet.md"
 COUNT = 20
 NANOSECONDS = 8  # of a cycle
 # Each reads the topic that the other one writes.

@@ -75,7 +75,7 @@ architecture simulation of firm_rtps_node_tb is
   signal names_address   : std_logic_vector(9 downto 0);
   signal names_data      : std_logic_vector(8*ENDPOINTS-1 downto 0);
   signal program_enable  : std_logic;
-  signal program_address : std_logic_vector(9 downto 0);
+  signal program_address : std_logic_vector(10 downto 0);
   signal program_word    : std_logic_vector(35 downto 0) := (others => '0');
   signal packets_enable  : std_logic;
   signal packets_address : std_logic_vector(12 downto 0);
@@ -118,7 +118,7 @@ architecture simulation of firm_rtps_node_tb is
   subtype program_word_t is std_logic_vector(35 downto 0);
   subtype name_word_t is std_logic_vector(8*ENDPOINTS-1 downto 0);
   type packet_words_t is array (natural range 0 to 8191) of packet_word_t;
-  type program_words_t is array (natural range 0 to 1023) of program_word_t;
+  type program_words_t is array (natural range 0 to 2047) of program_word_t;
   type name_words_t is array (natural range 0 to 1023) of name_word_t;
   type entries_t is array (natural range 0 to 255) of natural;
 

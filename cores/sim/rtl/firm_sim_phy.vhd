@@ -10,7 +10,7 @@
 --
 -- After each 'w', it reads at file descriptor 3: the number of bytes of the frame (2 bytes, the lowest first; 0
 -- without a frame), and these bytes. The simulation ends where the file ends, a frame that is not whole with it.
--- `firm live` starts it (docs/reference/network.md).
+-- `firm live` starts it (docs/reference/ethernet.md).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
