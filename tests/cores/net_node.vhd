@@ -5,6 +5,7 @@ library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
+use firm.firm_rtps_pkg.all;
 
 entity net_node is
   generic (
@@ -75,7 +76,9 @@ architecture rtl of net_node is
   signal entry           : std_logic_vector(12 downto 0);
   signal payload_bytes   : std_logic_vector(15 downto 0);
   signal is_busy         : std_logic;
+  signal bank            : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal build_valid     : std_logic;
+  signal build_bank      : std_logic_vector(RTPS_BANK_BITS-1 downto 0);
   signal build_address   : std_logic_vector(6 downto 0);
   signal build_data      : std_logic_vector(7 downto 0);
   signal program_enable  : std_logic;
@@ -218,9 +221,11 @@ begin
       sample_tready       => s_axis_tready,
       start               => start,
       packet              => packet,
+      bank                => bank,
       payload_bytes       => payload_bytes,
       is_busy             => is_busy,
       build_field_valid   => build_valid,
+      build_field_bank    => build_bank,
       build_field_address => build_address,
       build_field_data    => build_data,
       payload_tdata       => payload_tdata,
@@ -258,9 +263,11 @@ begin
       rst_n           => rst_n,
       start           => start,
       entry           => entry,
+      bank            => bank,
       payload_bytes   => payload_bytes,
       is_busy         => is_busy,
       field_valid     => build_valid,
+      field_bank      => build_bank,
       field_address   => build_address,
       field_data      => build_data,
       program_enable  => program_enable,

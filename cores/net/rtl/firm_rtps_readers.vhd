@@ -422,7 +422,7 @@ begin
         write_r <= place;
         full_r  <= '0';
         misses  := misses_r or (is_sample and not pushes) or (is_wanted and fragment_r and is_unplaced);
-        skips   := skips_r or (is_sample and is_long);
+        skips   := skips_r or (is_sample and fragment_r and is_long);
       end if;
       if ends_r = '1' then
         -- The packet may end with the submessage.
