@@ -185,7 +185,7 @@ class Source:
     last: int = 0
     is_heard: bool = False
     requested: int = 0
-    asked: int = 0  # the fragment after those that were asked for, its lowest byte; or 0
+    asked: int = 0  # the fragment after those that were asked for, or 0
     next_request: int = 0
 
     @property
@@ -404,7 +404,7 @@ class Participant:
         ends = source.endpoint.entity, source.entity
         if source.is_heard and (part := self._part_of(source)):
             missing = part.missing(MOST_REQUESTED if self._has_come(source, part) else most)
-            source.asked = (part.fragment + missing.size) % 256
+            source.asked = part.fragment + missing.size
             self._send_to(
                 source.peer,
                 source.address,
@@ -619,7 +619,7 @@ class Participant:
 
     def _has_come(self, source: Source, part: Assembly) -> bool:
         """Whether all fragments that were asked for have come."""
-        return source.asked in (0, part.fragment % 256)
+        return source.asked in (0, part.fragment)
 
     def _part_of(self, source: Source) -> Assembly | None:
         """The sample to take next, if some of its fragments have come."""

@@ -484,10 +484,13 @@ begin
     signal left_bytes     : std_logic_vector(15 downto 0);
     signal fragment_bytes : std_logic_vector(15 downto 0);
     -- What the program sees: it stays while the program reads it.
-    signal next_fragment_r : std_logic_vector(15 downto 0);
-    signal left_bytes_r    : std_logic_vector(15 downto 0);
-    signal is_open_r       : std_logic;
-    signal is_its_r        : std_logic;
+    signal next_fragment_r  : std_logic_vector(15 downto 0);
+    signal left_bytes_r     : std_logic_vector(15 downto 0);
+    signal fragment_bytes_r : std_logic_vector(15 downto 0);
+    signal is_open_r        : std_logic;
+    signal open_source_r    : source_t;
+    signal open_number_r    : std_logic_vector(NUMBER_BITS-1 downto 0);
+    signal is_its_r         : std_logic;
 
   begin
 
@@ -563,12 +566,15 @@ begin
     begin
       if rising_edge(clk) then
         if is_locked = '0' then
-          next_fragment_r <= next_fragment;
-          left_bytes_r    <= left_bytes;
-          is_open_r       <= is_open;
+          next_fragment_r  <= next_fragment;
+          left_bytes_r     <= left_bytes;
+          fragment_bytes_r <= fragment_bytes;
+          is_open_r        <= is_open;
+          open_source_r    <= open_source;
+          open_number_r    <= open_number;
         end if;
         is_its_r <= '0';
-        if open_source = chosen and unsigned(open_number) = next_r then
+        if open_source_r = chosen and unsigned(open_number_r) = next_r then
           is_its_r <= is_open_r;
         end if;
       end if;
@@ -578,8 +584,8 @@ begin
                  next_fragment_r(15 downto 8) when read_place(2 downto 0) = "001" else
                  left_bytes_r(7 downto 0) when read_place(2 downto 0) = "010" else
                  left_bytes_r(15 downto 8) when read_place(2 downto 0) = "011" else
-                 fragment_bytes(7 downto 0) when read_place(2 downto 0) = "100" else
-                 fragment_bytes(15 downto 8) when read_place(2 downto 0) = "101" else
+                 fragment_bytes_r(7 downto 0) when read_place(2 downto 0) = "100" else
+                 fragment_bytes_r(15 downto 8) when read_place(2 downto 0) = "101" else
                  "0000000" & is_its_r;
 
   end generate with_assembly;
