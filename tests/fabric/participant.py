@@ -68,7 +68,7 @@ class Limits:
     sources: int = 32
     sinks: int = 32
     longest: int = 65536
-    assembled: int = 65535
+    assembled: int = 65536
 
 
 @dataclass
