@@ -321,7 +321,7 @@ def test_a_pin_is_not_called_as_a_port_of_the_board(tmp_path: Path) -> None:
 def _inner_names() -> list[str]:
     """The signals, generics and labels of the top level, whatever the board."""
     text = (TEMPLATES / f"{BOARD_TEMPLATE}.mustache").read_text(encoding="utf-8")
-    declared = re.findall(r"^ *(?:signal )?(\w+) *: (?:entity|component|process|integer|std_logic)", text, re.M)
+    declared = re.findall(r"^ *(?:signal )?(\w+) *: (?:entity|component|process|integer|std_logic)", text, re.MULTILINE)
     return sorted({name.lower() for name in declared} - {"clk", "oscillator"})
 
 

@@ -147,8 +147,8 @@ class NodeNetwork(Section):
         default=1,
     )
     reassembly: int = key(
-        "bytes of the longest packet of IPv4 in fragments, up to 65535, if the topics need fewer; 0: as the topics need;"
-        " only used with ethernet",
+        "bytes of the longest packet of IPv4 in fragments, up to 65535, if the topics need fewer; 0: as the topics need"
+        "; only used with ethernet",
         form="integer",
         default=0,
     )
