@@ -6,8 +6,8 @@
 -- another sample are dropped meanwhile. A sample that its reader no longer wants makes room for its successor, and one
 -- without a new fragment for a while makes room for others.
 --
--- A fragment counts when its submessage has ended without a part of one, and its packet is known to be good. Until then,
--- its bytes are behind those that count, where the fragment can be written again.
+-- A fragment counts when its submessage has ended without a part of one, and its packet is known to be good. Until
+-- then, its bytes are behind those that count, where the fragment can be written again.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

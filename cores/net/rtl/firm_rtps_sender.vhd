@@ -13,9 +13,9 @@ entity firm_rtps_sender is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- Of the program, which waits while `waits` is high: the packet of a writer's next sample, or 0 if none is prepared,
-    -- since the sample has no reader or the program sends it; the slot of the payload of the next packet; the packet to
-    -- send.
+    -- Of the program, which waits while `waits` is high: the packet of a writer's next sample, or 0 if none is
+    -- prepared, since the sample has no reader or the program sends it; the slot of the payload of the next packet; the
+    -- packet to send.
     prepare_valid     : in  std_logic;
     prepare_writer    : in  std_logic_vector(2 downto 0);
     chosen_slot_valid : in  std_logic;
