@@ -32,6 +32,8 @@ OTHER_FAULTS = {
     ("message/library.py", "_check_equal"): "the file of a bag",
     ("system/boards/board.py", "read_board"): "the file of a board",
     ("system/boards/board.py", "_check_pins"): "the file of a board",
+    ("system/boards/board.py", "_check_ports"): "the file of a board",
+    ("system/boards/board.py", "_pll"): "the file of a board",
     ("system/boards/board.py", "_check_streams"): "the file of a board",
     ("system/boards/board.py", "check_fits"): "a board that a right specification does not fit on",
     ("system/boards/board.py", "_check_places"): "a board that a right specification does not fit on",

@@ -56,7 +56,7 @@ def test_a_point_between_two_boards_takes_as_long_as_the_page_says(tmp_path: Pat
     cycles = sorted(map(int, (tmp_path / "one_way.txt").read_text(encoding="ascii").split()))
     print(cycles, f"{NANOSECONDS * cycles[COUNT // 2]} ns")
     assert len(cycles) == COUNT
-    told = re.search(r"`Point` of best effort \|.*\| about (\d+) cycles", _PAGE.read_text(encoding="utf-8"))
+    told = re.search(r"of a `Point`, of best effort, .*\| about (\d+) cycles", _PAGE.read_text(encoding="utf-8"))
     assert told
     # Half of them leave while the node has nothing else to do.
     assert cycles[COUNT // 2] == pytest.approx(int(told[1]), rel=0.05)

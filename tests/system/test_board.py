@@ -29,7 +29,7 @@ from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.written.specification import LINKS, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
-from fusesoc_firm.text.render import render
+from fusesoc_firm.text.render import TEMPLATES, render
 
 LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 SPECIFICATION = """
@@ -316,6 +316,23 @@ def test_a_pin_is_not_called_as_a_port_of_the_board(tmp_path: Path) -> None:
     board = written(tmp_path, BOARD)
     with pytest.raises(InputError, match="pin 'n' of 'led' has the name 'led_n', which is reserved for boards"):
         check_fits(with_pins(tmp_path, board, "{name: n, direction: out}", "led"), board)
+
+
+def _inner_names() -> list[str]:
+    """The signals, generics and labels of the top level, whatever the board."""
+    text = (TEMPLATES / f"{BOARD_TEMPLATE}.mustache").read_text(encoding="utf-8")
+    declared = re.findall(r"^ *(?:signal )?(\w+) *: (?:entity|component|process|integer|std_logic)", text, re.MULTILINE)
+    return sorted({name.lower() for name in declared} - {"clk", "oscillator"})
+
+
+@pytest.mark.parametrize("name", _inner_names())
+def test_a_pin_is_not_called_as_a_name_inside_the_top_level(tmp_path: Path, name: str) -> None:
+    """Names without two parts are those of a block that is called `_`. Some are also taken inside the system."""
+    block, _, pin = name.partition("_") if "_" in name else ("_", "", name)
+    board = written(tmp_path, BOARD)
+    with pytest.raises(InputError) as raised:
+        check_fits(with_pins(tmp_path, board, f"{{name: {pin}, direction: out}}", f"'{block}'"), board)
+    assert re.search(rf"has the name '{name}', which is reserved|port: {name}_\d+,", str(raised.value))
 
 
 def test_a_clock_that_is_none(tmp_path: Path) -> None:

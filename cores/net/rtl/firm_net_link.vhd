@@ -91,7 +91,7 @@ entity firm_net_link is
     --   3  a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room
     --   4  another node has no room
     --   5  a publisher or subscriber of another node, of a topic of the board, has no room
-    --   6  a message of another node has no room, or comes in fragments of RTPS and is too long
+    --   6  a message of another node has no room, or comes in fragments of RTPS and is too long or the node takes none
     --   7  a message to send is empty, too long or of no publisher
     --   8  another host has the address of the board
     --   9  a packet of RTPS, or a list of parameters in it, is broken

@@ -48,7 +48,8 @@ architecture rtl of firm_net_presence is
   constant ADDRESS_BYTES   : natural := 4;
   constant SHORTEST_HEADER : natural := 5;  -- of IPv4, in words
   constant LAST_PLACE      : natural := 63;
-  -- Counts of the bytes before IGMP, of which there is one more at the first byte of IGMP, and then downwards.
+  -- `count_r` counts down from the bytes of the header of IPv4, from its second byte on. So it is one at the first byte
+  -- of IGMP, and goes on from zero to the highest count.
   constant TYPE_COUNT  : natural := 1;
   constant DELAY_COUNT : natural := 0;
   constant GROUP_COUNT : natural := 122;  -- of the last byte of the group

@@ -6,8 +6,8 @@
 -- another sample are dropped meanwhile. A sample that its reader no longer wants makes room for its successor, and one
 -- without a new fragment for a while makes room for others.
 --
--- A fragment counts when its submessage ends with a whole one, and when its packet is known to be good. Until then, its
--- bytes are where no byte counts.
+-- A fragment counts when its submessage has ended without a part of one, and its packet is known to be good. Until
+-- then, its bytes are behind those that count, where the fragment can be written again.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -112,7 +112,7 @@ architecture rtl of firm_rtps_assembly is
   signal begins     : std_logic;
   signal inside_r   : std_logic;                      -- a byte of the payload has come
   signal taken_r    : std_logic;                      -- its bytes are taken
-  signal closed_r   : std_logic;                      -- so far as the sample and the count go
+  signal closed_r   : std_logic;                      -- its sample, or the count of fragments, is full
   signal between_r  : std_logic;                      -- the bytes so far are whole fragments
   signal byte_r     : std_logic_vector(7 downto 0) := (others => '0');
   signal valid_r    : std_logic;

@@ -67,11 +67,11 @@ entity firm_rtps_control is
     is_done     : out std_logic;
 
     -- Of firm_rtps_sender; `slot_writer` is the writer whose packet is prepared.
-    prepare_valid : out std_logic;
-    payload_valid : out std_logic;  -- the slot of the payload
-    send_valid    : out std_logic;
-    waits         : in  std_logic;
-    is_started    : in  std_logic;
+    prepare_valid     : out std_logic;
+    chosen_slot_valid : out std_logic;  -- the slot of the payload
+    send_valid        : out std_logic;
+    waits             : in  std_logic;
+    is_started        : in  std_logic;
 
     -- To firm_packet_builder.
     build_field_valid   : out std_logic;
@@ -329,9 +329,9 @@ begin
   slot_valid  <= at_next_r and not waits;
   slot_writer <= writer_r;
 
-  prepare_valid <= at_prepare_r and not waits;
-  payload_valid <= at_slot_r and not waits;
-  send_valid    <= at_start_r and not waits;
+  prepare_valid     <= at_prepare_r and not waits;
+  chosen_slot_valid <= at_slot_r and not waits;
+  send_valid        <= at_start_r and not waits;
 
   build_field_valid   <= at_field_r and not waits;
   build_field_bank    <= bank_r;

@@ -161,23 +161,23 @@ architecture rtl of firm_rtps_node is
   signal early_number : std_logic_vector(31 downto 0);
   signal takes_early  : std_logic;
 
-  signal slot_valid  : std_logic;
-  signal slot_writer : std_logic_vector(2 downto 0);
-  signal comes       : std_logic;
-  signal has_sample  : std_logic;
-  signal sender      : std_logic_vector(2 downto 0);
-  signal is_done     : std_logic;
-  signal shows       : std_logic;
-  signal shows_new   : std_logic;
-  signal slot        : std_logic_vector(7 downto 0);
-  signal has_payload : std_logic;
-  signal slot_bytes  : std_logic_vector(15 downto 0);
+  signal slot_valid    : std_logic;
+  signal slot_writer   : std_logic_vector(2 downto 0);
+  signal comes         : std_logic;
+  signal has_sample    : std_logic;
+  signal sample_writer : std_logic_vector(2 downto 0);  -- of the sample of firm_rtps_history
+  signal is_done       : std_logic;
+  signal shows         : std_logic;
+  signal shows_new     : std_logic;
+  signal slot          : std_logic_vector(7 downto 0);
+  signal has_payload   : std_logic;
+  signal slot_bytes    : std_logic_vector(15 downto 0);
 
-  signal prepare_valid : std_logic;
-  signal payload_given : std_logic;
-  signal send_valid    : std_logic;
-  signal waits         : std_logic;
-  signal is_started    : std_logic;
+  signal prepare_valid     : std_logic;
+  signal chosen_slot_valid : std_logic;
+  signal send_valid        : std_logic;
+  signal waits             : std_logic;
+  signal is_started        : std_logic;
 
 begin
 
@@ -395,7 +395,7 @@ begin
       slot_next     => write_data,
       comes         => comes,
       has_sample    => has_sample,
-      writer        => sender,
+      writer        => sample_writer,
       is_done       => is_done,
       shows         => shows,
       shows_new     => shows_new,
@@ -411,25 +411,25 @@ begin
 
   u_sender : entity firm.firm_rtps_sender
     port map (
-      clk            => clk,
-      rst_n          => rst_n,
-      prepare_valid  => prepare_valid,
-      prepare_writer => slot_writer,
-      slot_valid     => payload_given,
-      send_valid     => send_valid,
-      data           => write_data,
-      waits          => waits,
-      comes          => comes,
-      writer         => sender,
-      is_started     => is_started,
-      shows          => shows,
-      shows_new      => shows_new,
-      slot           => slot,
-      start          => start,
-      packet         => packet,
-      bank           => bank,
-      has_payload    => has_payload,
-      is_busy        => is_busy
+      clk               => clk,
+      rst_n             => rst_n,
+      prepare_valid     => prepare_valid,
+      prepare_writer    => slot_writer,
+      chosen_slot_valid => chosen_slot_valid,
+      send_valid        => send_valid,
+      data              => write_data,
+      waits             => waits,
+      comes             => comes,
+      writer            => sample_writer,
+      is_started        => is_started,
+      shows             => shows,
+      shows_new         => shows_new,
+      slot              => slot,
+      start             => start,
+      packet            => packet,
+      bank              => bank,
+      has_payload       => has_payload,
+      is_busy           => is_busy
     );
 
   u_control : entity firm.firm_rtps_control
@@ -479,10 +479,10 @@ begin
       slot_valid          => slot_valid,
       slot_writer         => slot_writer,
       has_sample          => has_sample,
-      writer              => sender,
+      writer              => sample_writer,
       is_done             => is_done,
       prepare_valid       => prepare_valid,
-      payload_valid       => payload_given,
+      chosen_slot_valid   => chosen_slot_valid,
       send_valid          => send_valid,
       waits               => waits,
       is_started          => is_started,

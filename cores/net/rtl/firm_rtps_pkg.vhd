@@ -83,7 +83,8 @@ package firm_rtps_pkg is
 
   constant MOST_SET_BITS : positive := 256;
 
-  -- Banks of the builder's fields: one for each writer with frames, and one for all other packets.
+  -- Banks of the builder's fields: one for each writer with frames, and one for all other packets. These are up to
+  -- nine, so their numbers have four bits; 8 to 14 are not used.
   constant RTPS_BANK_BITS : positive := 4;
   constant RTPS_OWN_BANK  : std_logic_vector(RTPS_BANK_BITS-1 downto 0) := x"f";
 

@@ -13,14 +13,15 @@ entity firm_rtps_sender is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- Of the program, which waits while `waits` is high: the packet of a writer's next sample, or 0 if there is none;
-    -- the slot of the payload of the next packet; the packet to send.
-    prepare_valid  : in  std_logic;
-    prepare_writer : in  std_logic_vector(2 downto 0);
-    slot_valid     : in  std_logic;
-    send_valid     : in  std_logic;
-    data           : in  std_logic_vector(7 downto 0);
-    waits          : out std_logic;  -- a packet leaves, or is about to
+    -- Of the program, which waits while `waits` is high: the packet of a writer's next sample, or 0 if none is
+    -- prepared, since the sample has no reader or the program sends it; the slot of the payload of the next packet; the
+    -- packet to send.
+    prepare_valid     : in  std_logic;
+    prepare_writer    : in  std_logic_vector(2 downto 0);
+    chosen_slot_valid : in  std_logic;
+    send_valid        : in  std_logic;
+    data              : in  std_logic_vector(7 downto 0);
+    waits             : out std_logic;  -- a packet leaves, or is about to
 
     -- Of firm_rtps_history: a sample comes, and is there from the next cycle on.
     comes      : in  std_logic;
@@ -90,7 +91,7 @@ begin
       elsif is_busy = '0' and sample_r = '0' then
         asked_r <= '0';
       end if;
-      if slot_valid = '1' then
+      if chosen_slot_valid = '1' then
         slot_r   <= data;
         chosen_r <= '1';
       elsif begins = '1' and sample_r = '0' then

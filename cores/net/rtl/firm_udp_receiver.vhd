@@ -84,7 +84,7 @@ architecture rtl of firm_udp_receiver is
   signal mine_r         : std_logic;
   signal fragment_r     : std_logic;
   signal header_bytes_r : unsigned(5 downto 0) := (others => '0');
-  -- Bytes of the packet to come, and four; from the third byte of a datagram on, and six.
+  -- Four more than the bytes of the packet to come, and from the third byte of a datagram on, six more than those.
   signal packet_left_r  : unsigned(15 downto 0) := (others => '0');
   signal short_r        : std_logic;  -- the packet has no room for a datagram
   signal header_sum_r   : unsigned(16 downto 0) := (others => '0');

@@ -53,6 +53,12 @@ _PORTS = (
     *(name for pins in PHY_PINS.values() for name, _, _ in pins),
     *("led", "led_n", "reset", "reset_n"),
 )
+# Other names in the top level: signals, then the generic and labels.
+_INNER_NAMES = (
+    *("locked", "stable", "running_r", "button", "pressed", "miso", "error_r"),
+    *("link_error", "network_error", "id_error", "frame_error"),
+    *("debounce", "u_pll", "u_stable", "u_button", "start", "note_error", "u_phy_reset", "u_system"),
+)
 # Contacts bounce for up to some 10 ms, and PHYs need a reset of 10 ms; the cycles are at least those that firm_debounce
 # takes.
 _DEBOUNCE_SECONDS = 0.01
@@ -296,7 +302,7 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
     """Note every accelerator pin without a site on the board, and every port of the board file without a pin."""
     places = {pin.port.lower() for pin in board.pins}
     for pin in pins:
-        if pin.name in _PORTS:
+        if pin.name in (*_PORTS, *_INNER_NAMES):
             faults.error(f"{pin.what} has the name '{pin.name}', which is reserved for boards", pin.source)
         elif missing := next((bit for bit in pin.bits() if bit not in places), None):
             hint = f"add '{{port: {missing}, site: ...}}' to your own board file"

@@ -351,8 +351,8 @@ class Network:
     """The place of a system that is a node itself: its MAC address (six bytes), IPv4 addresses and names.
 
     `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port, and knows the
-    names of `hosts`. `reassemblies` are the messages in several packets that may arrive at the same time, and
-    `reassembly` the bytes of the longest one, if the topics need fewer.
+    names of `hosts`. `reassemblies` are the packets of IPv4 in fragments that may arrive at the same time, and
+    `reassembly` the bytes of the longest one, if the topics need fewer; 0 means as the topics need.
     """
 
     mac: bytes

@@ -91,7 +91,8 @@ NETWORK_FAULTS = {
     "lost_packets": "a reply to ARP or ping, a packet of discovery or a frame beside a reassembled packet has no room",
     "refused_nodes": "another node has no room",
     "refused_endpoints": "a publisher or subscriber of another node, of a topic of the board, has no room",
-    "lost_messages": "a message of another node has no room, or comes in fragments of RTPS and is too long",
+    "lost_messages": "a message of another node has no room, or comes in fragments of RTPS and is too long"
+    " or the node takes none",
     "refused_messages": "a message to send is empty, too long or of no publisher",
     "taken_addresses": "another host has the address of the board",
     "broken_packets": "a packet of RTPS, or a list of parameters in it, is broken",

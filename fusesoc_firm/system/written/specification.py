@@ -142,13 +142,13 @@ class NodeNetwork(Section):
     )
     phy: Text = key("the interface of the PHY; only used with ethernet", choices=PHYS, default=Text(PHYS[0]))
     reassemblies: int = key(
-        "messages in several packets that may arrive at the same time, 1 to 4; only used with ethernet",
+        "packets of IPv4 in fragments that may arrive at the same time, 1 to 4; only used with ethernet",
         form="integer",
         default=1,
     )
     reassembly: int = key(
-        "bytes of the longest packet that others send in fragments, up to 65535, if it is longer than the topics need;"
-        " only used with ethernet",
+        "bytes of the longest packet of IPv4 in fragments, up to 65535, if the topics need fewer; 0: as the topics need"
+        "; only used with ethernet",
         form="integer",
         default=0,
     )
