@@ -124,7 +124,7 @@ matrix: TOOLS = verilator
 matrix: tools $(VENV)/.extra-matrix ## Test each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' adds more
 	@$(BIN)/python -m tests.matrix $(PYTHONS)
 
-proofs: setup ## Prove the Manager and the schedulers, write docs/figures/proofs.md
+proofs: setup ## Prove the Manager, the schedulers, and readers, packets and frames of nodes in fabric; write docs/figures/proofs.md
 	@$(BIN)/python -m tests.proofs
 
 policies: $(VENV)/.installed ## Write the lists of schedulers in cores/sched from fusesoc_firm/scheduling/policies.py

@@ -57,6 +57,7 @@ CALLS: Sequence[tuple[str, str, Mapping[str, object]]] = (
     ("quat2euler/quat2euler_hls", "system", {}),
     ("quat2euler/quat2euler_hls", "simulation", {}),
     ("quat2euler/quat2euler_ethernet", "system", {"board": "ecp5_versa"}),
+    ("quat2euler/quat2euler_ethernet", "system", {"board": "ulx3s_lan8720"}),
     ("quat2euler/quat2euler_ethernet", "simulation", {"product": "network"}),
     ("mobile_robot/mobile_robot", "simulation", {"simulator": "icarus"}),
     ("image_pipeline/image_pipeline", "system", {"board": "zynq7000"}),
@@ -73,7 +74,7 @@ def generate(call: tuple[str, str, Mapping[str, object]]) -> None:
 def call_generator(path: Path, name: str, changes: Mapping[str, object]) -> None:
     """Call a generator of a core as FuseSoC does, in a folder of `SAMPLES`."""
     entry = yaml.safe_load(path.read_text(encoding="utf-8").partition("\n")[2])["generate"][name]
-    folder = SAMPLES / f"{path.stem}-{name}"
+    folder = SAMPLES / "-".join([path.stem, name, *map(str, changes.values())])
     folder.mkdir(parents=True)
     request = {
         "gapi": "1.0",

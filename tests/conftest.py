@@ -13,8 +13,8 @@ import signal
 import sys
 import tempfile
 import time
-from collections import Counter, deque
-from collections.abc import Iterable, Iterator
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from zlib import crc32
@@ -44,6 +44,8 @@ _QUIET_DASK = {
     "ADMIN__SYSTEM_MONITOR__GIL__ENABLED": "False",
 }
 _LOOKS = 10
+# Of a parameter with so many values, none is left to `thorough`.
+_FEW = 8
 # Rooms whose tests may leave no file or socket open: what is collected as garbage while it is open is a fault.
 _CLOSED = tuple(Path(__file__).parent / room for room in ("bags", "node", "simulation"))
 _OPEN = ("error::ResourceWarning", "error::pytest.PytestUnraisableExceptionWarning")
@@ -72,8 +74,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 # Absent without pytest-xdist.
 @pytest.hookimpl(optionalhook=True, tryfirst=True)
-def pytest_xdist_auto_num_workers() -> int:
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     """One process more than processors: tests of nodes wait for a part of their time, in which another one works."""
+    if config.option.numprocesses != "auto" or "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ:
+        return None
     return len(os.sched_getaffinity(0)) + 1
 
 
@@ -85,19 +89,48 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 # Before cases are left out by their markers.
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: Iterable[pytest.Item]) -> None:
-    cases: Counter[tuple[object, str]] = Counter()
+    cases: defaultdict[tuple[object, str], list[pytest.Item]] = defaultdict(list)
     for item in items:
         if any(room in item.path.parents for room in _CLOSED):
             for rule in _OPEN:
                 item.add_marker(pytest.mark.filterwarnings(rule))
-        if one_in := item.get_closest_marker("one_in"):
-            test = item.parent, item.name.partition("[")[0]
-            every, others = (*one_in.args, 1)[:2]
-            if cases[test] % every:
-                # Spread over types and widths: these alternate in the order of the cases.
-                is_next = not crc32(item.name.encode()) % others
-                item.add_marker(pytest.mark.check if is_next else pytest.mark.thorough)
-            cases[test] += 1
+        if item.get_closest_marker("one_in"):
+            cases[item.parent, item.name.partition("[")[0]].append(item)
+    for test in cases.values():
+        _share_out(test)
+
+
+def _share_out(cases: Sequence[pytest.Item]) -> None:
+    """Mark the cases of a test that do not run with `make test`, by its marker `one_in`."""
+    seen: set[tuple[str, str]] = set()
+    left = []
+    for number, item in enumerate(cases):
+        every, others = next((*marker.args, 1)[:2] for marker in item.iter_markers("one_in"))
+        # Spread over types and widths: these alternate in the order of the cases.
+        if number % every and crc32(item.name.encode()) % others:
+            left.append(item)
+            continue
+        if number % every:
+            item.add_marker(pytest.mark.check)
+        if not item.get_closest_marker("thorough"):
+            seen |= _values(item)
+    rare = _values_of_few(cases)
+    for item in left:
+        new = _values(item) & rare - seen
+        item.add_marker(pytest.mark.check if new else pytest.mark.thorough)
+        seen |= new
+
+
+def _values(item: pytest.Item) -> set[tuple[str, str]]:
+    """The parameters of a case, and their values."""
+    return {(name, repr(value)) for name, value in item.callspec.params.items()} if hasattr(item, "callspec") else set()
+
+
+def _values_of_few(cases: Iterable[pytest.Item]) -> set[tuple[str, str]]:
+    """The values of those parameters that have few: each of them is worth a case."""
+    values = set().union(*map(_values, cases))
+    counts = Counter(name for name, _ in values)
+    return {value for value in values if counts[value[0]] <= _FEW}
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

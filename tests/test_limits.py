@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.processes import IGNORING_INTERRUPTS
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -79,24 +81,59 @@ def test_a_run_that_inherits_an_ignored_interrupt(tmp_path: Path) -> None:
     assert "neither the test nor a process below it has done anything for 2 s" in done.stdout
 
 
-def test_a_run_has_a_process_more_than_processors_and_tells_its_time(tmp_path: Path) -> None:
+PROCESSORS = len(os.sched_getaffinity(0))
+
+
+@pytest.mark.parametrize(("asked", "processes"), [({}, PROCESSORS + 1), ({"PYTEST_XDIST_AUTO_NUM_WORKERS": "1"}, 1)])
+def test_a_run_has_a_process_more_than_processors_and_tells_its_time(
+    asked: dict[str, str], processes: int, tmp_path: Path
+) -> None:
+    """Unless the variable of pytest-xdist asks for another number."""
     (tmp_path / "test_passing.py").write_text("def test_passing():\n    pass\n")
     options = ["-p", "tests.conftest", "-p", "no:cacheprovider", "-n", "auto"]
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = thorough\n")
+    environment = {name: value for name, value in os.environ.items() if name != "PYTEST_XDIST_AUTO_NUM_WORKERS"}
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *options],
+        cwd=tmp_path,
+        env={**environment, **asked, "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    expected = (
+        rf"^\d+ s by the clock; processes: {processes}, which had tests for \d+% of it; "
+        rf"processors: {PROCESSORS}, which worked for \d+% of it$"
+    )
+    assert re.search(expected, done.stdout, re.MULTILINE), done.stdout
+
+
+def test_no_value_of_a_short_parametrisation_is_left_out(tmp_path: Path) -> None:
+    """`one_in(40, 40)` leaves out most of 80 cases, but of the parameters only values of the long one."""
+    source = """
+import pytest
+
+@pytest.mark.one_in(40, 40)
+@pytest.mark.parametrize("long", range(10))
+@pytest.mark.parametrize("short", range(8))
+def test_case(short, long):
+    pass
+"""
+    (tmp_path / "test_swept.py").write_text(source)
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  check\n  thorough\n  one_in(n, m)\n")
+    options = ["-p", "tests.conftest", "-p", "no:cacheprovider", "-p", "no:xdist", "--collect-only", "-q"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *options, "-m", "not thorough"],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
         capture_output=True,
         text=True,
         check=True,
     )
-    processors = len(os.sched_getaffinity(0))
-    expected = (
-        rf"^\d+ s by the clock; processes: {processors + 1}, which had tests for \d+% of it; "
-        rf"processors: {processors}, which worked for \d+% of it$"
-    )
-    assert re.search(expected, done.stdout, re.MULTILINE), done.stdout
+    found = re.findall(r"test_case\[(\d)-(\d)\]", done.stdout)
+    assert {short for short, _ in found} == set("01234567"), done.stdout
+    assert len({long for _, long in found}) < 10, done.stdout
+    assert len(found) < 16, done.stdout
 
 
 def test_a_group_of_tests_stays_in_one_process(tmp_path: Path) -> None:

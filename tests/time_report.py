@@ -1,8 +1,8 @@
 """Where the time of a test run goes: the seconds of each room of tests and of its slowest tests, the longest first.
 
 A test has the seconds of the processor that its process and the ended processes below it take, which say the same on
-a busy machine as on an idle one, and those of the clock. The last line tells the whole run: what its processes had no
-tests for, and what the processors did not work for, is time that the run could do without.
+a busy machine as on an idle one, and those of the clock. The last line shows idle time: of processes without a
+test, and of processors.
 """
 
 from __future__ import annotations

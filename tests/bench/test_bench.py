@@ -210,9 +210,11 @@ def test_a_bitstream_has_the_figures_of_nextpnrs_report() -> None:
 
 
 def test_a_bitstream_that_is_not_built_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """FuseSoC fails, as it does if a clock is too slow."""
+    """FuseSoC fails, as it does if a clock is too slow, and its last lines say why."""
     monkeypatch.setattr(bitstreams, "_BUILDS", (("quat2euler_ethernet", "nowhere"),))
-    table = bitstreams.measure(print)
+    told: list[str] = []
+    table = bitstreams.measure(told.append)
+    assert any("nowhere" in line for line in told[:-1]), told
     assert [row[-1] for row in table.rows] == [FAILED]
     assert not table.is_good
 

@@ -52,7 +52,7 @@ class World:
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match
         self.cycles = 0  # of the last event, until the node had nothing to do
-        self.latency = 0  # cycles from the last frame's end to the first byte of a packet
+        self.latency = 0  # cycles of the last event, from a frame's end to the first byte of a packet; 0 without both
 
     def __enter__(self) -> World:
         return self
@@ -64,6 +64,7 @@ class World:
     def do(self, event: Event) -> Results:
         """What an event causes, if the node had nothing to do before."""
         assert self._process.stdin and self._process.stdout
+        self.latency = 0
         self._process.stdin.write(event.row)
         self._process.stdin.flush()
         found = Results()

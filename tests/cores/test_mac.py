@@ -182,6 +182,7 @@ def test_what_is_sent_is_received(library: Library, tmp_path: Path) -> None:
     assert [data for name, data in rows if name == "stored"] == frames
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_takes_what_is_sent(library: Library, tmp_path: Path) -> None:
     frames = [udp_frame(bytes(range(size))) for size in (1, 17, 18, 19, 100, 255)]

@@ -133,6 +133,7 @@ def test_it_has_no_latch(library: Library) -> None:
     assert library.latches("firm_net_presence") == []
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_sees_a_report_and_a_probe(tmp_path: Path) -> None:
     frames = frames_of(NETWORK)

@@ -35,6 +35,9 @@ from tests.hdl.verilog import loops
 SEED = 20261127
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/builder", "net/rtps")
 NODE = a_node()
+# Peers, stall and seed of a case in which all happens, and the events of such a case.
+FULL = (9, 30, SEED + 2)
+EVENTS = 2000
 
 
 @pytest.fixture(scope="module")
@@ -147,23 +150,24 @@ def test_an_early_sample_of_a_writer_is_not_counted_for_its_successor(library: L
 @pytest.mark.check
 @pytest.mark.parametrize(
     ("peers", "stall", "seed"),
-    [(4, 0, SEED), (9, 30, SEED + 2), (6, 10, SEED + 2), (1, 0, SEED + 3)],
+    [(4, 0, SEED), FULL, (6, 10, SEED + 2), (1, 0, SEED + 3)],
 )
 def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: int) -> None:
     print(f"seed {seed}")
-    events = Peers(peers, seed).run(2000)
+    events = Peers(peers, seed).run(EVENTS)
     wanted = expected(events)
     _check_kinds(wanted)
     with World(stall) as world:
         _check(world.all(events), wanted)
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_reads_the_same_in_all_packets_of_the_node(tmp_path: Path) -> None:
     """They are those of the netlist in the test before."""
-    seed = SEED + 2
+    peers, _, seed = FULL
     print(f"seed {seed}")
-    packets = [packet for _, packet in expected(Peers(9, seed).run(2000)).sent]
+    packets = [packet for _, packet in expected(Peers(peers, seed).run(EVENTS)).sent]
     frames = [udp_frame(packet) for packet in packets]
     write_capture(tmp_path / "node.pcap", [frame + fcs(frame) for frame in frames])
     kinds: set[type] = set()

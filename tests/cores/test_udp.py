@@ -90,6 +90,7 @@ def test_it_has_no_combinational_loop(tmp_path: Path) -> None:
     assert loops("firm_udp_receiver", tmp_path, core_files("net/udp"), core_files("axis/package")) == []
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_agrees_with_the_model(tmp_path: Path) -> None:
     """On checksums, fragments and payloads."""

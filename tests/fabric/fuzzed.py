@@ -11,8 +11,6 @@ import zlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import pytest
-
 from tests.cores.datagrams import ADDRESS, GROUP_MAC, MAC, PORTS
 
 LONGEST, SHORTEST = 1514, 60
@@ -99,7 +97,6 @@ def _sum(frame: bytearray) -> None:
 
 def _layers() -> list[Callable[[random.Random], Any]]:
     """What makes a packet, for each protocol that a node speaks."""
-    pytest.importorskip("scapy", reason="scapy is not installed")
     from scapy.contrib import rtps
     from scapy.layers import igmp
     from scapy.layers.inet import ICMP, IP, UDP

@@ -7,8 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -22,12 +22,13 @@ _PATIENCE = 10.0
 _BOARD = "/board is at 192.0.2.9, at tap0, in domain 0; Ctrl-C ends it\n"
 
 
-def skip_without_peers() -> None:
-    """Skip a test where there is no Verilator, TAP device, rclpy or Cyclone DDS."""
+def skip_without_peers(*programs: str) -> None:
+    """Skip a test where there is no Verilator, TAP device, rclpy or Cyclone DDS, or one of these programs."""
     if reason := _why_not():
         pytest.skip(reason)
-    if not shutil.which("verilator"):
-        pytest.skip("verilator is not installed")
+    for program in ("verilator", *programs):
+        if not shutil.which(program):
+            pytest.skip(f"{program} is not installed")
     if not Path("/dev/net/tun").exists():
         pytest.skip("there is no /dev/net/tun")
 
@@ -53,14 +54,20 @@ class Lab:
         assert board.stdout.readline() == _BOARD
         return board
 
-    def capture(self, path: Path) -> None:
-        """Begin to write what the switch passes on."""
+    @contextmanager
+    def capture(self, path: Path) -> Iterator[None]:
+        """Write what the switch passes on."""
         words = ("dumpcap", "-q", "-i", "switch", "-w", str(path))
         recorder = subprocess.Popen(self.switch.command(*words), stderr=subprocess.PIPE, text=True)
-        self._stack.callback(_finish, recorder)
         assert recorder.stderr
-        while not recorder.stderr.readline().startswith("File:"):
-            assert recorder.poll() is None
+        try:
+            while not recorder.stderr.readline().startswith("File:"):
+                assert recorder.poll() is None
+            yield
+        finally:
+            # It still has something to write.
+            recorder.terminate()
+            recorder.communicate()
 
     def members(self) -> list[tuple[str, str]]:
         """Port and group of each membership that the switch knows."""
@@ -99,12 +106,6 @@ class Lab:
 
 def _end(process: subprocess.Popen[str]) -> None:
     process.kill()
-    process.communicate()
-
-
-def _finish(process: subprocess.Popen[str]) -> None:
-    """End a program that still has something to write."""
-    process.terminate()
     process.communicate()
 
 

@@ -49,7 +49,6 @@ architecture simulation of one_way is
   signal s_tlast  : std_logic := '0';
   signal s_tready : std_logic;
   signal m_tvalid : std_logic;
-  signal m_tlast  : std_logic;
 
 begin
 
@@ -124,7 +123,7 @@ begin
       m_axis_tkeep  => open,
       m_axis_tuser  => open,
       m_axis_tvalid => m_tvalid,
-      m_axis_tlast  => m_tlast,
+      m_axis_tlast  => open,
       m_axis_tready => '1',
       s_axis_tdata  => x"00",
       s_axis_tkeep  => "1",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack
-from itertools import count
+from itertools import count, islice
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ from tests.fabric.test_peers import Peer
 TOPICS = [f"t{number}" for number in range(8)]
 TYPES = dict.fromkeys(TOPICS, "Point")
 PEERS = 8
+# Rounds of which one comes to all.
+SETTLING = 20
 SPECIFICATION = """\
 project:
   name: board
@@ -49,6 +52,15 @@ def _round(peers: list[Peer], number: int) -> Round:
     return sent, [sample for _, sample in sent]
 
 
+def _settle(board: subprocess.Popen[str], peers: list[Peer], numbers: Iterator[int]) -> None:
+    """Send rounds until one comes to all."""
+    for number in islice(numbers, SETTLING):
+        if settled(peers, _round(peers, number)):
+            return
+        assert board.poll() is None
+    pytest.fail(f"none of {SETTLING} rounds came to all")
+
+
 def test_eight_peers_exchange_all_topics_and_a_ninth_waits_for_room(lab: Lab) -> None:
     board, numbers = lab.board(), count()
     peers = [lab.rclpy(TYPES, TYPES)]
@@ -57,8 +69,7 @@ def test_eight_peers_exchange_all_topics_and_a_ninth_waits_for_room(lab: Lab) ->
     for _ in range(1, PEERS):
         peers.append(lab.cyclone(TYPES, TYPES))
         print(peers[-1].wait_until_matched())
-    while not settled(peers, _round(peers, next(numbers))):
-        assert board.poll() is None
+    _settle(board, peers, numbers)
     exchange(peers, _round(peers, next(numbers)))
     ninth = lab.cyclone(TYPES, TYPES)
     ninth.wait_until_started()
@@ -69,6 +80,5 @@ def test_eight_peers_exchange_all_topics_and_a_ninth_waits_for_room(lab: Lab) ->
     peers.pop().tell('"farewell"\n')
     print(ninth.wait_until_matched())
     peers.append(ninth)
-    while not settled(peers, _round(peers, next(numbers))):
-        assert board.poll() is None
+    _settle(board, peers, numbers)
     exchange(peers, _round(peers, next(numbers)))

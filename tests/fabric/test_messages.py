@@ -143,6 +143,7 @@ def test_the_last_submessage_may_be_without_a_length() -> None:
     assert parse(packet[:22] + b"\0\0" + packet[24:]) == parse(packet)
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_reads_the_same(tmp_path: Path) -> None:
     packets = random_packets(200, SEED + 3)

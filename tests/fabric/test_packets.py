@@ -112,6 +112,7 @@ def test_announcements_name_no_receiver(name: str) -> None:
     assert frame == in_frame(message, is_for_group=name in GROUP)
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_finds_right_checksums_and_nothing_malformed(tmp_path: Path) -> None:
     chance = random.Random(SEED)

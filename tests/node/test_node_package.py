@@ -11,7 +11,7 @@ import pytest
 
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.node.cpp_package import cpp_package, generated_files, headers
+from fusesoc_firm.node.cpp_package import HEADERS, cpp_package, generated_files, headers
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
@@ -109,6 +109,16 @@ def test_all_that_is_included_is_there() -> None:
     sources = [text for path, text in files.items() if path.endswith(("pp", ".h"))]
     included = {name for text in sources for name in re.findall(r"#include <(firm/.*)>", text)}
     assert included and {f"include/{name}" for name in included} <= {*files}
+
+
+@pytest.mark.parametrize("spec", ["quat2euler/quat2euler.yaml", "obstacle/obstacle.yaml"])
+def test_the_headers_are_those_of_the_product(spec: str) -> None:
+    """Where ROS is, packages are compiled with a header that is compiled from those, once for all."""
+    files = cpp_package(load(SPECS / spec))
+    product = {f"include/{path.relative_to(HEADERS)}": path.read_bytes() for path in headers()}
+    package = {path: text.encode() for path, text in files.items() if path.startswith("include/")}
+    assert len(package) > 10
+    assert package == {path: product[path] for path in package}
 
 
 def test_a_definition_may_hold_what_ends_a_string_or_a_line(tmp_path: Path) -> None:

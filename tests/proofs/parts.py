@@ -287,6 +287,7 @@ _RECEIVED = Proof(
             _RECEIVER, "m_axis_tdata    <= delay_r(FCS_BYTES)", "m_axis_tdata    <= delay_r(0)", ("bytes_unchanged",)
         ),
         Mutation(_RECEIVER, "is_broken <= ends and not is_whole;", "is_broken <= '0';", ("one_verdict",)),
+        Mutation(_RECEIVER, "is_good   <= ends and is_whole;", "is_good   <= ends;", ("no_second_verdict",)),
     ),
     trace=14,
 )

@@ -125,6 +125,7 @@ always @* if (running) begin
     one_end: assert (!(m_axis_tvalid && m_axis_tlast) || ended);
     bytes_unchanged: assert (m_axis_tvalid == had_byte && (!m_axis_tvalid || m_axis_tdata == oldest));
     one_verdict: assert (is_good == was_right && is_long == was_long && (!was_ended_bad || is_broken));
+    no_second_verdict: assert (32'd0 + is_good + is_broken + is_long <= 1);
 
     helper_state: assert (\dut.state_r == at);
     if (at == INSIDE) begin

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The walker of RTPS packets: each packet has one verdict, two cycles after its last byte; nothing comes of what is not
-// RTPS 2; a submessage ends where its length says or where the packet does, and not before its head is over.
+// RTPS 2; a submessage ends where its length says or where the packet does, and not before its head is over. Which packets are whole and which are faulty, and which submessages are told, is
+// only bound by that.
 //
 // Assumed: the first cycle is a reset, and no other is. The bytes are free: any packets, pauses, ends and aborts.
 module packet_walker (input clk);
@@ -144,7 +145,7 @@ wire is_faulty_step  = \dut.step_r [0];
 wire in_body     = !(at_protocol || at_source || at_head || is_foreign_step || is_faulty_step);
 
 always @* if (running) begin
-    one_verdict: assert (is_whole + is_faulty + is_foreign + is_aborted == ended);
+    one_verdict: assert (32'd0 + is_whole + is_faulty + is_foreign + is_aborted == ended);
     aborts_are_told: assert (is_aborted == (ended && aborted));
     nothing_between: assert (came || !(field_valid || payload_valid || is_submessage));
     only_of_rtps_2: assert (!(payload_valid || is_submessage) || (of_rtps && of_body));

@@ -25,6 +25,7 @@ localparam ENTRY_BITS = AT_ID + 4;
 (* anyconst *) wire [SOURCE_BITS-1:0] writer;
 wire       is_judging;
 wire [7:0] number_byte;
+wire       m_axis_tvalid, m_axis_tlast;
 
 reg is_first_cycle = 1;
 always @(posedge clk) is_first_cycle <= 0;
@@ -62,7 +63,6 @@ firm_rtps_readers dut (
     .m_axis_tlast(m_axis_tlast),
     .m_axis_tready(m_axis_tready));
 
-wire       m_axis_tvalid, m_axis_tlast;
 reg                   was_running = 0;
 always @(posedge clk) was_running <= rst_n;
 reg                   was_locked, was_judging, was_submessage;
