@@ -279,7 +279,7 @@ _RECEIVED = Proof(
     depth=3,
     mutations=(
         # A trace with a good frame has 64 bytes, for which a search takes too long.
-        Mutation(_RECEIVER, "count_r >= SHORTEST", "count_r > FCS_BYTES", ("good_if_right",)),
+        Mutation(_RECEIVER, "is_below(count, SHORTEST)", "is_below(count, FCS_BYTES+1)", ("good_if_right",)),
         Mutation(_RECEIVER, "(ends and not is_whole) or overflows", "overflows", ("good_if_right",)),
         Mutation(_RECEIVER, "(takes_byte or ends) and has_byte", "takes_byte and has_byte", ("begun_frames_end",)),
         Mutation(_RECEIVER, "m_axis_tlast    <= ends or overflows;", "m_axis_tlast    <= takes_byte;", ("one_end",)),
