@@ -52,6 +52,8 @@ ASSEMBLY = 1000
 WINDOW = 2
 MOST_REQUESTED = 8
 FRAGMENT_BYTES = 1344
+# A sample with a larger number is not taken.
+NUMBER_BITS = 48
 XCDR1 = 0
 # The reader of each of the two writers of discovery.
 DISCOVERY = {PUBLICATIONS_WRITER: PUBLICATIONS_READER, SUBSCRIPTIONS_WRITER: SUBSCRIPTIONS_READER}
@@ -592,6 +594,8 @@ class Participant:
         for source in self.sources:
             if _is(source, peer, item.writer) and item.reader in (rtps.NO_ENTITY, source.endpoint.entity):
                 match item:
+                    case Data() | DataFrag() if item.number >= 1 << NUMBER_BITS:
+                        pass
                     case Data():
                         self._sample(source, item)
                     case DataFrag():
