@@ -13,6 +13,7 @@ from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.system.derived.ethernet import (
+    LEAST_REASSEMBLED,
     assembled_bytes,
     discovery_bytes,
     reassembled_bytes,
@@ -28,8 +29,6 @@ from fusesoc_firm.text.render import Context, Rendering, render
 _DISCOVERY_BITS = 17
 # Packets in memory for each one that is reassembled (firm_net_link).
 _PLACES = 2
-# What the hardware's generic may be at least; without a reassembly it has no effect.
-_LEAST_REASSEMBLED = 2048
 _NODE_TEMPLATE = "vhdl/net_node.vhd"
 
 
@@ -119,7 +118,8 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "waiting": waiting_bytes(system),
         "assembled": assembled_bytes(system),
         "reassemblies": node.network.reassemblies if reassembled_bytes(system) else 0,
-        "reassembled": reassembled_bytes(system) or _LEAST_REASSEMBLED,
+        # Without a reassembly it has no effect.
+        "reassembled": reassembled_bytes(system) or LEAST_REASSEMBLED,
         "has_status": str(bool(system.status)).lower(),
     }
 

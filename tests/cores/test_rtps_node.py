@@ -26,7 +26,7 @@ from tests.cores.announcements import (
 from tests.cores.ethernet import fcs, udp_frame, write_capture
 from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
-from tests.fabric.dissection import dissect, fields_of
+from tests.fabric.dissection import read_alike
 from tests.fabric.memories import bits
 from tests.fabric.messages import AckNack, Data, Gap, Heartbeat, InfoDestination, NackFrag, parse
 from tests.hdl.ghdl import Generic, Library, core_files
@@ -170,13 +170,9 @@ def test_tshark_reads_the_same_in_all_packets_of_the_node(tmp_path: Path) -> Non
     packets = [packet for _, packet in expected(Peers(peers, seed).run(EVENTS)).sent]
     frames = [udp_frame(packet) for packet in packets]
     write_capture(tmp_path / "node.pcap", [frame + fcs(frame) for frame in frames])
-    kinds: set[type] = set()
-    for packet, (payload, fields) in zip(packets, dissect(tmp_path / "node.pcap"), strict=True):
-        message = parse(packet)
-        assert message is not None and message.is_whole
-        assert payload == packet
-        assert fields == [fields_of(item) for item in message.submessages], packet.hex()
-        kinds |= {type(item) for item in message.submessages}
+    found = list(read_alike(tmp_path / "node.pcap"))
+    assert [payload for payload, _ in found] == packets
+    kinds = {type(item) for _, message in found for item in message.submessages}
     assert kinds == {AckNack, Data, Gap, Heartbeat, InfoDestination}
 
 

@@ -18,11 +18,13 @@ from tests.fabric.messages import (
     Heartbeat,
     HeartbeatFrag,
     InfoDestination,
+    Message,
     NackFrag,
     Numbers,
     Other,
     ParameterList,
     Submessage,
+    parse,
 )
 
 
@@ -155,3 +157,12 @@ def _listed(payload: bytes) -> Fields:
 def _parameters(items: tuple[tuple[int, bytes], ...]) -> Fields:
     ids = [[("rtps.param.id", number), ("rtps.param.length", len(value))] for number, value in items]
     return [*(field for both in ids for field in both), ("rtps.param.id", int(Parameter.SENTINEL))]
+
+
+def read_alike(capture: Path) -> Iterator[tuple[bytes, Message]]:
+    """The messages of a capture with their bytes. In each, tshark has to find what this folder's parser finds."""
+    for payload, fields in dissect(capture):
+        message = parse(payload)
+        assert message is not None and message.is_whole, payload.hex()
+        assert fields == [fields_of(item) for item in message.submessages], payload.hex()
+        yield payload, message

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from ipaddress import IPv4Address
+from pathlib import Path
 
 _PROGRAMS = ("unshare", "nsenter", "ip", "mount")
 _RIGHTS = [] if os.geteuid() == 0 else ["--user", "--preserve-credentials"]
@@ -49,6 +50,22 @@ def _namespaces(before: Sequence[str], address: str) -> Iterator[Host]:
         assert keeper.stdout.readline() == "ready\n"
         yield Host(keeper.pid, address)
         keeper.stdin.close()
+
+
+@contextmanager
+def captured(switch: Host, path: Path) -> Iterator[None]:
+    """Write what a switch passes on meanwhile."""
+    command = switch.command("dumpcap", "-q", "-i", "switch", "-w", str(path))
+    recorder = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    assert recorder.stderr
+    try:
+        while not recorder.stderr.readline().startswith("File:"):
+            assert recorder.poll() is None
+        yield
+    finally:
+        # It still has something to write.
+        recorder.terminate()
+        recorder.communicate()
 
 
 @contextmanager

@@ -7,8 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -53,21 +53,6 @@ class Lab:
         assert board.stdout
         assert board.stdout.readline() == _BOARD
         return board
-
-    @contextmanager
-    def capture(self, path: Path) -> Iterator[None]:
-        """Write what the switch passes on."""
-        words = ("dumpcap", "-q", "-i", "switch", "-w", str(path))
-        recorder = subprocess.Popen(self.switch.command(*words), stderr=subprocess.PIPE, text=True)
-        assert recorder.stderr
-        try:
-            while not recorder.stderr.readline().startswith("File:"):
-                assert recorder.poll() is None
-            yield
-        finally:
-            # It still has something to write.
-            recorder.terminate()
-            recorder.communicate()
 
     def members(self) -> list[tuple[str, str]]:
         """Port and group of each membership that the switch knows."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -52,11 +51,6 @@ def _matched(peer: Peer, since: float | None, times: list[float]) -> threading.T
     return thread
 
 
-def _peers(lab: Lab) -> Iterator[Peer]:
-    yield lab.rclpy(TYPES, TYPES)
-    yield lab.cyclone(TYPES, TYPES)
-
-
 @pytest.mark.parametrize("is_board_first", [True, False], ids=["board_first", "peers_first"])
 def test_both_ends_match(specification: Path, tmp_path: Path, is_board_first: bool) -> None:
     """The names, the topics and the hashes are those of the graph; the times are printed, with the load."""
@@ -68,7 +62,7 @@ def test_both_ends_match(specification: Path, tmp_path: Path, is_board_first: bo
             lab = Lab(specification, folder, stack)
             if is_board_first:
                 lab.board()
-            peers = list(_peers(lab))
+            peers = [lab.rclpy(TYPES, TYPES), lab.cyclone(TYPES, TYPES)]
             for peer in peers:
                 peer.wait_until_started()
             if not is_board_first:

@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 
 import pytest
 
-from tests.fabric.dissection import dissect, fields_of
-from tests.fabric.hosts import Host, missing, switched
-from tests.fabric.messages import AckNack, Data, DataFrag, Heartbeat, InfoDestination, NackFrag, Other, parse
+from tests.fabric.dissection import read_alike
+from tests.fabric.hosts import Host, captured, missing, switched
+from tests.fabric.messages import AckNack, Data, DataFrag, Heartbeat, InfoDestination, NackFrag, Other
 from tests.ros.cpp_nodes import missing_ros, ros2
 
 HERE = Path(__file__).parent
@@ -167,16 +167,6 @@ class Place:
             "cyclone": self._started(Peer(self._hosts[1], cyclone, dict(os.environ))),
         }
 
-    def capture(self, path: Path) -> subprocess.Popen[str]:
-        """Begin to write what the switch passes on."""
-        command = self.switch.command("dumpcap", "-q", "-i", "switch", "-w", str(path))
-        started = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-        self._stack.callback(started.kill)
-        assert started.stderr
-        while not started.stderr.readline().startswith("File:"):
-            assert started.poll() is None
-        return started
-
     def _started(self, process: AnyProcess) -> AnyProcess:
         self._stack.callback(process.kill)
         return process
@@ -290,27 +280,20 @@ def test_a_node_that_crashes_and_restarts_is_found_again(place: Place) -> None:
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_reads_all_their_packets_as_the_reference_does(place: Place) -> None:
     capture = place.folder / "switch.pcapng"
-    recorder = place.capture(capture)
-    board = place.board("{depth: 1000}", "--loss", "5", "--seed", str(SEED))
-    peers = place.peers()
-    for peer in peers.values():
-        peer.wait_until_matched()
-    wait_until_known(board)
-    sent = {name: samples(name, 30, (10, 3000, 65_527)) for name in peers}
-    for name, peer in peers.items():
-        peer.send(sent[name])
-    check_echoes(peers, sent)
-    for peer in peers.values():
-        peer.tell('"farewell"\n')
-        assert peer.wait() == 0
-    board.tell("stop\n")
-    board.wait()
-    recorder.terminate()
-    recorder.communicate()
-    kinds: set[type] = set()
-    for payload, fields in dissect(capture):
-        message = parse(payload)
-        assert message is not None and message.is_whole
-        assert fields == [fields_of(item) for item in message.submessages], payload.hex()
-        kinds |= {type(item) for item in message.submessages}
+    with captured(place.switch, capture):
+        board = place.board("{depth: 1000}", "--loss", "5", "--seed", str(SEED))
+        peers = place.peers()
+        for peer in peers.values():
+            peer.wait_until_matched()
+        wait_until_known(board)
+        sent = {name: samples(name, 30, (10, 3000, 65_527)) for name in peers}
+        for name, peer in peers.items():
+            peer.send(sent[name])
+        check_echoes(peers, sent)
+        for peer in peers.values():
+            peer.tell('"farewell"\n')
+            assert peer.wait() == 0
+        board.tell("stop\n")
+        board.wait()
+    kinds = {type(item) for _, message in read_alike(capture) for item in message.submessages}
     assert kinds >= {Data, DataFrag, Heartbeat, AckNack, NackFrag, InfoDestination, Other}

@@ -16,7 +16,8 @@ LONGEST_IN_FRAME, LONGEST_TAKEN, LONGEST_SENT = 1344, 65280, 1024
 # Bytes of the headers beside a payload in a packet of IPv4, with further submessages before it.
 _HEADERS_BYTES = 256
 _LEAST_WAITING, _MOST_DISCOVERY = 4096, 32768
-_LEAST_REASSEMBLED, _LEAST_ASSEMBLED = 2048, 1024
+# What the generics of the hardware may be at least.
+LEAST_REASSEMBLED, _LEAST_ASSEMBLED = 2048, 1024
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
 MOST_DEPTH, MOST_SLOTS = 127, 256
 _SHORTEST_SLOT = 2
@@ -61,7 +62,7 @@ def reassembled_bytes(system: DerivedSystem) -> int:
     """Return the bytes of the longest packet that is reassembled, a power of two; 0 if none needs to be."""
     longest, given = _longest_of_several(system), system.network.reassembly if system.network else 0
     needed = max(given, longest + _HEADERS_BYTES if longest else 0)
-    return max(_LEAST_REASSEMBLED, _power(needed)) if needed else 0
+    return max(LEAST_REASSEMBLED, _power(needed)) if needed else 0
 
 
 def assembled_bytes(system: DerivedSystem) -> int:
