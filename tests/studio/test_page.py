@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import re
 import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Awaitable, Callable
-from itertools import count
+from itertools import count, permutations
 from pathlib import Path
 
 import pytest
@@ -134,6 +135,30 @@ def test_shipped_systems_are_drawn(tmp_path: Path, name: str) -> None:
                 assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
 
     run(path, tmp_path, steps)
+
+
+@pytest.mark.parametrize("path", ["arm/arm", "planner/planner", "camera/camera", "camera/asking"])
+def test_a_loop_of_two_blocks_hides_no_wire(tmp_path: Path, path: str) -> None:
+    """A block of an action or a service and its accelerator: no wire is below a block, or along another wire."""
+
+    async def steps(page: Page) -> None:
+        await page.until("document.querySelectorAll('.svelte-flow__edge').length > 3")
+        wires, hidden = await page.evaluate(
+            """(() => {
+                 const boxes = [...document.querySelectorAll('.svelte-flow__node')].map(n => n.getBoundingClientRect());
+                 const wires = [...document.querySelectorAll('.svelte-flow__edge-path')].map(path =>
+                   Array.from({length: 101}, (_, part) => path.getPointAtLength(part / 100 * path.getTotalLength())
+                     .matrixTransform(path.getScreenCTM())).map(({x, y}) => [x, y]));
+                 const isIn = ([x, y], box) => box.left + 4 < x && x < box.right - 4 && box.top < y && y < box.bottom;
+                 return [wires, wires.flat().filter(point => boxes.some(box => isIn(point, box)))];
+               })()"""
+        )
+        assert hidden == []
+        for one, other in permutations(wires, 2):
+            shared = [(x, y) for x, y in one if any(math.dist((x, y), point) < 1 for point in other)]
+            assert len(shared) < len(one) / 3
+
+    run(SPECS.parent / "tests" / "ros" / f"{path}.yaml", tmp_path, steps)
 
 
 def test_edits_by_mouse(robot: Path, tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
 // The picture as a file: SVG, drawn from the blocks and wires themselves, or PNG.
 
-import { getBezierPath, Position, type Edge } from "@xyflow/svelte";
-import { labelPlace, type BlockNode, type WireData } from "./graph";
+import type { Edge } from "@xyflow/svelte";
+import { wayOf, type BlockNode, type WireData } from "./graph";
 import type { Live } from "./live.svelte";
 
-const MARGIN = 20;
+// With room for a wire below the lowest block.
+const MARGIN = 40;
 const LINE = 17;
 const SMALL_LINE = 14;
 // Pixels of PNG for each unit of the picture.
@@ -52,18 +53,10 @@ ${[...wires, ...blocks].join("\n")}
 function wire(edge: Edge, source: BlockNode, target: BlockNode, colour: Colour, live: Live): string {
   const from: [number, number] = [source.position.x + source.width!, source.position.y + source.height! / 2];
   const to: [number, number] = [target.position.x, target.position.y + target.height! / 2];
-  const [path, ...middle] = getBezierPath({
-    sourceX: from[0],
-    sourceY: from[1],
-    sourcePosition: Position.Right,
-    targetX: to[0],
-    targetY: to[1],
-    targetPosition: Position.Left,
-  });
+  const [path, x, y] = wayOf(edge.id, from, to);
   const { words, waiting } = live.shown(edge.data as WireData);
   const stroke = colour(waiting ? (waiting === "waits" ? "warn" : "bad") : "faint");
   const line = `<path d="${path}" fill="none" stroke="${stroke}" stroke-width="${edge.class === "stream" ? 3 : 1}"/>`;
-  const [x, y] = labelPlace(edge.id, from, to, [middle[0], middle[1]]);
   return line + linesAt([edge.label, words].filter(Boolean).join("\n"), x, y, colour);
 }
 

@@ -1,6 +1,6 @@
 // From a specification to nodes and edges in their places.
 
-import type { Edge, Node } from "@xyflow/svelte";
+import { getBezierPath, getSmoothStepPath, Position, type Edge, type Node } from "@xyflow/svelte";
 import { layout } from "./engine";
 import type { Fault, Path, Scene, Section } from "./api";
 import { FROM_HOST, HOST, TO_HOST, wireKey } from "./waits";
@@ -22,6 +22,8 @@ export type BlockNode = Node<BlockData, "block">;
 const LINE = 17;
 // The space between the Manager and the blocks beside it.
 const GAP = 140;
+// From the middle of the block at which a wire that leads back ends to the wire below it.
+const BELOW = 52;
 // The width that the derived facts of a converter need, so that the picture stays when they arrive.
 const FACTS_WIDTH = 260;
 const FACTS = "...";
@@ -176,11 +178,18 @@ function fixed(id: string, source: string, target: string, data: WireData): Edge
 
 type Place = [number, number];
 
-/** The place of a wire's words: its middle, or beside its block, as all streams come together at the Manager. */
-export function labelPlace(id: string, source: Place, target: Place, middle: Place): Place {
-  if (id.startsWith("in:")) return [target[0] - GAP / 2, target[1]];
-  if (id.startsWith("out:")) return [source[0] + GAP / 2, source[1]];
-  return middle;
+/**
+ * The path of a wire, and the place of its words: its middle, or beside its block, as all streams come together at the
+ * Manager. A wire that leads back goes below the block at its end, so that both wires of a loop are seen.
+ */
+export function wayOf(id: string, source: Place, target: Place): [string, ...Place] {
+  const [[sourceX, sourceY], [targetX, targetY]] = [source, target];
+  const ends = { sourceX, sourceY, sourcePosition: Position.Right, targetX, targetY, targetPosition: Position.Left };
+  const [path, ...middle] =
+    sourceX <= targetX ? getBezierPath(ends) : getSmoothStepPath({ ...ends, centerY: targetY + BELOW, borderRadius: 12 });
+  if (id.startsWith("in:")) return [path, targetX - GAP / 2, targetY];
+  if (id.startsWith("out:")) return [path, sourceX + GAP / 2, sourceY];
+  return [path, middle[0], middle[1]];
 }
 
 /**
@@ -192,10 +201,12 @@ export function labelPlace(id: string, source: Place, target: Place, middle: Pla
 export async function placed(nodes: BlockNode[], edges: Edge[]): Promise<BlockNode[]> {
   const [first, inner, last] = [nodes[0], nodes.slice(1, -1), nodes.at(-1)!];
   const isInner = (id: string) => id !== first.id && id !== last.id;
+  // In a column, the two blocks of a loop leave the way free for the wires to the Manager.
+  const ways = new Set(edges.map(({ source, target }) => `${source} ${target}`));
   const graph = await layout({
     children: inner.map(({ id, width, height }) => ({ id, width, height })),
     edges: edges
-      .filter(({ source, target }) => isInner(source) && isInner(target))
+      .filter(({ source, target }) => isInner(source) && isInner(target) && !ways.has(`${target} ${source}`))
       .map(({ id, source, target }) => ({ id, sources: [source], targets: [target] })),
   });
   const places = new Map(graph.children!.map((item) => [item.id, { x: item.x!, y: item.y! }]));
