@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The generated node of a system at a line that a file plays. A row is a burst: the cycles before it, the number of
--- bytes, and the bytes. Each frame to the system is a row of the results: the number of bytes, and the bytes.
+-- bytes, and the bytes. Each frame to the system is a row of the results: the number of bytes, and the bytes. Each byte
+-- that the node sends is a row of another file.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -11,7 +12,8 @@ entity playing_node is
   generic (
     LAST_CYCLES : integer := 20000;
     LINE_FILE   : string  := "line.txt";
-    RESULT_FILE : string  := "taken.txt"
+    RESULT_FILE : string  := "taken.txt";
+    SENT_FILE   : string  := "sent.txt"
   );
 end entity playing_node;
 
@@ -22,6 +24,8 @@ architecture simulation of playing_node is
   signal over   : boolean   := false;
   signal rx_dv  : std_logic := '0';
   signal rxd    : std_logic_vector(7 downto 0) := x"00";
+  signal tx_en  : std_logic;
+  signal txd    : std_logic_vector(7 downto 0);
   signal tdata  : std_logic_vector(7 downto 0);
   signal tvalid : std_logic;
   signal tlast  : std_logic;
@@ -39,9 +43,9 @@ begin
       rx_er         => '0',
       rxd           => rxd,
       tx_step       => '1',
-      tx_en         => open,
+      tx_en         => tx_en,
       tx_er         => open,
-      txd           => open,
+      txd           => txd,
       m_axis_tdata  => tdata,
       m_axis_tkeep  => open,
       m_axis_tuser  => open,
@@ -109,5 +113,15 @@ begin
     end loop;
     wait;
   end process record_frames;
+
+  record_bytes : process (clk)
+    file sent    : text open write_mode is SENT_FILE;
+    variable row : line;
+  begin
+    if rising_edge(clk) and tx_en = '1' then
+      write(row, to_integer(unsigned(txd)));
+      writeline(sent, row);
+    end if;
+  end process record_bytes;
 
 end architecture simulation;
