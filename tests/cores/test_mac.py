@@ -26,7 +26,7 @@ from tests.cores.ethernet import (
 from tests.hdl.ghdl import Generic, Library, core_files
 
 SEED = 20261124
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "net/mac")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac")
 PARTS = ("firm_mac_receiver", "firm_mac_store", "firm_mac_transmitter")
 
 
@@ -44,23 +44,28 @@ def _library(directory: Path) -> Library:
 # --- receiving -----------------------------------------------------------------------------------------------------
 
 
-def _received(library: Library, folder: Path, bursts: list[Burst], **generics: Generic) -> list[tuple[str, bytes]]:
+def _received(
+    library: Library, folder: Path, bursts: list[Burst], **generics: Generic
+) -> tuple[list[str], list[bytes], int]:
+    """The rows of the receiver, the frames of the store, and the number of those that are lost there."""
     (folder / "line.txt").write_text("".join(burst.row() for burst in bursts), encoding="ascii")
     result = library.run("firm_mac_receiver_tb", generics, directory=folder)
     assert result.exit_code == 0, result.output
-    rows = []
-    for line in (folder / "received.txt").read_text(encoding="ascii").splitlines():
-        name, *numbers = line.split()
-        size, data = int(numbers[0]) if numbers else 0, bytes(map(int, numbers[1:]))
-        assert len(data) == size
-        rows.append((name, data))
-    return rows
+    received, stored = (
+        (folder / name).read_text(encoding="ascii").splitlines() for name in ("received.txt", "stored.txt")
+    )
+    frames = [bytes(map(int, row.split()[1:])) for row in stored if row != "lost"]
+    return received, frames, stored.count("lost")
 
 
-def _row_of(judged: Verdict) -> list[tuple[str, bytes]]:
+def _frame_row(frame: bytes, *, is_aborted: bool = False) -> str:
+    return " ".join(map(str, (int(is_aborted), len(frame), *frame)))
+
+
+def _rows_of(judged: Verdict) -> list[str]:
     """What the receiver says of a burst."""
-    name = "frame" if judged.pulse == "good" else "aborted"
-    return [*([(name, judged.frame)] if judged.frame else []), (judged.pulse, b"")]
+    frame = _frame_row(judged.frame, is_aborted=judged.pulse != "good")
+    return [judged.pulse, *([frame] if judged.frame else [])]
 
 
 @pytest.mark.parametrize(("slow", "stall"), [(0, 0), pytest.param(60, 0, marks=pytest.mark.check), (0, 40)])
@@ -72,35 +77,31 @@ def test_every_burst_is_judged_and_only_good_frames_leave_the_store(
     bursts = list(random_bursts(400, longest, seed))
     verdicts = [verdict(burst, longest) for burst in bursts]
     assert {item.pulse for item in verdicts} == {"good", "broken", "long"}
-    rows = _received(
+    received, stored, _ = _received(
         library, tmp_path, bursts, LONGEST=longest, SLOW_PERCENT=slow, STALL_PERCENT=stall, SEED=seed, DEPTH=8192
     )
-    received = [row for row in rows if row[0] != "stored"]
-    assert received == [row for item in verdicts for row in _row_of(item)]
-    stored = [data for name, data in rows if name == "stored"]
+    assert received == [row for item in verdicts for row in _rows_of(item)]
     assert stored == [item.frame for item in verdicts if item.pulse == "good"]
 
 
 def test_the_longest_frame_of_ethernet_is_received_and_a_longer_one_is_not(library: Library, tmp_path: Path) -> None:
     frames = [random.Random(SEED).randbytes(size) for size in (LONGEST, LONGEST + 1, LONGEST)]
-    rows = _received(library, tmp_path, [Burst(on_line(frame)) for frame in frames], STALL_PERCENT=20)
-    assert [data for name, data in rows if name == "stored"] == [frames[0], frames[2]]
-    assert ("aborted", frames[1][:LONGEST]) in rows
+    received, stored, _ = _received(library, tmp_path, [Burst(on_line(frame)) for frame in frames], STALL_PERCENT=20)
+    assert stored == [frames[0], frames[2]]
+    assert _frame_row(frames[1][:LONGEST], is_aborted=True) in received
 
 
 def test_a_frame_of_fewer_than_64_bytes_is_broken(library: Library, tmp_path: Path) -> None:
     frames = [bytes(size) for size in (59, 60, 0, 1, 61)]
-    rows = _received(library, tmp_path, [Burst(PREAMBLE + frame + fcs(frame)) for frame in frames])
-    assert [data for name, data in rows if name == "stored"] == [frames[1], frames[4]]
-    assert rows.count(("broken", b"")) == 3
+    received, stored, _ = _received(library, tmp_path, [Burst(PREAMBLE + frame + fcs(frame)) for frame in frames])
+    assert stored == [frames[1], frames[4]]
+    assert received.count("broken") == 3
 
 
 def test_a_frame_without_room_is_lost_whole_and_told(library: Library, tmp_path: Path) -> None:
     bursts = [burst for burst in random_bursts(300, 200, SEED) if verdict(burst, 200).pulse != "long"]
-    rows = _received(library, tmp_path, bursts, LONGEST=200, DEPTH=256, STALL_PERCENT=70)
-    good = [data for name, data in rows if name == "frame"]
-    stored = [data for name, data in rows if name == "stored"]
-    lost = rows.count(("lost", b""))
+    _, stored, lost = _received(library, tmp_path, bursts, LONGEST=200, DEPTH=256, STALL_PERCENT=70)
+    good = [judged.frame for judged in (verdict(burst, 200) for burst in bursts) if judged.pulse == "good"]
     assert len(good) == len(stored) + lost
     assert 10 < lost < len(good) - 10
     assert _is_part(stored, good)
@@ -114,8 +115,8 @@ def _is_part(some: list[bytes], whole: list[bytes]) -> bool:
 
 def test_a_reset_in_a_frame_hides_it(library: Library, tmp_path: Path) -> None:
     """The line is busy when the reset of the bench ends, so the rest of that burst is not a frame."""
-    rows = _received(library, tmp_path, [Burst(on_line(b"a"), idle=0), Burst(on_line(b"b"))])
-    assert [row for row in rows if row[0] != "stored"] == _row_of(verdict(Burst(on_line(b"b"))))
+    received, _, _ = _received(library, tmp_path, [Burst(on_line(b"a"), idle=0), Burst(on_line(b"b"))])
+    assert received == _rows_of(verdict(Burst(on_line(b"b"))))
 
 
 # --- sending -------------------------------------------------------------------------------------------------------
@@ -178,8 +179,7 @@ def test_what_is_sent_is_received(library: Library, tmp_path: Path) -> None:
     random_ = random.Random(SEED)
     frames = [random_.randbytes(random_.randrange(60, 400)) for _ in range(40)]
     bursts, _ = _sent(library, tmp_path, [_row(frame, 20) for frame in frames])
-    rows = _received(library, tmp_path, bursts)
-    assert [data for name, data in rows if name == "stored"] == frames
+    assert _received(library, tmp_path, bursts)[1] == frames
 
 
 @pytest.mark.check
@@ -211,9 +211,8 @@ def test_the_netlist_of_a_receiving_part_does_the_same(tmp_path: Path, entity: s
     library.analyse(core_files("net/mac", fileset="tb"))
     bursts = list(random_bursts(100, 150, SEED))
     verdicts = [verdict(burst, 150) for burst in bursts]
-    rows = _received(library, tmp_path, bursts, LONGEST=150, DEPTH=1024, SLOW_PERCENT=20)
-    assert [row for row in rows if row[0] != "stored"] == [row for item in verdicts for row in _row_of(item)]
-    stored = [data for name, data in rows if name == "stored"]
+    received, stored, _ = _received(library, tmp_path, bursts, LONGEST=150, DEPTH=1024, SLOW_PERCENT=20)
+    assert received == [row for item in verdicts for row in _rows_of(item)]
     assert stored == [item.frame for item in verdicts if item.pulse == "good"]
 
 

@@ -1,27 +1,27 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Plays bursts of bytes on the line of a GMII to the receiver, which passes its frames to the store. A row of the file
 -- is a burst: the idle bytes before it, the byte at which the PHY reports an error or -1, the number of bytes, and the
--- bytes. The results go to a file, a row each: a frame of the receiver (`frame`, or `aborted`), one of the store
--- (`stored`), with size and bytes; and the pulses, `good`, `broken`, `long` and `lost`.
+-- bytes. What comes from the receiver goes to one file, and what comes from the store to another: see firm_sim_record.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 use ieee.math_real.all;
 use std.textio.all;
 library firm;
-use firm.firm_sim_pkg.all;
 
 entity firm_mac_receiver_tb is
   generic (
-    LONGEST       : integer := 1514;
-    DEPTH         : integer := 4096;
-    LINE_FILE     : string  := "line.txt";
-    RESULT_FILE   : string  := "received.txt";
-    EXPECTED_FILE : string  := "";
-    SEED          : integer := 1;
+    LONGEST         : integer := 1514;
+    DEPTH           : integer := 4096;
+    LINE_FILE       : string  := "line.txt";
+    RESULT_FILE     : string  := "received.txt";
+    EXPECTED_FILE   : string  := "";
+    STORED_FILE     : string  := "stored.txt";
+    EXPECTED_STORED : string  := "";
+    SEED            : integer := 1;
     -- The chances, each cycle, that the line does not count, and that the store's reader takes nothing.
-    SLOW_PERCENT  : integer := 0;
-    STALL_PERCENT : integer := 0
+    SLOW_PERCENT    : integer := 0;
+    STALL_PERCENT   : integer := 0
   );
 end entity firm_mac_receiver_tb;
 
@@ -51,7 +51,7 @@ architecture simulation of firm_mac_receiver_tb is
   signal stored_tdata  : std_logic_vector(7 downto 0);
   signal stored_tvalid : std_logic;
   signal stored_tlast  : std_logic;
-  signal stored_tready : std_logic := '0';
+  signal stored_tready : std_logic;
 
 begin
 
@@ -151,82 +151,42 @@ begin
     wait;
   end process play;
 
-  take : process (clk)
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 5;
-    variable draw     : real;
-  begin
-    if rising_edge(clk) then
-      uniform(random_1, random_2, draw);
-      stored_tready <= '1';
-      if 100.0 * draw < real(STALL_PERCENT) then
-        stored_tready <= '0';
-      end if;
-    end if;
-  end process take;
+  u_received : entity firm.firm_sim_record
+    generic map (
+      RESULT_FILE   => RESULT_FILE,
+      EXPECTED_FILE => EXPECTED_FILE,
+      SHOWS_USER    => true
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      over          => over,
+      s_axis_tdata  => received_tdata,
+      s_axis_tuser  => received_tuser,
+      s_axis_tvalid => received_tvalid,
+      s_axis_tlast  => received_tlast,
+      s_axis_tready => open,
+      is_good       => is_good,
+      is_broken     => is_broken,
+      is_long       => is_long
+    );
 
-  record_results : process
-    file results      : text open write_mode is RESULT_FILE;
-    file expected     : text open read_mode is existing(EXPECTED_FILE);
-    variable row      : line;
-    variable received : line;
-    variable stored   : line;
-    variable bytes    : natural := 0;
-    variable kept     : natural := 0;
-
-    procedure put(name : in string; size : inout natural; content : inout line) is
-    begin
-      write(row, name & ' ' & integer'image(size) & content.all);
-      write_result(results, expected, EXPECTED_FILE, row);
-      deallocate(content);
-      size := 0;
-    end procedure put;
-
-    procedure put_pulse(pulse : in std_logic; name : in string) is
-    begin
-      if pulse = '1' then
-        write(row, name);
-        write_result(results, expected, EXPECTED_FILE, row);
-      end if;
-    end procedure put_pulse;
-
-    procedure add(size : inout natural; content : inout line; byte : in std_logic_vector(7 downto 0)) is
-    begin
-      size := size + 1;
-      write(content, ' ' & integer'image(to_integer(unsigned(byte))));
-    end procedure add;
-
-  begin
-    while not over loop
-      wait until rising_edge(clk) or over;
-      next when over or rst_n = '0';
-      if received_tvalid = '1' then
-        add(bytes, received, received_tdata);
-        if received_tlast = '1' then
-          if received_tuser(0) = '1' then
-            put("aborted", bytes, received);
-          else
-            put("frame", bytes, received);
-          end if;
-        end if;
-      end if;
-      put_pulse(is_good, "good");
-      put_pulse(is_broken, "broken");
-      put_pulse(is_long, "long");
-      put_pulse(is_lost, "lost");
-      if stored_tvalid = '1' and stored_tready = '1' then
-        add(kept, stored, stored_tdata);
-        if stored_tlast = '1' then
-          put("stored", kept, stored);
-        end if;
-      end if;
-    end loop;
-    assert bytes = 0 and kept = 0
-      report "a frame without an end" severity failure;
-    assert endfile(expected)
-      report EXPECTED_FILE & " has more lines than there are results" severity failure;
-    print("PASS");
-    wait;
-  end process record_results;
+  u_stored : entity firm.firm_sim_record
+    generic map (
+      RESULT_FILE   => STORED_FILE,
+      EXPECTED_FILE => EXPECTED_STORED,
+      SEED          => SEED,
+      STALL_PERCENT => STALL_PERCENT
+    )
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      over          => over,
+      s_axis_tdata  => stored_tdata,
+      s_axis_tvalid => stored_tvalid,
+      s_axis_tlast  => stored_tlast,
+      s_axis_tready => stored_tready,
+      is_lost       => is_lost
+    );
 
 end architecture simulation;

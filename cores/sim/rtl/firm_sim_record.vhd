@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Takes a stream of bytes with random stalls and writes it to a file. A row is a frame: the number of bytes, and the
--- bytes; with SHOWS_USER, tuser of the last byte before them. Each cycle of a pulse is a row of its own, `dropped` or
--- `lost`. The rows are compared with those of EXPECTED_FILE, if it has a name. Prints PASS when `over` ends the run.
+-- bytes; with SHOWS_USER, tuser of the last byte before them. Each cycle of a pulse is a row of its own, its name:
+-- `dropped`. The rows are compared with those of EXPECTED_FILE, if it has a name. Prints PASS when `over` ends the run.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -30,7 +30,10 @@ entity firm_sim_record is
     s_axis_tready : out std_logic;
 
     is_dropped : in  std_logic := '0';
-    is_lost    : in  std_logic := '0'
+    is_lost    : in  std_logic := '0';
+    is_good    : in  std_logic := '0';
+    is_broken  : in  std_logic := '0';
+    is_long    : in  std_logic := '0'
   );
 end entity firm_sim_record;
 
@@ -69,16 +72,22 @@ begin
       write_result(results, expected, EXPECTED_FILE, row);
     end procedure note;
 
+    procedure note_pulse(pulse : in std_logic; name : in string) is
+    begin
+      if pulse = '1' then
+        note(name);
+      end if;
+    end procedure note_pulse;
+
   begin
     while not over loop
       wait until rising_edge(clk) or over;
       next when over or rst_n = '0';
-      if is_dropped = '1' then
-        note("dropped");
-      end if;
-      if is_lost = '1' then
-        note("lost");
-      end if;
+      note_pulse(is_dropped, "dropped");
+      note_pulse(is_lost, "lost");
+      note_pulse(is_good, "good");
+      note_pulse(is_broken, "broken");
+      note_pulse(is_long, "long");
       next when s_axis_tvalid = '0' or ready_r = '0';
       size := size + 1;
       write(content, ' ' & integer'image(to_integer(unsigned(s_axis_tdata))));
