@@ -471,9 +471,8 @@ def test_restarted_hardware_gets_no_result_of_goals_before(peer: Make) -> None:
     assert [item for item, _ in server.received()] == [2]
 
 
-def test_goals_are_canceled_when_the_node_ends(peer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """While ROS still takes messages."""
-    server = peer()
+def canceled_before_the_end(server: Peer, monkeypatch: pytest.MonkeyPatch) -> list[list[bytes]]:
+    """The list to which the node adds what is canceled while ROS still takes messages."""
     canceled: list[list[bytes]] = []
 
     def stop() -> None:
@@ -482,6 +481,13 @@ def test_goals_are_canceled_when_the_node_ends(peer: Make, monkeypatch: pytest.M
 
     stop_carrier = server.run.carrier.stop
     monkeypatch.setattr(server.run.carrier, "stop", stop)
+    return canceled
+
+
+def test_goals_are_canceled_when_the_node_ends(peer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While ROS still takes messages."""
+    server = peer()
+    canceled = canceled_before_the_end(server, monkeypatch)
     server.order(4)
     identity = server.accept()
     server.feed(identity, 1)
@@ -497,14 +503,7 @@ def test_a_goal_that_is_not_accepted_yet_is_canceled_when_the_node_ends(
 ) -> None:
     """While ROS still takes messages. In ROS 2, its server has to accept it before."""
     server = peer()
-    canceled: list[list[bytes]] = []
-
-    def stop() -> None:
-        canceled.append(server.canceled())
-        stop_carrier()
-
-    stop_carrier = server.run.carrier.stop
-    monkeypatch.setattr(server.run.carrier, "stop", stop)
+    canceled = canceled_before_the_end(server, monkeypatch)
     server.order(4)
     identity = server.goal()
     server.run.node.stop()

@@ -52,9 +52,8 @@ def _proofs(
     )
 
 
-def _fixed_priority() -> tuple[Proof, ...]:
-    file = "firm_sched_fixed_priority.vhd"
-    mutations = {
+def _grants_of_fixed_priority(file: str) -> Mutations:
+    return {
         "scheduler_grants": (
             Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
             Mutation(
@@ -65,6 +64,13 @@ def _fixed_priority() -> tuple[Proof, ...]:
         "scheduler_sticky": (
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
         ),
+    }
+
+
+def _fixed_priority() -> tuple[Proof, ...]:
+    file = "firm_sched_fixed_priority.vhd"
+    mutations = {
+        **_grants_of_fixed_priority(file),
         "scheduler_whole_tasks": (
             Mutation(file, "started_r or beat;", "beat;", ("whole_tasks", "only_to_who_has_not_begun")),
             Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("request_is_still_there",)),
@@ -90,16 +96,7 @@ def _fixed_priority() -> tuple[Proof, ...]:
 def _fixed_priority_preemptive() -> tuple[Proof, ...]:
     file = "firm_sched_fixed_priority.vhd"
     mutations = {
-        "scheduler_grants": (
-            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
-            Mutation(
-                file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
-            ),
-            Mutation(file, "if moves = '1' then", "if kept = '0' then", ("no_grant_unasked",)),
-        ),
-        "scheduler_sticky": (
-            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
-        ),
+        **_grants_of_fixed_priority(file),
         "scheduler_service": (Mutation(file, "    kept <= '0';", "    kept <= not beat;", ("no_deadlock",)),),
         "scheduler_gaps": (Mutation(file, "(finished or (", "((", ("no_gap_between_tasks",)),),
         "scheduler_priority": (Mutation(file, "    kept <= '0';", "    kept <= beat;", ("lowest_index_first",)),),

@@ -6,11 +6,13 @@ import base64
 import ctypes.util
 import itertools
 import json
+import math
 import os
 import queue
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -21,8 +23,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from random import Random
 from types import TracebackType
 from typing import Any, Self
+
+import pytest
 
 from tests.node.drivers import HEADERS
 from tests.processes import IGNORING_INTERRUPTS
@@ -308,6 +313,20 @@ class Peer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.kill()
+
+
+def check_angles(peer: Peer, source: Random, prefix: bytes) -> None:
+    """Send a random quaternion, after a prefix, to the system quat2euler, and check the angles that it answers."""
+    x, y, z, w = (source.gauss(0, 1) for _ in range(4))
+    peer.publish("/QuaternionToEuler_sub", prefix + struct.pack("<4d", x, y, z, w))
+    _, payload = peer.take()
+    norm = x * x + y * y + z * z + w * w
+    expected = (
+        math.atan2(2 * (w * x + y * z), norm - 2 * (x * x + y * y)),
+        math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x) / norm))),
+        math.atan2(2 * (w * z + x * y), norm - 2 * (y * y + z * z)),
+    )
+    assert struct.unpack("<3d", payload[len(prefix) :]) == pytest.approx(expected, abs=1e-9)
 
 
 def roscpp_peer(name: str, *packages: str) -> Path:

@@ -6,7 +6,6 @@ import json
 import random
 import re
 import shutil
-import subprocess
 import time
 import xmlrpc.client
 from collections.abc import Iterator, Sequence
@@ -24,7 +23,7 @@ from tests.ros.action_server_peer import HELD, Kind
 from tests.ros.action_simulator import in_ros2
 from tests.ros.cpp_nodes import Client, NodeProcess, Peer, roscpp_peer
 from tests.ros.places import Place, diagnoses, running, versions
-from tests.ros.test_actions import MODULES
+from tests.ros.test_actions import skip_without_actions
 
 pytestmark = pytest.mark.check
 
@@ -156,14 +155,7 @@ class Orders:
 @pytest.fixture(scope="module", params=versions("action_clients"))
 def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Planner]:
     with running(request, tmp_path_factory) as (ros, folder):
-        module = MODULES[ros.version]
-        done = subprocess.run(
-            [ros.python, "-c", f"import {module}"], env=dict(ros.environment), capture_output=True, check=False
-        )
-        if done.returncode:
-            pytest.skip(f"{ros.python} lacks {module}")
-        if ros.version == 1 and subprocess.run(["pkg-config", "--exists", "actionlib"], check=False).returncode:
-            pytest.skip("actionlib is not installed (libactionlib-dev)")
+        skip_without_actions(ros)
         yield Planner(ros, folder)
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from tests.ros.action_simulator import HELD, Goal, in_ros2
-from tests.ros.cpp_nodes import Client, NodeProcess, roscpp_peer
+from tests.ros.cpp_nodes import Client, NodeProcess, Ros, roscpp_peer
 from tests.ros.live_nodes import REPOSITORY
 from tests.ros.places import Place, diagnoses, running, versions, wait_until_reached
 
@@ -70,17 +70,21 @@ class Arm(Place):
         return Client(self.ros, [*script, *words])
 
 
+def skip_without_actions(ros: Ros) -> None:
+    module = MODULES[ros.version]
+    done = subprocess.run(
+        [ros.python, "-c", f"import {module}"], env=dict(ros.environment), capture_output=True, check=False
+    )
+    if done.returncode:
+        pytest.skip(f"{ros.python} lacks {module}")
+    if ros.version == 1 and subprocess.run(["pkg-config", "--exists", "actionlib"], check=False).returncode:
+        pytest.skip("actionlib is not installed (libactionlib-dev)")
+
+
 @pytest.fixture(scope="module", params=versions("actions"))
 def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Arm]:
     with running(request, tmp_path_factory) as (ros, folder):
-        module = MODULES[ros.version]
-        done = subprocess.run(
-            [ros.python, "-c", f"import {module}"], env=dict(ros.environment), capture_output=True, check=False
-        )
-        if done.returncode:
-            pytest.skip(f"{ros.python} lacks {module}")
-        if ros.version == 1 and subprocess.run(["pkg-config", "--exists", "actionlib"], check=False).returncode:
-            pytest.skip("actionlib is not installed (libactionlib-dev)")
+        skip_without_actions(ros)
         yield Arm(ros, folder)
 
 

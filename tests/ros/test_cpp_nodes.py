@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import random
 import re
 import shutil
@@ -28,7 +27,7 @@ from fusesoc_firm.node.description import describe
 from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.system.system_core import load_system
 from tests.applications.images import filtered, image, load_model
-from tests.ros.cpp_nodes import Node, Peer, Ros, missing_ros, running_ros
+from tests.ros.cpp_nodes import Node, Peer, Ros, check_angles, missing_ros, running_ros
 
 REPOSITORY = Path(__file__).parents[2]
 SPECS = REPOSITORY / "specs"
@@ -187,16 +186,7 @@ def test_quaternions_come_back_as_angles(workshop: Workshop) -> None:
     ):
         peer.wait_until_connected()
         for _ in range(20):
-            x, y, z, w = (source.gauss(0, 1) for _ in range(4))
-            peer.publish("/QuaternionToEuler_sub", prefix + struct.pack("<4d", x, y, z, w))
-            _, payload = peer.take()
-            norm = x * x + y * y + z * z + w * w
-            expected = (
-                math.atan2(2 * (w * x + y * z), norm - 2 * (x * x + y * y)),
-                math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x) / norm))),
-                math.atan2(2 * (w * z + x * y), norm - 2 * (y * y + z * z)),
-            )
-            assert struct.unpack("<3d", payload[len(prefix) :]) == pytest.approx(expected, abs=1e-9)
+            check_angles(peer, source, prefix)
         assert node.stop() == 0
         assert "20 received, 0 dropped, 20 sent, 20 published, 0 errors, 0 restarts" in node.said()
     steps = [line.split(",")[1] for line in trace.read_text(encoding="utf-8").splitlines()[1:]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 import random
 import re
 import signal
@@ -20,7 +19,7 @@ from urllib.request import Request, urlopen
 import pytest
 
 from fusesoc_firm.cli import main
-from tests.ros.cpp_nodes import Peer, Ros
+from tests.ros.cpp_nodes import Peer, Ros, check_angles
 from tests.ros.live_nodes import LiveNode, model_address, paced, specification
 from tests.ros.places import running, versions
 
@@ -204,16 +203,7 @@ def test_quaternions_come_back_as_angles(place: Place) -> None:
         ) as peer,
     ):
         for _ in range(20):
-            x, y, z, w = (source.gauss(0, 1) for _ in range(4))
-            peer.publish("/QuaternionToEuler_sub", prefix + struct.pack("<4d", x, y, z, w))
-            _, payload = peer.take()
-            norm = x * x + y * y + z * z + w * w
-            expected = (
-                math.atan2(2 * (w * x + y * z), norm - 2 * (x * x + y * y)),
-                math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x) / norm))),
-                math.atan2(2 * (w * z + x * y), norm - 2 * (y * y + z * z)),
-            )
-            assert struct.unpack_from("<3d", payload, len(prefix)) == pytest.approx(expected, abs=1e-9)
+            check_angles(peer, source, prefix)
         assert node.stop() == 0
         assert re.search(r"QuaternionToEuler_sub +20 +0 +20 +0 +0\n", node.said())
     rows = [*csv.DictReader(table.open(encoding="utf-8"))]

@@ -30,6 +30,21 @@ STIMULI = [
 # The percentage of the cycles in which each wire waits: from and to the host, from the Manager, to the publishers, and
 # from them. The point waits for the Manager, and the text for its publisher.
 WAITS = (0, 0, 40, 25, 0, 50, 30, 0, 60, 0, 0)
+# A service in hardware.
+SERVICE = """\
+project: {name: robot, width: 64, clock: 100 MHz}
+paths: [messages]
+accelerators:
+  - name: switch
+    type: VHDL
+    sources: [switch.vhd]
+    interface:
+      input: [{middleware: ROS2, message: demo_msgs/Enable_Request}]
+      output: [{middleware: ROS2, message: demo_msgs/Enable_Response}]
+blocks:
+  - {name: enable, middleware: ROS2, mode: server, service: demo_msgs/Enable, outgoing: [{name: switch}]}
+  - {name: switch, type: switch, outgoing: [{name: enable}]}
+"""
 TYPES = {"point": "geometry_msgs/Point", "text": "std_msgs/String", "image": "sensor_msgs/Image"}
 
 
@@ -46,6 +61,15 @@ def write_system(folder: Path, stimuli: Sequence[object] = STIMULI, types: Mappi
     write_core(spec)
     (folder / "stimuli.yaml").write_text(yaml.safe_dump([*stimuli], sort_keys=False), encoding="utf-8")
     return spec
+
+
+def write_service(spec: Path) -> None:
+    """Write the specification of a service, and its files beside it."""
+    spec.write_text(SERVICE, encoding="utf-8")
+    spec.with_name("switch.vhd").touch()
+    package = spec.parent / "messages" / "demo_msgs" / "srv"
+    package.mkdir(parents=True)
+    (package / "Enable.srv").write_text("bool data\n---\nbool success\n", encoding="utf-8")
 
 
 def write_core(spec: Path) -> None:

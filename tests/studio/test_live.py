@@ -26,7 +26,7 @@ from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
 from fusesoc_firm.studio.reports import Reports
 from fusesoc_firm.studio.run import Run
 from fusesoc_firm.studio.server import Studio
-from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_system
+from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_service, write_system
 from tests.studio.served import load, served
 from tests.studio.test_server import ask
 
@@ -126,26 +126,8 @@ def test_it_pauses_steps_and_ends(studio: Studio) -> None:
 
 def test_messages_of_services_and_actions_are_played(tmp_path: Path) -> None:
     """As by `firm sim`, each converter gets its messages; the model answers with the bytes that it takes."""
-    text = """\
-project: {name: robot, width: 64, clock: 100 MHz}
-paths: [messages]
-accelerators:
-  - name: switch
-    type: VHDL
-    sources: [switch.vhd]
-    interface:
-      input: [{middleware: ROS2, message: demo_msgs/Enable_Request}]
-      output: [{middleware: ROS2, message: demo_msgs/Enable_Response}]
-blocks:
-  - {name: enable, middleware: ROS2, mode: server, service: demo_msgs/Enable, outgoing: [{name: switch}]}
-  - {name: switch, type: switch, outgoing: [{name: enable}]}
-"""
     spec = write_system(tmp_path, [{"enable_request": {"data": True}}] * 3)
-    spec.write_text(text, encoding="utf-8")
-    (tmp_path / "switch.vhd").touch()
-    package = tmp_path / "messages" / "demo_msgs" / "srv"
-    package.mkdir(parents=True)
-    (package / "Enable.srv").write_text("bool data\n---\nbool success\n", encoding="utf-8")
+    write_service(spec)
     with served(spec, modelled()) as studio:
         begin(studio)
         news = until(studio, lambda now: now["run"] and now["run"]["state"] in ("ended", "failed"))

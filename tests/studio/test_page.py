@@ -20,6 +20,7 @@ import fusesoc_firm.studio
 from fusesoc_firm.studio import evaluation
 from fusesoc_firm.studio.resources import Tell
 from tests.studio.browser import PROGRAM, Page, opened
+from tests.studio.played import write_service
 from tests.studio.served import served
 
 ROOM = Path(fusesoc_firm.studio.__file__).parent
@@ -551,26 +552,8 @@ def test_the_file_is_beside_the_picture_in_a_wide_window(robot: Path, tmp_path: 
 
 
 def test_a_service_has_both_streams(tmp_path: Path) -> None:
-    text = """\
-project: {name: robot}
-paths: [messages]
-accelerators:
-  - name: switch
-    type: VHDL
-    sources: [switch.vhd]
-    interface:
-      input: [{middleware: ROS2, message: demo_msgs/Enable_Request}]
-      output: [{middleware: ROS2, message: demo_msgs/Enable_Response}]
-blocks:
-  - {name: enable, middleware: ROS2, mode: server, service: demo_msgs/Enable, outgoing: [{name: switch}]}
-  - {name: switch, type: switch, outgoing: [{name: enable}]}
-"""
     spec = tmp_path / "robot.yaml"
-    spec.write_text(text, encoding="utf-8")
-    (tmp_path / "switch.vhd").touch()
-    package = tmp_path / "messages" / "demo_msgs" / "srv"
-    package.mkdir(parents=True)
-    (package / "Enable.srv").write_text("bool data\n---\nbool success\n", encoding="utf-8")
+    write_service(spec)
 
     async def steps(page: Page) -> None:
         await page.until("document.querySelector('header output').textContent === 'no faults'")
