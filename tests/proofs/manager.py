@@ -124,7 +124,7 @@ _BURSTS = Proof(
             ("resumption_names_the_publisher",),
         ),
         Mutation(_BURST, "held_r   <= resume_r;", "held_r   <= '1';", ("no_beat_invented",)),
-        Mutation(_BURST, "clearing_r <= '0'", "clearing_r <= '1'", ("no_bubble",)),
+        Mutation(_BURST, "cleared_r <= cleared_r + 1", "cleared_r <= cleared_r", ("no_bubble",)),
     ),
 )
 

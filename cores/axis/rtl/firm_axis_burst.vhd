@@ -51,8 +51,8 @@ architecture rtl of firm_axis_burst is
   signal write_bit  : std_logic;
   signal begun      : std_logic_vector(0 downto 0);
   signal begun_next : std_logic_vector(0 downto 0);
-  signal clearing_r : std_logic;
-  signal cleared_r  : unsigned(INDEX_BITS_USED-1 downto 0);  -- the next bit to clear
+  signal cleared_r  : unsigned(INDEX_BITS_USED downto 0);  -- the next bit to clear; the highest bit: there is one
+  signal clearing   : std_logic;
 
   signal held_tdata_r  : std_logic_vector(WIDTH-1 downto 0);
   signal held_tkeep_r  : std_logic_vector(WIDTH/8-1 downto 0);
@@ -78,12 +78,13 @@ begin
     severity failure;
 
   moved <= '0' when source = held_source_r else '1';
-  ready <= not clearing_r and (not held_r or (m_axis_tready and not resume_r));
+  ready <= not clearing and (not held_r or (m_axis_tready and not resume_r));
   taken <= s_axis_tvalid and ready;
 
-  address       <= std_logic_vector(cleared_r) when clearing_r = '1' else source;
-  write_bit     <= clearing_r or taken;
-  begun_next(0) <= not clearing_r and not s_axis_tlast;
+  clearing      <= cleared_r(INDEX_BITS_USED);
+  address       <= std_logic_vector(cleared_r(INDEX_BITS_USED-1 downto 0)) when clearing = '1' else source;
+  write_bit     <= clearing or taken;
+  begun_next(0) <= not clearing and not s_axis_tlast;
   begun         <= is_begun(to_integer(unsigned(address)));
 
   remember_frames : process (clk)
@@ -99,13 +100,9 @@ begin
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
-        clearing_r <= '1';
-        cleared_r  <= (others => '0');
-      elsif clearing_r = '1' then
+        cleared_r <= to_unsigned(2**INDEX_BITS_USED, INDEX_BITS_USED+1);
+      elsif clearing = '1' then
         cleared_r <= cleared_r + 1;
-        if cleared_r = 2**INDEX_BITS_USED-1 then
-          clearing_r <= '0';
-        end if;
       end if;
     end if;
   end process clear_memory;

@@ -118,26 +118,21 @@ begin
   end generate shares_clearing;
 
   clears_itself : if not SHARED_CLEARING generate
-    signal clearing_r : std_logic;
-    signal cleared_r  : unsigned(INDEX_BITS_USED-1 downto 0);
+    signal cleared_r : unsigned(INDEX_BITS_USED downto 0);  -- the highest bit: not all are cleared
   begin
     clear_memory : process (clk)
     begin
       if rising_edge(clk) then
         if rst_n = '0' then
-          clearing_r <= '1';
-          cleared_r  <= (others => '0');
-        elsif clearing_r = '1' then
+          cleared_r <= to_unsigned(2**INDEX_BITS_USED, INDEX_BITS_USED+1);
+        elsif clears = '1' then
           cleared_r <= cleared_r + 1;
-          if cleared_r = 2**INDEX_BITS_USED-1 then
-            clearing_r <= '0';
-          end if;
         end if;
       end if;
     end process clear_memory;
 
-    clears   <= clearing_r;
-    to_clear <= std_logic_vector(cleared_r);
+    clears   <= cleared_r(INDEX_BITS_USED);
+    to_clear <= std_logic_vector(cleared_r(INDEX_BITS_USED-1 downto 0));
   end generate clears_itself;
 
   stops <= inside_r and ready and tick and not s_axis_tvalid when waited_r = LIMIT-1 else '0';

@@ -274,13 +274,12 @@ begin
     );
 
   watched_frames : if WATCHDOG > 0 generate
-    signal counted_r  : natural range 0 to max(1, PERIOD-1);
-    signal clearing_r : std_logic;
-    signal cleared_r  : unsigned(CLEAR_BITS-1 downto 0);
+    signal counted_r : natural range 0 to max(1, PERIOD-1);
+    signal cleared_r : unsigned(CLEAR_BITS downto 0);  -- the highest bit: not all are cleared
   begin
     tick     <= '1' when counted_r = PERIOD-1 else '0';
-    clearing <= clearing_r;
-    cleared  <= std_logic_vector(cleared_r);
+    clearing <= cleared_r(CLEAR_BITS);
+    cleared  <= std_logic_vector(cleared_r(CLEAR_BITS-1 downto 0));
 
     count_cycles : process (clk)
     begin
@@ -297,13 +296,9 @@ begin
     begin
       if rising_edge(clk) then
         if rst_n = '0' then
-          clearing_r <= '1';
-          cleared_r  <= (others => '0');
-        elsif clearing_r = '1' then
+          cleared_r <= to_unsigned(2**CLEAR_BITS, CLEAR_BITS+1);
+        elsif clearing = '1' then
           cleared_r <= cleared_r + 1;
-          if cleared_r = 2**CLEAR_BITS-1 then
-            clearing_r <= '0';
-          end if;
         end if;
       end if;
     end process clear_memories;

@@ -133,8 +133,7 @@ localparam INDEX_BITS = $clog2(`PUBLISHERS);
 (* hierconn *) wire                  \dut.parts_of_frames_u_burst.held_tuser_r ;
 (* hierconn *) wire                  \dut.parts_of_frames_u_burst.held_tlast_r ;
 (* hierconn *) wire [INDEX_BITS-1:0] \dut.parts_of_frames_u_burst.held_source_r ;
-(* hierconn *) wire                  \dut.parts_of_frames_u_burst.clearing_r ;
-(* hierconn *) wire [INDEX_BITS-1:0] \dut.parts_of_frames_u_burst.cleared_r ;
+(* hierconn *) wire [INDEX_BITS:0]   \dut.parts_of_frames_u_burst.cleared_r ;
 
 wire                    is_held     = \dut.parts_of_frames_u_burst.held_r ;
 wire                    is_resumed  = \dut.parts_of_frames_u_burst.resume_r ;
@@ -161,8 +160,9 @@ assign memory[2] = \dut.parts_of_frames_u_burst.is_begun[2] ;
 assign memory[3] = \dut.parts_of_frames_u_burst.is_begun[3] ;
 `endif
 
+wire is_clearing = \dut.parts_of_frames_u_burst.cleared_r [INDEX_BITS];
 wire [`PUBLISHERS-1:0] uncleared =
-    \dut.parts_of_frames_u_burst.clearing_r ? {`PUBLISHERS{1'b1}} << \dut.parts_of_frames_u_burst.cleared_r : 0;
+    is_clearing ? {`PUBLISHERS{1'b1}} << \dut.parts_of_frames_u_burst.cleared_r [INDEX_BITS-1:0] : 0;
 
 wire is_marked_held  = marked && ahead == in_slice + is_resumed;
 wire is_marked_newer = marked && has_newer && ahead == 1;
@@ -170,7 +170,7 @@ wire is_marked_older = marked && has_older && ahead == 0;
 
 always @* if (running) begin
     helper_memory: assert (((memory ^ begun) & ~uncleared) == 0);
-    helper_clearing: assert (!\dut.parts_of_frames_u_burst.clearing_r || !has_last);
+    helper_clearing: assert (!is_clearing || !has_last);
     helper_nothing_taken: assert (has_last || (begun == 0 && inside == 0 && !is_held && is_over));
     helper_inside: assert (inside == in_slice + is_held + is_resumed);
     helper_first: assert (has_older || is_first == older[PAYLOAD_BITS-1]);
