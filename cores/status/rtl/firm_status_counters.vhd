@@ -378,16 +378,9 @@ begin
       read_longest => open
     );
 
-  fault      <= counted_r;
-  fault_code <= code_r;
-  name_channel : for place in 0 to 11 generate
-    of_index : if place < CHANNEL_BITS generate
-      fault_channel(place) <= channel_r(place);
-    end generate of_index;
-    above : if place >= CHANNEL_BITS generate
-      fault_channel(place) <= '0';
-    end generate above;
-  end generate name_channel;
+  fault         <= counted_r;
+  fault_channel <= std_logic_vector(resize(unsigned(channel_r), 12));
+  fault_code    <= code_r;
 
   -- Reading. The indices of other tables are meaningless, but within the tables.
   channel    <= unsigned(read_address(12 downto 4));

@@ -311,16 +311,9 @@ begin
       read_longest => open
     );
 
-  fault      <= counted;
-  fault_code <= code;
-  name_channel : for place in 0 to 11 generate
-    of_index : if place < CHANNEL_BITS generate
-      fault_channel(place) <= fault_number(place);
-    end generate of_index;
-    above : if place >= CHANNEL_BITS generate
-      fault_channel(place) <= '0';
-    end generate above;
-  end generate name_channel;
+  fault         <= counted;
+  fault_channel <= std_logic_vector(resize(unsigned(fault_number), 12));
+  fault_code    <= code;
 
   -- Reading. An index that belongs to another table is meaningless, but within the range of its own.
   channel    <= unsigned(read_address(15 downto 4));
