@@ -63,16 +63,7 @@ begin
 
   finished <= is_empty and received = sent;
 
-  clock : process
-  begin
-    while not finished loop
-      clk <= '0';
-      wait for PERIOD / 2;
-      clk <= '1';
-      wait for PERIOD / 2;
-    end loop;
-    wait;
-  end process clock;
+  clk <= not clk after PERIOD / 2 when not finished else '0';
 
   source : process
     file     vector_file : text open read_mode is VECTORS;

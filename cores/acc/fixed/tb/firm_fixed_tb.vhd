@@ -162,17 +162,7 @@ begin
 
   end generate resizes;
 
-  clock : process
-  begin
-    while not is_done loop
-      clk <= '0';
-      wait for PERIOD / 2;
-      clk <= '1';
-      wait for PERIOD / 2;
-    end loop;
-    wait;
-  end process clock;
-
+  clk   <= not clk after PERIOD / 2 when not is_done else '0';
   rst_n <= '1' after 4 * PERIOD;
 
   u_operation : entity firm.firm_sim_operation

@@ -87,17 +87,7 @@ begin
       out_number => fixed_number
     );
 
-  clock : process
-  begin
-    while not (is_block_done and is_fixed_done) loop
-      clk <= '0';
-      wait for PERIOD / 2;
-      clk <= '1';
-      wait for PERIOD / 2;
-    end loop;
-    wait;
-  end process clock;
-
+  clk   <= not clk after PERIOD / 2 when not (is_block_done and is_fixed_done) else '0';
   rst_n <= '1' after 4 * PERIOD;
 
   blocks : process
