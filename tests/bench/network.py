@@ -9,28 +9,14 @@ from tests.bench import bitstreams, timing
 from tests.bench.nextpnr import SEEDS, Nextpnr
 from tests.bench.tables import Table, Tell
 from tests.bench.timing import Design, Row
+from tests.cores.test_net_link import NODE
 from tests.hdl.ghdl import Generic, Library, core_files
 
 TITLE = "A node of ROS 2 by Ethernet, MHz"
 DEVICE = "--25k --speed 8 --package CABGA381"
 # The clock of a GMII, in MHz.
 _BAR = 125.0
-_CORES = (
-    "axis/package",
-    "axis/axis",
-    "cdc/sync",
-    "cdc/cdc",
-    "net/mac",
-    "net/streams",
-    "net/responder",
-    "net/reassembly",
-    "net/presence",
-    "net/status",
-    "net/udp",
-    "net/rtps",
-    "net/builder",
-    "net/net_node",
-)
+_CORES = (*NODE, "cdc/sync", "cdc/cdc")
 _TOPICS: Mapping[str, Generic] = {"WRITERS": 3, "READERS": 2, "SOURCES": 16, "SINKS": 24, "SAMPLE": 64}
 _NOTE = """The node consists of the MAC, ARP and ping, IGMP and the probes for its address, UDP, RTPS and the packet
     builder. It has two topics each way, with up to 64 bytes, and room for eight peers with all of them. It is measured

@@ -18,7 +18,7 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.stimuli import KINDS, TYPICAL
 from tests.converter.simulated.samples import ORACLES, case, exchanged, framed, serialise, stimuli
-from tests.converter.simulated.subscribers import LENGTH_BYTES, SubscriberBench
+from tests.converter.simulated.subscribers import LENGTH_BYTES, Subscriber, SubscriberBench
 from tests.frame.samples import AWKWARD_VARIABLE
 
 SEED = 20240711
@@ -97,6 +97,25 @@ SELECTIONS = [
 ]
 
 
+def _run_with_cut_frames(
+    subscriber: Subscriber, ros: Middleware, name: str, count: int, folder: Path
+) -> tuple[list[bytes], list[str]]:
+    """Send frames, each followed by a copy without its last byte; return them, and the events of the good ones."""
+    source = stimuli(ros, name, SEED)
+    frames: list[bytes] = []
+    expected: list[str] = []
+    for number in range(count):
+        value = source.message(parse_name(name), KINDS[number % len(KINDS)])
+        payload = serialise(ros, name, value)
+        frames += [framed(payload), framed(payload)[:-1]]
+        expected += subscriber.events(value, len(payload))
+    events = subscriber.run(folder, frames, SEED=SEED % 1000, STALL_PERCENT=30)
+    assert outcomes(events) == [True, False] * count
+    messages = [line for line in expected if line.startswith("message ")]
+    assert [line for line in events if line.startswith("message ")] == messages
+    return frames, expected
+
+
 @pytest.mark.one_in(5, 3)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize(("ros", "name", "include", "exclude"), SELECTIONS)
@@ -106,17 +125,7 @@ def test_what_is_not_used_is_skipped(
     """The used fields come as ever; broken frames are told by what is looked at, and by their length."""
     frame = select(ORACLES[ros].frame(name), dict.fromkeys(include), dict.fromkeys(exclude))
     subscriber = SubscriberBench(tmp_path).subscriber(frame, width)
-    source = stimuli(ros, name, SEED)
-    frames, expected = [], []
-    for number in range(8):
-        value = source.message(parse_name(name), KINDS[number % len(KINDS)])
-        payload = serialise(ros, name, value)
-        frames += [framed(payload), framed(payload)[:-1]]
-        expected += subscriber.events(value, len(payload))
-    events = subscriber.run(tmp_path, frames, SEED=SEED % 1000, STALL_PERCENT=30)
-    assert outcomes(events) == [True, False] * 8
-    messages = [line for line in expected if line.startswith("message ")]
-    assert [line for line in events if line.startswith("message ")] == messages
+    frames, expected = _run_with_cut_frames(subscriber, ros, name, 8, tmp_path)
     assert subscriber.run(tmp_path, frames[::2], SEED=1) == expected
 
 
@@ -237,17 +246,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, ros: Middleware, name: str, w
     subscriber = SubscriberBench(tmp_path).subscriber(ORACLES[ros].frame(name), width)
     subscriber.library.replace_by_netlist(subscriber.entity)
     subscriber.analyse_bench()
-    source = stimuli(ros, name, SEED)
-    frames, expected = [], []
-    for number in range(6):
-        value = source.message(parse_name(name), KINDS[number % len(KINDS)])
-        payload = serialise(ros, name, value)
-        frames += [framed(payload), framed(payload)[:-1]]
-        expected += subscriber.events(value, len(payload))
-    events = subscriber.run(tmp_path, frames, SEED=SEED % 1000, STALL_PERCENT=30)
-    assert outcomes(events) == [True, False] * 6
-    messages = [line for line in expected if line.startswith("message ")]
-    assert [line for line in events if line.startswith("message ")] == messages
+    _run_with_cut_frames(subscriber, ros, name, 6, tmp_path)
 
 
 # --- frames ----------------------------------------------------------------------------------------------------------
