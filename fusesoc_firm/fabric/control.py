@@ -75,12 +75,15 @@ _PORTS = {
     "early_source": 0xAC,
     "frame_writer": 0xAD,
     "large": 0xAE,
-    "started": 0xAF,
+    "sample": 0xAF,
+    "sample_bytes": 0xB0,
     "peers": 0xB4,
     "sources": 0xB5,
     "sinks": 0xB6,
     "bank": 0xB7,
     "prepared": 0xB8,
+    "look": 0xB9,
+    "fragment": 0xBA,
 }
 # Tables of the node's own writers with frames, of the writer of ros_discovery_info, and of the readers.
 _GRAPH, _FIRST_READER = 15, 16
@@ -99,6 +102,8 @@ _TIMES = {
     # Seconds, and one more: the first one may be short.
     "USUAL_LEASE": 101,
 }
+# Of samples to send: the new one, and that whose slot is looked at.
+_SAMPLE_FACTS = ("IS_STARTED", "IS_LONG", "IS_LAST", "IS_BEYOND", "IS_NEW_LONG")
 _FACTS = ("RELIABLE", "KNOWN", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
 _OTHERS = {
     # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, whose fragments
@@ -114,7 +119,7 @@ _OTHERS = {
     "NO_PACKET": _NO_PACKET,
     "FIRST_READER": _FIRST_READER,
     **{kind.name: int(kind) for kind in Kind},
-    **{name: 1 << number for number, name in enumerate(_FACTS)},
+    **{name: 1 << number for names in (_FACTS, _SAMPLE_FACTS) for number, name in enumerate(names)},
 }
 
 

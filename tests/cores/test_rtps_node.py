@@ -12,6 +12,7 @@ import pytest
 from fusesoc_firm.fabric.control import main_of
 from tests.cores.announcements import (
     ASSEMBLED,
+    LONG,
     SURE,
     WRITTEN,
     Event,
@@ -28,7 +29,7 @@ from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
 from tests.fabric.dissection import read_alike
 from tests.fabric.memories import bits
-from tests.fabric.messages import AckNack, Data, Gap, Heartbeat, InfoDestination, NackFrag, parse
+from tests.fabric.messages import AckNack, Data, DataFrag, Gap, Heartbeat, InfoDestination, NackFrag, parse
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
@@ -188,6 +189,25 @@ def test_samples_in_fragments_are_put_together(peers: int, stall: int, seed: int
     print(Counter(sizes), len(requests))
     assert sizes.count(ASSEMBLED) >= 3 and len(requests) >= 5
     with World(stall, assembled=ASSEMBLED) as world:
+        _check(world.all(events), wanted)
+
+
+def _long_events(peers: int, seed: int, turns: int) -> list[Event]:
+    print(f"seed {seed}")
+    return Peers(peers, seed, sample=LONG).run(turns)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(("peers", "stall", "seed"), [(2, 0, SEED), (5, 30, SEED + 1), (1, 10, SEED + 2)])
+def test_long_samples_are_sent_in_fragments(peers: int, stall: int, seed: int) -> None:
+    """All sizes from 4 to 65,536 bytes, and longer ones are refused; peers ask for samples and fragments again."""
+    events = _long_events(peers, seed, 2000)
+    wanted = expected(events, sample=LONG)
+    items = [item for _, packet in wanted.sent if (message := parse(packet)) for item in message.submessages]
+    parts = Counter(item.size for item in items if isinstance(item, DataFrag))
+    print(sorted(parts.items()), wanted.refused)
+    assert {1345, 2688, 2689, 65280, LONG} <= {*parts} and wanted.refused > 2
+    with World(stall, sample=LONG) as world:
         _check(world.all(events), wanted)
 
 
