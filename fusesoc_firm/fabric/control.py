@@ -35,7 +35,7 @@ from pathlib import Path
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.packets import Field, packets_of
 from fusesoc_firm.fabric.rtps import Kind
-from fusesoc_firm.system.derived.ethernet import MOST_DEPTH, MOST_SLOTS, kept_of, ring_slots
+from fusesoc_firm.system.derived.ethernet import MOST_DEPTH, MOST_SLOTS, kept_of, ring_slots, slot_count
 from fusesoc_firm.text.render import Rendering
 
 PROGRAM = Path(__file__).with_name("ros2_node.seq")
@@ -169,7 +169,7 @@ def rings_of(node: Node) -> tuple[Ring, ...]:
 
 def slots_of(node: Node) -> int:
     """Return the number of slots of the history, a power of two."""
-    return max(2, 1 << (sum(ring.size for ring in rings_of(node)) - 1).bit_length())
+    return slot_count(sum(ring.size for ring in rings_of(node)))
 
 
 def generics_of(node: Node, sizes: Sizes) -> dict[str, int]:

@@ -716,7 +716,7 @@ class Participant:
                 Gap(sink.entity, sink.history.endpoint.entity, gone[0], Numbers(sink.first)),
             )
         kept = [number for number in wanted if number >= sink.first]
-        # Several samples in fragments might be too many for the reader, which asks for the next one after the heartbeat.
+        # Several samples in fragments might be too many for a reader, which asks for the next one after the heartbeat.
         long = [place for place, number in enumerate(kept, 1) if len(sink.history.samples[number]) > FRAGMENT_BYTES]
         kept = kept[: long[0]] if long else kept
         for number in kept:

@@ -100,15 +100,17 @@ architecture rtl of firm_rtps_history is
   signal ends      : std_logic;
 
   -- The payload that leaves.
-  signal shown_r   : unsigned(BYTE_BITS downto 0) := (others => '0');  -- the size in the slot
-  signal shown_size : unsigned(RTPS_SAMPLE_BITS-1 downto 0);
-  signal start     : unsigned(RTPS_SAMPLE_BITS-1 downto 0);            -- of the fragment
-  signal part_r    : std_logic := '0';                                 -- a fragment is shown
-  signal part_size : unsigned(10 downto 0);
-  signal slot_r    : slot_t := (others => '0');
-  signal place_r   : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
-  signal shows_r   : std_logic := '0';
-  signal byte_r    : std_logic_vector(7 downto 0) := (others => '0');
+  signal slot_r  : slot_t := (others => '0');
+  signal shown_r : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
+  signal place_r : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
+  signal shows_r : std_logic := '0';
+  signal byte_r  : std_logic_vector(7 downto 0) := (others => '0');
+
+  -- The fragment that the program chose.
+  signal size   : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- of the sample in the slot
+  signal start  : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- its first byte
+  signal part   : unsigned(10 downto 0);                  -- its bytes
+  signal part_r : std_logic := '0';                       -- it is shown
 
 begin
 
@@ -233,27 +235,29 @@ begin
       port map (
         clk          => clk,
         looks        => looks,
-        size         => shown_size,
+        size         => size,
         number_valid => chooses,
         number       => choice(5 downto 0),
         sample_bytes => sample_bytes,
         is_long      => is_long,
         start        => start,
-        bytes        => part_size,
+        bytes        => part,
         is_last      => is_last,
         is_beyond    => is_beyond
       );
 
-    shown_size    <= resize(shown_r, RTPS_SAMPLE_BITS);
+    size          <= resize(shown_r, RTPS_SAMPLE_BITS);
     is_new_long   <= '1' when size_r >= RTPS_FRAGMENT_BYTES else '0';
-    payload_bytes <= std_logic_vector(resize(part_size, 16)) when part_r = '1' else
+    payload_bytes <= std_logic_vector(resize(part, 16)) when part_r = '1' else
                      std_logic_vector(resize(shown_r, 16));
 
   end generate with_fragments;
 
   without_fragments : if not PARTED generate
 
+    size          <= (others => '0');
     start         <= (others => '0');
+    part          <= (others => '0');
     sample_bytes  <= (others => '0');
     is_long       <= '0';
     is_last       <= '0';
