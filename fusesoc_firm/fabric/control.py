@@ -35,7 +35,7 @@ from pathlib import Path
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.packets import Field, packets_of
 from fusesoc_firm.fabric.rtps import Kind
-from fusesoc_firm.system.derived.ethernet import MOST_DEPTH, MOST_SLOTS, kept_of, ring_slots
+from fusesoc_firm.system.derived.ethernet import MOST_DEPTH, MOST_SLOTS, kept_of, ring_slots, slot_count
 from fusesoc_firm.text.render import Rendering
 
 PROGRAM = Path(__file__).with_name("ros2_node.seq")
@@ -75,12 +75,15 @@ _PORTS = {
     "early_source": 0xAC,
     "frame_writer": 0xAD,
     "large": 0xAE,
-    "started": 0xAF,
+    "sample": 0xAF,
+    "sample_bytes": 0xB0,
     "peers": 0xB4,
     "sources": 0xB5,
     "sinks": 0xB6,
     "bank": 0xB7,
     "prepared": 0xB8,
+    "look": 0xB9,
+    "fragment": 0xBA,
 }
 # Tables of the node's own writers with frames, of the writer of ros_discovery_info, and of the readers.
 _GRAPH, _FIRST_READER = 15, 16
@@ -99,6 +102,8 @@ _TIMES = {
     # Seconds, and one more: the first one may be short.
     "USUAL_LEASE": 101,
 }
+# Of samples to send: the new one, and that whose slot is looked at.
+_SAMPLE_FACTS = ("IS_STARTED", "IS_LONG", "IS_LAST", "IS_BEYOND", "IS_NEW_LONG")
 _FACTS = ("RELIABLE", "KNOWN", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
 _OTHERS = {
     # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, whose fragments
@@ -114,7 +119,7 @@ _OTHERS = {
     "NO_PACKET": _NO_PACKET,
     "FIRST_READER": _FIRST_READER,
     **{kind.name: int(kind) for kind in Kind},
-    **{name: 1 << number for number, name in enumerate(_FACTS)},
+    **{name: 1 << number for names in (_FACTS, _SAMPLE_FACTS) for number, name in enumerate(names)},
 }
 
 
@@ -164,7 +169,7 @@ def rings_of(node: Node) -> tuple[Ring, ...]:
 
 def slots_of(node: Node) -> int:
     """Return the number of slots of the history, a power of two."""
-    return max(2, 1 << (sum(ring.size for ring in rings_of(node)) - 1).bit_length())
+    return slot_count(sum(ring.size for ring in rings_of(node)))
 
 
 def generics_of(node: Node, sizes: Sizes) -> dict[str, int]:

@@ -23,11 +23,12 @@ from tests.fabric.messages import (
     Heartbeat,
     HeartbeatFrag,
     InfoDestination,
+    NackFrag,
     Numbers,
     Submessage,
     Writer,
 )
-from tests.fabric.participant import DISCOVERY, Limits, Participant
+from tests.fabric.participant import DISCOVERY, FRAGMENT_BYTES, Limits, Participant
 
 HASH = "RIHS01_" + "5af0" * 16
 _DURABLE = Quality(is_reliable=False, is_transient_local=True)
@@ -47,6 +48,7 @@ WRITTEN = (
 SURE = 2  # the reader that is reliable
 ROOM = Sizes(sources=8, sinks=8)  # in the tables; less than for eight peers
 SAMPLE = 64  # bytes of the longest payload that the node sends
+LONG = 65536  # the same, if it sends samples in fragments
 ASSEMBLED = 4096  # bytes of the longest one that it puts together, if it does
 _IDLE = -1  # an event that waits until the node has nothing to do
 _GAP = 12  # cycles between two packets, at least
@@ -105,8 +107,8 @@ class Results:
     refused: int = 0
 
 
-def expected(events: Sequence[Event], assembled: int = 0) -> Results:
-    """What the reference does; samples in fragments have up to so many bytes."""
+def expected(events: Sequence[Event], assembled: int = 0, sample: int = SAMPLE) -> Results:
+    """What the reference does; samples in fragments have up to so many bytes, and those that it sends."""
     node, results, now = a_node(), Results(), 0
 
     def take(endpoint: Endpoint, payload: bytes) -> None:
@@ -127,15 +129,15 @@ def expected(events: Sequence[Event], assembled: int = 0) -> Results:
                 now += event.count
                 participant.tick(now)
             case Kind.FRAME:
-                _publish(participant, event.data, results, now)
+                _publish(participant, event.data, results, now, sample)
         results.sent += participant.outbox
         participant.outbox.clear()
     print(participant.counts)
     return results
 
 
-def _publish(participant: Participant, frame: bytes, results: Results, now: int) -> None:
-    if frame[0] >= len(WRITTEN) or not 1 <= len(frame) - 5 <= SAMPLE:
+def _publish(participant: Participant, frame: bytes, results: Results, now: int, longest: int) -> None:
+    if frame[0] >= len(WRITTEN) or not 1 <= len(frame) - 5 <= longest:
         results.refused += 1
     else:
         participant.publish(participant.node.writers[1 + frame[0]], frame[5:], now)
@@ -201,7 +203,8 @@ class Peers:
 
     If they exaggerate, so do their lists of encodings. Unless `is_sure`, no writer matches the reliable reader. `burst`
     is the largest number of packets for best effort that are sent one after the other. If it `is_long`, they also send
-    samples in fragments.
+    samples in fragments. `sample` is the size of the longest payload that the node sends; if it may need fragments, the
+    peers ask for some.
     """
 
     def __init__(
@@ -213,7 +216,9 @@ class Peers:
         is_sure: bool = True,
         burst: int = 5,
         is_long: bool = False,
+        sample: int = SAMPLE,
     ) -> None:
+        self._sample_bytes = sample
         self._is_sure, self._burst, self._is_long = is_sure, burst, is_long
         self._exaggerates = exaggerate
         self._chance, self._node = random.Random(seed), a_node()
@@ -252,6 +257,8 @@ class Peers:
         }
         if self._is_long:
             ways[self._long_sample] = 40
+        if self._sample_bytes > FRAGMENT_BYTES:
+            ways |= {self._ask_for_fragments: 30, self._publish: 30, self._ask: 30}
         for _ in range(count):
             self._chance.choices(list(ways), list(ways.values()))[0](self._chance.choice(self._peers))
         return self.events
@@ -656,14 +663,38 @@ class Peers:
     def _publish(self, _: _Peer) -> None:
         """A frame of the Manager, seldom one that is refused or aborted."""
         chance = self._chance
-        size = chance.choice([4, 8, 12, SAMPLE, SAMPLE, SAMPLE + 1, SAMPLE + 40 if chance.random() < 0.2 else 8])
+        size = self._size()
         number = chance.choice([*range(len(WRITTEN)), *range(len(WRITTEN)), *range(len(WRITTEN)), len(WRITTEN), 255])
         frame = bytes([number]) + struct.pack("<I", size) + rtps.XCDR1 + chance.randbytes(size - 4)
         is_aborted = chance.random() < 0.1
         self.events.append(Event(Kind.ABORTED_FRAME if is_aborted else Kind.FRAME, frame))
-        if number < len(WRITTEN) and size <= SAMPLE and not is_aborted:
+        if number < len(WRITTEN) and size <= self._sample_bytes and not is_aborted:
             self._published[number] += 1
         self._was_slow = True
+
+    def _size(self) -> int:
+        """The size of a sample; most of those that need fragments have few."""
+        chance, longest = self._chance, self._sample_bytes
+        if longest <= FRAGMENT_BYTES or chance.random() < 0.4:
+            sizes = [4, 8, 12, SAMPLE, SAMPLE, SAMPLE + 1, SAMPLE + 40 if chance.random() < 0.2 else 8]
+            return chance.choice(sizes)
+        if chance.random() < 0.1:
+            return chance.choice([65280, longest - 1, longest, longest + 1])
+        return FRAGMENT_BYTES * chance.choice([1, 1, 1, 2, 3]) + chance.choice([-3, -1, 0, 0, 1, 2, 700])
+
+    def _ask_for_fragments(self, peer: _Peer) -> None:
+        """A reader lacks fragments of a sample, which may be another one than it has got, or says so."""
+        chance = self._chance
+        reader = chance.choice(peer.readers[:3] or [_Reader(b"none", 0)])
+        # The writer of ros_discovery_info has no bit of its own here.
+        ours = reader.ours if chance.random() < 0.9 else chance.randrange(len(WRITTEN) + 1)
+        last = 1 if ours == len(WRITTEN) else self._published[ours]
+        number = max(0, last + chance.choice([0, 0, 0, 0, -1, -1, -2, -3, 1, -last, 1 << 32]))
+        base = chance.choice([1, 1, 1, 2, 3, 40, 0, 48, 50, 60, 300, (1 << 32) - 2])
+        wanted = [base + place for place in range(chance.choice([0, 1, 2, 3, 49, 256])) if chance.random() < 0.7]
+        writer = self._node.writers[0 if ours == len(WRITTEN) else 1 + ours]
+        request = NackFrag(reader.entity, writer.entity, number, Numbers.of(wanted, base), 3)
+        self._send(peer, self._destination(), request)
 
     def _wait(self, _: _Peer) -> None:
         self.events.append(Event(Kind.TICKS, count=self._chance.choice([1, 3, 19, 20, 21, 40])))

@@ -12,6 +12,7 @@ entity rtps_world is
     READERS      : integer := 3;
     SOURCES      : integer := 8;
     SINKS        : integer := 8;
+    SAMPLE       : integer := 64;
     SLOTS        : integer := 16;
     RELIABLE     : integer := 0; -- a bit for each endpoint
     TRANSIENT    : integer := 0;
@@ -126,7 +127,7 @@ begin
       READERS   => READERS,
       SOURCES   => SOURCES,
       SINKS     => SINKS,
-      SAMPLE    => 64,
+      SAMPLE    => SAMPLE,
       SLOTS     => SLOTS,
       DEPTH     => 4096,
       BYTES     => 4096,

@@ -12,6 +12,8 @@ import pytest
 from fusesoc_firm.fabric.control import main_of
 from tests.cores.announcements import (
     ASSEMBLED,
+    LONG,
+    SAMPLE,
     SURE,
     WRITTEN,
     Event,
@@ -28,7 +30,7 @@ from tests.cores.rtps_data import DATA, SIZES, write_data, write_memories
 from tests.cores.rtps_world import HARDWARE, World
 from tests.fabric.dissection import read_alike
 from tests.fabric.memories import bits
-from tests.fabric.messages import AckNack, Data, Gap, Heartbeat, InfoDestination, NackFrag, parse
+from tests.fabric.messages import AckNack, Data, DataFrag, Gap, Heartbeat, InfoDestination, NackFrag, parse
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
@@ -38,6 +40,8 @@ NODE = a_node()
 # Peers, stall and seed of a case in which all happens, and the events of such a case.
 FULL = (9, 30, SEED + 2)
 EVENTS = 2000
+# The same of cases in which samples are sent in fragments.
+LONG_CASES = [(2, 0, SEED), (5, 30, SEED + 1), (1, 10, SEED + 2)]
 
 
 @pytest.fixture(scope="module")
@@ -163,17 +167,18 @@ def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: 
 
 @pytest.mark.check
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
-def test_tshark_reads_the_same_in_all_packets_of_the_node(tmp_path: Path) -> None:
-    """They are those of the netlist in the test before."""
-    peers, _, seed = FULL
+@pytest.mark.parametrize("sample", [SAMPLE, LONG])
+def test_tshark_reads_the_same_in_all_packets_of_the_node(tmp_path: Path, sample: int) -> None:
+    """They are those of the netlist in other tests of this file."""
+    peers, _, seed = FULL if sample == SAMPLE else LONG_CASES[0]
     print(f"seed {seed}")
-    packets = [packet for _, packet in expected(Peers(peers, seed).run(EVENTS)).sent]
+    packets = [packet for _, packet in expected(Peers(peers, seed, sample=sample).run(EVENTS), sample=sample).sent]
     frames = [udp_frame(packet) for packet in packets]
     write_capture(tmp_path / "node.pcap", [frame + fcs(frame) for frame in frames])
     found = list(read_alike(tmp_path / "node.pcap"))
     assert [payload for payload, _ in found] == packets
     kinds = {type(item) for _, message in found for item in message.submessages}
-    assert kinds == {AckNack, Data, Gap, Heartbeat, InfoDestination}
+    assert kinds == {AckNack, Data, Gap, Heartbeat, InfoDestination, *([DataFrag] if sample == LONG else [])}
 
 
 @pytest.mark.check
@@ -188,6 +193,21 @@ def test_samples_in_fragments_are_put_together(peers: int, stall: int, seed: int
     print(Counter(sizes), len(requests))
     assert sizes.count(ASSEMBLED) >= 3 and len(requests) >= 5
     with World(stall, assembled=ASSEMBLED) as world:
+        _check(world.all(events), wanted)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(("peers", "stall", "seed"), LONG_CASES)
+def test_long_samples_are_sent_in_fragments(peers: int, stall: int, seed: int) -> None:
+    """All sizes from 4 to 65,536 bytes, and longer ones are refused; peers ask for samples and fragments again."""
+    print(f"seed {seed}")
+    events = Peers(peers, seed, sample=LONG).run(EVENTS)
+    wanted = expected(events, sample=LONG)
+    items = [item for _, packet in wanted.sent if (message := parse(packet)) for item in message.submessages]
+    parts = Counter(item.size for item in items if isinstance(item, DataFrag))
+    print(sorted(parts.items()), wanted.refused)
+    assert {1345, 2688, 2689, 65280} <= {*parts} and wanted.refused > 2
+    with World(stall, sample=LONG) as world:
         _check(world.all(events), wanted)
 
 
@@ -214,14 +234,23 @@ def test_a_list_of_very_many_encodings_counts() -> None:
         _check(world.all(events), expected(events))
 
 
-def test_the_node_has_no_latch(library: Library) -> None:
-    assert library.latches("firm_rtps_node", SIZES) == []
+@pytest.mark.parametrize("sample", [SAMPLE, 2048])
+def test_the_node_has_no_latch(library: Library, sample: int) -> None:
+    assert library.latches("firm_rtps_node", {**SIZES, "SAMPLE": sample}) == []
 
 
 @pytest.mark.check
-def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
+@pytest.mark.parametrize("sample", [SAMPLE, 2048])
+def test_the_node_has_no_combinational_loop(tmp_path: Path, sample: int) -> None:
     *others, node = core_files(*HARDWARE)
-    assert loops("firm_rtps_node", tmp_path, [node], others) == []
+    assert loops("firm_rtps_node", tmp_path, [node], others, {"SAMPLE": sample}) == []
+
+
+@pytest.mark.check
+def test_too_large_a_history_is_refused(library: Library) -> None:
+    result = library.run("firm_rtps_history", {"SAMPLE": 65536, "SLOTS": 32})
+    assert result.exit_code != 0
+    assert "firm_rtps_history: SAMPLE is 65536 with 32 SLOTS; legal: up to 1048576 bytes" in result.output
 
 
 @pytest.mark.parametrize(
@@ -236,7 +265,7 @@ def test_the_node_has_no_combinational_loop(tmp_path: Path) -> None:
         ("firm_rtps_endpoint", "READERS", 9, "0 to 8"),
         ("firm_rtps_endpoint", "WRITERS", 10, "1 to 9"),
         ("firm_rtps_history", "WRITERS", 9, "1 to 8"),
-        ("firm_rtps_history", "SAMPLE", 48, "powers of two, 2 to 1024"),
+        ("firm_rtps_history", "SAMPLE", 48, "powers of two, 2 to 65536"),
         ("firm_rtps_history", "SLOTS", 512, "powers of two, 2 to 256"),
         ("firm_rtps_readers", "READERS", 9, "0 to 8"),
         ("firm_rtps_readers", "FIRST", 256, "0 to 256-READERS"),

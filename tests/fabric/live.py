@@ -7,8 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -53,6 +53,20 @@ class Lab:
         assert board.stdout
         assert board.stdout.readline() == _BOARD
         return board
+
+    @contextmanager
+    def lossy(self, percent: int, seed: int) -> Iterator[None]:
+        """A line between board and switch that loses so many frames each way."""
+        self.switch.run("ip", "link", "set", "tap0", "nomaster")
+        words = [sys.executable, str(HERE / "lossy_line.py"), "line", "tap0", str(percent), str(seed)]
+        with subprocess.Popen(
+            self.switch.command(*words), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as line:
+            assert line.stdin and line.stdout
+            assert line.stdout.readline() == "ready\n"
+            self.switch.run("ip", "link", "set", "line", "master", "switch", "up")
+            yield
+            line.stdin.close()
 
     def members(self) -> list[tuple[str, str]]:
         """Port and group of each membership that the switch knows."""

@@ -390,7 +390,7 @@ class Participant:
     def _send_sample(self, sink: Sink, number: int, *, is_last: bool = True) -> None:
         payload = sink.history.samples[number]
         ends = sink.entity, sink.history.endpoint.entity, number
-        parts: list[Submessage] = [Data(*ends, payload)]
+        parts: list[Submessage] = [Data(*ends, _padded(payload))]
         if len(payload) > FRAGMENT_BYTES:
             count = -(-len(payload) // FRAGMENT_BYTES)
             parts = [_fragment(ends, payload, place) for place in range(1, count + 1)]
@@ -715,9 +715,12 @@ class Participant:
                 sink.address,
                 Gap(sink.entity, sink.history.endpoint.entity, gone[0], Numbers(sink.first)),
             )
-        for number in wanted:
-            if number >= sink.first:
-                self._send_sample(sink, number, is_last=number == wanted[-1])
+        kept = [number for number in wanted if number >= sink.first]
+        # Several samples in fragments might be too many for a reader, which asks for the next one after the heartbeat.
+        long = [place for place, number in enumerate(kept, 1) if len(sink.history.samples[number]) > FRAGMENT_BYTES]
+        kept = kept[: long[0]] if long else kept
+        for number in kept:
+            self._send_sample(sink, number, is_last=number == kept[-1])
         has_news = not was_heard and sink.is_heard and sink.is_behind
         if not wanted and (has_news or not item.is_final):
             self._send_heartbeat(sink)
@@ -725,9 +728,12 @@ class Participant:
     def _asked_for_fragments(self, sink: Sink, item: NackFrag) -> None:
         payload = sink.history.samples[item.number]
         ends = sink.entity, sink.history.endpoint.entity, item.number
-        for place in item.missing:
-            if 1 <= place <= -(-len(payload) // FRAGMENT_BYTES) and len(payload) > FRAGMENT_BYTES:
-                self._send_to(sink.peer, sink.address, _fragment(ends, payload, place))
+        count = -(-len(payload) // FRAGMENT_BYTES)
+        wanted = [place for place in item.missing if 1 <= place <= count] if count > 1 else []
+        for place in wanted:
+            self._send_to(sink.peer, sink.address, _fragment(ends, payload, place))
+        if wanted:
+            self._send_heartbeat(sink)
 
 
 def _slot(item: Peer | Source | Sink) -> int:
@@ -752,10 +758,16 @@ def _ours(item: Source | Sink) -> Endpoint:
     return item.endpoint if isinstance(item, Source) else item.history.endpoint
 
 
+def _padded(payload: bytes) -> bytes:
+    """With zeros up to a multiple of four bytes, as all submessages have."""
+    return payload + bytes(-len(payload) % 4)
+
+
 def _fragment(ends: tuple[bytes, bytes, int], payload: bytes, place: int) -> DataFrag:
     """The fragment at a place, from 1."""
     start = (place - 1) * FRAGMENT_BYTES
-    return DataFrag(*ends, place, 1, FRAGMENT_BYTES, len(payload), payload[start : start + FRAGMENT_BYTES])
+    part = _padded(payload[start : start + FRAGMENT_BYTES])
+    return DataFrag(*ends, place, 1, FRAGMENT_BYTES, len(payload), part)
 
 
 def _type_hash(facts: ParameterList) -> str:

@@ -91,8 +91,11 @@ class Process:
         """Wait for its end, whatever it prints till then."""
         return self._process.wait()
 
+    def send_signal(self, number: signal.Signals) -> None:
+        self._process.send_signal(number)
+
     def kill(self) -> None:
-        self._process.send_signal(signal.SIGKILL)
+        self.send_signal(signal.SIGKILL)
         self._process.wait()
 
 

@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from fusesoc_firm.netlist.translation import Translation, find_loops, translate
 from fusesoc_firm.request.request import Request
@@ -80,10 +81,17 @@ def netlist(
     return output
 
 
-def loops(top: str, folder: Path, work: Sequence[Path], firm: Sequence[Path] = ()) -> list[str]:
+def loops(
+    top: str,
+    folder: Path,
+    work: Sequence[Path],
+    firm: Sequence[Path] = (),
+    generics: Mapping[str, Generic] = MappingProxyType({}),
+) -> list[str]:
     """The combinational loops of the entity `top`, a sentence for each. Raises `NetlistError`."""
     libraries = {"firm": list(map(str, firm)), "work": list(map(str, work))}
-    return find_loops(Translation(top, "", libraries, {}), folder / f"{top}.ghdl")
+    given = {name: str(value) for name, value in generics.items()}
+    return find_loops(Translation(top, "", libraries, given), folder / f"{top}.ghdl")
 
 
 def build(request: Request, folder: Path, *cores: str) -> Icarus:

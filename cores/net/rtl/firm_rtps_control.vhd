@@ -10,9 +10,10 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_control is
   generic (
-    ENDPOINTS : integer := 2; -- of the node, 1 to 24
-    SOURCES   : integer := 8; -- matched writers of peers, 1 to 64
-    SINKS     : integer := 16 -- matched readers of peers, 1 to 128
+    ENDPOINTS : integer := 2;  -- of the node, 1 to 24
+    SOURCES   : integer := 8;  -- matched writers of peers, 1 to 64
+    SINKS     : integer := 16; -- matched readers of peers, 1 to 128
+    PARTED    : boolean := false -- samples may be sent in fragments
   );
   port (
     clk   : in std_logic;
@@ -65,6 +66,13 @@ entity firm_rtps_control is
     has_sample  : in  std_logic;
     writer      : in  std_logic_vector(2 downto 0);
     is_done     : out std_logic;
+    -- Of the sample that is looked at, and of its fragment.
+    looks        : out std_logic;
+    chooses      : out std_logic;
+    sample_bytes : in  unsigned(RTPS_SAMPLE_BITS-1 downto 0);
+    is_long      : in  std_logic;
+    is_last      : in  std_logic;
+    is_beyond    : in  std_logic;
 
     -- Of firm_rtps_sender; `slot_writer` is the writer whose packet is prepared.
     prepare_valid     : out std_logic;
@@ -72,6 +80,7 @@ entity firm_rtps_control is
     send_valid        : out std_logic;
     waits             : in  std_logic;
     is_started        : in  std_logic;
+    is_new_long       : in  std_logic;
 
     -- To firm_packet_builder.
     build_field_valid   : out std_logic;
@@ -92,8 +101,18 @@ end entity firm_rtps_control;
 architecture rtl of firm_rtps_control is
 
   constant MOST_ENDPOINTS : positive := 24;
-  -- The program is held while a packet leaves: more milliseconds than these are lost.
-  constant TICK_BITS      : positive := 8;
+
+  -- The program is held while a packet leaves, and takes no milliseconds while it sends a sample in fragments.
+  function tick_bits_of(has_fragments : boolean) return positive is
+  begin
+    if has_fragments then
+      return 13;
+    end if;
+    return 8;
+  end function tick_bits_of;
+
+  -- More milliseconds than these are lost.
+  constant TICK_BITS      : positive := tick_bits_of(PARTED);
   constant MOST_TICKS     : positive := 2**TICK_BITS-1;
   constant MOST_SOURCES   : positive := 64;
   constant MOST_SINKS     : positive := 128;
@@ -115,8 +134,11 @@ architecture rtl of firm_rtps_control is
   constant AT_SINKS     : address_t := x"b6";
   constant AT_BANK      : address_t := x"b7";  -- of the fields that are written
   constant AT_PREPARED  : address_t := x"b8";  -- the packet of this writer's next sample
+  constant AT_LOOK      : address_t := x"b9";  -- the slot of the sample that is looked at
+  constant AT_FRAGMENT  : address_t := x"ba";  -- of this sample, from 0 on
   -- Words that are read, from x"a0" on; of the last one, the bytes are the early sample's source, the writer of the
-  -- sample to send, whether numbers are large, and whether the packet of the sample was prepared.
+  -- sample to send, whether numbers are large, and facts about samples. After them comes the size of the sample that is
+  -- looked at.
   constant WORD_OF_FACTS  : std_logic_vector(1 downto 0) := "00";
   constant WORD_OF_ENTITY : std_logic_vector(1 downto 0) := "01";
   constant WORD_OF_EARLY  : std_logic_vector(1 downto 0) := "10";
@@ -132,6 +154,7 @@ architecture rtl of firm_rtps_control is
   signal hold          : std_logic;
   signal padded        : std_logic_vector(MOST_ENDPOINTS-1 downto 0);
   signal facts         : std_logic_vector(7 downto 0);
+  signal sample_facts  : std_logic_vector(7 downto 0);
   signal word          : std_logic_vector(31 downto 0);
 
   -- What is written, unless everything waits.
@@ -151,6 +174,8 @@ architecture rtl of firm_rtps_control is
   signal at_sinks_r   : std_logic;
   signal at_bank_r    : std_logic;
   signal at_prepare_r : std_logic;
+  signal at_look_r    : std_logic;
+  signal at_part_r    : std_logic;
   signal builds_r     : std_logic;  -- one of the builder's, or of the payload's
 
   signal ticks_r   : unsigned(TICK_BITS-1 downto 0);  -- that the program has not taken
@@ -245,9 +270,14 @@ begin
         at_sinks_r   <= is_at(coming, next_address, AT_SINKS);
         at_bank_r    <= is_at(coming, next_address, AT_BANK);
         at_prepare_r <= is_at(coming, next_address, AT_PREPARED);
+        at_look_r    <= is_at(coming, next_address, AT_LOOK);
+        at_part_r    <= is_at(coming, next_address, AT_FRAGMENT);
         builds_r     <= coming and not next_address(7);
         if next_address = AT_SLOT or next_address = AT_NEXT_SLOT or next_address = AT_START
            or next_address = AT_PREPARED then
+          builds_r <= coming;
+        end if;
+        if PARTED and (next_address = AT_LOOK or next_address = AT_FRAGMENT) then
           builds_r <= coming;
         end if;
       end if;
@@ -268,6 +298,8 @@ begin
         at_sinks_r   <= '0';
         at_bank_r    <= '0';
         at_prepare_r <= '0';
+        at_look_r    <= '0';
+        at_part_r    <= '0';
         builds_r     <= '0';
       end if;
     end if;
@@ -328,6 +360,8 @@ begin
   is_done     <= at_taken_r and data(2);
   slot_valid  <= at_next_r and not waits;
   slot_writer <= writer_r;
+  looks       <= at_look_r and not waits;
+  chooses     <= at_part_r and not waits;
 
   prepare_valid     <= at_prepare_r and not waits;
   chosen_slot_valid <= at_slot_r and not waits;
@@ -358,18 +392,22 @@ begin
 
   facts <= has_lease & is_gone & has_default & has_metatraffic & has_unicast & is_transient & is_known & is_reliable;
 
+  sample_facts <= "000" & is_new_long & is_beyond & is_last & is_long & is_started;
+
   -- Entities have their first byte highest.
-  choose_word : process (read_address, facts, padded, entity_id, early_number, is_started, is_large, writer,
-                         early_source)
+  choose_word : process (read_address, facts, padded, entity_id, early_number, sample_facts, is_large, writer,
+                         early_source, sample_bytes)
   begin
-    if read_address(3 downto 2) = WORD_OF_FACTS then
+    if PARTED and read_address(4) = '1' then
+      word <= std_logic_vector(resize(sample_bytes, 32));
+    elsif read_address(3 downto 2) = WORD_OF_FACTS then
       word <= facts & padded;
     elsif read_address(3 downto 2) = WORD_OF_ENTITY then
       word <= entity_id(7 downto 0) & entity_id(15 downto 8) & entity_id(23 downto 16) & entity_id(31 downto 24);
     elsif read_address(3 downto 2) = WORD_OF_EARLY then
       word <= early_number;
     else
-      word <= "0000000" & is_started & "0000000" & is_large & "00000" & writer & "00" & early_source;
+      word <= sample_facts & "0000000" & is_large & "00000" & writer & "00" & early_source;
     end if;
   end process choose_word;
 

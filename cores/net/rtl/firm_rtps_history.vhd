@@ -2,18 +2,20 @@
 -- Holds the last samples of a node's writers: takes frames `id | length | payload`, each into a slot of its writer,
 -- and gives the payload of a slot to firm_packet_builder as often as it is asked for. Which slots are whose is in the
 -- program of firm_rtps_sequencer, which tells where the next sample of each writer goes. The slot after the last one
--- is not among those that may be asked for, so that a sample can come while another one leaves.
+-- is not among those that may be asked for, so that a sample can come while another one leaves. Samples of more than
+-- 1344 bytes leave in fragments, of which it shows the one that the program chooses.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_history is
   generic (
     WRITERS : integer := 1;  -- that send frames, 1 to 8
-    SAMPLE  : integer := 64; -- bytes of a slot, a power of two, 2 to 1024
-    SLOTS   : integer := 16  -- a power of two, 2 to 256
+    SAMPLE  : integer := 64; -- bytes of a slot, a power of two, 2 to 65536
+    SLOTS   : integer := 16  -- a power of two, 2 to 256; SAMPLE*SLOTS may be 1048576
   );
   port (
     clk   : in std_logic;
@@ -34,10 +36,21 @@ entity firm_rtps_history is
     -- A sample of this writer comes, and has come from the next cycle on. The next one is not taken before `is_done`.
     -- After a reset it is as if one had come: the program takes it when it has written the slots of all writers, so
     -- that none comes before.
-    comes      : out std_logic;
-    has_sample : out std_logic;
-    writer     : out std_logic_vector(2 downto 0);
-    is_done    : in  std_logic;
+    comes       : out std_logic;
+    is_new_long : out std_logic;  -- it needs fragments
+    has_sample  : out std_logic;
+    writer      : out std_logic_vector(2 downto 0);
+    is_done     : in  std_logic;
+
+    -- The slot whose sample is sent next, unless it is the last one that has come; and which fragment of it, from 0 on.
+    -- What follows of them is told by firm_rtps_fragment.
+    looks        : in  std_logic;
+    chooses      : in  std_logic;
+    choice       : in  std_logic_vector(7 downto 0);
+    sample_bytes : out unsigned(RTPS_SAMPLE_BITS-1 downto 0);
+    is_long      : out std_logic;
+    is_last      : out std_logic;
+    is_beyond    : out std_logic;
 
     -- Shows the payload of a slot, or of the last sample that has come, and its size, from two cycles after `shows` on.
     shows         : in  std_logic;
@@ -54,11 +67,13 @@ end entity firm_rtps_history;
 architecture rtl of firm_rtps_history is
 
   constant MOST_WRITERS : positive := 8;
-  constant MOST_BYTES   : positive := 1024; -- a larger one may need several packets
+  constant MOST_BYTES   : positive := 65536;
   constant MOST_SLOTS   : positive := 256;
+  constant MOST_MEMORY  : positive := 1048576;
   constant HEAD_BYTES   : positive := 5;
   constant BYTE_BITS    : positive := clog2(SAMPLE);
   constant SLOT_BITS    : positive := clog2(SLOTS);
+  constant PARTED       : boolean  := SAMPLE > RTPS_FRAGMENT_BYTES;
 
   subtype slot_t is unsigned(SLOT_BITS-1 downto 0);
   type bytes_t is array (natural range 0 to SLOTS*SAMPLE-1) of std_logic_vector(7 downto 0);
@@ -85,10 +100,17 @@ architecture rtl of firm_rtps_history is
   signal ends      : std_logic;
 
   -- The payload that leaves.
-  signal slot_r    : slot_t := (others => '0');
-  signal place_r   : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
-  signal shows_r   : std_logic := '0';
-  signal byte_r    : std_logic_vector(7 downto 0) := (others => '0');
+  signal slot_r  : slot_t := (others => '0');
+  signal shown_r : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
+  signal place_r : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
+  signal shows_r : std_logic := '0';
+  signal byte_r  : std_logic_vector(7 downto 0) := (others => '0');
+
+  -- The fragment that the program chose.
+  signal size   : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- of the sample in the slot
+  signal start  : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- its first byte
+  signal part   : unsigned(10 downto 0);                  -- its bytes
+  signal part_r : std_logic := '0';                       -- it is shown
 
 begin
 
@@ -102,6 +124,10 @@ begin
   assert SLOTS >= 2 and SLOTS <= MOST_SLOTS and 2**clog2(SLOTS) = SLOTS
     report "firm_rtps_history: SLOTS is " & integer'image(SLOTS) & "; legal: powers of two, 2 to "
            & integer'image(MOST_SLOTS)
+    severity failure;
+  assert SAMPLE <= MOST_MEMORY/SLOTS
+    report "firm_rtps_history: SAMPLE is " & integer'image(SAMPLE) & " with " & integer'image(SLOTS)
+           & " SLOTS; legal: up to " & integer'image(MOST_MEMORY) & " bytes"
     severity failure;
 
   -- ------------------------------------------------------------------ frames
@@ -180,22 +206,65 @@ begin
   read_payload : process (clk)
   begin
     if rising_edge(clk) then
-      shows_r       <= shows;
-      payload_bytes <= std_logic_vector(resize(sizes(to_integer(slot_r)), 16));
+      shows_r <= shows;
+      shown_r <= sizes(to_integer(slot_r));
       if shows_r = '1' or m_axis_tready = '1' then
         byte_r  <= bytes(to_integer(slot_r & place_r));
         place_r <= place_r + 1;
       end if;
       if shows = '1' then
         slot_r  <= unsigned(slot(SLOT_BITS-1 downto 0));
-        place_r <= (others => '0');
+        place_r <= resize(start, BYTE_BITS);
+        part_r  <= '1';
         if shows_new = '1' then
-          slot_r <= next_slot;
+          slot_r  <= next_slot;
+          place_r <= (others => '0');
+          part_r  <= '0';
         end if;
+      elsif PARTED and looks = '1' then
+        slot_r <= unsigned(choice(SLOT_BITS-1 downto 0));
       end if;
     end if;
   end process read_payload;
 
   m_axis_tdata <= byte_r;
+
+  with_fragments : if PARTED generate
+
+    u_fragment : entity firm.firm_rtps_fragment
+      port map (
+        clk          => clk,
+        looks        => looks,
+        size         => size,
+        number_valid => chooses,
+        number       => choice(5 downto 0),
+        sample_bytes => sample_bytes,
+        is_long      => is_long,
+        start        => start,
+        bytes        => part,
+        is_last      => is_last,
+        is_beyond    => is_beyond
+      );
+
+    size          <= resize(shown_r, RTPS_SAMPLE_BITS);
+    is_new_long   <= '1' when size_r >= RTPS_FRAGMENT_BYTES else '0';
+    payload_bytes <= std_logic_vector(resize(part, 16)) when part_r = '1' else
+                     std_logic_vector(resize(shown_r, 16));
+
+  end generate with_fragments;
+
+  without_fragments : if not PARTED generate
+
+    size          <= (others => '0');
+    start         <= (others => '0');
+    part          <= (others => '0');
+    sample_bytes  <= (others => '0');
+    is_long       <= '0';
+    is_last       <= '0';
+    is_beyond     <= '0';
+    is_new_long   <= '0';
+    payload_bytes <= std_logic_vector(resize(shown_r, 16));
+
+  end generate without_fragments;
 
 end architecture rtl;

@@ -3,6 +3,7 @@
 -- and the other way round. It announces itself, finds its peers, and matches their readers and writers with its own.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
 use firm.firm_rtps_pkg.all;
@@ -13,7 +14,7 @@ entity firm_rtps_node is
     READERS : integer := 1;    -- 0 to 8
     SOURCES : integer := 8;    -- matched writers of peers, 1 to 64
     SINKS   : integer := 16;   -- matched readers of peers, 1 to 128
-    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 1024
+    SAMPLE  : integer := 64;   -- bytes of the longest payload that is sent, a power of two, 2 to 65536
     SLOTS   : integer := 16;   -- for the last samples of all writers, a power of two, 2 to 256
     DEPTH   : integer := 2048; -- bytes of waiting discovery, a power of two, 4 to 65536
     BYTES   : integer := 2048; -- of waiting payloads, a power of two, 4 to 131072
@@ -96,6 +97,7 @@ architecture rtl of firm_rtps_node is
 
   constant FIRST_READER : positive := 2;  -- 1 is the writer of ros_discovery_info
   constant ENDPOINTS    : positive := READERS+WRITERS;
+  constant PARTED       : boolean  := SAMPLE > RTPS_FRAGMENT_BYTES;
 
   signal field_valid   : std_logic;
   signal field_address : std_logic_vector(RECORD_BITS-1 downto 0);
@@ -164,6 +166,14 @@ architecture rtl of firm_rtps_node is
   signal slot_valid    : std_logic;
   signal slot_writer   : std_logic_vector(2 downto 0);
   signal comes         : std_logic;
+  signal comes_long    : std_logic;
+  signal is_new_long   : std_logic;
+  signal looks         : std_logic;
+  signal chooses       : std_logic;
+  signal sample_bytes  : unsigned(RTPS_SAMPLE_BITS-1 downto 0);
+  signal is_long       : std_logic;
+  signal is_last_part  : std_logic;
+  signal is_beyond     : std_logic;
   signal has_sample    : std_logic;
   signal sample_writer : std_logic_vector(2 downto 0);  -- of the sample of firm_rtps_history
   signal is_done       : std_logic;
@@ -394,9 +404,17 @@ begin
       slot_writer   => slot_writer,
       slot_next     => write_data,
       comes         => comes,
+      is_new_long   => comes_long,
       has_sample    => has_sample,
       writer        => sample_writer,
       is_done       => is_done,
+      looks         => looks,
+      chooses       => chooses,
+      choice        => write_data,
+      sample_bytes  => sample_bytes,
+      is_long       => is_long,
+      is_last       => is_last_part,
+      is_beyond     => is_beyond,
       shows         => shows,
       shows_new     => shows_new,
       slot          => slot,
@@ -420,8 +438,10 @@ begin
       data              => write_data,
       waits             => waits,
       comes             => comes,
+      is_new_long       => comes_long,
       writer            => sample_writer,
       is_started        => is_started,
+      is_long           => is_new_long,
       shows             => shows,
       shows_new         => shows_new,
       slot              => slot,
@@ -436,7 +456,8 @@ begin
     generic map (
       ENDPOINTS => ENDPOINTS,
       SOURCES   => SOURCES,
-      SINKS     => SINKS
+      SINKS     => SINKS,
+      PARTED    => PARTED
     )
     port map (
       clk                 => clk,
@@ -481,11 +502,18 @@ begin
       has_sample          => has_sample,
       writer              => sample_writer,
       is_done             => is_done,
+      looks               => looks,
+      chooses             => chooses,
+      sample_bytes        => sample_bytes,
+      is_long             => is_long,
+      is_last             => is_last_part,
+      is_beyond           => is_beyond,
       prepare_valid       => prepare_valid,
       chosen_slot_valid   => chosen_slot_valid,
       send_valid          => send_valid,
       waits               => waits,
       is_started          => is_started,
+      is_new_long         => is_new_long,
       build_field_valid   => build_field_valid,
       build_field_bank    => build_field_bank,
       build_field_address => build_field_address,

@@ -83,6 +83,10 @@ package firm_rtps_pkg is
 
   constant MOST_SET_BITS : positive := 256;
 
+  -- Bytes of a sample in a packet, and in each fragment of a longer one but the last.
+  constant RTPS_FRAGMENT_BYTES : positive := 1344;
+  constant RTPS_SAMPLE_BITS    : positive := 17;  -- of the size of a sample
+
   -- Banks of the builder's fields: one for each writer with frames, and one for all other packets. These are up to
   -- nine, so their numbers have four bits; 8 to 14 are not used.
   constant RTPS_BANK_BITS : positive := 4;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Starts the packets of a node: those that the program asks for, and that of a new sample at once, if the program has
--- prepared it. Such a packet has a bank of fields for itself, with the number of the writer, so it needs the sample
--- only. Fields of a bank may be changed while no packet is prepared in it.
+-- prepared it and the sample needs no fragments. Such a packet has a bank of fields for itself, with the number of the
+-- writer, so it needs the sample only. Fields of a bank may be changed while no packet is prepared in it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -24,12 +24,14 @@ entity firm_rtps_sender is
     waits             : out std_logic;  -- a packet leaves, or is about to
 
     -- Of firm_rtps_history: a sample comes, and is there from the next cycle on.
-    comes      : in  std_logic;
-    writer     : in  std_logic_vector(2 downto 0);
-    is_started : out std_logic;  -- the packet of the last sample was prepared
-    shows      : out std_logic;
-    shows_new  : out std_logic;  -- the last sample, and not that of `slot`
-    slot       : out std_logic_vector(7 downto 0);
+    comes       : in  std_logic;
+    is_new_long : in  std_logic;  -- with `comes`: it needs fragments
+    writer      : in  std_logic_vector(2 downto 0);
+    is_started  : out std_logic;  -- the packet of the last sample was prepared, and begins
+    is_long     : out std_logic;  -- the last sample needs fragments
+    shows       : out std_logic;
+    shows_new   : out std_logic;  -- the last sample, and not that of `slot`
+    slot        : out std_logic_vector(7 downto 0);
 
     -- To firm_packet_builder. `packet` is a number of fusesoc_firm.fabric.packets.
     start       : out std_logic;
@@ -51,6 +53,7 @@ architecture rtl of firm_rtps_sender is
   signal of_writer   : std_logic_vector(7 downto 0);
   signal is_prepared : std_logic;
   signal started_r   : std_logic;
+  signal long_r      : std_logic;
   signal sample_r    : std_logic;  -- a new sample's packet is to begin
   signal sample_is_r : std_logic_vector(7 downto 0) := (others => '0');
   signal asked_r     : std_logic;  -- the program's packet is to begin
@@ -63,7 +66,7 @@ architecture rtl of firm_rtps_sender is
 begin
 
   of_writer   <= prepared(to_integer(unsigned(writer)));
-  is_prepared <= '0' when of_writer = NO_PACKET else '1';
+  is_prepared <= '0' when of_writer = NO_PACKET else not is_new_long;
   begins      <= (sample_r or asked_r) and not is_busy;
 
   keep_prepared : process (clk)
@@ -80,6 +83,7 @@ begin
     if rising_edge(clk) then
       if comes = '1' then
         started_r   <= is_prepared;
+        long_r      <= is_new_long;
         sample_r    <= is_prepared;
         sample_is_r <= of_writer;
       elsif is_busy = '0' then
@@ -103,6 +107,7 @@ begin
       end if;
       if rst_n = '0' then
         started_r <= '0';
+        long_r    <= '0';
         sample_r  <= '0';
         asked_r   <= '0';
         chosen_r  <= '0';
@@ -113,6 +118,7 @@ begin
 
   waits       <= is_busy or sample_r or asked_r;
   is_started  <= started_r;
+  is_long     <= long_r;
   shows       <= begins;
   shows_new   <= sample_r;
   slot        <= slot_r;

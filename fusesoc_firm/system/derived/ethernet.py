@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
 from fusesoc_firm.frame.length import length_of
@@ -11,8 +11,8 @@ from fusesoc_firm.system.written.specification import Block, Project, Specificat
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 MOST_SUBSCRIBERS = MOST_PUBLISHERS = 8
-# Bytes of the longest payload: of a sample in one frame, of one that comes in several, and of a slot of the history.
-LONGEST_IN_FRAME, LONGEST_TAKEN, LONGEST_SENT = 1344, 65280, 1024
+# Bytes of the longest payload: of a sample in one frame, of one in several, and of one that is sent by default.
+LONGEST_IN_FRAME, LONGEST, LONGEST_SENT_BY_DEFAULT = 1344, 65280, 1024
 # Bytes of the headers beside a payload in a packet of IPv4, with further submessages before it.
 _HEADERS_BYTES = 256
 _LEAST_WAITING, _MOST_DISCOVERY = 4096, 32768
@@ -20,6 +20,8 @@ _LEAST_WAITING, _MOST_DISCOVERY = 4096, 32768
 LEAST_REASSEMBLED, _LEAST_ASSEMBLED = 2048, 1024
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
 MOST_DEPTH, MOST_SLOTS = 127, 256
+# Bytes of all of them.
+MOST_HISTORY = 1 << 20
 _SHORTEST_SLOT = 2
 # The frequencies of clk in MHz that the line of each PHY needs, and the hint about them.
 _CLOCKS = {
@@ -46,16 +48,15 @@ def check_ethernet(written: Specification, system: DerivedSystem, faults: Diagno
             place = blocks[items[most].block].name.source
             faults.error(f"{message}allows {most} {name}, not {len(items)}", place)
     for item in system.subscribers:
-        _check_size(item, blocks[item.block], LONGEST_TAKEN, faults)
+        _check_size(item, blocks[item.block], "take", faults)
     for item in system.publishers:
-        _check_size(item, blocks[item.block], LONGEST_SENT, faults)
+        _check_size(item, blocks[item.block], "send", faults)
     _check_history(system.publishers, blocks, message, faults)
 
 
 def slot_bytes(publishers: Iterable[Converter]) -> int:
     """Return the bytes of a slot, a power of two: the longest payload that a node sends fits in."""
-    longest = max(map(_longest, publishers), default=1)
-    return max(_SHORTEST_SLOT, 1 << (longest - 1).bit_length())
+    return max(_SHORTEST_SLOT, _power(max(map(_longest, publishers), default=1)))
 
 
 def reassembled_bytes(system: DerivedSystem) -> int:
@@ -83,6 +84,11 @@ def discovery_bytes(system: DerivedSystem) -> int:
     Peers announce all their endpoints in one packet, with whose payloads the fields of its submessages wait.
     """
     return min(_MOST_DISCOVERY, max(_LEAST_WAITING, 2 * reassembled_bytes(system)))
+
+
+def slot_count(used: int) -> int:
+    """Return the slots of a history of which so many are used, a power of two."""
+    return max(2, _power(used))
 
 
 def kept_of(quality: Quality) -> int:
@@ -129,9 +135,9 @@ def _check_clock(project: Project, phy: Phy, clock: Fraction | None, faults: Dia
 
 
 def _check_history(
-    publishers: Iterable[Converter], blocks: Mapping[str, Block], message: str, faults: Diagnostics
+    publishers: Sequence[Converter], blocks: Mapping[str, Block], message: str, faults: Diagnostics
 ) -> None:
-    """Note a publisher with too many kept messages, or else the first one for whose messages no slot is left."""
+    """Note a publisher with too many kept messages, the first one without slots, or too many bytes of all of them."""
     used = 0
     for item in publishers:
         block, kept = blocks[item.block], kept_of(item.quality)
@@ -144,6 +150,12 @@ def _check_history(
             text = f"{message}has {MOST_SLOTS} slots for the last messages; with '{item.block}', it needs {used}"
             hint = "give publishers a smaller 'depth' in 'qos': each needs a power of two of slots, more than its depth"
             faults.error(text, _place_of_depth(block), hint)
+    slots, size = slot_count(used), slot_bytes(publishers)
+    if slots <= MOST_SLOTS and slots * size > MOST_HISTORY:
+        block = blocks[max(publishers, key=_longest).block]
+        text = f"{message}has {MOST_HISTORY} bytes for the last messages; {slots} slots for those of '{block.name}'"
+        hint = "give publishers a smaller 'depth' in 'qos', or the longest messages a smaller 'maxLength'"
+        faults.error(f"{text} need {slots * size}", block.name.source, hint)
 
 
 def _place_of_depth(block: Block) -> SourceRef | None:
@@ -153,18 +165,20 @@ def _place_of_depth(block: Block) -> SourceRef | None:
     return block.qos.place("profile" if block.qos.profile and block.qos.depth is None else "depth")
 
 
-def _check_size(item: Converter, block: Block, longest: int, faults: Diagnostics) -> None:
-    """Note a converter whose payloads, or the payloads that its block asks for, are longer than `longest` bytes."""
-    direction = "send" if longest == LONGEST_SENT else "take"
-    reason = f"but the node can {direction} {longest} so far"
-    key = next((name for name in ("max_length", "buffer") if (getattr(block, name) or 0) > longest), None)
+def _check_size(item: Converter, block: Block, direction: str, faults: Diagnostics) -> None:
+    """Note a converter whose payloads, or those that its block asks for, are too long or longer than the default."""
+    reason = f"but the node can {direction} {LONGEST}"
+    key = next((name for name in ("max_length", "buffer") if (getattr(block, name) or 0) > LONGEST), None)
     if key:
         message = f"payloads of '{item.block}' have up to {getattr(block, key)} bytes, {reason}"
         faults.error(message, block.place(key))
         return
     least = item.frame.payload_bytes if item.frame.is_fixed_size else length_of(item.frame).minimum
-    if max(least, _longest(item)) > longest:
-        is_short = least <= longest
-        hint = f"add 'maxLength: {longest}' to the block" if is_short else "use a smaller message"
+    if max(least, _longest(item)) > LONGEST:
+        is_short = least <= LONGEST
+        hint = f"add 'maxLength: {LONGEST}' to the block" if is_short else "use a smaller message"
         size = _longest(item) if is_short else least
         faults.error(f"'{item.block}' has payloads of {size} bytes, {reason}", block.name.source, hint)
+    elif least > _longest(item):
+        text = f"'{item.block}' has payloads of {least} bytes and more, but without 'maxLength', {_longest(item)} fit"
+        faults.error(text, block.name.source, f"add 'maxLength' to the block, up to {LONGEST}")

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from fusesoc_firm.frame.length import DEFAULT_LONGEST, MOST_BYTES, bounded_payload, length_of
-from fusesoc_firm.system.derived.ethernet import LONGEST_IN_FRAME, LONGEST_SENT
+from fusesoc_firm.system.derived.ethernet import LONGEST_IN_FRAME, LONGEST_SENT_BY_DEFAULT
 from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -38,13 +38,13 @@ def with_longest_sent(
 
     By default, a publisher sends at most as much as the system's subscribers accept from the host, since a response
     often has the size of its cause. A node in the sockets of a chip sends no more than a link does, and one by Ethernet
-    no more than its memory holds.
+    no more than fits in a small memory.
     """
     _check_keys(blocks, publishers, faults)
     least = _LINK_DEFAULT if project.interconnect in CHIPS else DEFAULT_LONGEST
     default = max([least, *(item.max_length or 0 for item in subscribers if item.software is None)])
     if project.interconnect == ETHERNET:
-        default = LONGEST_SENT
+        default = LONGEST_SENT_BY_DEFAULT
     return tuple(
         _limited(item, blocks[item.block], default if item.software is None else MOST_BYTES, faults)
         if item.may_pause
