@@ -10,10 +10,9 @@ import select
 import socket
 import threading
 from pathlib import Path
-from types import TracebackType
 
 from fusesoc_firm.node.transport.simulator import Simulator, Taken
-from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError
 
 # The system takes this many bytes at once from the emulator, whose UART waits meanwhile.
 _MOST_BYTES = 64
@@ -23,7 +22,7 @@ _REST_CYCLES = 100_000
 _REST_SECONDS = 0.02
 
 
-class Line:
+class Line(Closing):
     """The line, which a thread of its own serves until it is closed.
 
     `error` is what ended it unasked. `moved` counts the bytes in both directions. `is_at_rest` if nothing has moved at
@@ -50,14 +49,6 @@ class Line:
         self._thread.join()
         self._listener.close()
         self._simulator.close()
-
-    def __enter__(self) -> Line:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _serve(self) -> None:
         try:

@@ -21,11 +21,10 @@ import struct
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from types import TracebackType
 
 from fusesoc_firm.node.transport.open_transport import device_of, open_transport
 from fusesoc_firm.node.transport.status_registers import AXI, open_registers_at
-from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError
+from fusesoc_firm.node.transport.transport import Burst, Closing, Transport, TransportError
 from fusesoc_firm.node.transport.udp import UDP, UdpStatus
 from fusesoc_firm.system.status_frames import answered
 
@@ -44,7 +43,7 @@ def served_names(system: str, address: str) -> tuple[str, ...]:
     return (f"{NODE}:{system}", *([device] if device else []))
 
 
-class StatusServer:
+class StatusServer(Closing):
     """Serves requests in a thread of its own, those of one peer at a time; `access` returns the answer to a request.
 
     A name that another node has, or that is too long, is reported and not served.
@@ -64,14 +63,6 @@ class StatusServer:
         self._thread.join()
         for item in (*self._listeners, self._stop, self._stopped):
             item.close()
-
-    def __enter__(self) -> StatusServer:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _serve(self) -> None:
         while self._stopped not in (ready := select.select([self._stopped, *self._listeners], [], [])[0]):
@@ -94,7 +85,7 @@ class StatusServer:
             peer.send(reply, socket.MSG_DONTWAIT)
 
 
-class NodeTransport:
+class NodeTransport(Closing):
     """A transport that a node has, for the frames of the status only."""
 
     def __init__(self, peer: socket.socket) -> None:
@@ -131,14 +122,6 @@ class NodeTransport:
     def close(self) -> None:
         """Close the connection to the node."""
         self._peer.close()
-
-    def __enter__(self) -> NodeTransport:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def open_status(address: str) -> Transport:

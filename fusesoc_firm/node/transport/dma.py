@@ -16,11 +16,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntFlag
-from types import TracebackType
 
 from fusesoc_firm.node.transport.abort_record import burst_of
 from fusesoc_firm.node.transport.dma_device import DMA_ALIGNMENT, DmaDevice
-from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError
 
 # The addresses of the first registers of the channels to and from the system; other registers are at offsets from them.
 TO_SYSTEM, FROM_SYSTEM = 0x00, 0x30
@@ -126,7 +125,7 @@ class _Ring:
         self._words[self._place(index) + word] = value
 
 
-class DmaTransport:
+class DmaTransport(Closing):
     """A transport over AXI DMA."""
 
     def __init__(self, device: DmaDevice, buffers: DmaBuffers | None = None, longest: int = 2**26) -> None:
@@ -207,14 +206,6 @@ class DmaTransport:
         self._device.end()
         with self._receiving, self._sending:
             self._reset()
-
-    def __enter__(self) -> DmaTransport:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _buffer_bytes(self) -> int:
         """Return the size of each buffer in bytes.

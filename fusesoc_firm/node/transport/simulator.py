@@ -29,10 +29,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import NoReturn
 
-from fusesoc_firm.node.transport.transport import Burst, TransportError, TransportResetError
+from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError, TransportResetError
 
 MOST_CYCLES = 2**31 - 1
 """The maximum number of cycles in one run, and of bytes in a frame."""
@@ -129,7 +128,7 @@ def _pipe() -> tuple[int, int]:
     return ends
 
 
-class Simulator:
+class Simulator(Closing):
     """A simulator in lock-step, which runs only on request and may be used by only one thread at a time.
 
     `cycle` is the number of cycles run so far; the last `quiet` of these cycles had no beat in either direction.
@@ -262,14 +261,6 @@ class Simulator:
         text = os.pread(self._printed.fileno(), os.fstat(self._printed.fileno()).st_size, 0)
         return "\n".join(text.decode(errors="replace").splitlines()[-_SHOWN_LINES:])
 
-    def __enter__(self) -> Simulator:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def _write(self, data: bytes, *, is_last: bool = False) -> None:
         try:
             self._requests.write(data)
@@ -362,7 +353,7 @@ class Pace:
     restarts: int = 0
 
 
-class SimulatorTransport:
+class SimulatorTransport(Closing):
     """A transport to a simulator, which runs while a thread waits in `receive` or `send`.
 
     `send` starts a simulator at rest; the thread in `receive` runs it further. Without such a thread, one that waits in
@@ -449,14 +440,6 @@ class SimulatorTransport:
             self._changed.notify_all()
             self._changed.wait_for(lambda: not self._is_used)
             self._simulator.close()
-
-    def __enter__(self) -> SimulatorTransport:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def waiting_bytes(self) -> int:

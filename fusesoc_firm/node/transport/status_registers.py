@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 from collections import deque
 from pathlib import Path
-from types import TracebackType
 
 from fusesoc_firm.node.transport.dma_device import MappedRegisters, Registers, number_in
-from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError
 from fusesoc_firm.system.boards.overlay import STATUS_NAME
 from fusesoc_firm.system.status_frames import WRITE, answered, status_answer
 
@@ -19,7 +18,7 @@ _MAP_BYTES = 2**16
 _DEVICES = "sys/class/uio"
 
 
-class StatusRegisters:
+class StatusRegisters(Closing):
     """A transport that answers a request of the status at once; all other frames are dropped."""
 
     def __init__(self, registers: Registers) -> None:
@@ -58,14 +57,6 @@ class StatusRegisters:
 
     def close(self) -> None:
         """Do nothing, since the memory is unmapped with its last reference."""
-
-    def __enter__(self) -> StatusRegisters:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def open_registers(uio: str, root: Path = Path("/")) -> StatusRegisters:

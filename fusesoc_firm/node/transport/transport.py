@@ -9,9 +9,10 @@ A simulator's pipe, a UART and AXI DMA implement this interface. `../cpp/firm/tr
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, Self
 
 
 class TransportError(Exception):
@@ -39,6 +40,22 @@ class Burst:
     first_cycle: int | None = None
     last_cycle: int | None = None
     is_aborted: bool = False
+
+
+class Closing(ABC):
+    """An object that a `with` statement closes at its end."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the object."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 class Transport(Protocol):

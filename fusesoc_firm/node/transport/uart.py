@@ -18,10 +18,9 @@ import termios
 import threading
 import time
 from collections import deque
-from types import TracebackType
 
 from fusesoc_firm.node.transport.link_code import Counts, LinkDecoder, encode
-from fusesoc_firm.node.transport.transport import Burst, LostFrameError, TransportError
+from fusesoc_firm.node.transport.transport import Burst, Closing, LostFrameError, TransportError
 
 DEFAULT_BAUD = 1_000_000
 """The default of the hardware's generic BAUD; a board may set another one."""
@@ -29,7 +28,7 @@ DEFAULT_BAUD = 1_000_000
 _CHUNK_BYTES = 65536
 
 
-class UartTransport:
+class UartTransport(Closing):
     """A transport over a serial line."""
 
     def __init__(
@@ -100,14 +99,6 @@ class UartTransport:
         with self._receiving, self._sending:
             os.close(self._line)
             os.close(self._wake)
-
-    def __enter__(self) -> UartTransport:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _receive(self, timeout: float | None) -> Burst | None:
         end = None if timeout is None else time.monotonic() + timeout

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import socket
 import time
-from types import TracebackType
 
-from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError
 from fusesoc_firm.system.status_frames import answered, status_answer
 
 # The kind of the addresses of such nodes, and the port of firm_net_status.
@@ -21,7 +20,7 @@ _WORD_BYTES = 4
 _MOST_BYTES = 100
 
 
-class UdpStatus:
+class UdpStatus(Closing):
     """A transport to the status of the node at an IPv4 address."""
 
     def __init__(self, address: str) -> None:
@@ -84,14 +83,6 @@ class UdpStatus:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
-
-    def __enter__(self) -> UdpStatus:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _ask(self) -> None:
         try:
