@@ -101,7 +101,12 @@ def found(folder: Path, **texts: str) -> list[str]:
     return loops(files[-1].stem, folder, files)
 
 
-@pytest.mark.skipif(not (shutil.which("yosys") and shutil.which("verilator")), reason="no yosys or no verilator")
+needs_others = pytest.mark.skipif(
+    not (shutil.which("yosys") and shutil.which("verilator")), reason="no yosys or no verilator"
+)
+
+
+@needs_others
 @pytest.mark.parametrize("has_loop", [True, False])
 def test_yosys_and_verilator_find_a_loop_through_instances(tmp_path: Path, has_loop: bool) -> None:
     """The first stage's ready waits for the second's, which waits for a valid."""
@@ -128,9 +133,10 @@ def test_a_loop_of_signals_is_named(tmp_path: Path, statements: str) -> None:
         assert sentence.startswith(f"{tmp_path}/design.vhd:")
 
 
+@needs_others
 @pytest.mark.parametrize(("address", "has_loop"), [("w", False), ("v", True)])
 def test_a_memory_depends_on_the_address_of_each_port_alone(tmp_path: Path, address: str, has_loop: bool) -> None:
-    """The second port reads at what the first one shows, or at what it shows itself."""
+    """The second port reads at what the first one shows, or at what it shows itself; all searches tell it."""
     memory = "  type words_t is array (0 to 3) of std_logic_vector(7 downto 0);\n  signal words : words_t;\n"
     statements = f"""
   write : process (clk)
@@ -144,6 +150,8 @@ def test_a_memory_depends_on_the_address_of_each_port_alone(tmp_path: Path, addr
 """
     text = DESIGN.replace("  signal r    : std_logic;\n", f"  signal r    : std_logic;\n{memory}")
     assert bool(found(tmp_path, design=text.format(statements))) == has_loop
+    others = found_by_others("design", netlist("design", tmp_path, [tmp_path / "design.vhd"]))
+    assert [sentence.partition(":")[0] for sentence in others] == (["Yosys", "Verilator"] if has_loop else [])
 
 
 def test_the_ports_of_a_loop_through_instances_are_named(tmp_path: Path) -> None:
