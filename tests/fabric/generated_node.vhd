@@ -8,7 +8,7 @@ library firm;
 
 entity generated_node is
   generic (
-    CYCLES      : integer := 3000;
+    CYCLES      : integer := 3500;
     RESULT_FILE : string  := "sent.txt"
   );
 end entity generated_node;
