@@ -140,7 +140,9 @@ def _publish(participant: Participant, frame: bytes, results: Results, now: int,
     if frame[0] >= len(WRITTEN) or not 1 <= len(frame) - 5 <= longest:
         results.refused += 1
     else:
-        participant.publish(participant.node.writers[1 + frame[0]], frame[5:], now)
+        # A packet has a multiple of four bytes. Only the size in fragments is that of the sample.
+        padding = bytes(-len(frame[5:]) % 4) if len(frame) - 5 <= FRAGMENT_BYTES else b""
+        participant.publish(participant.node.writers[1 + frame[0]], frame[5:] + padding, now)
 
 
 def sent(frame: bytes) -> Sent:

@@ -126,16 +126,19 @@ def test_others_are_served_between_the_readers_of_a_sample() -> None:
         assert _parts(items) == dict.fromkeys(_readers(net), COUNT)
 
 
-def test_a_reader_that_asks_before_its_turn_gets_the_sample_once() -> None:
-    payload = _payload(random.Random(SEED), SAMPLE)
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_reader_that_asks_before_its_turn_gets_each_sample_once(number: int) -> None:
+    """The one before, or the one that is being sent to other readers."""
+    chance = random.Random(SEED)
     with _world() as world:
         net = _matched(world)
         readers = _readers(net)
-        asks = AckNack(readers[-1], NODE.writers[1].entity, Numbers.of([1], 1), 99)
-        items = _sent(net, _frame(payload), _from(net, asks, SOON_CYCLES))
-        order = list(_parts(items))
-        assert order.index(readers[-1]) <= 2
-        assert _parts(items) == dict.fromkeys(readers, COUNT)
+        _sent(net, _frame(_payload(chance, SAMPLE)))
+        asks = AckNack(readers[-1], NODE.writers[1].entity, Numbers.of([number], number), 99)
+        items = _sent(net, _frame(_payload(chance, SAMPLE)), _from(net, asks, SOON_CYCLES))
+        assert list(_parts(items)).index(readers[-1]) <= 2
+        parts = Counter((item.reader, item.number) for item in items if isinstance(item, DataFrag))
+        assert parts == {(readers[-1], number): COUNT} | {(reader, 2): COUNT for reader in readers}
 
 
 def test_readers_that_leave_get_no_more_and_the_next_sample_begins() -> None:

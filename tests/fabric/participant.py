@@ -390,7 +390,7 @@ class Participant:
     def _send_sample(self, sink: Sink, number: int, *, is_last: bool = True) -> None:
         payload = sink.history.samples[number]
         ends = sink.entity, sink.history.endpoint.entity, number
-        parts: list[Submessage] = [Data(*ends, _padded(payload))]
+        parts: list[Submessage] = [Data(*ends, payload)]
         if len(payload) > FRAGMENT_BYTES:
             count = -(-len(payload) // FRAGMENT_BYTES)
             parts = [_fragment(ends, payload, place) for place in range(1, count + 1)]
@@ -758,16 +758,11 @@ def _ours(item: Source | Sink) -> Endpoint:
     return item.endpoint if isinstance(item, Source) else item.history.endpoint
 
 
-def _padded(payload: bytes) -> bytes:
-    """With zeros up to a multiple of four bytes, as all submessages have."""
-    return payload + bytes(-len(payload) % 4)
-
-
 def _fragment(ends: tuple[bytes, bytes, int], payload: bytes, place: int) -> DataFrag:
     """The fragment at a place, from 1."""
     start = (place - 1) * FRAGMENT_BYTES
-    part = _padded(payload[start : start + FRAGMENT_BYTES])
-    return DataFrag(*ends, place, 1, FRAGMENT_BYTES, len(payload), part)
+    part = payload[start : start + FRAGMENT_BYTES]
+    return DataFrag(*ends, place, 1, FRAGMENT_BYTES, len(payload), part + bytes(-len(part) % 4))
 
 
 def _type_hash(facts: ParameterList) -> str:

@@ -47,7 +47,7 @@ def test_it_says_farewell_first(tmp_path: Path) -> None:
     library = Library("firm", tmp_path)
     library.analyse([*core_files(*NODE), *hardware(tmp_path), HERE / "playing_node.vhd"])
     (tmp_path / "line.txt").touch()
-    result = library.run("playing_node", {"LAST_CYCLES": 3000}, directory=tmp_path)
+    result = library.run("playing_node", {"LAST_CYCLES": 3500}, directory=tmp_path)
     assert result.exit_code == 0, result.output
     sent = bytes(map(int, (tmp_path / "sent.txt").read_text(encoding="ascii").split()))
     assert sent.startswith(PREAMBLE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import signal
 import string
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,7 +17,7 @@ from fusesoc_firm.fabric.packets import FRAGMENT_BYTES
 from tests.fabric.dissection import read_alike
 from tests.fabric.hosts import captured
 from tests.fabric.live import Lab, exchange, settled, skip_without_peers
-from tests.fabric.messages import DataFrag
+from tests.fabric.messages import DataFrag, NackFrag
 from tests.fabric.test_peers import Peer
 
 SEED = 20261127
@@ -28,6 +29,7 @@ SIZES = (1, 2, 3, 1335, 1336, 1337, 2679, 2680, 5001, 20_000, LONGEST - BESIDES)
 SETTLING = 20
 LOSS = 3  # percent of the frames each way
 TYPES = {"text": "String"}
+BOARD = rtps.VENDOR + bytes.fromhex("020000000009") + bytes(4)
 SPECIFICATION = f"""\
 project:
   name: board
@@ -99,20 +101,26 @@ def test_texts_of_all_sizes_come_back_to_both_peers(lab: Lab, tmp_path: Path) ->
         for size in SIZES:
             _exchange([other], [_text(chance, size)])
         slow.send_signal(signal.SIGCONT)
-    board = rtps.VENDOR + bytes.fromhex("020000000009")
-    sent = [message for _, message in read_alike(capture) if message.prefix.startswith(board)]
+    sent = [message for _, message in read_alike(capture) if message.prefix == BOARD]
     sizes = {item.size for message in sent for item in message.submessages if isinstance(item, DataFrag)}
     # A publisher pads its payloads to multiples of four bytes.
     wanted = {-(-(size + BESIDES) // 4) * 4 for size in SIZES}
     assert sizes == {size for size in wanted if size > FRAGMENT_BYTES}
 
 
-def test_what_gets_lost_is_sent_again(lab: Lab) -> None:
-    """Some fragments of most messages get lost, and are asked for."""
+def test_what_gets_lost_is_sent_again(lab: Lab, tmp_path: Path) -> None:
+    """Some fragments of most messages get lost, and peers ask for them alone."""
     print(f"seed {SEED}")
-    chance = random.Random(SEED)
-    with lab.lossy(LOSS, SEED):
+    chance, capture = random.Random(SEED), tmp_path / "capture.pcapng"
+    with lab.lossy(LOSS, SEED), captured(lab.switch, capture):
         lab.board()
         peers = _peers(lab)
         for size in (100, 5000, 1400, 20_000, 9000, 40_000):
             _exchange(peers, [_text(chance, size) for _ in peers])
+    asked = Counter(
+        message.prefix
+        for _, message in read_alike(capture)
+        if any(isinstance(item, NackFrag) for item in message.submessages)
+    )
+    print(asked)
+    assert len({*asked} - {BOARD}) == len(peers)

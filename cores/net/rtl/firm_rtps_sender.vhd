@@ -66,7 +66,7 @@ architecture rtl of firm_rtps_sender is
 begin
 
   of_writer   <= prepared(to_integer(unsigned(writer)));
-  is_prepared <= '0' when of_writer = NO_PACKET else not is_new_long;
+  is_prepared <= '0' when of_writer = NO_PACKET else '1';
   begins      <= (sample_r or asked_r) and not is_busy;
 
   keep_prepared : process (clk)
@@ -82,9 +82,9 @@ begin
   begin
     if rising_edge(clk) then
       if comes = '1' then
-        started_r   <= is_prepared;
+        started_r   <= is_prepared and not is_new_long;
         long_r      <= is_new_long;
-        sample_r    <= is_prepared;
+        sample_r    <= is_prepared and not is_new_long;
         sample_is_r <= of_writer;
       elsif is_busy = '0' then
         sample_r <= '0';
