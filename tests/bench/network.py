@@ -25,6 +25,7 @@ _CORES = (
     "net/responder",
     "net/reassembly",
     "net/presence",
+    "net/dhcp",
     "net/status",
     "net/udp",
     "net/rtps",
