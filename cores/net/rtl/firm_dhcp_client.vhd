@@ -543,10 +543,11 @@ begin
                   & (random_r(31) xor random_r(21) xor random_r(1) xor random_r(0) xor (s_axis_tvalid and s_axis_tdata(0)));
 
       if tick = '1' then
-        ms_r <= ms_r + 1;
         if ms_r = LAST_MS then
           ms_r     <= 0;
           second_r <= '1';
+        else
+          ms_r <= ms_r + 1;
         end if;
       end if;
       if is_taken = '1' and (state_r = CHECKING or bound_r = '1') then
