@@ -60,9 +60,14 @@ class Lab:
         shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         return [(item["port"], item["grp"]) for part in json.loads(shown) for item in part.get("mdb", [])]
 
-    def status(self) -> str:
+    def answers(self, address: str) -> bool:
+        """Whether an address answers a ping of the first host."""
+        command = self.hosts[0].command("busybox", "ping", "-c", "3", "-W", "2", address)
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+    def status(self, address: str = "192.0.2.9") -> str:
         """The status of the board."""
-        command = self.hosts[0].command(sys.executable, "-m", "fusesoc_firm.cli", "status", "udp:192.0.2.9")
+        command = self.hosts[0].command(sys.executable, "-m", "fusesoc_firm.cli", "status", f"udp:{address}")
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     def rclpy(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> Peer:

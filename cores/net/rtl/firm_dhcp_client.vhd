@@ -27,9 +27,9 @@ entity firm_dhcp_client is
     wants_announcement : out std_logic;
     is_sent            : in  std_logic;
 
-    -- For the builder: which byte, and the byte. Bits 6 to 5 of `own_select` are 0 for the byte that bits 4 to 0 select,
-    -- 1 for the same or 0 while the board has no address, 2 for the same or 0 in a message without a choice of server
-    -- and address, and 3 for the number of bits 4 to 0 with bit 4 repeated, or 0 likewise.
+    -- For the builder: which byte, and the byte. Bits 6 to 5 of `own_select` are 0 for the byte that bits 4 to 0
+    -- select, 1 for the same or 0 while the board has no address, 2 for the same or 0 in a message without a choice of
+    -- server and address, and 3 for the number of bits 4 to 0 with bit 4 repeated, or 0 likewise.
     own_select : in  std_logic_vector(6 downto 0);
     own_byte   : out std_logic_vector(7 downto 0);
 
@@ -48,7 +48,7 @@ architecture rtl of firm_dhcp_client is
   -- ------------------------------------------------------------------ places
 
   -- In a frame, from the header of IPv4 on; those before it are at the end of the memory.
-  constant PLACE_BITS : positive := 11;
+  constant PLACE_BITS     : positive := 11;
   subtype place_t is unsigned(PLACE_BITS-1 downto 0);
   constant FIRST_PLACE    : natural := 2**PLACE_BITS-14;
   constant SENDER_PLACE   : natural := 2**PLACE_BITS-8;
@@ -198,20 +198,20 @@ architecture rtl of firm_dhcp_client is
   constant EXPIRED_PASS  : natural := 9;
   constant TO_REBIND     : natural := 10;
   constant TO_RENEW      : natural := 11;
-  signal pass_r       : unsigned(3 downto 0) := (others => '0');
-  signal first_base   : time_t;
-  signal second_base  : time_t;
-  signal target_base  : time_t;
-  signal halves       : std_logic;  -- the first one is halved, from its highest byte on
-  signal offset       : unsigned(1 downto 0);
-  signal first        : unsigned(7 downto 0);
-  signal second       : unsigned(7 downto 0);
-  signal total        : unsigned(8 downto 0);
-  signal carry        : unsigned(0 downto 0);
-  signal carry_r      : unsigned(0 downto 0) := (others => '0');
-  signal writes_times : std_logic;
-  signal time_slot    : time_t;
-  signal time_data    : byte_t;
+  signal pass_r          : unsigned(3 downto 0) := (others => '0');
+  signal first_base      : time_t;
+  signal second_base     : time_t;
+  signal target_base     : time_t;
+  signal halves          : std_logic;  -- the first one is halved, from its highest byte on
+  signal offset          : unsigned(1 downto 0);
+  signal first           : unsigned(7 downto 0);
+  signal second          : unsigned(7 downto 0);
+  signal total           : unsigned(8 downto 0);
+  signal carry           : unsigned(0 downto 0);
+  signal carry_r         : unsigned(0 downto 0) := (others => '0');
+  signal writes_times    : std_logic;
+  signal time_slot       : time_t;
+  signal time_data       : byte_t;
 
   -- ------------------------------------------------------------------ time
 
@@ -235,8 +235,8 @@ architecture rtl of firm_dhcp_client is
   signal due_r      : std_logic;
   signal tries_r    : natural range 0 to LAST_TRY;
 
-  -- Four seconds, doubled with each try, and up to one second less or more: with up to one second added, the half of the
-  -- pauses that are shorter begins one second earlier.
+  -- Four seconds, doubled with each try, and up to one second less or more: up to one second is added, and half of the
+  -- pauses are one second shorter.
   function pause_of(tries : natural; is_longer : std_logic) return pause_t is
     variable pause : pause_t := (others => '0');
   begin
@@ -386,7 +386,7 @@ begin
                 to_unsigned(OFFERED_SLOT, 5) + count_r(1 downto 0) when step_r = ADDRESSING else
                 to_unsigned(SERVER_SLOT, 5) + count_r(1 downto 0);
   known_data <= random_r(7 downto 0) xor byte_of(mac, MAC_BYTES-4+to_integer(count_r(4 downto 3)))
-                  when step_r = MIXING else
+                when step_r = MIXING else
                 data_r;
   is_selecting <= '1' when state_r = SELECTING else '0';
   is_server    <= '1' when option_r = SERVER else '0';
@@ -449,7 +449,9 @@ begin
   offset <= count_r(1 downto 0) when halves = '1' else not count_r(1 downto 0);
   first  <= unsigned(times(to_integer(first_base + offset)));
   second <= x"00" when pass_r = ELAPSE_PASS else not unsigned(times(to_integer(second_base + offset)));
-  carry  <= carry_r when count_r(1 downto 0) /= 0 else "0" when halves = '1' else "1";
+  carry  <= carry_r when count_r(1 downto 0) /= 0 else
+            "0" when halves = '1' else
+            "1";
   total  <= resize(first, 9) + second + carry;
 
   writes_times <= not (pass_r(3) and (pass_r(1) or pass_r(0))) when step_r = COUNTING else
@@ -540,7 +542,8 @@ begin
 
       -- A register with a period of 2**32 - 1, disturbed by what the line brings.
       random_r <= random_r(30 downto 0)
-                  & (random_r(31) xor random_r(21) xor random_r(1) xor random_r(0) xor (s_axis_tvalid and s_axis_tdata(0)));
+                  & (random_r(31) xor random_r(21) xor random_r(1) xor random_r(0)
+                     xor (s_axis_tvalid and s_axis_tdata(0)));
 
       if tick = '1' then
         if ms_r = LAST_MS then
@@ -746,7 +749,6 @@ begin
             end if;
           end if;
         end if;
-
       end if;
 
       if is_over then

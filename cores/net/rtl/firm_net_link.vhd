@@ -98,7 +98,7 @@ entity firm_net_link is
     --   5  a publisher or subscriber of another node, of a topic of the board, has no room
     --   6  a message of another node has no room, or comes in fragments of RTPS and is too long or the node takes none
     --   7  a message to send is empty, too long or of no publisher
-    --   8  another host has the address of the board; with DHCP, also: its address has been refused, or its lease has ended
+    --   8  another host has the address of the board, or a board with DHCP has lost its address
     --   9  a packet of RTPS, or a list of parameters in it, is broken
     --  10  a publisher or subscriber of a topic of the board has another type, hash, quality, partition or encoding
     network_error : out std_logic_vector(10 downto 0)

@@ -1,14 +1,14 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A client of the board 02:00:00:00:00:02 between a line and a builder. A row of the file begins with what happens:
 --
---   0 aborted size bytes   a frame; 256 to 259 are the bytes of the client's number, 260 to 263 the same with other bits
+--   0 aborted size bytes   a frame; 256 to 259 are the bytes of the client's number, 260 to 263 their complements
 --   1 ms                   nothing, for some milliseconds
 --   2                      nothing, until the client has sent a packet
 --   3                      another host has the address
 --
--- A row of the results is a millisecond and an event: `checking`, `bound` or `lost`, or a packet, `message`, `renewal` or
--- `announcement`, with the bytes that the builder gets: the type, the current address, the option with the address, the
--- option with the server, the MAC address of the server, the address and the number.
+-- A row of the results is a millisecond and an event: `checking`, `bound` or `lost`, or a packet, `message`, `renewal`
+-- or `announcement`, with the bytes that the builder gets: the type, the current address, the option with the address,
+-- the option with the server, the MAC address of the server, the address and the number.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
