@@ -621,6 +621,8 @@ begin
           end if;
         end if;
       elsif step_r = MIXING then
+        -- What has come answers the number before.
+        got_r   <= '0';
         count_r <= count_r + 1;
         if count_r = 31 then
           step_r <= SENDING;

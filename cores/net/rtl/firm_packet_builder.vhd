@@ -66,9 +66,9 @@ architecture rtl of firm_packet_builder is
   constant FIELD_BITS   : positive := 7;
   constant HEADER_BYTES : positive := 20;  -- of IPv4
 
-  function prelude_words_of(has_own : boolean) return positive is
+  function prelude_words_of(is_longer : boolean) return positive is
   begin
-    if has_own then
+    if is_longer then
       return 12;
     end if;
     return 8;
