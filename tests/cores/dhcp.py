@@ -193,6 +193,9 @@ def _overloaded(chance: random.Random, message: Message, options: Options) -> Me
     """Some of the options are in the fields of names, at their ends or before."""
     cut = sorted(chance.randrange(len(options) + 1) for _ in range(2))
     parts = options[: cut[0]], options[cut[0] : cut[1]], options[cut[1] :]
+    if chance.random() < 0.4:
+        # It has no effect there.
+        parts[1].insert(0, (OVERLOAD, bytes([chance.randrange(4)])))
     first = listed(parts[0]) + listed([(OVERLOAD, bytes([chance.choice((1, 2, 3, 3, 3))]))]) + b"\xff"
     file, name = (_area(chance, part) for part in parts[1:])
     return replace(message, options=first, file=file.ljust(128, b"\0")[:128], name=name.ljust(64, b"\0")[:64])

@@ -35,6 +35,7 @@ architecture simulation of firm_dhcp_client_tb is
   constant STOP_CYCLES  : positive := 40;  -- until the user of an address rests
   constant OWN_BYTES    : positive := 31;
   constant NUMBER       : positive := 256; -- the first of the bytes that are the client's
+  constant MOST_MS      : positive := 150000;
 
   type selects_t is array (0 to OWN_BYTES-1) of natural range 0 to 127;
   constant SELECTS : selects_t := (
@@ -133,6 +134,7 @@ begin
     variable aborted  : integer;
     variable size     : integer;
     variable before   : natural;
+    variable start    : natural;
     variable random_1 : positive := SEED;
     variable random_2 : positive := 3;
     variable draw     : real;
@@ -185,7 +187,10 @@ begin
         wait_for(value * TICK_CYCLES);
       elsif what = 2 then
         before := sent;
+        start  := ms;
         while sent = before loop
+          assert ms < start + MOST_MS
+            report "no packet" severity failure;
           wait until rising_edge(clk);
         end loop;
       else
