@@ -36,7 +36,7 @@ TICK_CYCLES = 2
 NEXT, TAKEN = "2\n", "3\n"
 NOTHING = bytes(4)
 # Milliseconds in which a message is read, and what follows from it is sent.
-READING = 600
+READING = 1000
 # Rounding of a second, and of what is sent.
 SLACK = 1100
 

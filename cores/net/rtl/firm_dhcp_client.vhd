@@ -129,7 +129,9 @@ architecture rtl of firm_dhcp_client is
   -- STARTING: without an address, until the pause is over. The others wait for an offer, for the lease, for a host with
   -- the same address, for the time of renewal, for the server, and for any server.
   type state_t is (STARTING, SELECTING, REQUESTING, CHECKING, BOUND, RENEWING, REBOUND);
-  type step_t is (RESTING, MIXING, SENDING, SENDER, ADDRESSING, TAG, SIZE, VALUE, JUDGING, COUNTING);
+  type step_t is (
+    RESTING, MIXING, SENDING, SENDER, ADDRESSING, TAG, SIZE, VALUE, ENDING, JUDGING, COUNTING, DECIDING
+  );
 
   signal state_r : state_t;
   signal step_r  : step_t;
@@ -152,15 +154,17 @@ architecture rtl of firm_dhcp_client is
   signal comes     : std_logic;  -- it was a reply to this host
   signal got_r     : std_logic;  -- one waits to be read
 
-  signal data_r   : byte_t := (others => '0');  -- the byte at the place before
-  signal ready_r  : std_logic;                  -- it is the byte at the place
-  signal walks    : std_logic;  -- the frame is read
-  signal at_limit : std_logic;
-  signal area_r   : area_t;
-  signal writes_r : std_logic;  -- the message is read for the second time
-  signal option_r : option_t;
-  signal size_r   : unsigned(7 downto 0) := (others => '0');  -- bytes of the option to come
-  signal count_r  : unsigned(4 downto 0) := (others => '0');
+  signal shown_r   : byte_t := (others => '0');  -- the byte at the place before
+  signal data_r    : byte_t := (others => '0');  -- the same one cycle later, since the memory is slow
+  signal settles_r : std_logic;
+  signal ready_r   : std_logic;                  -- it is the byte at the place
+  signal walks     : std_logic;  -- the frame is read
+  signal at_limit  : std_logic;
+  signal area_r    : area_t;
+  signal writes_r  : std_logic;  -- the message is read for the second time
+  signal option_r  : option_t;
+  signal size_r    : unsigned(7 downto 0) := (others => '0');  -- bytes of the option to come
+  signal count_r   : unsigned(4 downto 0) := (others => '0');
 
   -- Of the message.
   signal type_r       : type_t := (others => '0');
@@ -218,6 +222,7 @@ architecture rtl of firm_dhcp_client is
   constant MS_BITS     : natural := 10;
   constant LAST_MS     : natural := 999;
   constant PAUSE_BITS  : natural := 7;
+  subtype tries_t is unsigned(2 downto 0);
   -- Pauses, in 1024 ms, to which up to 1023 ms are added.
   subtype pause_t is unsigned(PAUSE_BITS-1 downto 0);
   constant START_PAUSE    : natural := 1;
@@ -227,24 +232,27 @@ architecture rtl of firm_dhcp_client is
   constant LAST_TRY       : natural := 4;
   constant LAST_REQUEST   : natural := 2;
 
-  signal ms_r       : natural range 0 to LAST_MS;
-  signal second_r   : std_logic;  -- a second has passed
-  signal conflict_r : std_logic;
-  signal random_r   : std_logic_vector(31 downto 0) := (others => '1');
-  signal wait_r     : unsigned(PAUSE_BITS+MS_BITS-1 downto 0) := (others => '0');
-  signal due_r      : std_logic;
-  signal tries_r    : natural range 0 to LAST_TRY;
+  signal ms_r          : unsigned(MS_BITS-1 downto 0) := (others => '0');
+  signal second_r      : std_logic;  -- a second has passed
+  signal conflict_r    : std_logic;
+  signal random_r      : std_logic_vector(31 downto 0) := (others => '1');
+  signal wait_r        : unsigned(PAUSE_BITS+MS_BITS-1 downto 0) := (others => '0');
+  signal due_r         : std_logic;
+  signal pauses_r      : boolean;                       -- a pause begins
+  signal pause_r       : pause_t := (others => '0');  -- its length; 0 for that before the next try
+  signal tries_r       : tries_t := (others => '0');
 
   -- Four seconds, doubled with each try, and up to one second less or more: up to one second is added, and half of the
   -- pauses are one second shorter.
-  function pause_of(tries : natural; is_longer : std_logic) return pause_t is
-    variable pause : pause_t := (others => '0');
+  function pause_of(tries : tries_t; is_longer : std_logic) return pause_t is
+    variable pause : pause_t   := (others => '0');
+    variable below : std_logic := not is_longer;
   begin
-    for place in pause'range loop
-      if is_longer = '1' and place = tries+2 then
-        pause(place) := '1';
-      elsif is_longer = '0' and place < tries+2 then
-        pause(place) := '1';
+    for place in 0 to PAUSE_BITS-1 loop
+      pause(place) := below;
+      if tries+2 = place then
+        pause(place) := is_longer;
+        below        := '0';
       end if;
     end loop;
     return pause;
@@ -369,7 +377,8 @@ begin
       if writes = '1' then
         frame(to_integer(place_r)) <= s_axis_tdata;
       end if;
-      data_r <= frame(to_integer(place_r));
+      shown_r <= frame(to_integer(place_r));
+      data_r  <= shown_r;
     end if;
   end process access_frame;
 
@@ -385,8 +394,7 @@ begin
                 to_unsigned(SENDER_SLOT, 5) + count_r(2 downto 0) when step_r = SENDER else
                 to_unsigned(OFFERED_SLOT, 5) + count_r(1 downto 0) when step_r = ADDRESSING else
                 to_unsigned(SERVER_SLOT, 5) + count_r(1 downto 0);
-  known_data <= random_r(7 downto 0) xor byte_of(mac, MAC_BYTES-4+to_integer(count_r(4 downto 3)))
-                when step_r = MIXING else
+  known_data <= random_r(7 downto 0) when step_r = MIXING else
                 data_r;
   is_selecting <= '1' when state_r = SELECTING else '0';
   is_server    <= '1' when option_r = SERVER else '0';
@@ -495,8 +503,7 @@ begin
   wants_announcement <= '1' when step_r = SENDING and state_r = BOUND else '0';
 
   proceed : process (clk)
-    variable is_over : boolean;                      -- an area has been read
-    variable tries   : natural range 0 to LAST_TRY;
+    variable tries   : tries_t;
     variable pauses  : boolean;                      -- a pause begins
     variable length  : pause_t;
     variable jumps   : boolean;                      -- to another place
@@ -527,27 +534,27 @@ begin
       state_r <= state;
       step_r  <= MIXING;
       count_r <= (others => '0');
-      tries   := 0;
+      tries   := (others => '0');
       pauses  := true;
     end procedure ask;
 
   begin
     if rising_edge(clk) then
       is_lost <= '0';
-      is_over := false;
       pauses  := false;
       length  := (others => '0');
       target  := FIRST_PLACE;
       tries   := tries_r;
 
-      -- A register with a period of 2**32 - 1, disturbed by what the line brings.
+      -- A register with a period of 2**32 - 1, disturbed by what the line brings. Boards that start together differ by
+      -- their addresses.
       random_r <= random_r(30 downto 0)
                   & (random_r(31) xor random_r(21) xor random_r(1) xor random_r(0)
                      xor (s_axis_tvalid and s_axis_tdata(0)));
 
       if tick = '1' then
         if ms_r = LAST_MS then
-          ms_r     <= 0;
+          ms_r     <= (others => '0');
           second_r <= '1';
         else
           ms_r <= ms_r + 1;
@@ -562,10 +569,8 @@ begin
         got_r <= '1';
       end if;
 
-      ready_r <= walks;
       if walks = '1' and ready_r = '1' and at_limit = '0' then
         count_r <= count_r + 1;
-        ready_r <= '0';
       end if;
 
       if step_r = RESTING then
@@ -607,7 +612,7 @@ begin
             state_r <= BOUND;
             bound_r <= '1';
             step_r  <= SENDING;
-            tries   := 0;
+            tries   := (others => '0');
             pause(ANNOUNCE_PAUSE);
           elsif state_r = REQUESTING and tries_r = LAST_REQUEST then
             lose(START_PAUSE);
@@ -656,10 +661,10 @@ begin
         end if;
       elsif step_r = TAG then
         if at_limit = '1' then
-          is_over := true;
+          step_r <= ENDING;
         elsif ready_r = '1' then
           if unsigned(data_r) = END_TAG then
-            is_over := true;
+            step_r <= ENDING;
           elsif unsigned(data_r) /= PAD_TAG then
             step_r <= SIZE;
           end if;
@@ -707,6 +712,29 @@ begin
             has_rebind_r <= '1';
           end if;
         end if;
+      -- Of an area; then comes the next one.
+      elsif step_r = ENDING then
+        step_r  <= TAG;
+        if area_r = OPTIONS and overload_r(0) = '1' then
+          area_r  <= FILE_NAME;
+          jump(FILE_PLACE);
+        elsif area_r /= SERVER_NAME and overload_r(1) = '1' then
+          area_r  <= SERVER_NAME;
+          jump(NAME_PLACE);
+        elsif writes_r = '0' then
+          step_r <= JUDGING;
+        else
+          got_r   <= '0';
+          count_r <= (others => '0');
+          pass_r  <= to_unsigned(CLEAR_PASS, 4);
+          step_r  <= COUNTING;
+          if state_r = SELECTING then
+            state_r <= REQUESTING;
+            step_r  <= SENDING;
+            tries   := (others => '0');
+            pauses  := true;
+          end if;
+        end if;
       elsif step_r = JUDGING then
         writes_r <= '1';
         jump(SENDER_PLACE);
@@ -724,76 +752,60 @@ begin
       elsif step_r = COUNTING then
         count_r <= count_r + 1;
         if count_r(1 downto 0) = 3 then
-          count_r <= (others => '0');
-          pass_r  <= pass_r + 1;
-          if pass_r = CLEAR_PASS and has_renew_r = '1' then
-            pass_r <= to_unsigned(HALF_PASS, 4);
+          step_r <= DECIDING;
+        end if;
+      elsif step_r = DECIDING then
+        count_r <= (others => '0');
+        step_r  <= COUNTING;
+        pass_r  <= pass_r + 1;
+        if pass_r = CLEAR_PASS and has_renew_r = '1' then
+          pass_r <= to_unsigned(HALF_PASS, 4);
+        end if;
+        if pass_r = REBIND_PASS
+           or (has_rebind_r = '1' and (pass_r = RENEW_PASS or (pass_r = CLEAR_PASS and has_renew_r = '1'))) then
+          step_r <= RESTING;
+          if state_r = REQUESTING then
+            state_r <= CHECKING;
+            pause(CHECK_PAUSE);
+          else
+            state_r <= BOUND;
+            tries   := to_unsigned(LAST_TRY, tries'length);
           end if;
-          if pass_r = REBIND_PASS
-             or (has_rebind_r = '1' and (pass_r = RENEW_PASS or (pass_r = CLEAR_PASS and has_renew_r = '1'))) then
-            step_r <= RESTING;
-            if state_r = REQUESTING then
-              state_r <= CHECKING;
-              pause(CHECK_PAUSE);
-            else
-              state_r <= BOUND;
-              tries   := LAST_TRY;
-            end if;
-          elsif pass_r = EXPIRED_PASS and total(8) = '1' then
-            lose(START_PAUSE);
-            step_r <= RESTING;
-          elsif pass_r = TO_REBIND and total(8) = '1' and (state_r = BOUND or state_r = RENEWING) then
-            ask(REBOUND);
-          elsif pass_r = TO_RENEW then
-            step_r <= RESTING;
-            if total(8) = '1' and state_r = BOUND then
-              ask(RENEWING);
-            end if;
+        elsif pass_r = EXPIRED_PASS and carry_r = 1 then
+          lose(START_PAUSE);
+          step_r <= RESTING;
+        elsif pass_r = TO_REBIND and carry_r = 1 and (state_r = BOUND or state_r = RENEWING) then
+          ask(REBOUND);
+        elsif pass_r = TO_RENEW then
+          step_r <= RESTING;
+          if carry_r = 1 and state_r = BOUND then
+            ask(RENEWING);
           end if;
         end if;
       end if;
 
-      if is_over then
-        step_r  <= TAG;
-        ready_r <= '0';
-        if area_r = OPTIONS and overload_r(0) = '1' then
-          area_r  <= FILE_NAME;
-          jump(FILE_PLACE);
-        elsif area_r /= SERVER_NAME and overload_r(1) = '1' then
-          area_r  <= SERVER_NAME;
-          jump(NAME_PLACE);
-        elsif writes_r = '0' then
-          step_r <= JUDGING;
-        else
-          got_r   <= '0';
-          count_r <= (others => '0');
-          pass_r  <= to_unsigned(CLEAR_PASS, 4);
-          step_r  <= COUNTING;
-          if state_r = SELECTING then
-            state_r <= REQUESTING;
-            step_r  <= SENDING;
-            tries   := 0;
-            pauses  := true;
-          end if;
-        end if;
-      end if;
-
+      settles_r <= '0';
+      ready_r   <= '0';
       if jumps then
         place_r <= to_unsigned(target, PLACE_BITS);
       elsif writes = '1' or (walks = '1' and ready_r = '1' and at_limit = '0') then
         place_r <= place_r + 1;
+      else
+        settles_r <= walks;
+        ready_r   <= settles_r;
       end if;
 
-      tries_r <= tries;
-      due_r   <= '0';
-      if length = 0 then
-        length := pause_of(tries, random_r(MS_BITS));
-      end if;
-      if pauses then
-        wait_r <= length & unsigned(random_r(MS_BITS-1 downto 0));
-      elsif wait_r = 0 then
+      tries_r  <= tries;
+      pauses_r <= pauses;
+      pause_r  <= length;
+      due_r    <= '0';
+      if pauses_r and pause_r = 0 then
+        wait_r <= pause_of(tries_r, random_r(MS_BITS)) & unsigned(random_r(MS_BITS-1 downto 0));
+      elsif pauses_r then
+        wait_r <= pause_r & unsigned(random_r(MS_BITS-1 downto 0));
+      elsif wait_r = 0 and not pauses then
         due_r <= '1';
-      elsif tick = '1' then
+      elsif wait_r /= 0 and tick = '1' then
         wait_r <= wait_r - 1;
       end if;
 
@@ -803,11 +815,13 @@ begin
         bound_r    <= '0';
         is_lost    <= '0';
         got_r      <= '0';
-        ms_r       <= 0;
+        ms_r       <= (others => '0');
         second_r   <= '0';
         conflict_r <= '0';
         due_r      <= '0';
-        wait_r     <= to_unsigned(START_PAUSE*2**MS_BITS, PAUSE_BITS+MS_BITS);
+        pauses_r   <= false;
+        wait_r     <= to_unsigned(START_PAUSE, PAUSE_BITS) & unsigned(mac(MS_BITS-1 downto 0));
+        random_r   <= mac(30 downto 0) & '1';
       end if;
     end if;
   end process proceed;

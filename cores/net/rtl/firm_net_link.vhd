@@ -189,6 +189,7 @@ architecture rtl of firm_net_link is
   -- This host: constant without DHCP. Otherwise the node and all that has its address rest while it has none.
   signal own_address : std_logic_vector(31 downto 0);
   signal is_bound    : std_logic;
+  signal node_runs   : std_logic;
   signal node_rst_n  : std_logic;
   signal watch_rst_n : std_logic;  -- of the presence
   signal node_takes  : std_logic;  -- frames of the system
@@ -276,6 +277,7 @@ begin
   without_dhcp : if not HAS_DHCP generate
     own_address <= address;
     is_bound    <= '1';
+    node_runs   <= '1';
     node_rst_n  <= rst_n;
     watch_rst_n <= rst_n;
     node_takes  <= '1';
@@ -337,6 +339,7 @@ begin
 
     -- The node ends what it has begun, a packet and a frame in each direction. Then it is reset, and the next address
     -- finds a node that announces itself anew.
+    node_runs  <= runs_r;
     node_rst_n <= rst_n and runs_r;
     is_stopped <= not runs_r;
     rests      <= not (is_bound or is_busy or node_start or to_r or sample_tvalid or from_r);
@@ -705,7 +708,7 @@ begin
   -- nor change the fields and the payload that the node has prepared; so they may leave between any two packets.
   -- Before the node has an address, there is nothing to report.
   node_busy   <= is_busy or not is_bound;
-  node_starts <= node_start and node_rst_n;
+  node_starts <= node_start and node_runs;
   start       <= node_starts or ((wants_report or wants_probe or wants_dhcp) and not is_busy);
   is_sent     <= not node_starts and (wants_report or wants_probe) and not is_busy;
   dhcp_sent   <= not (node_starts or wants_report or wants_probe or is_busy);
