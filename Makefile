@@ -40,7 +40,7 @@ EMULATION_TOOLS := qemu-system-arm arm-none-eabi-gcc:gcc-arm-none-eabi \
   /usr/lib/arm-none-eabi/include/string.h:libnewlib-arm-none-eabi \
   qemu-arm:qemu-user $(foreach triple,arm-linux-gnueabihf aarch64-linux-gnu,$(triple)-g++:g++-$(triple))
 STUDIO_TOOLS := chromium
-NETWORK_TOOLS := ip:iproute2 tshark
+NETWORK_TOOLS := busybox dnsmasq:dnsmasq-base ip:iproute2 tshark
 TEST_TOOLS := bwrap:bubblewrap ccache fdtoverlay:device-tree-compiler iverilog strace verilator yosys dot:graphviz \
   tclsh:tcl rosbag:python3-rosbag
 

@@ -32,6 +32,7 @@ RUN_TIME = "run time"
 # Packages of Debian and what they are called for.
 PROGRAMS: Mapping[str, str] = {
     "bubblewrap": "runs steps of builds in a sandbox",
+    "busybox": "gives addresses by DHCP, in tests",
     "ccache": "caches compiled files, in tests",
     "g++": "compiles simulated C++ kernels, Verilator's models, nodes in C++",
     "g++-aarch64-linux-gnu": "compiles nodes in C++ for emulated processors, in tests",
@@ -39,6 +40,7 @@ PROGRAMS: Mapping[str, str] = {
     "gcc-aarch64-linux-gnu": "compiles programs for emulated processors",
     "gcc-arm-none-eabi": "compiles programs for emulated processors",
     "device-tree-compiler": "compiles and merges device trees, in tests and on boards",
+    "dnsmasq-base": "gives addresses by DHCP, in tests",
     "ghdl": "analyses, simulates and translates VHDL",
     "graphviz": "draws diagrams",
     "iproute2": "makes networks for tests",

@@ -126,8 +126,14 @@ def _at_device(arguments: argparse.Namespace, loaded: LoadedSystem) -> tuple[Sim
     Tap(arguments.network).close()
     built = built_board(arguments)
     board = Board(built.words, built.folder, Tap(arguments.network), NETWORK_HERTZ[network.kind.value])
-    name = f"{network.namespace.rstrip('/')}/{network.name}"
-    return board, f"{name} is at {network.address}, at {arguments.network}, in domain {network.domain}"
+    name, place = (
+        f"{network.namespace.rstrip('/')}/{network.name}",
+        f"at {arguments.network}, in domain {network.domain}",
+    )
+    if network.has_dhcp:
+        board.on_address = lambda address: print(f"{name} is at {address}, {place}", flush=True)
+        return board, f"{name} asks for an address by DHCP, {place}"
+    return board, f"{name} is at {network.address}, {place}"
 
 
 def _fail_for_network(arguments: argparse.Namespace, loaded: LoadedSystem) -> NoReturn:

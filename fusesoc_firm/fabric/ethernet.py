@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from fusesoc_firm.fabric import rtps
+from fusesoc_firm.fabric import dhcp, rtps
 from fusesoc_firm.fabric.control import Sizes, generics_of, memory_of_control, slots_of
 from fusesoc_firm.fabric.names import LONGEST_NAME, memory_of_names
 from fusesoc_firm.fabric.node import Node, node_of
-from fusesoc_firm.fabric.packets import memory_of, programs_of
+from fusesoc_firm.fabric.packets import Words, memory_of, plain_program, programs_of
 from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
@@ -43,7 +43,7 @@ def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibr
     memories = {name: f"{system.entity}_{name}" for name in ("control", "packets", "names")}
     made = [
         memory_of_control(node, memories["control"], Sizes.of(node)),
-        memory_of(node, memories["packets"], frames_of(node.network)),
+        memory_of(node, memories["packets"], _others(node)),
         memory_of_names(node.compared, memories["names"]),
         Rendering(_NODE_TEMPLATE, _configuration(system, node, {"entity": entity, **memories})),
     ]
@@ -81,10 +81,18 @@ def fragment_bytes(system: DerivedSystem, node: Node) -> int:
     return longest * places + assembled_bytes(system) + waiting if longest else 0
 
 
+def _others(node: Node) -> dict[str, Words]:
+    """Return the programs of the packets that do not come from RTPS."""
+    network = node.network
+    if network.has_dhcp:
+        return dhcp.programs_of(network)
+    return {name: plain_program(network, frame) for name, frame in frames_of(network).items()}
+
+
 def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Context:
     """Return the configuration of the node."""
     assert system.clock is not None
-    network, programs = node.network, programs_of(node, frames_of(node.network))
+    network, programs = node.network, programs_of(node, _others(node))
     numbers = {name: number for number, name in enumerate(programs.entries)}
     ports = {
         "all participants": rtps.multicast_port(network.domain),
@@ -101,7 +109,7 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "fault_count": len(NETWORK_FAULTS),
         "mac": network.mac.hex(),
         "address": network.address.packed.hex(),
-        "dotted": str(network.address),
+        "dotted": "by DHCP" if network.has_dhcp else str(network.address),
         "ports": ", ".join(f"{port} ({name})" for name, port in ports.items()),
         "udp_ports": "".join(f"{port:04x}" for port in reversed(ports.values())),
         "generics": [{"name": name, "value": value} for name, value in generics_of(node, Sizes.of(node)).items()],
@@ -114,6 +122,9 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         "sample": slot_bytes(system.publishers),
         "report_packet": numbers[REPORT],
         "probe_packet": numbers[PROBE],
+        "has_dhcp": str(network.has_dhcp).lower(),
+        # Without DHCP they have no effect.
+        **{f"{name}_packet": numbers.get(name, 0) for name in dhcp.PACKETS},
         "discovery": discovery_bytes(system),
         "waiting": waiting_bytes(system),
         "assembled": assembled_bytes(system),

@@ -13,6 +13,7 @@ import socket
 import struct
 import zlib
 from collections.abc import Callable, Sequence
+from ipaddress import IPv4Address
 from pathlib import Path
 
 from fusesoc_firm.fabric.simulated_board import SimulatedBoard
@@ -27,6 +28,9 @@ _LONGEST_NAME = 15
 _NO_ROOM = (errno.EAGAIN, errno.ENOBUFS, errno.ENOMEM)
 _PREAMBLE = b"\x55" * 7 + b"\xd5"
 _SHORTEST, _FCS_BYTES = 60, 4
+# The type of Ethernet and the head of a request of ARP; the places of its addresses.
+_ARP_REQUEST = bytes.fromhex("0806 0001 0800 06 04 0001")
+_SENDER_PLACE, _TARGET_PLACE, _ADDRESS_BYTES = 28, 38, 4
 # Frames at a device with a larger MTU than Ethernet's are longer.
 _MOST_BYTES = 2048
 _CYCLES_BYTES, _SIZE_BYTES = 4, 2
@@ -98,12 +102,17 @@ def _how_to_make(name: str) -> str:
 
 
 class Board(SimulatedBoard):
-    """A running board at a TAP device."""
+    """A running board at a TAP device.
+
+    Each address that the board announces by ARP, and that differs from the last one, is given to `on_address`.
+    """
 
     def __init__(self, command: Sequence[str], folder: Path, tap: Tap, hertz: int) -> None:
         """Start the simulator `command` in `folder`; its clock has `hertz`. Raise `OSError` if that is impossible."""
         super().__init__(command, folder, hertz)
         self._tap, self._sent = tap, bytearray()
+        self._address = ""
+        self.on_address: Callable[[str], None] = lambda address: None
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
         """Exchange frames until the condition holds. Raise `InputError` if the simulator ends."""
@@ -139,7 +148,17 @@ class Board(SimulatedBoard):
         frame = line[len(_PREAMBLE) : -_FCS_BYTES]
         if not line.startswith(_PREAMBLE) or len(frame) < _SHORTEST or line[-_FCS_BYTES:] != _checksum(frame):
             fail(f"the board sent a broken frame: {line.hex()}")
+        address = _announced(frame)
+        if address and address != self._address:
+            self._address = address
+            self.on_address(address)
         self._tap.write(frame)
+
+
+def _announced(frame: bytes) -> str:
+    """Return the address that a frame announces (RFC 5227, section 2.3), or nothing."""
+    sender, target = frame[_SENDER_PLACE:][:_ADDRESS_BYTES], frame[_TARGET_PLACE:][:_ADDRESS_BYTES]
+    return str(IPv4Address(sender)) if frame[12:22] == _ARP_REQUEST and sender == target else ""
 
 
 def _checksum(frame: bytes) -> bytes:

@@ -87,17 +87,23 @@ class Node:
     @cached_property
     def participant_data(self) -> bytes:
         """The payload that announces the node (SPDP)."""
-        metatraffic, user = (port(self.network.domain) for port in (rtps.metatraffic_port, rtps.user_port))
+        metatraffic, user = self.locators
         return rtps.parameter_list(
             parameter(Parameter.PROTOCOL_VERSION, rtps.HEADER[4:]),
             parameter(Parameter.VENDOR_ID, rtps.VENDOR),
             parameter(Parameter.PARTICIPANT_GUID, self.prefix + rtps.PARTICIPANT),
             parameter(Parameter.BUILTIN_ENDPOINT_SET, struct.pack("<I", rtps.BUILTIN_ENDPOINTS)),
-            parameter(Parameter.METATRAFFIC_UNICAST_LOCATOR, self._locator(metatraffic)),
-            parameter(Parameter.DEFAULT_UNICAST_LOCATOR, self._locator(user)),
+            parameter(Parameter.METATRAFFIC_UNICAST_LOCATOR, metatraffic),
+            parameter(Parameter.DEFAULT_UNICAST_LOCATOR, user),
             parameter(Parameter.LEASE_DURATION, struct.pack("<iI", self.lease_seconds, 0)),
             parameter(Parameter.USER_DATA, rtps.octets(b"enclave=/;")),
         )
+
+    @property
+    def locators(self) -> tuple[bytes, bytes]:
+        """Where the node listens, for discovery and for messages; addresses of DHCP are 0.0.0.0."""
+        metatraffic, user = (port(self.network.domain) for port in (rtps.metatraffic_port, rtps.user_port))
+        return self._locator(metatraffic), self._locator(user)
 
     @cached_property
     def farewell(self) -> tuple[dict[Parameter, bytes], bytes]:

@@ -1,13 +1,14 @@
 """The programs from which the hardware builds a node's packets (`firm_packet_builder`), made from constant payloads.
 
 A program is a list of words, one for each byte of the frame: a constant, a byte of a field that the hardware fills in,
-a length or checksum that it computes, or the payload of a sample. RTPS is little-endian here.
+a length or checksum that it computes, or the payload of a sample. RTPS is little-endian here. If the node gets its
+address by DHCP, the bytes of the address are words of their own (`Own`).
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from ipaddress import IPv4Address
@@ -17,6 +18,7 @@ from types import MappingProxyType
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.rtps import Kind, Parameter
+from fusesoc_firm.system.derived.model import Network
 from fusesoc_firm.text.render import Rendering
 
 # Bytes of a sample in each fragment but the last.
@@ -24,11 +26,14 @@ FRAGMENT_BYTES = 1344
 
 _LAST = 1 << 10
 _FROM_FIELD, _FROM_PAYLOAD, _FROM_RESULT = 1 << 8, 2 << 8, 3 << 8
+# A field that the host gets while it runs.
+_OWN = 1 << 7
 # The arguments of the results that depend on what is before the payload, the low byte first.
 _DATA_BYTES = 6, 7
 _LITTLE, _INLINE, _DATA, _KEY = 1, 2, 4, 8
 _IP_BYTES, _UDP_BYTES = 20, 8
-_PRELUDE_WORDS = 8
+# Words of the prelude, and those of a host with DHCP after them.
+_PRELUDE_WORDS, _OWN_WORDS = 8, 4
 # A header of IPv4 without options; its protocol.
 _IPV4, _TIME_TO_LIVE, _UDP, _DO_NOT_FRAGMENT = 0x45, 64, 17, 0x4000
 _TYPE_IPV4, _NO_CHECKSUM = b"\x08\x00", bytes(2)
@@ -94,7 +99,17 @@ class DataBytes:
     before: int
 
 
-Part = bytes | Field | Result | DataBytes | Payload
+@dataclass(frozen=True)
+class Own:
+    """Bytes that a host with DHCP gets while it runs, as `own_select` of `firm_dhcp_client` counts them."""
+
+    selects: tuple[int, ...]
+
+
+OWN_ADDRESS = Own((0, 1, 2, 3))
+"""The address of a host with DHCP."""
+
+Part = bytes | Field | Result | DataBytes | Payload | Own
 
 
 @dataclass(frozen=True)
@@ -118,25 +133,32 @@ class Programs:
         return max(4, (len(self.words) - 1).bit_length())
 
 
-def programs_of(node: Node, frames: Mapping[str, bytes] = MappingProxyType({})) -> Programs:
-    """Return the programs of a node, in the order of `packets_of`, and those of constant `frames`."""
+def programs_of(node: Node, others: Mapping[str, Words] = MappingProxyType({})) -> Programs:
+    """Return the programs of a node, in the order of `packets_of`, and `others`."""
     words: Words = []
     entries = {}
     made = {name: program(node, packet) for name, packet in packets_of(node).items()}
-    for name, items in {**made, **{name: _constant(frame) for name, frame in frames.items()}}.items():
+    for name, items in {**made, **others}.items():
         entries[name] = len(words)
         words += items
     return Programs(tuple(words), entries)
 
 
-def _constant(frame: bytes) -> Words:
+def plain_program(network: Network, *parts: Part) -> Words:
     """Return the program of a frame without results, whose prelude has no effect."""
-    return [*bytes(_PRELUDE_WORDS), *frame[:-1], frame[-1] | _LAST]
+    return program_of([bytes(_PRELUDE_WORDS + _OWN_WORDS * network.has_dhcp)], parts)
+
+
+def program_of(prelude: Iterable[Part], parts: Iterable[Part]) -> Words:
+    """Return the program of a frame with a prelude, which is not sent."""
+    words = list(chain.from_iterable(map(_words, (*prelude, *parts))))
+    words[-1] |= _LAST
+    return words
 
 
 def packets_of(node: Node) -> dict[str, Packet]:
     """Return the packets that a node sends: what announces it, its endpoints, and the kinds of all others."""
-    announcement = _constant_data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 1, node.participant_data)
+    announcement = _constant_data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 1, *_participant_data(node))
     graph = _constant_data(Field.READER, node.writers[0].entity, 1, node.graph)
     publications = rtps.PUBLICATIONS_READER, rtps.PUBLICATIONS_WRITER
     subscriptions = rtps.SUBSCRIPTIONS_READER, rtps.SUBSCRIPTIONS_WRITER
@@ -163,19 +185,36 @@ def packets_of(node: Node) -> dict[str, Packet]:
 
 def program(node: Node, packet: Packet) -> Words:
     """Return the words of a packet's program: the prelude, which is not sent, the headers, and the packet's parts."""
+    network = node.network
     target: Part = IPv4Address(rtps.MULTICAST).packed if packet.to_group else Field.ADDRESS
+    port: Part = struct.pack(">H", rtps.multicast_port(network.domain)) if packet.to_group else Field.PORT
+    ports = struct.pack(">H", rtps.metatraffic_port(network.domain)), port
+    mac = _GROUP_MAC if packet.to_group else Field.MAC
+    source = OWN_ADDRESS if network.has_dhcp else network.address.packed
+    return datagram(network, mac, (source, target), ports, packet.parts)
+
+
+def datagram(
+    network: Network, mac: Part, ends: tuple[Part, Part], ports: tuple[Part, Part], parts: Sequence[Part]
+) -> Words:
+    """Return the program of a datagram with `parts`, from an address and a port to others at `mac`."""
+    source, target = ends
     header = struct.pack(">BBH", _IPV4, 0, 0), struct.pack(">HHBB", 0, _DO_NOT_FRAGMENT, _TIME_TO_LIVE, _UDP)
-    sum_ = sum_of_words(b"".join(header) + node.network.address.packed)
-    length = _IP_BYTES + _UDP_BYTES + sum(map(_size, packet.parts))
-    prelude = struct.pack(">HH", sum_, length), target
-    ethernet = _GROUP_MAC if packet.to_group else Field.MAC, node.network.mac, _TYPE_IPV4
-    ip = header[0][:2], Result.PACKET_BYTES, header[1], Result.HEADER_CHECKSUM, node.network.address.packed, target
-    domain = node.network.domain
-    port: Part = struct.pack(">H", rtps.multicast_port(domain)) if packet.to_group else Field.PORT
-    udp = struct.pack(">H", rtps.metatraffic_port(domain)), port, Result.DATAGRAM_BYTES, _NO_CHECKSUM
-    words = list(chain.from_iterable(map(_words, (*prelude, *ethernet, *ip, *udp, *packet.parts))))
-    words[-1] |= _LAST
-    return words
+    length = _IP_BYTES + _UDP_BYTES + sum(map(_size, parts))
+    ip = header[0][:2], Result.PACKET_BYTES, header[1], Result.HEADER_CHECKSUM, source, target
+    udp = *ports, Result.DATAGRAM_BYTES, _NO_CHECKSUM
+    prelude = header_prelude(network, b"".join(header), length, source, target)
+    return program_of(prelude, (mac, network.mac, _TYPE_IPV4, *ip, *udp, *parts))
+
+
+def header_prelude(network: Network, constant: bytes, length: int, source: Part, target: Part) -> tuple[Part, ...]:
+    """Return the prelude for a header of IPv4: `constant` are all of its words but the length and the addresses.
+
+    The address of a host with DHCP is part of the prelude; otherwise it is a constant of the sum.
+    """
+    own = (source,) if network.has_dhcp else ()
+    known = b"" if own or not isinstance(source, bytes) else source
+    return struct.pack(">HH", sum_of_words(constant + known), length), target, *own
 
 
 def _words(part: Part) -> Iterable[int]:
@@ -190,6 +229,8 @@ def _words(part: Part) -> Iterable[int]:
             return (_FROM_RESULT | part.before // 4 << 3 | argument for argument in _DATA_BYTES)
         case Payload():
             return (_FROM_PAYLOAD,)
+        case Own():
+            return (_FROM_FIELD | _OWN | select for select in part.selects)
 
 
 def _size(part: Part) -> int:
@@ -205,6 +246,8 @@ def _size(part: Part) -> int:
             return len(_DATA_BYTES)
         case Payload():
             return 0
+        case Own():
+            return len(part.selects)
 
 
 def sum_of_words(data: bytes) -> int:
@@ -246,10 +289,19 @@ def _number(number: int) -> bytes:
     return struct.pack("<iI", number >> 32, number & 0xFFFFFFFF)
 
 
-def _constant_data(reader: bytes | Field, writer: bytes, number: int, payload: bytes) -> Submessage:
-    padded = payload + bytes(-len(payload) % 4)
+def _constant_data(reader: bytes | Field, writer: bytes, number: int, *payload: Part) -> Submessage:
+    padding = bytes(-sum(map(_size, payload)) % 4)
     head = struct.pack("<HH", 0, _TO_INLINE)
-    return _submessage(Kind.DATA, _LITTLE | _DATA, head, reader, writer, _number(number), padded)
+    return _submessage(Kind.DATA, _LITTLE | _DATA, head, reader, writer, _number(number), *payload, padding)
+
+
+def _participant_data(node: Node) -> Iterator[Part]:
+    """What announces the node; its own address is the end of each locator."""
+    data = node.participant_data
+    for locator in node.locators if node.network.has_dhcp else ():
+        before, _, data = data.partition(locator)
+        yield from (before + locator[: -len(OWN_ADDRESS.selects)], OWN_ADDRESS)
+    yield data
 
 
 def _farewell(node: Node) -> Submessage:
@@ -312,9 +364,9 @@ def _gap() -> Submessage:
 _WORDS_IN_ROW = 8
 
 
-def memory_of(node: Node, entity: str, frames: Mapping[str, bytes] = MappingProxyType({})) -> Rendering:
-    """Return the memory of the programs of a node and of constant frames, as an entity for `firm_packet_builder`."""
-    programs = programs_of(node, frames)
+def memory_of(node: Node, entity: str, others: Mapping[str, Words] = MappingProxyType({})) -> Rendering:
+    """Return the memory of the programs of a node and of others, as an entity for `firm_packet_builder`."""
+    programs = programs_of(node, others)
     words = [f'"{word:011b}"' for word in programs.words]
     return Rendering(
         "vhdl/packets.vhd",

@@ -22,6 +22,7 @@ NODE = (
     "net/responder",
     "net/reassembly",
     "net/presence",
+    "net/dhcp",
     "net/status",
     "net/udp",
     "net/rtps",

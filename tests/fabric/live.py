@@ -38,12 +38,12 @@ class Lab:
 
     def __init__(self, specification: Path, folder: Path, stack: ExitStack, depend: Sequence[str] = ()) -> None:
         self._specification, self._stack, self._ros, self._depend = specification, stack, ros2(folder), depend
-        self.switch, *self._hosts = stack.enter_context(switched(2))
+        self.switch, *self.hosts = stack.enter_context(switched(2))
         self.switch.run("ip", "tuntap", "add", "dev", "tap0", "mode", "tap")
         self.switch.run("ip", "link", "set", "tap0", "master", "switch", "up")
 
-    def board(self) -> subprocess.Popen[str]:
-        """The board, when it runs."""
+    def board(self, line: str = _BOARD) -> subprocess.Popen[str]:
+        """The board, when it runs and has printed its first line."""
         words = [sys.executable, "-m", "fusesoc_firm.cli", "live", str(self._specification), "--tool", "verilator"]
         words += ["--network", "tap0", "--build-root", str(self._specification.parent / "build")]
         for core in self._depend:
@@ -51,7 +51,7 @@ class Lab:
         board = subprocess.Popen(self.switch.command(*words), stdout=subprocess.PIPE, text=True)
         self._stack.callback(_end, board)
         assert board.stdout
-        assert board.stdout.readline() == _BOARD
+        assert board.stdout.readline() == line
         return board
 
     @contextmanager
@@ -74,21 +74,26 @@ class Lab:
         shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         return [(item["port"], item["grp"]) for part in json.loads(shown) for item in part.get("mdb", [])]
 
-    def status(self) -> str:
+    def answers(self, address: str) -> bool:
+        """Whether an address answers a ping of the first host."""
+        command = self.hosts[0].command("busybox", "ping", "-c", "3", "-W", "2", address)
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+    def status(self, address: str = "192.0.2.9") -> str:
         """The status of the board."""
-        command = self._hosts[0].command(sys.executable, "-m", "fusesoc_firm.cli", "status", "udp:192.0.2.9")
+        command = self.hosts[0].command(sys.executable, "-m", "fusesoc_firm.cli", "status", f"udp:{address}")
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     def rclpy(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> Peer:
         """A peer of rclpy, at the first host."""
         others = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DOMAIN_ID")
         environment = {name: value for name, value in self._ros.environment.items() if name not in others}
-        return self._peer(self._hosts[0], [self._ros.python, str(HERE / "ros_peer.py")], environment, reads, writes)
+        return self._peer(self.hosts[0], [self._ros.python, str(HERE / "ros_peer.py")], environment, reads, writes)
 
     def cyclone(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> Peer:
         """A peer of Cyclone DDS, at the second host."""
         words = [sys.executable, str(HERE / "cyclone_peer.py")]
-        return self._peer(self._hosts[1], words, dict(os.environ), reads, writes)
+        return self._peer(self.hosts[1], words, dict(os.environ), reads, writes)
 
     def _peer(
         self,

@@ -86,16 +86,19 @@ def random_fields(chance: random.Random) -> Fields:
     return Fields(prefix, reader, writer, count, *numbers, *others)
 
 
-def run(programs: Programs, name: str, fields: Fields, payload: bytes = b"") -> bytes:
-    """The frame without padding and FCS; an empty payload is one byte there."""
-    memory, padded = fields.memory(), payload + bytes(-len(payload) % 4)
-    words = list(_words(programs, programs.entries[name]))
-    prelude = bytes(_constant(word, memory) for word in words[:_PRELUDE])
+def run(programs: Programs, name: str, fields: Fields, payload: bytes = b"", own: bytes = b"") -> bytes:
+    """The frame without padding and FCS; an empty payload is one byte there.
+
+    `own` are the bytes of a host with DHCP, whose preludes are longer.
+    """
+    memory, padded = fields.memory().ljust(128, b"\0") + own, payload + bytes(-len(payload) % 4)
+    words, size = list(_words(programs, programs.entries[name])), _PRELUDE + 4 * bool(own)
+    prelude = bytes(_constant(word, memory) for word in words[:size])
     total = int.from_bytes(prelude[2:4]) + len(padded)
-    header = prelude[:2] + total.to_bytes(2, "big") + prelude[4:8]
-    results = b"".join(number.to_bytes(2, "big") for number in (total, total - 20, checksum(header)))
+    header = prelude[:2] + total.to_bytes(2, "big") + prelude[4:]
+    results = b"".join(number.to_bytes(2, "big") for number in (total, max(0, total - 20), checksum(header)))
     frame = b""
-    for word in words[_PRELUDE:]:
+    for word in words[size:]:
         source = word >> 8 & 3
         frame += (
             (padded or b"\0")
@@ -115,4 +118,4 @@ def _words(programs: Programs, entry: int) -> Iterator[int]:
 
 
 def _constant(word: int, memory: bytes) -> int:
-    return memory[word & 127] if word >> 8 & 3 == 1 else word & 255
+    return memory[word & 255] if word >> 8 & 3 == 1 else word & 255

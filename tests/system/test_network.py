@@ -56,6 +56,23 @@ def test_it_is_checked_and_shown(path: Path, capsys: pytest.CaptureFixture[str])
     }
 
 
+def test_its_address_may_come_by_dhcp(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = path.read_text(encoding="utf-8").replace("192.0.2.9, gateway: 192.0.2.254", "dhcp")
+    path.write_text(text, encoding="utf-8")
+    assert main(["system", "show", str(path)]) == 0
+    shown = yaml.safe_load(capsys.readouterr().out)["System"]["network"]
+    assert shown["address"] == "dhcp"
+    assert not {"netmask", "gateway"} & {*shown}
+    files = _files(path.parent)
+    assert re.search(r"HAS_DHCP +=> true", files["turtle_system_node.vhd"])
+    # A node with a constant address has no packets of DHCP.
+    assert " message\n" in files["turtle_system_packets.vhd"]
+    path.write_text(SPECIFICATION, encoding="utf-8")
+    files = _files(path.parent)
+    assert re.search(r"HAS_DHCP +=> false", files["turtle_system_node.vhd"])
+    assert " message\n" not in files["turtle_system_packets.vhd"]
+
+
 def test_no_node_on_a_host_serves_it(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for command in (["live", str(path), "--transport", "uart:/dev/null"], ["system", "node", str(path)]):
         assert main(command) == 1

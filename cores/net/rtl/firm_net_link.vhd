@@ -31,7 +31,12 @@ entity firm_net_link is
     -- Packets whose fragments may be interleaved, 0 to 4, and the bytes of the longest one; without them, fragments
     -- are dropped.
     REASSEMBLIES : integer := 0;
-    REASSEMBLED  : integer := 16384
+    REASSEMBLED  : integer := 16384;
+    -- The address comes by DHCP, and the port `address` is not used.
+    HAS_DHCP            : boolean := false;
+    MESSAGE_PACKET      : integer := 0;
+    RENEWAL_PACKET      : integer := 0;
+    ANNOUNCEMENT_PACKET : integer := 0
   );
   port (
     clk   : in std_logic;
@@ -93,7 +98,7 @@ entity firm_net_link is
     --   5  a publisher or subscriber of another node, of a topic of the board, has no room
     --   6  a message of another node has no room, or comes in fragments of RTPS and is too long or the node takes none
     --   7  a message to send is empty, too long or of no publisher
-    --   8  another host has the address of the board
+    --   8  another host has the address of the board, or a board with DHCP has lost its address
     --   9  a packet of RTPS, or a list of parameters in it, is broken
     --  10  a publisher or subscriber of a topic of the board has another type, hash, quality, partition or encoding
     network_error : out std_logic_vector(10 downto 0)
@@ -177,9 +182,31 @@ architecture rtl of firm_net_link is
   signal sample_tready : std_logic;
   signal frame_tvalid  : std_logic;
   signal frame_tready  : std_logic;
+  -- Those that the node takes.
+  signal offered_tvalid : std_logic;
+  signal offered_tready : std_logic;
 
-  -- Packets of the node, and of its presence.
+  -- This host: constant without DHCP. Otherwise the node and all that has its address rest while it has none.
+  signal own_address : std_logic_vector(31 downto 0);
+  signal is_bound    : std_logic;
+  signal node_runs   : std_logic;
+  signal node_rst_n  : std_logic;
+  signal watch_rst_n : std_logic;  -- of the presence
+  signal node_takes  : std_logic;  -- frames of the system
+  signal node_busy   : std_logic;
+  signal heard_valid : std_logic;  -- a byte received, for what has an address
+  signal data_bytes  : std_logic_vector(15 downto 0);
+  signal own_select  : std_logic_vector(6 downto 0);
+  signal own_byte    : std_logic_vector(7 downto 0);
+  signal is_conflict : std_logic;
+  signal is_unbound  : std_logic;  -- a pulse when the address is lost
+
+  -- Packets of the node, of its presence, and of DHCP.
   signal node_start    : std_logic;
+  signal node_starts   : std_logic;
+  signal wants_dhcp    : std_logic;
+  signal dhcp_packet   : std_logic_vector(7 downto 0);
+  signal dhcp_sent     : std_logic;
   signal node_packet   : std_logic_vector(7 downto 0);
   signal wants_report  : std_logic;
   signal wants_probe   : std_logic;
@@ -245,6 +272,122 @@ begin
     end if;
   end process count_time;
 
+  -- ------------------------------------------------------------------ the address
+
+  without_dhcp : if not HAS_DHCP generate
+    own_address <= address;
+    is_bound    <= '1';
+    node_runs   <= '1';
+    node_rst_n  <= rst_n;
+    watch_rst_n <= rst_n;
+    node_takes  <= '1';
+    heard_valid <= received_tvalid;
+    data_bytes  <= payload_bytes;
+    own_byte    <= (others => '0');
+    wants_dhcp  <= '0';
+    dhcp_packet <= (others => '0');
+    is_unbound  <= '0';
+  end generate without_dhcp;
+
+  with_dhcp : if HAS_DHCP generate
+
+    signal wants_message      : std_logic;
+    signal wants_renewal      : std_logic;
+    signal wants_announcement : std_logic;
+    signal is_checking        : std_logic;
+    signal is_stopped         : std_logic;
+
+    signal inside_r   : std_logic;  -- of a frame received
+    signal hears_r    : std_logic;
+    signal checks_r   : std_logic;
+    signal runs_r     : std_logic;
+    signal to_r       : std_logic;  -- inside a frame to the system
+    signal from_r     : std_logic;  -- inside a frame from it
+    signal rests      : std_logic;
+    signal is_own_r   : std_logic;  -- the packet is not the node's
+
+  begin
+
+    u_client : entity firm.firm_dhcp_client
+      port map (
+        clk                => clk,
+        rst_n              => rst_n,
+        tick               => tick_r,
+        mac                => mac,
+        s_axis_tdata       => received_tdata,
+        s_axis_tuser       => received_tuser,
+        s_axis_tvalid      => received_tvalid,
+        s_axis_tlast       => received_tlast,
+        wants_message      => wants_message,
+        wants_renewal      => wants_renewal,
+        wants_announcement => wants_announcement,
+        is_sent            => dhcp_sent,
+        own_select         => own_select,
+        own_byte           => own_byte,
+        address            => own_address,
+        is_bound           => is_bound,
+        is_checking        => is_checking,
+        is_taken           => is_conflict,
+        is_stopped         => is_stopped,
+        is_lost            => is_unbound
+      );
+
+    wants_dhcp  <= wants_message or wants_renewal or wants_announcement;
+    dhcp_packet <= number_of(RENEWAL_PACKET) when wants_renewal = '1' else
+                   number_of(ANNOUNCEMENT_PACKET) when wants_announcement = '1' else
+                   number_of(MESSAGE_PACKET);
+
+    -- The node ends what it has begun, a packet and a frame in each direction. Then it is reset, and the next address
+    -- finds a node that announces itself anew.
+    node_runs  <= runs_r;
+    node_rst_n <= rst_n and runs_r;
+    is_stopped <= not runs_r;
+    rests      <= not (is_bound or is_busy or node_start or to_r or sample_tvalid or from_r);
+    node_takes <= runs_r and (is_bound or from_r);
+
+    -- The presence starts anew with each address. It also probes for the one that is not in use yet.
+    watch_rst_n <= rst_n and (hears_r or checks_r);
+    heard_valid <= received_tvalid and hears_r;
+
+    -- The node tells the size of its last payload, also while another packet leaves.
+    data_bytes <= (others => '0') when is_own_r = '1' else payload_bytes;
+
+    follow_address : process (clk)
+    begin
+      if rising_edge(clk) then
+        if received_tvalid = '1' then
+          inside_r <= not received_tlast;
+        elsif inside_r = '0' then
+          checks_r <= is_checking;
+          hears_r  <= is_bound and not (checks_r or is_checking);
+        end if;
+        if start = '1' then
+          is_own_r <= not node_starts;
+        end if;
+        if sample_tvalid = '1' and sample_tready = '1' then
+          to_r <= not sample_tlast;
+        end if;
+        if frame_tvalid = '1' and frame_tready = '1' then
+          from_r <= not out_tlast;
+        end if;
+        if is_bound = '1' then
+          runs_r <= '1';
+        elsif rests = '1' then
+          runs_r <= '0';
+        end if;
+        if rst_n = '0' then
+          inside_r <= '0';
+          checks_r <= '0';
+          hears_r  <= '0';
+          to_r     <= '0';
+          from_r   <= '0';
+          runs_r   <= '0';
+        end if;
+      end if;
+    end process follow_address;
+
+  end generate with_dhcp;
+
   -- ------------------------------------------------------------------ frames of the line
 
   u_receiver : entity firm.firm_mac_receiver
@@ -269,10 +412,10 @@ begin
       clk           => clk,
       rst_n         => rst_n,
       mac           => mac,
-      address       => address,
+      address       => own_address,
       s_axis_tdata  => received_tdata,
       s_axis_tuser  => received_tuser,
-      s_axis_tvalid => received_tvalid,
+      s_axis_tvalid => heard_valid,
       s_axis_tlast  => received_tlast,
       m_axis_tdata  => sources_tdata(7 downto 0),
       m_axis_tvalid => sources_tvalid(0),
@@ -284,10 +427,10 @@ begin
   u_presence : entity firm.firm_net_presence
     port map (
       clk           => clk,
-      rst_n         => rst_n,
+      rst_n         => watch_rst_n,
       tick          => tick_r,
       mac           => mac,
-      address       => address,
+      address       => own_address,
       group_ip      => GROUP_IP,
       s_axis_tdata  => received_tdata,
       s_axis_tuser  => received_tuser,
@@ -296,13 +439,13 @@ begin
       wants_report  => wants_report,
       wants_probe   => wants_probe,
       is_sent       => is_sent,
-      is_taken      => network_error(8)
+      is_taken      => is_conflict
     );
 
   without_fragments : if REASSEMBLIES = 0 generate
     whole_tdata       <= received_tdata;
     whole_tuser       <= received_tuser;
-    whole_tvalid      <= received_tvalid;
+    whole_tvalid      <= heard_valid;
     whole_tlast       <= received_tlast;
     is_packet_dropped <= '0';
     is_frame_lost     <= '0';
@@ -322,10 +465,10 @@ begin
         rst_n         => rst_n,
         tick          => tick_r,
         mac           => mac,
-        address       => address,
+        address       => own_address,
         s_axis_tdata  => received_tdata,
         s_axis_tuser  => received_tuser,
-        s_axis_tvalid => received_tvalid,
+        s_axis_tvalid => heard_valid,
         s_axis_tlast  => received_tlast,
         m_axis_tdata  => whole_tdata,
         m_axis_tuser  => whole_tuser,
@@ -345,7 +488,7 @@ begin
       clk            => clk,
       rst_n          => rst_n,
       mac            => mac,
-      address        => address,
+      address        => own_address,
       group_ip       => GROUP_IP,
       udp_ports      => udp_ports,
       s_axis_tdata   => whole_tdata,
@@ -366,6 +509,9 @@ begin
 
   -- ------------------------------------------------------------------ the node
 
+  offered_tvalid <= frame_tvalid and node_takes;
+  frame_tready   <= offered_tready and node_takes;
+
   prefix <= PREFIX_HEAD & mac & PREFIX_TAIL;
 
   u_node : entity firm.firm_rtps_node
@@ -382,7 +528,7 @@ begin
     )
     port map (
       clk                 => clk,
-      rst_n               => rst_n,
+      rst_n               => node_rst_n,
       tick                => tick_r,
       prefix              => prefix,
       are_reliable        => are_reliable,
@@ -403,14 +549,14 @@ begin
       frame_tready        => sample_tready,
       sample_tdata        => out_tdata,
       sample_tuser        => out_tuser,
-      sample_tvalid       => frame_tvalid,
+      sample_tvalid       => offered_tvalid,
       sample_tlast        => out_tlast,
-      sample_tready       => frame_tready,
+      sample_tready       => offered_tready,
       start               => node_start,
       packet              => node_packet,
       bank                => bank,
       payload_bytes       => payload_bytes,
-      is_busy             => is_busy,
+      is_busy             => node_busy,
       build_field_valid   => field_valid,
       build_field_bank    => field_bank,
       build_field_address => field_address,
@@ -464,10 +610,10 @@ begin
         clk            => clk,
         rst_n          => rst_n,
         mac            => mac,
-        address        => address,
+        address        => own_address,
         s_axis_tdata   => received_tdata,
         s_axis_tuser   => received_tuser,
-        s_axis_tvalid  => received_tvalid,
+        s_axis_tvalid  => heard_valid,
         s_axis_tlast   => received_tlast,
         request_tdata  => merged_tdata(15 downto 8),
         request_tvalid => merged_tvalid(1),
@@ -560,16 +706,22 @@ begin
 
   -- The node starts a packet only while the builder is not busy. Its presence has constant frames, which neither need
   -- nor change the fields and the payload that the node has prepared; so they may leave between any two packets.
-  start   <= node_start or ((wants_report or wants_probe) and not is_busy);
-  is_sent <= not node_start and (wants_report or wants_probe) and not is_busy;
-  packet  <= node_packet when node_start = '1' else
-             number_of(REPORT_PACKET) when wants_report = '1' else
-             number_of(PROBE_PACKET);
+  -- Before the node has an address, there is nothing to report.
+  node_busy   <= is_busy or not is_bound;
+  node_starts <= node_start and node_runs;
+  start       <= node_starts or ((wants_report or wants_probe or wants_dhcp) and not is_busy);
+  is_sent     <= not node_starts and (wants_report or wants_probe) and not is_busy;
+  dhcp_sent   <= not (node_starts or wants_report or wants_probe or is_busy);
+  packet      <= node_packet when node_starts = '1' else
+                 number_of(REPORT_PACKET) when wants_report = '1' else
+                 number_of(PROBE_PACKET) when wants_probe = '1' or wants_dhcp = '0' else
+                 dhcp_packet;
 
   u_builder : entity firm.firm_packet_builder
     generic map (
       ADDRESS_BITS => PROGRAM_BITS,
-      BANK_BITS    => RTPS_BANK_BITS
+      BANK_BITS    => RTPS_BANK_BITS,
+      HAS_OWN      => HAS_DHCP
     )
     port map (
       clk             => clk,
@@ -577,12 +729,14 @@ begin
       start           => start,
       entry           => entry,
       bank            => bank,
-      payload_bytes   => payload_bytes,
+      payload_bytes   => data_bytes,
       is_busy         => is_busy,
       field_valid     => field_valid,
       field_bank      => field_bank,
       field_address   => field_address,
       field_data      => field_data,
+      own_select      => own_select,
+      own_byte        => own_byte,
       program_enable  => program_enable,
       program_address => program_address,
       program_word    => program_word,
@@ -632,5 +786,6 @@ begin
   network_error(2) <= is_fragment or is_packet_dropped;
   network_error(3) <= is_reply_lost or is_lost or is_frame_lost;
   network_error(6) <= is_sample_lost or is_sample_parted;
+  network_error(8) <= is_conflict or is_unbound;
 
 end architecture rtl;

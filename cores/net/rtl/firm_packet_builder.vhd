@@ -6,6 +6,8 @@
 -- A word of a program is one byte of the frame, or the payload: bit 10 marks the last one, bits 9 to 8 are the source,
 -- and bits 7 to 0 the argument. A program begins with eight words that are not sent: the sum of the header's constant
 -- words, the length of the packet without the payload, both with the high byte first, and the destination's address.
+-- With HAS_OWN, four more follow, the address of this host, and bit 7 of a field's address tells a byte that this host
+-- gets while it runs, such as one of its address.
 --
 -- There are several banks of fields. So a packet may be ready in one of them while others are written and sent.
 library ieee;
@@ -15,7 +17,8 @@ use ieee.numeric_std.all;
 entity firm_packet_builder is
   generic (
     ADDRESS_BITS : integer := 12; -- of the programs' memory
-    BANK_BITS    : integer := 4   -- of the number of a bank, 1 to 8
+    BANK_BITS    : integer := 4;  -- of the number of a bank, 1 to 8
+    HAS_OWN      : boolean := false
   );
   port (
     clk   : in std_logic;
@@ -37,6 +40,10 @@ entity firm_packet_builder is
     field_address : in std_logic_vector(6 downto 0);
     field_data    : in std_logic_vector(7 downto 0);
 
+    -- With HAS_OWN: which byte of this host, and the byte in the same cycle.
+    own_select : out std_logic_vector(6 downto 0);
+    own_byte   : in  std_logic_vector(7 downto 0) := x"00";
+
     -- The programs: a memory that shows the word one cycle after `program_enable`, and keeps it.
     program_enable  : out std_logic;
     program_address : out std_logic_vector(ADDRESS_BITS-1 downto 0);
@@ -56,9 +63,18 @@ end entity firm_packet_builder;
 
 architecture rtl of firm_packet_builder is
 
-  constant FIELD_BITS     : positive := 7;
-  constant HEADER_BYTES   : positive := 20;  -- of IPv4
-  constant PRELUDE_WORDS  : positive := 8;   -- that are not sent
+  constant FIELD_BITS   : positive := 7;
+  constant HEADER_BYTES : positive := 20;  -- of IPv4
+
+  function prelude_words_of(is_longer : boolean) return positive is
+  begin
+    if is_longer then
+      return 12;
+    end if;
+    return 8;
+  end function prelude_words_of;
+
+  constant PRELUDE_WORDS : positive := prelude_words_of(HAS_OWN);  -- that are not sent
 
   subtype source_t is std_logic_vector(1 downto 0);
   constant FROM_WORD    : source_t := "00";  -- the argument itself
@@ -231,6 +247,8 @@ begin
 
   -- ------------------------------------------------------------------ the byte
 
+  own_select <= argument(FIELD_BITS-1 downto 0);
+
   access_fields : process (clk)
   begin
     if rising_edge(clk) then
@@ -251,7 +269,9 @@ begin
         final_r  <= word_r(10) and is_final;
         chosen_r <= '0';
         value_r  <= argument;
-        if source = FROM_FIELD then
+        if HAS_OWN and source = FROM_FIELD and argument(FIELD_BITS) = '1' then
+          value_r <= own_byte;
+        elsif source = FROM_FIELD then
           chosen_r <= '1';
         elsif source = FROM_RESULT then
           value_r <= result;

@@ -352,7 +352,8 @@ class Network:
 
     `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port, and knows the
     names of `hosts`. `reassemblies` are the packets of IPv4 in fragments that may arrive at the same time, and
-    `reassembly` the bytes of the longest one, if the topics need fewer; 0 means as the topics need.
+    `reassembly` the bytes of the longest one, if the topics need fewer; 0 means as the topics need. Without an
+    `address` (0.0.0.0), the node gets one by DHCP.
     """
 
     mac: bytes
@@ -368,6 +369,11 @@ class Network:
     phy: Phy = Phy.GMII
     reassemblies: int = 1
     reassembly: int = 0
+
+    @property
+    def has_dhcp(self) -> bool:
+        """Whether the node gets its address by DHCP."""
+        return self.address == IPv4Address(0)
 
 
 class StatusAccess(Enum):

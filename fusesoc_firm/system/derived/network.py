@@ -13,6 +13,7 @@ from fusesoc_firm.system.derived.model import Converter, Host, Network, NetworkK
 from fusesoc_firm.system.written.specification import (
     AXI_STREAM,
     CHIPS,
+    DHCP,
     ETHERNET,
     NETWORKS,
     NO_STATUS,
@@ -142,7 +143,7 @@ def _check_system(written: Specification, scheduling: Scheduling, software: Soft
 def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Network | None:
     """Return the network of a section, or None if it has a fault."""
     mac = _mac(section.mac, faults)
-    network = _addresses(section, faults)
+    network = _no_addresses(section, project, faults) if section.address == DHCP else _addresses(section, faults)
     hosts = _hosts(section, faults)
     master = None if section.master is None else _master(section.master, hosts, faults)
     name = _name(section, project, faults)
@@ -161,7 +162,7 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     if not section.is_sound or mac is None or network is None:
         return None
     address, netmask, gateway = network
-    if master:
+    if master and address != _UNUSED_ADDRESS:
         _check_reachable(section, address, IPv4Network((address, str(netmask)), strict=False), master[0], faults)
     kind = NetworkKind(project.interconnect) if project.interconnect in NETWORKS else NetworkKind.ETHERNET
     namespace, domain, phy = str(section.namespace), section.domain, Phy(section.phy)
@@ -246,6 +247,25 @@ def _addresses(section: NodeNetwork, faults: Diagnostics) -> tuple[IPv4Address, 
             hint = f"legal here: another address of {network}"
             faults.error(f"the gateway {gateway} is not a neighbour of {address}", section.gateway.source, hint)
     return address, netmask, gateway
+
+
+def _no_addresses(
+    section: NodeNetwork, project: Project, faults: Diagnostics
+) -> tuple[IPv4Address, IPv4Address, None] | None:
+    """Return what stands for the addresses that a DHCP server gives; note keys that have no meaning then."""
+    before = len(faults.found)
+    if project.interconnect in CHIPS:
+        hint = f"legal here: an IPv4 address; '{DHCP}' is for interconnect '{ETHERNET}'"
+        message = f"'address: {DHCP}' is not possible with interconnect '{project.interconnect}'"
+        faults.error(message, section.address.source, hint)
+    for name in ("netmask", "gateway"):
+        value: Text | None = getattr(section, name)
+        if value is not None and value.source:
+            hint = "remove the key; the server knows it, and the board sends to its neighbours and routers only"
+            faults.error(f"'{name}' is not possible with 'address: {DHCP}'", value.source, hint)
+    if len(faults.found) > before:
+        return None
+    return _UNUSED_ADDRESS, _UNUSED_ADDRESS, None
 
 
 def _address(text: Text, faults: Diagnostics) -> IPv4Address | None:

@@ -94,7 +94,7 @@ NETWORK_FAULTS = {
     "lost_messages": "a message of another node has no room, or comes in fragments of RTPS and is too long"
     " or the node takes none",
     "refused_messages": "a message to send is empty, too long or of no publisher",
-    "taken_addresses": "another host has the address of the board",
+    "taken_addresses": "another host has the address of the board, or a board with DHCP has lost its address",
     "broken_packets": "a packet of RTPS, or a list of parameters in it, is broken",
     "other_endpoints": "a publisher or subscriber of a topic of the board has another type, hash, quality, partition"
     " or encoding",

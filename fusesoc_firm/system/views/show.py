@@ -27,7 +27,7 @@ from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.derived.timing import bounds_of
 from fusesoc_firm.system.hardware.configuration import top_level_pins
 from fusesoc_firm.system.hardware.crossings import all_crossings
-from fusesoc_firm.system.written.specification import AXI_STREAM
+from fusesoc_firm.system.written.specification import AXI_STREAM, DHCP
 
 if TYPE_CHECKING:
     from fusesoc_firm.scheduling.analysis import Bound
@@ -79,7 +79,9 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
 def _network(network: Network | None) -> dict[str, Any]:
     if network is None:
         return {}
-    addresses = {"address": network.address, "netmask": network.netmask, "gateway": network.gateway}
+    addresses: dict[str, object] = {"address": DHCP}
+    if not network.has_dhcp:
+        addresses = {"address": network.address, "netmask": network.netmask, "gateway": network.gateway}
     return {
         "network": {
             "mac": network.mac.hex(":"),

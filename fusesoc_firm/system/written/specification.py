@@ -50,6 +50,7 @@ LINKS = ("uart", "spi")
 ETHERNET = "ethernet"
 CHIPS = W5500, W5200 = ("w5500", "w5200")
 NETWORKS = (ETHERNET, *CHIPS)
+DHCP = "dhcp"
 # The interface of the PHY of a node by Ethernet.
 PHYS = ("gmii", "mii", "rgmii", "rmii")
 # The accesses to the registers of a system's status, if it has one.
@@ -125,9 +126,12 @@ class NodeNetwork(Section):
     """The place of a system that is a node itself in its network, and its name in ROS."""
 
     mac: Text = key("the board's MAC address, such as 02:00:00:00:00:01", is_required=True)
-    address: Text = key("the board's IPv4 address, such as 192.168.1.20", is_required=True)
-    netmask: Text = key("the mask of the network's addresses", default=Text("255.255.255.0"))
-    gateway: Text | None = key("the router to other networks (default: none)")
+    address: Text = key(
+        "the board's IPv4 address, such as 192.168.1.20, or dhcp: one of a DHCP server; dhcp only with ethernet",
+        is_required=True,
+    )
+    netmask: Text = key("the mask of the network's addresses; not with dhcp", default=Text("255.255.255.0"))
+    gateway: Text | None = key("the router to other networks (default: none); not with dhcp")
     name: Text | None = key("the node's name (default: the system's name)")
     namespace: Text = key("the node's namespace, such as /arm", default=Text("/"))
     domain: int = key("the domain of ROS 2 (ROS_DOMAIN_ID); only used with ethernet", form="integer", default=0)

@@ -1,0 +1,98 @@
+"""The packets of a node that gets its address by DHCP (`firm_dhcp_client`), as programs for `firm_packet_builder`.
+
+Messages follow RFC 2131, their options RFC 2132. Options that only some messages have are pads in the others.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from enum import IntEnum
+
+from fusesoc_firm.fabric.packets import OWN_ADDRESS, Own, Part, Words, datagram, plain_program
+from fusesoc_firm.fabric.presence import ALL_HOSTS, ARP_REQUEST, PROBE, REPORT, TYPE_ARP, report_program
+from fusesoc_firm.system.derived.model import Network
+
+MESSAGE, RENEWAL, ANNOUNCEMENT = "message", "renewal", "announcement"
+PACKETS = MESSAGE, RENEWAL, ANNOUNCEMENT
+
+_CLIENT_PORT, _SERVER_PORT = 68, 67
+_TO_ALL = b"\xff" * 4
+_REQUEST, _ETHERNET, _MAC_BYTES = 1, 1, 6
+_HARDWARE_BYTES, _NAME_BYTES, _FILE_BYTES, _SHORTEST = 16, 64, 128, 300
+_MAGIC = bytes.fromhex("63825363")
+_LONGEST_LABEL = 63
+# The forms of `own_select`: bytes that are 0 without an address, those that are 0 in a message without a choice of
+# server and address, and constants that are 0 there.
+_IF_BOUND, _IF_CHOSEN, _CONSTANT = 1 << 5, 2 << 5, 3 << 5
+_SERVER_SLOT, _NUMBER_SLOT, _SENDER_SLOT, _TYPE_SLOT = 4, 8, 12, 31
+# Bits 5 and 4 of such a constant are the same.
+_CONSTANT_BITS = 0x1F
+
+
+class Option(IntEnum):
+    """The tags of options."""
+
+    MASK = 1
+    ROUTER = 3
+    HOST_NAME = 12
+    REQUESTED_ADDRESS = 50
+    LEASE = 51
+    TYPE = 53
+    SERVER = 54
+    LIST = 55
+    RENEWAL = 58
+    REBINDING = 59
+    CLIENT = 61
+    END = 255
+
+
+_WANTED = Option.LEASE, Option.SERVER, Option.RENEWAL, Option.REBINDING, Option.MASK, Option.ROUTER
+_CURRENT = Own(tuple(_IF_BOUND | select for select in OWN_ADDRESS.selects))
+_NUMBER = Own(tuple(range(_NUMBER_SLOT, _NUMBER_SLOT + 4)))
+_SERVER = Own(tuple(range(_SERVER_SLOT, _SERVER_SLOT + 4)))
+_SENDER = Own(tuple(range(_SENDER_SLOT, _SENDER_SLOT + _MAC_BYTES)))
+
+
+def programs_of(network: Network) -> dict[str, Words]:
+    """Return the programs of the packets that keep a node with DHCP in its network."""
+    head = ALL_HOSTS, network.mac, TYPE_ARP + ARP_REQUEST + network.mac
+    ports = struct.pack(">H", _CLIENT_PORT), struct.pack(">H", _SERVER_PORT)
+    parts = _message(network)
+    return {
+        REPORT: report_program(network),
+        PROBE: plain_program(network, *head, bytes(4 + _MAC_BYTES), OWN_ADDRESS),
+        MESSAGE: datagram(network, ALL_HOSTS, (_CURRENT, _TO_ALL), ports, parts),
+        RENEWAL: datagram(network, _SENDER, (_CURRENT, _SERVER), ports, parts),
+        ANNOUNCEMENT: plain_program(network, *head, OWN_ADDRESS, bytes(_MAC_BYTES), OWN_ADDRESS),
+    }
+
+
+def host_name(network: Network) -> str:
+    """Return the node's name as that of a host: letters, digits and single '-' (RFC 1123), up to 63 of them."""
+    return re.sub("_+", "-", network.name)[:_LONGEST_LABEL].strip("-")
+
+
+def _message(network: Network) -> tuple[Part, ...]:
+    """All messages are one: what differs between them, the client tells. The broadcast flag is not set."""
+    head = struct.pack(">BBBB", _REQUEST, _ETHERNET, _MAC_BYTES, 0)
+    hardware = network.mac.ljust(_HARDWARE_BYTES, b"\0")
+    name = host_name(network).encode()
+    told = _option(Option.CLIENT, bytes([_ETHERNET]) + network.mac) + _option(Option.HOST_NAME, name)
+    told += _option(Option.LIST, bytes(_WANTED))
+    chosen = *_chosen(Option.REQUESTED_ADDRESS, OWN_ADDRESS), *_chosen(Option.SERVER, _SERVER)
+    fixed = bytes(12) + hardware + bytes(_NAME_BYTES + _FILE_BYTES) + _MAGIC
+    type_ = bytes([Option.TYPE, 1]), Own((_TYPE_SLOT,))
+    size = len(head) + 12 + len(fixed) + 3 + len(told) + 2 * 6 + 1
+    padding = bytes(max(0, _SHORTEST - size))
+    return head, _NUMBER, bytes(4), _CURRENT, fixed, *type_, told, *chosen, bytes([Option.END]) + padding
+
+
+def _option(tag: Option, value: bytes) -> bytes:
+    return bytes([tag, len(value)]) + value
+
+
+def _chosen(tag: Option, value: Own) -> tuple[Part, ...]:
+    """An option that only a message with a choice has."""
+    constants = tuple(_CONSTANT | number & _CONSTANT_BITS for number in (tag, len(value.selects)))
+    return Own(constants), Own(tuple(_IF_CHOSEN | select for select in value.selects))
