@@ -18,11 +18,12 @@ from types import MappingProxyType
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.rtps import Kind, Parameter
+from fusesoc_firm.system.derived.ethernet import LONGEST_IN_FRAME
 from fusesoc_firm.system.derived.model import Network
 from fusesoc_firm.text.render import Rendering
 
 # Bytes of a sample in each fragment but the last.
-FRAGMENT_BYTES = 1344
+FRAGMENT_BYTES = LONGEST_IN_FRAME
 
 _LAST = 1 << 10
 _FROM_FIELD, _FROM_PAYLOAD, _FROM_RESULT = 1 << 8, 2 << 8, 3 << 8

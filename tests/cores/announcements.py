@@ -50,7 +50,7 @@ ROOM = Sizes(sources=8, sinks=8)  # in the tables; less than for eight peers
 SAMPLE = 64  # bytes of the longest payload that the node sends
 LONG = 65536  # the same, if it sends samples in fragments
 ASSEMBLED = 4096  # bytes of the longest one that it puts together, if it does
-_IDLE = -1  # an event that waits until the node has nothing to do
+IDLE = -1  # an event that waits until the node has nothing to do
 _GAP = 12  # cycles between two packets, at least
 _ETHERNET, _UDP = 14, 42  # bytes before the header of IPv4, and before the payload of UDP
 _RTPS_HEADER = 20  # bytes
@@ -89,7 +89,7 @@ class Event:
     kind: Kind
     data: bytes = b""
     count: int = 0
-    before: int = _IDLE
+    before: int = IDLE
 
     @property
     def row(self) -> str:
@@ -228,6 +228,7 @@ class Peers:
         self.events: list[Event] = []
         self._was_slow = True
         self._published = [0] * len(WRITTEN)
+        self._requests = 0  # for fragments
 
     def _peer(self, number: int) -> _Peer:
         # The prefixes of two peers differ in one byte only.
@@ -303,7 +304,7 @@ class Peers:
     def _send(self, peer: _Peer, *items: Submessage, is_slow: bool = True) -> None:
         chance = self._chance
         packet = Writer(is_little=peer.is_little).message(peer.prefix, *items)
-        before = _IDLE if is_slow or self._was_slow else _GAP + chance.choice([0, 0, 3, 100])
+        before = IDLE if is_slow or self._was_slow else _GAP + chance.choice([0, 0, 3, 100])
         self._was_slow = is_slow
         if chance.random() < 0.1:
             part = packet[: chance.randrange(1, len(packet) + 1)]
@@ -695,7 +696,10 @@ class Peers:
         base = chance.choice([1, 1, 1, 2, 3, 40, 0, 48, 50, 60, 300, (1 << 32) - 2])
         wanted = [base + place for place in range(chance.choice([0, 1, 2, 3, 49, 256])) if chance.random() < 0.7]
         writer = self._node.writers[0 if ours == len(WRITTEN) else 1 + ours]
-        request = NackFrag(reader.entity, writer.entity, number, Numbers.of(wanted, base), 3)
+        # Most counts are new, and some old ones come again.
+        self._requests += 1
+        count = self._requests if chance.random() < 0.8 else chance.choice([0, self._requests - 1, (1 << 32) - 1])
+        request = NackFrag(reader.entity, writer.entity, number, Numbers.of(wanted, base), count)
         self._send(peer, self._destination(), request)
 
     def _wait(self, _: _Peer) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from ipaddress import IPv4Address
 
 from fusesoc_firm.fabric import rtps
@@ -20,6 +20,7 @@ DEPTH = 15  # of the node's topics
 RELIABLE, GRAPH = Quality(depth=DEPTH), Quality(is_transient_local=True, depth=1)
 _FIRST_PEER = 10  # the last byte of the addresses of the first one
 _MOST = 60_000  # milliseconds for anything
+_GAP = 100  # cycles before a packet
 _GROUP = Address(rtps.MULTICAST, rtps.multicast_port(0))
 
 
@@ -79,7 +80,10 @@ class Host:
 
 @dataclass
 class Net:
-    """The node, its peers, and the network between them, which loses a part of the packets each way."""
+    """The node, its peers, and the network between them, which loses a part of the packets each way.
+
+    A node at `pace` does not end what it does before the next event: a millisecond has so many cycles, or some more.
+    """
 
     world: World
     peers: list[Host]
@@ -88,6 +92,7 @@ class Net:
     now: int = 0
     frames: list[bytes] = field(default_factory=list)  # of the node
     sent: int = 0
+    pace: int = 0
 
     def __post_init__(self) -> None:
         print(f"seed {self.seed}")
@@ -100,11 +105,12 @@ class Net:
         peer.participant.start(self.now)
         self.peers.append(peer)
 
-    def run(self, until: Callable[[], bool]) -> None:
-        """Let milliseconds pass until the condition holds."""
+    def run(self, until: Callable[[], bool], each: Callable[[], None] = lambda: None) -> None:
+        """Let milliseconds pass, before each of which something is done, until the condition holds."""
         end = self.now + _MOST
         while not until():
             assert self.now < end, (self.world.entries, self.world.pulses)
+            each()
             self.step()
 
     def step(self) -> None:
@@ -112,7 +118,7 @@ class Net:
         self.now += 1
         for peer in self.peers:
             peer.participant.tick(self.now)
-        self.do(Event(Kind.TICKS, count=1))
+        self.do(Event(Kind.RUSHED, count=1, before=self.pace) if self.pace else Event(Kind.TICKS, count=1))
 
     def do(self, event: Event) -> None:
         """An event at the node, and all that follows from it within the same millisecond."""
@@ -120,13 +126,17 @@ class Net:
         while packets := self._outbox():
             for packet in packets:
                 if not self._is_lost():
-                    self._take(self.world.do(Event(Kind.PACKET, packet)))
+                    self._take(self.world.do(self._soon(Event(Kind.PACKET, packet))))
         # What the last packet causes comes with the next event, which waits for it.
-        self._take(self.world.do(Event(Kind.TICKS, count=0)))
+        if not self.pace:
+            self._take(self.world.do(Event(Kind.TICKS, count=0)))
 
     def publish(self, writer: int, payload: bytes) -> None:
         """A frame of the host for a writer of the node."""
-        self.do(Event(Kind.FRAME, bytes([writer]) + len(payload).to_bytes(4, "little") + payload))
+        self.do(self._soon(Event(Kind.FRAME, bytes([writer]) + len(payload).to_bytes(4, "little") + payload)))
+
+    def _soon(self, event: Event) -> Event:
+        return replace(event, before=_GAP) if self.pace else event
 
     def _outbox(self) -> list[bytes]:
         packets = [packet for peer in self.peers for _, packet in peer.participant.outbox]

@@ -40,8 +40,8 @@ NODE = a_node()
 # Peers, stall and seed of a case in which all happens, and the events of such a case.
 FULL = (9, 30, SEED + 2)
 EVENTS = 2000
-# The same of cases in which samples are sent in fragments.
-LONG_CASES = [(2, 0, SEED), (5, 30, SEED + 1), (1, 10, SEED + 2)]
+# The same of cases in which samples are sent in fragments, also of the longest ones.
+LONG_CASES = [(2, 0, SEED + 3), (5, 30, SEED + 1), (1, 10, SEED + 6)]
 
 
 @pytest.fixture(scope="module")

@@ -55,8 +55,8 @@ class Lab:
         return board
 
     @contextmanager
-    def lossy(self, percent: int, seed: int) -> Iterator[None]:
-        """A line between board and switch that loses so many frames each way."""
+    def lossy(self, percent: int, seed: int) -> Iterator[list[int]]:
+        """A line between board and switch that loses so many frames each way; their numbers are there at its end."""
         self.switch.run("ip", "link", "set", "tap0", "nomaster")
         words = [sys.executable, str(HERE / "lossy_line.py"), "line", "tap0", str(percent), str(seed)]
         with subprocess.Popen(
@@ -65,8 +65,11 @@ class Lab:
             assert line.stdin and line.stdout
             assert line.stdout.readline() == "ready\n"
             self.switch.run("ip", "link", "set", "line", "master", "switch", "up")
-            yield
-            line.stdin.close()
+            lost: list[int] = []
+            yield lost
+            printed, _ = line.communicate(timeout=_PATIENCE)
+            assert line.returncode == 0
+            lost += map(int, printed.split())
 
     def members(self) -> list[tuple[str, str]]:
         """Port and group of each membership that the switch knows."""

@@ -234,6 +234,7 @@ class Sink:
     is_heard: bool = False
     acknowledged: int = 0
     next_heartbeat: int = 0
+    next_count: int = 0  # the least one of its next request for fragments
 
     @property
     def first(self) -> int:
@@ -702,7 +703,8 @@ class Participant:
             if _is(sink, peer, item.reader) and sink.history.endpoint.entity == item.writer and sink.is_reliable:
                 if isinstance(item, AckNack):
                     self._asked(sink, item)
-                elif item.number in sink.history.samples and item.number >= sink.first:
+                elif item.number <= sink.history.number and item.count >= sink.next_count:
+                    sink.next_count = (item.count + 1) % (1 << 32)
                     self._asked_for_fragments(sink, item)
 
     def _asked(self, sink: Sink, item: AckNack) -> None:
@@ -726,6 +728,9 @@ class Participant:
             self._send_heartbeat(sink)
 
     def _asked_for_fragments(self, sink: Sink, item: NackFrag) -> None:
+        if item.number < sink.first:
+            self._send_heartbeat(sink)
+            return
         payload = sink.history.samples[item.number]
         ends = sink.entity, sink.history.endpoint.entity, item.number
         count = -(-len(payload) // FRAGMENT_BYTES)

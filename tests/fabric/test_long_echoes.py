@@ -17,7 +17,7 @@ from fusesoc_firm.fabric.packets import FRAGMENT_BYTES
 from tests.fabric.dissection import read_alike
 from tests.fabric.hosts import captured
 from tests.fabric.live import Lab, exchange, settled, skip_without_peers
-from tests.fabric.messages import DataFrag, NackFrag
+from tests.fabric.messages import DataFrag, InfoDestination, NackFrag
 from tests.fabric.test_peers import Peer
 
 SEED = 20261127
@@ -109,18 +109,36 @@ def test_texts_of_all_sizes_come_back_to_both_peers(lab: Lab, tmp_path: Path) ->
 
 
 def test_what_gets_lost_is_sent_again(lab: Lab, tmp_path: Path) -> None:
-    """Some fragments of most messages get lost, and peers ask for them alone."""
+    """Some fragments of most messages get lost; each peer asks for them alone, and gets them."""
     print(f"seed {SEED}")
     chance, capture = random.Random(SEED), tmp_path / "capture.pcapng"
-    with lab.lossy(LOSS, SEED), captured(lab.switch, capture):
+    with lab.lossy(LOSS, SEED) as lost, captured(lab.switch, capture):
         lab.board()
         peers = _peers(lab)
         for size in (100, 5000, 1400, 20_000, 9000, 40_000):
             _exchange(peers, [_text(chance, size) for _ in peers])
-    asked = Counter(
-        message.prefix
-        for _, message in read_alike(capture)
-        if any(isinstance(item, NackFrag) for item in message.submessages)
-    )
-    print(asked)
-    assert len({*asked} - {BOARD}) == len(peers)
+    asked, answered = _requests(capture)
+    print(f"{lost} frames lost; {asked} fragments asked for, {answered} of them sent then")
+    assert min(lost) > 0
+    assert len(asked) == len(answered) == len(peers)
+
+
+def _requests(capture: Path) -> tuple[Counter[bytes], Counter[bytes]]:
+    """Of each peer's reader, the fragments that it asked for, and those that the board sent after that."""
+    wanted: set[tuple[bytes, bytes, int, int]] = set()
+    asked, answered = Counter[bytes](), Counter[bytes]()
+    to = b""
+    for _, message in read_alike(capture):
+        for item in message.submessages:
+            match item:
+                case InfoDestination():
+                    to = item.prefix
+                case NackFrag() if message.prefix != BOARD:
+                    fragments = {(message.prefix, item.reader, item.number, place) for place in item.missing}
+                    asked[message.prefix] += len(fragments - wanted)
+                    wanted |= fragments
+                case DataFrag() if message.prefix == BOARD:
+                    fragment = to, item.reader, item.number, item.first
+                    answered[to] += fragment in wanted
+                    wanted.discard(fragment)
+    return asked, +answered

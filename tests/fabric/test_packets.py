@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -27,6 +28,7 @@ from tests.fabric.messages import (
 )
 from tests.fabric.programs import PEER, PORT, Fields, random_fields, run
 from tests.fabric.test_node import node
+from tests.hdl.ghdl import REPOSITORY
 
 SEED = 20261127
 NODE = node()
@@ -131,3 +133,8 @@ def test_tshark_finds_right_checksums_and_nothing_malformed(tmp_path: Path) -> N
 def test_programs_fit_into_the_memory_of_their_addresses() -> None:
     assert len(PROGRAMS.words) <= 1 << PROGRAMS.address_bits
     assert all(0 <= word < 1 << 11 for word in PROGRAMS.words)
+
+
+def test_fragments_have_the_size_of_the_hardware() -> None:
+    package = (REPOSITORY / "cores/net/rtl/firm_rtps_pkg.vhd").read_text(encoding="utf-8")
+    assert re.findall(r"RTPS_FRAGMENT_BYTES : positive := (\d+);", package) == [str(FRAGMENT_BYTES)]

@@ -10,10 +10,10 @@ use firm.firm_rtps_pkg.all;
 
 entity firm_rtps_control is
   generic (
-    ENDPOINTS : integer := 2;  -- of the node, 1 to 24
-    SOURCES   : integer := 8;  -- matched writers of peers, 1 to 64
-    SINKS     : integer := 16; -- matched readers of peers, 1 to 128
-    PARTED    : boolean := false -- samples may be sent in fragments
+    ENDPOINTS     : integer := 2;  -- of the node, 1 to 24
+    SOURCES       : integer := 8;  -- matched writers of peers, 1 to 64
+    SINKS         : integer := 16; -- matched readers of peers, 1 to 128
+    HAS_FRAGMENTS : boolean := false -- samples may be sent in fragments
   );
   port (
     clk   : in std_logic;
@@ -71,7 +71,7 @@ entity firm_rtps_control is
     chooses      : out std_logic;
     sample_bytes : in  unsigned(RTPS_SAMPLE_BITS-1 downto 0);
     is_long      : in  std_logic;
-    is_last      : in  std_logic;
+    is_last_part : in  std_logic;
     is_beyond    : in  std_logic;
 
     -- Of firm_rtps_sender; `slot_writer` is the writer whose packet is prepared.
@@ -101,18 +101,8 @@ end entity firm_rtps_control;
 architecture rtl of firm_rtps_control is
 
   constant MOST_ENDPOINTS : positive := 24;
-
-  -- The program is held while a packet leaves, and takes no milliseconds while it sends a sample in fragments.
-  function tick_bits_of(has_fragments : boolean) return positive is
-  begin
-    if has_fragments then
-      return 13;
-    end if;
-    return 8;
-  end function tick_bits_of;
-
-  -- More milliseconds than these are lost.
-  constant TICK_BITS      : positive := tick_bits_of(PARTED);
+  -- The program is held while a packet leaves: more milliseconds than these are lost.
+  constant TICK_BITS      : positive := 8;
   constant MOST_TICKS     : positive := 2**TICK_BITS-1;
   constant MOST_SOURCES   : positive := 64;
   constant MOST_SINKS     : positive := 128;
@@ -277,7 +267,7 @@ begin
            or next_address = AT_PREPARED then
           builds_r <= coming;
         end if;
-        if PARTED and (next_address = AT_LOOK or next_address = AT_FRAGMENT) then
+        if HAS_FRAGMENTS and (next_address = AT_LOOK or next_address = AT_FRAGMENT) then
           builds_r <= coming;
         end if;
       end if;
@@ -392,13 +382,13 @@ begin
 
   facts <= has_lease & is_gone & has_default & has_metatraffic & has_unicast & is_transient & is_known & is_reliable;
 
-  sample_facts <= "000" & is_new_long & is_beyond & is_last & is_long & is_started;
+  sample_facts <= "000" & is_new_long & is_beyond & is_last_part & is_long & is_started;
 
   -- Entities have their first byte highest.
   choose_word : process (read_address, facts, padded, entity_id, early_number, sample_facts, is_large, writer,
                          early_source, sample_bytes)
   begin
-    if PARTED and read_address(4) = '1' then
+    if HAS_FRAGMENTS and read_address(4) = '1' then
       word <= std_logic_vector(resize(sample_bytes, 32));
     elsif read_address(3 downto 2) = WORD_OF_FACTS then
       word <= facts & padded;

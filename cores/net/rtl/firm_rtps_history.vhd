@@ -15,7 +15,7 @@ entity firm_rtps_history is
   generic (
     WRITERS : integer := 1;  -- that send frames, 1 to 8
     SAMPLE  : integer := 64; -- bytes of a slot, a power of two, 2 to 65536
-    SLOTS   : integer := 16  -- a power of two, 2 to 256; SAMPLE*SLOTS may be 1048576
+    SLOTS   : integer := 16  -- a power of two, 2 to 256; SAMPLE*SLOTS is at most 1048576
   );
   port (
     clk   : in std_logic;
@@ -43,13 +43,13 @@ entity firm_rtps_history is
     is_done     : in  std_logic;
 
     -- The slot whose sample is sent next, unless it is the last one that has come; and which fragment of it, from 0 on.
-    -- What follows of them is told by firm_rtps_fragment.
+    -- firm_rtps_fragment computes the rest.
     looks        : in  std_logic;
     chooses      : in  std_logic;
     choice       : in  std_logic_vector(7 downto 0);
     sample_bytes : out unsigned(RTPS_SAMPLE_BITS-1 downto 0);
     is_long      : out std_logic;
-    is_last      : out std_logic;
+    is_last_part : out std_logic;
     is_beyond    : out std_logic;
 
     -- Shows the payload of a slot, or of the last sample that has come, and its size, from two cycles after `shows` on.
@@ -66,14 +66,14 @@ end entity firm_rtps_history;
 
 architecture rtl of firm_rtps_history is
 
-  constant MOST_WRITERS : positive := 8;
-  constant MOST_BYTES   : positive := 65536;
-  constant MOST_SLOTS   : positive := 256;
-  constant MOST_MEMORY  : positive := 1048576;
-  constant HEAD_BYTES   : positive := 5;
-  constant BYTE_BITS    : positive := clog2(SAMPLE);
-  constant SLOT_BITS    : positive := clog2(SLOTS);
-  constant PARTED       : boolean  := SAMPLE > RTPS_FRAGMENT_BYTES;
+  constant MOST_WRITERS  : positive := 8;
+  constant MOST_BYTES    : positive := 65536;
+  constant MOST_SLOTS    : positive := 256;
+  constant MOST_MEMORY   : positive := 1048576;
+  constant HEAD_BYTES    : positive := 5;
+  constant BYTE_BITS     : positive := clog2(SAMPLE);
+  constant SLOT_BITS     : positive := clog2(SLOTS);
+  constant HAS_FRAGMENTS : boolean  := SAMPLE > RTPS_FRAGMENT_BYTES;
 
   subtype slot_t is unsigned(SLOT_BITS-1 downto 0);
   type bytes_t is array (natural range 0 to SLOTS*SAMPLE-1) of std_logic_vector(7 downto 0);
@@ -107,10 +107,10 @@ architecture rtl of firm_rtps_history is
   signal byte_r  : std_logic_vector(7 downto 0) := (others => '0');
 
   -- The fragment that the program chose.
-  signal size   : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- of the sample in the slot
-  signal start  : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- its first byte
-  signal part   : unsigned(10 downto 0);                  -- its bytes
-  signal part_r : std_logic := '0';                       -- it is shown
+  signal size       : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- of the sample in the slot
+  signal start      : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- its first byte
+  signal part_bytes : unsigned(10 downto 0);                  -- its bytes
+  signal is_part_r  : std_logic := '0';                       -- it is shown
 
 begin
 
@@ -213,15 +213,15 @@ begin
         place_r <= place_r + 1;
       end if;
       if shows = '1' then
-        slot_r  <= unsigned(slot(SLOT_BITS-1 downto 0));
-        place_r <= resize(start, BYTE_BITS);
-        part_r  <= '1';
+        slot_r    <= unsigned(slot(SLOT_BITS-1 downto 0));
+        place_r   <= resize(start, BYTE_BITS);
+        is_part_r <= '1';
         if shows_new = '1' then
-          slot_r  <= next_slot;
-          place_r <= (others => '0');
-          part_r  <= '0';
+          slot_r    <= next_slot;
+          place_r   <= (others => '0');
+          is_part_r <= '0';
         end if;
-      elsif PARTED and looks = '1' then
+      elsif HAS_FRAGMENTS and looks = '1' then
         slot_r <= unsigned(choice(SLOT_BITS-1 downto 0));
       end if;
     end if;
@@ -229,7 +229,7 @@ begin
 
   m_axis_tdata <= byte_r;
 
-  with_fragments : if PARTED generate
+  with_fragments : if HAS_FRAGMENTS generate
 
     u_fragment : entity firm.firm_rtps_fragment
       port map (
@@ -241,26 +241,26 @@ begin
         sample_bytes => sample_bytes,
         is_long      => is_long,
         start        => start,
-        bytes        => part,
-        is_last      => is_last,
+        bytes        => part_bytes,
+        is_last_part => is_last_part,
         is_beyond    => is_beyond
       );
 
     size          <= resize(shown_r, RTPS_SAMPLE_BITS);
     is_new_long   <= '1' when size_r >= RTPS_FRAGMENT_BYTES else '0';
-    payload_bytes <= std_logic_vector(resize(part, 16)) when part_r = '1' else
+    payload_bytes <= std_logic_vector(resize(part_bytes, 16)) when is_part_r = '1' else
                      std_logic_vector(resize(shown_r, 16));
 
   end generate with_fragments;
 
-  without_fragments : if not PARTED generate
+  without_fragments : if not HAS_FRAGMENTS generate
 
     size          <= (others => '0');
     start         <= (others => '0');
-    part          <= (others => '0');
+    part_bytes    <= (others => '0');
     sample_bytes  <= (others => '0');
     is_long       <= '0';
-    is_last       <= '0';
+    is_last_part  <= '0';
     is_beyond     <= '0';
     is_new_long   <= '0';
     payload_bytes <= std_logic_vector(resize(shown_r, 16));

@@ -95,9 +95,9 @@ end entity firm_rtps_node;
 
 architecture rtl of firm_rtps_node is
 
-  constant FIRST_READER : positive := 2;  -- 1 is the writer of ros_discovery_info
-  constant ENDPOINTS    : positive := READERS+WRITERS;
-  constant PARTED       : boolean  := SAMPLE > RTPS_FRAGMENT_BYTES;
+  constant FIRST_READER  : positive := 2;  -- 1 is the writer of ros_discovery_info
+  constant ENDPOINTS     : positive := READERS+WRITERS;
+  constant HAS_FRAGMENTS : boolean  := SAMPLE > RTPS_FRAGMENT_BYTES;
 
   signal field_valid   : std_logic;
   signal field_address : std_logic_vector(RECORD_BITS-1 downto 0);
@@ -413,7 +413,7 @@ begin
       choice        => write_data,
       sample_bytes  => sample_bytes,
       is_long       => is_long,
-      is_last       => is_last_part,
+      is_last_part  => is_last_part,
       is_beyond     => is_beyond,
       shows         => shows,
       shows_new     => shows_new,
@@ -454,10 +454,10 @@ begin
 
   u_control : entity firm.firm_rtps_control
     generic map (
-      ENDPOINTS => ENDPOINTS,
-      SOURCES   => SOURCES,
-      SINKS     => SINKS,
-      PARTED    => PARTED
+      ENDPOINTS     => ENDPOINTS,
+      SOURCES       => SOURCES,
+      SINKS         => SINKS,
+      HAS_FRAGMENTS => HAS_FRAGMENTS
     )
     port map (
       clk                 => clk,
@@ -506,7 +506,7 @@ begin
       chooses             => chooses,
       sample_bytes        => sample_bytes,
       is_long             => is_long,
-      is_last             => is_last_part,
+      is_last_part        => is_last_part,
       is_beyond           => is_beyond,
       prepare_valid       => prepare_valid,
       chosen_slot_valid   => chosen_slot_valid,

@@ -28,7 +28,7 @@ entity firm_rtps_node_tb is
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;              -- the chance, each cycle, that the host takes nothing
-    MAIN          : integer := 39;             -- the address of the program's loop
+    MAIN          : integer := 40;             -- the address of the program's loop
     WRITERS       : integer := 4;
     READERS       : integer := 3;
     SOURCES       : integer := 8;

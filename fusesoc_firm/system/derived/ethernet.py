@@ -20,8 +20,8 @@ _LEAST_WAITING, _MOST_DISCOVERY = 4096, 32768
 LEAST_REASSEMBLED, _LEAST_ASSEMBLED = 2048, 1024
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
 MOST_DEPTH, MOST_SLOTS = 127, 256
-# Bytes of all of them.
-MOST_HISTORY = 1 << 20
+# Bytes of all slots.
+MOST_HISTORY_BYTES = 1 << 20
 _SHORTEST_SLOT = 2
 # The frequencies of clk in MHz that the line of each PHY needs, and the hint about them.
 _CLOCKS = {
@@ -49,9 +49,13 @@ def check_ethernet(written: Specification, system: DerivedSystem, faults: Diagno
             faults.error(f"{message}allows {most} {name}, not {len(items)}", place)
     for item in system.subscribers:
         _check_size(item, blocks[item.block], "take", faults)
+    before = len(faults.found)
     for item in system.publishers:
         _check_size(item, blocks[item.block], "send", faults)
-    _check_history(system.publishers, blocks, message, faults)
+    has_sizes = len(faults.found) == before
+    slots = _check_slots(system.publishers, blocks, message, faults)
+    if has_sizes and slots <= MOST_SLOTS:
+        _check_history(system.publishers, slots, blocks, message, faults)
 
 
 def slot_bytes(publishers: Iterable[Converter]) -> int:
@@ -134,10 +138,10 @@ def _check_clock(project: Project, phy: Phy, clock: Fraction | None, faults: Dia
             faults.error(message, project.clock.source, f"legal here: {hint}")
 
 
-def _check_history(
-    publishers: Sequence[Converter], blocks: Mapping[str, Block], message: str, faults: Diagnostics
-) -> None:
-    """Note a publisher with too many kept messages, the first one without slots, or too many bytes of all of them."""
+def _check_slots(
+    publishers: Iterable[Converter], blocks: Mapping[str, Block], message: str, faults: Diagnostics
+) -> int:
+    """Return the number of slots; note a publisher with too many kept messages, or else the first one without slots."""
     used = 0
     for item in publishers:
         block, kept = blocks[item.block], kept_of(item.quality)
@@ -150,12 +154,19 @@ def _check_history(
             text = f"{message}has {MOST_SLOTS} slots for the last messages; with '{item.block}', it needs {used}"
             hint = "give publishers a smaller 'depth' in 'qos': each needs a power of two of slots, more than its depth"
             faults.error(text, _place_of_depth(block), hint)
-    slots, size = slot_count(used), slot_bytes(publishers)
-    if slots <= MOST_SLOTS and slots * size > MOST_HISTORY:
+    return slot_count(used)
+
+
+def _check_history(
+    publishers: Sequence[Converter], slots: int, blocks: Mapping[str, Block], message: str, faults: Diagnostics
+) -> None:
+    """Note too many bytes of all slots."""
+    size = slots * slot_bytes(publishers)
+    if size > MOST_HISTORY_BYTES:
         block = blocks[max(publishers, key=_longest).block]
-        text = f"{message}has {MOST_HISTORY} bytes for the last messages; {slots} slots for those of '{block.name}'"
+        need = f"{slots} slots, each for the longest message, that of '{block.name}', need {size}"
         hint = "give publishers a smaller 'depth' in 'qos', or the longest messages a smaller 'maxLength'"
-        faults.error(f"{text} need {slots * size}", block.name.source, hint)
+        faults.error(f"{message}has {MOST_HISTORY_BYTES} bytes for the last messages; {need}", block.name.source, hint)
 
 
 def _place_of_depth(block: Block) -> SourceRef | None:
@@ -181,4 +192,4 @@ def _check_size(item: Converter, block: Block, direction: str, faults: Diagnosti
         faults.error(f"'{item.block}' has payloads of {size} bytes, {reason}", block.name.source, hint)
     elif least > _longest(item):
         text = f"'{item.block}' has payloads of {least} bytes and more, but without 'maxLength', {_longest(item)} fit"
-        faults.error(text, block.name.source, f"add 'maxLength' to the block, up to {LONGEST}")
+        faults.error(text, block.name.source, f"add 'maxLength' to the block; legal here: {least} to {LONGEST}")
