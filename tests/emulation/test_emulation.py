@@ -135,17 +135,20 @@ def test_a_wrong_response_is_reported(build_root: Path, tmp_path: Path, capsys: 
     assert "the messages differ from those of the model" in said.err
 
 
+@_emulated_by("zynq7000")
 def test_bursts_do_not_fit_a_line(build_root: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spec = SPECS / "multi_type" / "multi_type.yaml"
     assert main(["emulate", str(spec), "--build-root", str(build_root)]) == 1
     assert "cannot carry the bursts of scheduler 'fixed_priority_preemptive'" in capsys.readouterr().err
 
 
+@_emulated_by("zynq7000")
 def test_a_folder_without_the_kernel(tmp_path: Path, build_root: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert emulated(build_root, "quat2euler", "--freertos", str(tmp_path)) == 1
     assert f"{tmp_path} is not the FreeRTOS kernel: there is no tasks.c" in capsys.readouterr().err
 
 
+@_emulated_by("zynq7000")
 def test_a_specification_without_a_core(tmp_path: Path, build_root: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copytree(SPECS / "quat2euler", tmp_path / "own", ignore=shutil.ignore_patterns("*.core"))
     assert main(["emulate", str(tmp_path / "own" / "quat2euler.yaml"), "--build-root", str(build_root)]) == 1
