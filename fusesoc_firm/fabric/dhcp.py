@@ -13,8 +13,8 @@ from fusesoc_firm.fabric.packets import OWN_ADDRESS, Own, Part, Words, datagram,
 from fusesoc_firm.fabric.presence import ALL_HOSTS, ARP_REQUEST, PROBE, REPORT, TYPE_ARP, report_program
 from fusesoc_firm.system.derived.model import Network
 
-MESSAGE, RENEWAL, ANNOUNCEMENT = "message", "renewal", "announcement"
-PACKETS = MESSAGE, RENEWAL, ANNOUNCEMENT
+DHCP, RENEWAL, ANNOUNCEMENT = "dhcp", "renewal", "announcement"
+PACKETS = DHCP, RENEWAL, ANNOUNCEMENT
 
 _CLIENT_PORT, _SERVER_PORT = 68, 67
 _TO_ALL = b"\xff" * 4
@@ -62,7 +62,7 @@ def programs_of(network: Network) -> dict[str, Words]:
     return {
         REPORT: report_program(network),
         PROBE: plain_program(network, *head, bytes(4 + _MAC_BYTES), OWN_ADDRESS),
-        MESSAGE: datagram(network, ALL_HOSTS, (_CURRENT, _TO_ALL), ports, parts),
+        DHCP: datagram(network, ALL_HOSTS, (_CURRENT, _TO_ALL), ports, parts),
         RENEWAL: datagram(network, _SENDER, (_CURRENT, _SERVER), ports, parts),
         ANNOUNCEMENT: plain_program(network, *head, OWN_ADDRESS, bytes(_MAC_BYTES), OWN_ADDRESS),
     }

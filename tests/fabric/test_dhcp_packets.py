@@ -110,10 +110,10 @@ NO_CHOICE = dict.fromkeys(CHOICE, "")
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_reads_each_message(tmp_path: Path) -> None:
     messages = [
-        ("message", own(DISCOVER, is_bound=False), TO_ALL | UNBOUND | NO_CHOICE),
-        ("message", own(REQUEST, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
-        ("message", own(DECLINE, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
-        ("message", own(REQUEST), TO_ALL | BOUND | NO_CHOICE),
+        ("dhcp", own(DISCOVER, is_bound=False), TO_ALL | UNBOUND | NO_CHOICE),
+        ("dhcp", own(REQUEST, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
+        ("dhcp", own(DECLINE, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
+        ("dhcp", own(REQUEST), TO_ALL | BOUND | NO_CHOICE),
         ("renewal", own(REQUEST), TO_SERVER | BOUND | NO_CHOICE),
     ]
     found = _fields(tmp_path, [built(name, bytes_) for name, bytes_, _ in messages], *NAMES)
