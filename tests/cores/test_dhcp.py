@@ -81,7 +81,12 @@ class Event:
 
     @property
     def number(self) -> bytes:
-        return self.own[27:]
+        return self.own[27:31]
+
+    @property
+    def is_ended(self) -> bool:
+        """Whether the message lacks the last options."""
+        return self.own[31:] == b"\xff"
 
 
 @pytest.fixture(scope="module")
@@ -295,6 +300,7 @@ def test_an_address_that_another_host_has_is_declined(library: Library, tmp_path
     assert decline.chosen == _chosen(ADDRESS, SERVER_ADDRESS)
     assert discover.type == DISCOVER
     assert _is_after(decline, discover, 10, 12)
+    assert [event.is_ended for event in events if event.own] == [event.type == DECLINE for event in events if event.own]
 
 
 def test_without_an_address_nothing_is_taken(library: Library, tmp_path: Path) -> None:

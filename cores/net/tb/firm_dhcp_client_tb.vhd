@@ -10,7 +10,7 @@
 --
 -- A row of the results is a millisecond and an event: `checking`, `bound` or `lost`, or a packet, `message`, `renewal`
 -- or `announcement`, with the bytes that the builder gets: the type, the current address, the option with the address,
--- the option with the server, the MAC address of the server, the address and the number.
+-- the option with the server, the MAC address of the server, the address, the number, and an end or not.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -35,7 +35,8 @@ architecture simulation of firm_dhcp_client_tb is
 
   constant RESET_CYCLES : positive := 4;
   constant GAP_CYCLES   : positive := 6;
-  constant OWN_BYTES    : positive := 31;
+  constant OWN_BYTES    : positive := 32;
+  constant NUMBER_PLACE : positive := 27;  -- of the number among them
   constant NUMBER       : positive := 256; -- the first of the bytes that are the client's
   constant MOST_MS      : positive := 150000;
   constant BYTE_CYCLES  : positive := 3;   -- from a byte of a packet to the next one
@@ -47,7 +48,8 @@ architecture simulation of firm_dhcp_client_tb is
     96+22, 96+4, 68, 69, 70, 71,
     12, 13, 14, 15, 16, 17,
     0, 1, 2, 3,
-    8, 9, 10, 11
+    8, 9, 10, 11,
+    30
   );
 
   type number_t is array (0 to 3) of integer range 0 to 255;
@@ -279,8 +281,8 @@ begin
           end loop;
           byte := to_integer(unsigned(own_byte));
           write(row, ' ' & integer'image(byte));
-          if index >= OWN_BYTES-4 then
-            xid(index-OWN_BYTES+4) <= byte;
+          if index >= NUMBER_PLACE and index < NUMBER_PLACE+4 then
+            xid(index-NUMBER_PLACE) <= byte;
           end if;
         end loop;
         finish;
