@@ -267,7 +267,8 @@ begin
         note("message " & integer'image(sent(MESSAGE_PLACE)));
         xid      <= sent(NUMBER_PLACE to NUMBER_PLACE+3);
         messages <= messages + 1;
-      elsif sent(TYPE_PLACE+1) = ARP and sent(SENDER_PLACE to SENDER_PLACE+3) = sent(TARGET_PLACE to TARGET_PLACE+3) then
+      elsif sent(TYPE_PLACE+1) = ARP
+            and sent(SENDER_PLACE to SENDER_PLACE+3) = sent(TARGET_PLACE to TARGET_PLACE+3) then
         note("announced");
       end if;
     end procedure judge;

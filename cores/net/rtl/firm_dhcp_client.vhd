@@ -197,17 +197,10 @@ architecture rtl of firm_dhcp_client is
   signal is_time      : std_logic;
 
   -- A pass over four bytes of times: what is computed of which of them.
-  constant CLEAR_PASS    : natural := 0;
-  constant RENEW_PASS    : natural := 1;  -- half of the lease
-  constant HALF_PASS     : natural := 2;
-  constant QUARTER_PASS  : natural := 3;
-  constant EIGHTH_PASS   : natural := 4;
-  constant REBIND_PASS   : natural := 5;  -- seven eighths
-  constant ELAPSE_PASS   : natural := 8;
-  constant EXPIRED_PASS  : natural := 9;
-  constant TO_REBIND     : natural := 10;
-  constant TO_RENEW      : natural := 11;
-  signal pass_r          : unsigned(3 downto 0) := (others => '0');
+  -- RENEW finds half of the lease; HALF, QUARTER, EIGHTH and REBIND find seven eighths of it. CLEAR begins with the
+  -- seconds since the request. ELAPSE adds a second; the others compare.
+  type pass_t is (CLEAR, RENEW, HALF, QUARTER, EIGHTH, REBIND, ELAPSE, EXPIRED, TO_REBIND, TO_RENEW);
+  signal pass_r          : pass_t;
   signal first_base      : time_t;
   signal second_base     : time_t;
   signal target_base     : time_t;
@@ -276,6 +269,26 @@ architecture rtl of firm_dhcp_client is
     end loop;
     return false;
   end function differs;
+
+  function after_pass(pass : pass_t) return pass_t is
+  begin
+    if pass = CLEAR then
+      return RENEW;
+    elsif pass = RENEW then
+      return HALF;
+    elsif pass = HALF then
+      return QUARTER;
+    elsif pass = QUARTER then
+      return EIGHTH;
+    elsif pass = EIGHTH then
+      return REBIND;
+    elsif pass = ELAPSE then
+      return EXPIRED;
+    elsif pass = EXPIRED then
+      return TO_REBIND;
+    end if;
+    return TO_RENEW;
+  end function after_pass;
 
   function byte_of(number : std_logic_vector(47 downto 0); index : natural) return byte_t is
   begin
@@ -456,27 +469,27 @@ begin
 
   -- ------------------------------------------------------------------ times
 
-  halves <= '1' when pass_r = RENEW_PASS or pass_r = HALF_PASS or pass_r = QUARTER_PASS or pass_r = EIGHTH_PASS else
+  halves <= '1' when pass_r = RENEW or pass_r = HALF or pass_r = QUARTER or pass_r = EIGHTH else
             '0';
-  first_base  <= to_unsigned(ELAPSED_TIME, 4) when pass_r(3) = '1' else
-                 to_unsigned(REBIND_TIME, 4) when pass_r = QUARTER_PASS or pass_r = EIGHTH_PASS else
+  first_base  <= to_unsigned(ELAPSED_TIME, 4) when pass_r >= ELAPSE else
+                 to_unsigned(REBIND_TIME, 4) when pass_r = QUARTER or pass_r = EIGHTH else
                  to_unsigned(LEASE_TIME, 4);
-  second_base <= to_unsigned(LEASE_TIME, 4) when pass_r = EXPIRED_PASS else
+  second_base <= to_unsigned(LEASE_TIME, 4) when pass_r = EXPIRED else
                  to_unsigned(RENEW_TIME, 4) when pass_r = TO_RENEW else
                  to_unsigned(REBIND_TIME, 4);
-  target_base <= to_unsigned(RENEW_TIME, 4) when pass_r = RENEW_PASS else
-                 to_unsigned(ELAPSED_TIME, 4) when pass_r = CLEAR_PASS or pass_r = ELAPSE_PASS else
+  target_base <= to_unsigned(RENEW_TIME, 4) when pass_r = RENEW else
+                 to_unsigned(ELAPSED_TIME, 4) when pass_r = CLEAR or pass_r = ELAPSE else
                  to_unsigned(REBIND_TIME, 4);
   -- The lowest byte is the last one.
   offset <= count_r(1 downto 0) when halves = '1' else not count_r(1 downto 0);
   first  <= unsigned(times(to_integer(first_base + offset)));
-  second <= x"00" when pass_r = ELAPSE_PASS else not unsigned(times(to_integer(second_base + offset)));
+  second <= x"00" when pass_r = ELAPSE else not unsigned(times(to_integer(second_base + offset)));
   carry  <= carry_r when count_r(1 downto 0) /= 0 else
             "0" when halves = '1' else
             "1";
   total  <= resize(first, 9) + second + carry;
 
-  writes_times <= not (pass_r(3) and (pass_r(1) or pass_r(0))) when step_r = COUNTING else
+  writes_times <= '1' when step_r = COUNTING and pass_r <= ELAPSE else
                   writes_r and ready_r and is_time and not at_limit when step_r = VALUE else
                   '0';
 
@@ -486,8 +499,8 @@ begin
                to_unsigned(RENEW_TIME, 4) + count_r(1 downto 0) when option_r = RENEWAL else
                to_unsigned(REBIND_TIME, 4) + count_r(1 downto 0);
   time_data <= data_r when step_r /= COUNTING else
-               std_logic_vector(resize(since_r, 8)) when pass_r = CLEAR_PASS and count_r(1 downto 0) = 0 else
-               x"00" when pass_r = CLEAR_PASS else
+               std_logic_vector(resize(since_r, 8)) when pass_r = CLEAR and count_r(1 downto 0) = 0 else
+               x"00" when pass_r = CLEAR else
                std_logic_vector(carry & first(7 downto 1)) when halves = '1' else
                std_logic_vector(total(7 downto 0));
 
@@ -610,7 +623,7 @@ begin
             step_r <= SENDING;
           end if;
         elsif second_r = '1' then
-          pass_r <= to_unsigned(ELAPSE_PASS, 4);
+          pass_r <= ELAPSE;
           counts := true;
           if state_r = CHECKING or bound_r = '1' then
             step_r <= COUNTING;
@@ -760,7 +773,7 @@ begin
         else
           got_r   <= '0';
           count_r <= (others => '0');
-          pass_r  <= to_unsigned(CLEAR_PASS, 4);
+          pass_r  <= CLEAR;
           step_r  <= COUNTING;
           if state_r = SELECTING then
             state_r <= REQUESTING;
@@ -792,12 +805,12 @@ begin
       elsif step_r = DECIDING then
         count_r <= (others => '0');
         step_r  <= COUNTING;
-        pass_r  <= pass_r + 1;
-        if pass_r = CLEAR_PASS and has_renew_r = '1' then
-          pass_r <= to_unsigned(HALF_PASS, 4);
+        pass_r  <= after_pass(pass_r);
+        if pass_r = CLEAR and has_renew_r = '1' then
+          pass_r <= HALF;
         end if;
-        if pass_r = REBIND_PASS
-           or (has_rebind_r = '1' and (pass_r = RENEW_PASS or (pass_r = CLEAR_PASS and has_renew_r = '1'))) then
+        if pass_r = REBIND
+           or (has_rebind_r = '1' and (pass_r = RENEW or (pass_r = CLEAR and has_renew_r = '1'))) then
           step_r <= RESTING;
           if state_r = REQUESTING then
             state_r <= CHECKING;
@@ -806,7 +819,7 @@ begin
             state_r <= BOUND;
             tries   := to_unsigned(LAST_TRY, tries'length);
           end if;
-        elsif pass_r = EXPIRED_PASS and carry_r = 1 then
+        elsif pass_r = EXPIRED and carry_r = 1 then
           lose(START_PAUSE);
           step_r <= RESTING;
         elsif pass_r = TO_REBIND and carry_r = 1 and (state_r = BOUND or state_r = RENEWING) then

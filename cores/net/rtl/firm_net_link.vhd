@@ -340,8 +340,8 @@ begin
 
     wants_dhcp  <= (wants_broadcast or wants_renewal or wants_announcement) and not sends_r;
     client_packet <= number_of(RENEWAL_PACKET) when wants_renewal = '1' else
-                   number_of(ANNOUNCEMENT_PACKET) when wants_announcement = '1' else
-                   number_of(DHCP_PACKET);
+                     number_of(ANNOUNCEMENT_PACKET) when wants_announcement = '1' else
+                     number_of(DHCP_PACKET);
     -- The builder reads the bytes of the client up to the end of the packet.
     dhcp_sent   <= sends_r and not is_busy;
 

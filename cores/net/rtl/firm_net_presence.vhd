@@ -61,11 +61,11 @@ architecture rtl of firm_net_presence is
   subtype byte_t is std_logic_vector(7 downto 0);
   type bytes_t is array (natural range <>) of byte_t;
   -- ARP for Ethernet and IPv4.
-  constant ARP      : bytes_t(12 to 19) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04");
-  constant IPV4     : bytes_t(12 to 13) := (x"08", x"00");
-  constant VERSION  : std_logic_vector(3 downto 0) := x"4";
-  constant IGMP     : byte_t            := x"02";
-  constant QUERY    : byte_t            := x"11";
+  constant ARP        : bytes_t(12 to 19) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04");
+  constant IPV4       : bytes_t(12 to 13) := (x"08", x"00");
+  constant VERSION    : std_logic_vector(3 downto 0) := x"4";
+  constant IGMP       : byte_t            := x"02";
+  constant QUERY      : byte_t            := x"11";
   constant NO_ADDRESS : std_logic_vector(31 downto 0) := (others => '0');
 
   -- Of the frame so far.
