@@ -126,12 +126,12 @@ def _at_device(arguments: argparse.Namespace, loaded: LoadedSystem) -> tuple[Sim
     Tap(arguments.network).close()
     built = built_board(arguments)
     board = Board(built.words, built.folder, Tap(arguments.network), NETWORK_HERTZ[network.kind.value])
-    name, place = (
-        f"{network.namespace.rstrip('/')}/{network.name}",
-        f"at {arguments.network}, in domain {network.domain}",
-    )
+    name = f"{network.namespace.rstrip('/')}/{network.name}"
+    place = f"at {arguments.network}, in domain {network.domain}"
     if network.has_dhcp:
-        board.on_address = lambda address: print(f"{name} is at {address}, {place}", flush=True)
+        board.on_address = lambda address: print(
+            f"{name} {f'is at {address}' if address else 'has lost its address'}, {place}", flush=True
+        )
         return board, f"{name} asks for an address by DHCP, {place}"
     return board, f"{name} is at {network.address}, {place}"
 

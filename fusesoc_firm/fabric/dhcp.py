@@ -1,6 +1,7 @@
 """The packets of a node that gets its address by DHCP (`firm_dhcp_client`), as programs for `firm_packet_builder`.
 
-Messages follow RFC 2131, their options RFC 2132. Options that only some messages have are pads in the others.
+Messages follow RFC 2131, their options RFC 2132. Options that only some messages have are pads in the others, or are
+after the end of a DHCPDECLINE, which must not have them.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from fusesoc_firm.fabric.packets import OWN_ADDRESS, Own, Part, Words, datagram,
 from fusesoc_firm.fabric.presence import ALL_HOSTS, ARP_REQUEST, PROBE, REPORT, TYPE_ARP, report_program
 from fusesoc_firm.system.derived.model import Network
 
-MESSAGE, RENEWAL, ANNOUNCEMENT = "message", "renewal", "announcement"
-PACKETS = MESSAGE, RENEWAL, ANNOUNCEMENT
+DHCP, RENEWAL, ANNOUNCEMENT = "dhcp", "renewal", "announcement"
+PACKETS = DHCP, RENEWAL, ANNOUNCEMENT
 
 _CLIENT_PORT, _SERVER_PORT = 68, 67
 _TO_ALL = b"\xff" * 4
@@ -25,7 +26,7 @@ _LONGEST_LABEL = 63
 # The forms of `own_select`: bytes that are 0 without an address, those that are 0 in a message without a choice of
 # server and address, and constants that are 0 there.
 _IF_BOUND, _IF_CHOSEN, _CONSTANT = 1 << 5, 2 << 5, 3 << 5
-_SERVER_SLOT, _NUMBER_SLOT, _SENDER_SLOT, _TYPE_SLOT = 4, 8, 12, 31
+_SERVER_SLOT, _NUMBER_SLOT, _SENDER_SLOT, _END_SLOT, _TYPE_SLOT = 4, 8, 12, 30, 31
 # Bits 5 and 4 of such a constant are the same.
 _CONSTANT_BITS = 0x1F
 
@@ -33,8 +34,6 @@ _CONSTANT_BITS = 0x1F
 class Option(IntEnum):
     """The tags of options."""
 
-    MASK = 1
-    ROUTER = 3
     HOST_NAME = 12
     REQUESTED_ADDRESS = 50
     LEASE = 51
@@ -47,7 +46,7 @@ class Option(IntEnum):
     END = 255
 
 
-_WANTED = Option.LEASE, Option.SERVER, Option.RENEWAL, Option.REBINDING, Option.MASK, Option.ROUTER
+_WANTED = Option.LEASE, Option.SERVER, Option.RENEWAL, Option.REBINDING
 _CURRENT = Own(tuple(_IF_BOUND | select for select in OWN_ADDRESS.selects))
 _NUMBER = Own(tuple(range(_NUMBER_SLOT, _NUMBER_SLOT + 4)))
 _SERVER = Own(tuple(range(_SERVER_SLOT, _SERVER_SLOT + 4)))
@@ -62,7 +61,7 @@ def programs_of(network: Network) -> dict[str, Words]:
     return {
         REPORT: report_program(network),
         PROBE: plain_program(network, *head, bytes(4 + _MAC_BYTES), OWN_ADDRESS),
-        MESSAGE: datagram(network, ALL_HOSTS, (_CURRENT, _TO_ALL), ports, parts),
+        DHCP: datagram(network, ALL_HOSTS, (_CURRENT, _TO_ALL), ports, parts),
         RENEWAL: datagram(network, _SENDER, (_CURRENT, _SERVER), ports, parts),
         ANNOUNCEMENT: plain_program(network, *head, OWN_ADDRESS, bytes(_MAC_BYTES), OWN_ADDRESS),
     }
@@ -74,18 +73,22 @@ def host_name(network: Network) -> str:
 
 
 def _message(network: Network) -> tuple[Part, ...]:
-    """All messages are one: what differs between them, the client tells. The broadcast flag is not set."""
+    """All messages are one: what differs between them, the client tells.
+
+    The broadcast flag is not set, and the seconds since the first message are 0.
+    """
     head = struct.pack(">BBBB", _REQUEST, _ETHERNET, _MAC_BYTES, 0)
     hardware = network.mac.ljust(_HARDWARE_BYTES, b"\0")
     name = host_name(network).encode()
-    told = _option(Option.CLIENT, bytes([_ETHERNET]) + network.mac) + _option(Option.HOST_NAME, name)
-    told += _option(Option.LIST, bytes(_WANTED))
+    identity = _option(Option.CLIENT, bytes([_ETHERNET]) + network.mac)
+    told = _option(Option.HOST_NAME, name) + _option(Option.LIST, bytes(_WANTED)) + bytes([Option.END])
     chosen = *_chosen(Option.REQUESTED_ADDRESS, OWN_ADDRESS), *_chosen(Option.SERVER, _SERVER)
     fixed = bytes(12) + hardware + bytes(_NAME_BYTES + _FILE_BYTES) + _MAGIC
     type_ = bytes([Option.TYPE, 1]), Own((_TYPE_SLOT,))
-    size = len(head) + 12 + len(fixed) + 3 + len(told) + 2 * 6 + 1
+    size = len(head) + 12 + len(fixed) + 3 + len(identity) + 2 * 6 + 1 + len(told)
     padding = bytes(max(0, _SHORTEST - size))
-    return head, _NUMBER, bytes(4), _CURRENT, fixed, *type_, told, *chosen, bytes([Option.END]) + padding
+    options = *type_, identity, *chosen, Own((_END_SLOT,)), told + padding
+    return head, _NUMBER, bytes(4), _CURRENT, fixed, *options
 
 
 def _option(tag: Option, value: bytes) -> bytes:

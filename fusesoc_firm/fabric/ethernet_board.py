@@ -30,6 +30,7 @@ _PREAMBLE = b"\x55" * 7 + b"\xd5"
 _SHORTEST, _FCS_BYTES = 60, 4
 # The type of Ethernet and the head of a request of ARP; the places of its addresses.
 _ARP_REQUEST = bytes.fromhex("0806 0001 0800 06 04 0001")
+_TYPE_IPV4, _DHCP_PORTS = b"\x08\x00", b"\0\x44\0\x43"
 _SENDER_PLACE, _TARGET_PLACE, _ADDRESS_BYTES = 28, 38, 4
 # Frames at a device with a larger MTU than Ethernet's are longer.
 _MOST_BYTES = 2048
@@ -104,7 +105,8 @@ def _how_to_make(name: str) -> str:
 class Board(SimulatedBoard):
     """A running board at a TAP device.
 
-    Each address that the board announces by ARP, and that differs from the last one, is given to `on_address`.
+    Each address that the board announces by ARP, and that differs from the last one, is given to `on_address`, and no
+    text when the board has lost its address and asks for another one by DHCP.
     """
 
     def __init__(self, command: Sequence[str], folder: Path, tap: Tap, hertz: int) -> None:
@@ -148,8 +150,8 @@ class Board(SimulatedBoard):
         frame = line[len(_PREAMBLE) : -_FCS_BYTES]
         if not line.startswith(_PREAMBLE) or len(frame) < _SHORTEST or line[-_FCS_BYTES:] != _checksum(frame):
             fail(f"the board sent a broken frame: {line.hex()}")
-        address = _announced(frame)
-        if address and address != self._address:
+        address = "" if _is_without_address(frame) else _announced(frame) or self._address
+        if address != self._address:
             self._address = address
             self.on_address(address)
         self._tap.write(frame)
@@ -159,6 +161,11 @@ def _announced(frame: bytes) -> str:
     """Return the address that a frame announces (RFC 5227, section 2.3), or nothing."""
     sender, target = frame[_SENDER_PLACE:][:_ADDRESS_BYTES], frame[_TARGET_PLACE:][:_ADDRESS_BYTES]
     return str(IPv4Address(sender)) if frame[12:22] == _ARP_REQUEST and sender == target else ""
+
+
+def _is_without_address(frame: bytes) -> bool:
+    """Return whether a frame is a message of DHCP of a board that has no address."""
+    return frame[12:14] == _TYPE_IPV4 and frame[26:30] == bytes(4) and frame[34:38] == _DHCP_PORTS
 
 
 def _checksum(frame: bytes) -> bytes:

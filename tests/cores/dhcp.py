@@ -143,19 +143,22 @@ def is_offer(message: Message) -> bool:
     return found is not None and found.type == OFFER and SERVER in found.values and is_host
 
 
-def answer(message: Message, address: bytes = ADDRESS) -> str:
-    """What a client that asks for an address gets: "lease", "no", or nothing."""
+def answer(message: Message, address: bytes = ADDRESS, server: bytes = SERVER_ADDRESS) -> str:
+    """What a client that asks a server for an address gets: "lease", "no", or nothing."""
     found = meaning(message)
-    if found is None or found.type not in (ACK, NAK) or (found.type == ACK and LEASE not in found.values):
+    if found is None or found.values.get(SERVER) != server:
+        return ""
+    if found.type not in (ACK, NAK) or (found.type == ACK and LEASE not in found.values):
         return ""
     return "lease" if found.type == ACK and message.address == address else "no"
 
 
 def offer(kind: int = OFFER, seconds: int = 60, **changes: object) -> Message:
-    """A usual message."""
-    times = changes.pop("times", ())
+    """A usual message; `server` is the address that it tells, or nothing."""
+    times, server = changes.pop("times", ()), changes.pop("server", SERVER_ADDRESS)
+    assert isinstance(server, bytes)
     assert isinstance(times, tuple)
-    options = [(TYPE, bytes([kind])), (SERVER, SERVER_ADDRESS), (LEASE, seconds.to_bytes(4))]
+    options = [(TYPE, bytes([kind])), *([(SERVER, server)] if server else []), (LEASE, seconds.to_bytes(4))]
     options += [(tag, value.to_bytes(4)) for tag, value in zip((RENEWAL, REBINDING), times, strict=False)]
     made: Mapping[str, object] = {"options": listed(options) + b"\xff", **changes}
     return Message(**made)  # type: ignore[arg-type]
@@ -164,7 +167,7 @@ def offer(kind: int = OFFER, seconds: int = 60, **changes: object) -> Message:
 def random_message(chance: random.Random, kinds: tuple[int, ...]) -> Message:
     """A message of a server, half of which have something unusual or wrong."""
     options: Options = [(TYPE, bytes([chance.choice(kinds)])), (LEASE, chance.randbytes(4))]
-    options.append((SERVER, bytes([192, 0, 2, chance.randrange(1, 9)])))
+    options.append((SERVER, bytes([192, 0, 2, chance.choice((1, 1, 1, 1, 2))])))
     options += [(tag, chance.randbytes(4)) for tag in (RENEWAL, REBINDING) if chance.random() < 0.5]
     options += [(chance.choice((1, 3, 12, 43)), chance.randbytes(chance.randrange(9))) for _ in range(3)]
     if chance.random() < 0.3:

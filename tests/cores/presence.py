@@ -53,6 +53,12 @@ def is_conflict(frame: bytes) -> bool:
     return is_arp and frame[28:32] == ADDRESS and frame[22:28] != MAC
 
 
+def is_probe(frame: bytes) -> bool:
+    """Whether another host probes for the board's address, too."""
+    is_arp = frame[12:20] == b"\x08\x06\0\1\x08\0\6\4"
+    return is_arp and frame[28:32] == bytes(4) and frame[38:42] == ADDRESS and frame[22:28] != MAC
+
+
 def random_frame(chance: random.Random) -> bytes:
     """A query or an ARP packet; about half of them concern the board."""
     if chance.random() < 0.5:

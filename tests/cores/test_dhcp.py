@@ -33,7 +33,7 @@ from tests.hdl.verilog import loops
 SEED = 20261127
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/dhcp")
 TICK_CYCLES = 2
-NEXT, TAKEN = "2\n", "3\n"
+NEXT, TAKEN, DUE = "2\n", "3\n", "4\n"
 NOTHING = bytes(4)
 # Milliseconds in which a message is read, and what follows from it is sent.
 READING = 1000
@@ -43,6 +43,11 @@ SLACK = 1100
 
 def pause(ms: int) -> str:
     return f"1 {ms}\n"
+
+
+def busy(ms: int) -> str:
+    """The builder is busy from now on."""
+    return f"5 {ms}\n"
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,12 @@ class Event:
 
     @property
     def number(self) -> bytes:
-        return self.own[27:]
+        return self.own[27:31]
+
+    @property
+    def is_ended(self) -> bool:
+        """Whether the message lacks the last options."""
+        return self.own[31:] == b"\xff"
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +199,89 @@ def test_an_address_that_is_refused_is_given_up(library: Library, tmp_path: Path
     assert discover.current == NOTHING
 
 
+@pytest.mark.parametrize("refusal", [offer(ACK, 20), offer(NAK)])
+def test_only_the_server_that_was_chosen_answers_a_request(library: Library, tmp_path: Path, refusal: Message) -> None:
+    """After a renewal that nobody answers, any server may answer, but it tells its address."""
+    kind = meaning(refusal)
+    assert kind
+    others = [offer(kind.type, 40, server=server).row() for server in (bytes([192, 0, 2, 2]), b"")]
+    rows = [*ACCEPTED, *[row for other in others for row in (other, pause(READING))], offer(ACK, 40).row()]
+    # Two announcements, three renewals, and a request to all.
+    rows += [*[NEXT] * 6, others[1], pause(500), others[0], pause(8000)]
+    events = _events(library, tmp_path, rows)
+    kinds = ["message"] * 2 + ["checking", "bound"] + ["announcement"] * 2 + ["renewal"] * 3 + ["message"]
+    assert [event.what for event in events[:10]] == kinds
+    losses = [event.ms - events[9].ms for event in events if event.what == "lost"]
+    assert len(losses) == (kind.type == NAK)
+    assert all(500 < ms < READING for ms in losses)
+
+
+def test_a_lease_begins_with_its_request(library: Library, tmp_path: Path) -> None:
+    late = [pause(2500), offer(ACK, 30).row()]
+    events = _events(library, tmp_path, [*ACCEPTED, *late, NEXT, NEXT, NEXT, *late, NEXT])
+    _, request, first, second = [event for event in events if event.what in ("message", "renewal")]
+    assert _is_after(request, first, 14, 15)
+    assert _is_after(first, second, 14, 15)
+
+
+def test_seconds_of_a_lease_pass_while_a_packet_waits(library: Library, tmp_path: Path) -> None:
+    rows = [*ACCEPTED, offer(ACK, 20).row(), NEXT, NEXT, DUE, busy(30_000), NEXT, pause(3000)]
+    *_, renewal, request, lost, discover = _events(library, tmp_path, rows)
+    assert (renewal.what, request.type, lost.what, discover.type) == ("renewal", REQUEST, "lost", DISCOVER)
+    assert _is_after(renewal, lost, 30, 30)
+
+
+@pytest.mark.parametrize("row", [TAKEN, offer(NAK).row()])
+def test_a_packet_stays_as_it_is_until_it_is_sent(library: Library, tmp_path: Path, row: str) -> None:
+    rows = [*ACCEPTED, offer(ACK, 20).row(), NEXT, NEXT, NEXT, DUE, row, NEXT, pause(READING)]
+    events = _events(library, tmp_path, rows)
+    first, second = [event for event in events if event.what == "renewal"]
+    assert first.own == second.own
+    assert events.index(second) < [event.what for event in events].index("lost")
+
+
+def test_the_next_address_waits_until_the_last_one_rests(library: Library, tmp_path: Path) -> None:
+    rows = [*ACCEPTED, offer(ACK, 20).row(), NEXT, NEXT, NEXT, offer(NAK).row(), NEXT]
+    *_, lost, discover = _events(library, tmp_path, rows, STOP_CYCLES=20_000 * TICK_CYCLES)
+    assert (lost.what, discover.type) == ("lost", DISCOVER)
+    assert _is_after(lost, discover, 20, 20)
+
+
+ENDLESS = (1 << 32) - 1
+
+
+@pytest.mark.parametrize(
+    ("seconds", "times", "what"),
+    [
+        (ENDLESS, (), {}),
+        (0, (), {"lost": 0}),
+        (3, (), {"lost": 3}),
+        (40, (30, 20), {"message": 20, "lost": 40}),
+        (40, (0,), {"renewal": 0, "message": 35, "lost": 40}),
+        (20, (10, 60), {"renewal": 10, "lost": 20}),
+        (20, (60, 90), {"lost": 20}),
+        (20, (ENDLESS, ENDLESS), {"lost": 20}),
+    ],
+)
+def test_times_of_a_server_that_make_no_sense(
+    library: Library, tmp_path: Path, seconds: int, times: tuple[int, ...], what: dict[str, int]
+) -> None:
+    """A time that has passed when the address is bound has its effect then, and none is later than the lease's end."""
+    rows = [*ACCEPTED, offer(ACK, seconds, times=times).row(), pause(42_000)]
+    _, request, checking, *events = _events(library, tmp_path, rows)
+    end = next((place for place, event in enumerate(events) if event.what == "lost"), len(events))
+    first = {event.what: event for event in reversed(events[: end + 1])}
+    bound = first.pop("bound", checking)
+    first.pop("announcement", None)
+    if seconds < 5:
+        assert not any(event.what in ("bound", "renewal") for event in events[:end])
+    else:
+        assert set(first) == set(what)
+        for kind, second in what.items():
+            since = bound if second < 5 else request
+            assert _is_after(since, first[kind], max(0, second - 1) if second >= 5 else 0, second)
+
+
 def test_a_request_that_nobody_answers_ends(library: Library, tmp_path: Path) -> None:
     discover, *requests, last = _events(library, tmp_path, [*ACCEPTED, *[NEXT] * 3])
     assert [event.type for event in requests] == [REQUEST] * 3
@@ -207,6 +300,7 @@ def test_an_address_that_another_host_has_is_declined(library: Library, tmp_path
     assert decline.chosen == _chosen(ADDRESS, SERVER_ADDRESS)
     assert discover.type == DISCOVER
     assert _is_after(decline, discover, 10, 12)
+    assert [event.is_ended for event in events if event.own] == [event.type == DECLINE for event in events if event.own]
 
 
 def test_without_an_address_nothing_is_taken(library: Library, tmp_path: Path) -> None:
@@ -238,16 +332,15 @@ def _trial(chance: random.Random) -> tuple[list[str], list[tuple[int, bytes, byt
     assert found
     address = messages[taken].address
     packets.append((REQUEST, address, found.values[SERVER]))
-    messages = [random_message(chance, (ACK, ACK, ACK, NAK, OFFER)) for _ in range(4)] + [offer(NAK)]
+    messages = [random_message(chance, (ACK, ACK, ACK, NAK, OFFER)) for _ in range(4)]
+    messages.append(offer(NAK, server=found.values[SERVER]))
     for message in messages:
         rows += [message.row(), pause(READING)]
-        if result := answer(message, address):
+        if result := answer(message, address, found.values[SERVER]):
             break
     if result == "lease":
         rows += [TAKEN, NEXT]
-        server = meaning(message)
-        assert server
-        packets.append((DECLINE, address, server.values.get(SERVER, found.values[SERVER])))
+        packets.append((DECLINE, address, found.values[SERVER]))
     return rows, packets, result == "lease"
 
 

@@ -13,7 +13,7 @@ import pytest
 from fusesoc_firm.fabric.presence import PROBE, REPORT, frames_of
 from fusesoc_firm.system.derived.model import Network
 from tests.cores.ethernet import fcs, padded, write_capture
-from tests.cores.presence import is_conflict, is_query, query, random_frame
+from tests.cores.presence import is_conflict, is_probe, is_query, query, random_frame
 from tests.cores.requests import ADDRESS, MAC
 from tests.hdl.ghdl import Generic, Library, core_files
 
@@ -57,7 +57,7 @@ def test_reports_and_probes_are_repeated(library: Library, tmp_path: Path) -> No
     assert all(ms % 1000 <= 1 for ms, _ in events)
 
 
-def _concerns(library: Library, folder: Path, seed: int) -> None:
+def _concerns(library: Library, folder: Path, seed: int, *, in_use: bool = True) -> None:
     """Frames that are far apart: each has its own answer, besides those of the first seconds."""
     print(f"seed {seed}")
     chance = random.Random(seed)
@@ -68,17 +68,27 @@ def _concerns(library: Library, folder: Path, seed: int) -> None:
         _row(frame, 4200 * TICK_CYCLES if number == 0 else chance.randrange(400, 800), is_aborted=is_aborted)
         for number, (frame, is_aborted) in enumerate(zip(frames, aborted, strict=True))
     ]
-    events = _events(library, folder, rows, SEED=seed, SLOW_PERCENT=20)
+    events = _events(library, folder, rows, SEED=seed, SLOW_PERCENT=20, IN_USE=in_use)
     later = [what for ms, what in events if ms > 4100]
     known = [frame for frame, is_aborted in zip(frames, aborted, strict=True) if not is_aborted]
-    assert later.count("report") == sum(map(is_query, known)) > 20
-    assert later.count("taken") == sum(map(is_conflict, known)) > 20
+    probes = 0 if in_use else sum(map(is_probe, known))
+    assert (probes > 10) != in_use
+    assert later.count("taken") == sum(map(is_conflict, known)) + probes > 20
+    if in_use:
+        assert later.count("report") == sum(map(is_query, known)) > 20
+    else:
+        assert "report" not in [what for _, what in events]
+        assert [what for _, what in events].count("probe") == 4
     assert later.count("probe") == 0
 
 
 @pytest.mark.parametrize("seed", [SEED, SEED + 1])
 def test_queries_are_answered_and_conflicts_reported(library: Library, tmp_path: Path, seed: int) -> None:
     _concerns(library, tmp_path, seed)
+
+
+def test_an_address_that_is_not_in_use_yet_is_only_probed_for(library: Library, tmp_path: Path) -> None:
+    _concerns(library, tmp_path, SEED, in_use=False)
 
 
 def test_an_answer_is_delayed_and_given_once(library: Library, tmp_path: Path) -> None:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from contextlib import ExitStack
 from pathlib import Path
 
-from tests.fabric.hosts import Host
+from tests.fabric.hosts import Host, found
 
 Server = subprocess.Popen[bytes]
 
 
 def dnsmasq(host: Host, folder: Path, stack: ExitStack, first: str, *options: str, log: str = "dnsmasq") -> Server:
     """Start dnsmasq with one address to give for two minutes."""
-    words = [shutil.which("dnsmasq") or "/usr/sbin/dnsmasq", "--no-daemon", "--conf-file=/dev/null", "--port=0"]
+    words = [found("dnsmasq") or "dnsmasq", "--no-daemon", "--conf-file=/dev/null", "--port=0"]
     words += ["--interface=eth0", "--bind-dynamic", "--no-ping", "--dhcp-authoritative", "--log-dhcp", "--user=root"]
     words += [f"--dhcp-range={first},{first},2m", f"--dhcp-leasefile={folder / f'{log}.leases'}", "--group="]
     words += [f"--log-facility={folder / f'{log}.log'}", f"--pid-file={folder / f'{log}.pid'}", *options]

@@ -24,6 +24,11 @@ exec cat
 """
 
 
+def found(program: str) -> str | None:
+    """The path of a program, also of one for administrators, or None."""
+    return shutil.which(program) or shutil.which(program, path="/usr/sbin:/sbin")
+
+
 @dataclass(frozen=True)
 class Host:
     """A host: the process that keeps its namespaces, and its address."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fabric.hosts import Host, switched
+from tests.fabric.hosts import Host, found, switched
 from tests.fabric.test_peers import HERE, Peer, Sample, _why_not
 from tests.ros.cpp_nodes import ros2
 
@@ -27,7 +26,7 @@ def skip_without_peers(*programs: str) -> None:
     if reason := _why_not():
         pytest.skip(reason)
     for program in ("verilator", *programs):
-        if not shutil.which(program):
+        if not found(program):
             pytest.skip(f"{program} is not installed")
     if not Path("/dev/net/tun").exists():
         pytest.skip("there is no /dev/net/tun")

@@ -34,6 +34,7 @@ def own(kind: int = REQUEST, *, is_bound: bool = True, chooses: bool = False) ->
     slots = bytearray(32)
     for place, value in ((0, ADDRESS), (4, SERVER), (8, NUMBER), (12, SERVER_MAC), (31, bytes([kind]))):
         slots[place : place + len(value)] = value
+    slots[30] = 255 if kind == DECLINE else 0
     constants = bytes(number | number << 1 & 32 for number in range(32))
     nothing = bytes(32)
     chosen = (bytes(slots), constants) if chooses else (nothing, nothing)
@@ -92,7 +93,7 @@ COMMON = {
     "dhcp.cookie": "99.130.83.99",
     "dhcp.option.hostname": "turtle",
     "_ws.malformed": "",
-    "dhcp.option.request_list_item": "51,54,58,59,1,3",
+    "dhcp.option.request_list_item": "51,54,58,59",
     "ip.len": "328",
     "udp.length": "308",
     # The second ones are in option 61.
@@ -110,20 +111,23 @@ NO_CHOICE = dict.fromkeys(CHOICE, "")
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_reads_each_message(tmp_path: Path) -> None:
     messages = [
-        ("message", own(DISCOVER, is_bound=False), TO_ALL | UNBOUND | NO_CHOICE),
-        ("message", own(REQUEST, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
-        ("message", own(DECLINE, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
-        ("message", own(REQUEST), TO_ALL | BOUND | NO_CHOICE),
+        ("dhcp", own(DISCOVER, is_bound=False), TO_ALL | UNBOUND | NO_CHOICE),
+        ("dhcp", own(REQUEST, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
+        ("dhcp", own(DECLINE, is_bound=False, chooses=True), TO_ALL | UNBOUND | CHOICE),
+        ("dhcp", own(REQUEST), TO_ALL | BOUND | NO_CHOICE),
         ("renewal", own(REQUEST), TO_SERVER | BOUND | NO_CHOICE),
     ]
     found = _fields(tmp_path, [built(name, bytes_) for name, bytes_, _ in messages], *NAMES)
     for fields, (_, bytes_, special) in zip(found, messages, strict=True):
         tags = [int(tag) for tag in fields.pop("dhcp.option.type").split(",")]
         chosen = [50, 54] if special["dhcp.option.dhcp_server_id"] else []
-        assert [tag for tag in tags if tag] == [53, 61, 12, 55, *chosen]
+        told = [] if bytes_[31] == DECLINE else [12, 55]
+        assert [tag for tag in tags if tag] == [53, 61, *chosen, *told]
         assert fields.pop("dhcp.option.end") == "255"
         assert fields.pop("dhcp.option.dhcp") == str(bytes_[31])
-        assert fields == COMMON | special
+        # RFC 2131, table 5.
+        untold = {} if told else dict.fromkeys(("dhcp.option.hostname", "dhcp.option.request_list_item"), "")
+        assert fields == COMMON | special | untold
 
 
 @pytest.mark.check

@@ -30,9 +30,9 @@ blocks:
 """
 
 
-def hardware(folder: Path, clock: str = "250 kHz") -> list[Path]:
+def hardware(folder: Path, clock: str = "250 kHz", specification: str = SPECIFICATION) -> list[Path]:
     """The node; its clock is that of a simulated board."""
-    (folder / "turtle.yaml").write_text(SPECIFICATION, encoding="utf-8")
+    (folder / "turtle.yaml").write_text(specification, encoding="utf-8")
     others = dict.fromkeys(("board", "paths", "distro"))
     parameters = {"spec": "turtle.yaml", "product": "system", "clock": clock, **others}
     files = GENERATORS["far"].load(Request("far", "test:sys:turtle-system:0", folder, parameters)).generate().files

@@ -66,11 +66,11 @@ def test_its_address_may_come_by_dhcp(path: Path, capsys: pytest.CaptureFixture[
     files = _files(path.parent)
     assert re.search(r"HAS_DHCP +=> true", files["turtle_system_node.vhd"])
     # A node with a constant address has no packets of DHCP.
-    assert " message\n" in files["turtle_system_packets.vhd"]
+    assert " dhcp\n" in files["turtle_system_packets.vhd"]
     path.write_text(SPECIFICATION, encoding="utf-8")
     files = _files(path.parent)
     assert re.search(r"HAS_DHCP +=> false", files["turtle_system_node.vhd"])
-    assert " message\n" not in files["turtle_system_packets.vhd"]
+    assert " dhcp\n" not in files["turtle_system_packets.vhd"]
 
 
 def test_no_node_on_a_host_serves_it(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -125,8 +125,8 @@ def test_its_node_has_the_numbers_of_the_specification(path: Path) -> None:
         'x"020a00000002"',
         'x"c0000209"',
         'x"1fe11fe01fd6"',
-        "CLOCK_HZ      => 125000000",
-        "SAMPLE        => 64",
+        "CLOCK_HZ            => 125000000",
+        "SAMPLE              => 64",
     ):
         assert line in node
     assert "--   0  rt/lab/turn\n" in node
@@ -146,16 +146,16 @@ def test_a_board_brings_its_phy_and_its_clock(path: Path) -> None:
     files = _files(path.parent, board="ulx3s_lan8720")
     assert {"turtle_ulx3s_lan8720.vhd", "ulx3s_lan8720.lpf"} < set(files)
     assert "u_phy : entity firm.firm_rmii" in files["turtle_system.vhd"]
-    assert "CLOCK_HZ      => 50000000" in files["turtle_system_node.vhd"]
+    assert "CLOCK_HZ            => 50000000" in files["turtle_system_node.vhd"]
     assert 'LOCATE COMP "rmii_rxd[1]" SITE "B9";' in files["ulx3s_lan8720.lpf"]
 
 
 def test_its_status_counts_the_faults_of_its_network(path: Path) -> None:
-    assert "HAS_STATUS    => false" in _files(path.parent)["turtle_system_node.vhd"]
+    assert "HAS_STATUS          => false" in _files(path.parent)["turtle_system_node.vhd"]
     text = path.read_text(encoding="utf-8").replace("interconnect:", "status: frames\n  interconnect:")
     path.write_text(text, encoding="utf-8")
     files = _files(path.parent)
-    assert "HAS_STATUS    => true" in files["turtle_system_node.vhd"]
+    assert "HAS_STATUS          => true" in files["turtle_system_node.vhd"]
     assert "network_other_endpoints_count" in files["turtle_system.vhd"]
     # With a host instead, there is no network.
     assert "network_" not in _files(path.parent, interconnect="axi_stream")["turtle_system.vhd"]

@@ -21,8 +21,9 @@ entity firm_dhcp_client is
     s_axis_tvalid : in std_logic;
     s_axis_tlast  : in std_logic;
 
-    -- A packet is due, until `is_sent`: a message to all, a message to the server, or an announcement by ARP.
-    wants_message      : out std_logic;
+    -- A packet is due, until `is_sent`: a message to all, a message to the server, or an announcement by ARP. Up to
+    -- then, `own_byte` stays that of the packet; so `is_sent` is a pulse after the builder has read it.
+    wants_broadcast    : out std_logic;
     wants_renewal      : out std_logic;
     wants_announcement : out std_logic;
     is_sent            : in  std_logic;
@@ -84,7 +85,9 @@ architecture rtl of firm_dhcp_client is
   constant SERVER_SLOT  : natural := 4;
   constant XID_SLOT     : natural := 8;
   constant SENDER_SLOT  : natural := 12;
-  constant TYPE_SLOT    : natural := 31;  -- not in the memory: the type of the message
+  -- Not in the memory: the end of a message that lacks some options (0 in the others), and the type of the message.
+  constant END_SLOT  : natural := 30;
+  constant TYPE_SLOT : natural := 31;
 
   -- Slots of `times`, the highest byte first: seconds since the lease began.
   subtype time_t is unsigned(3 downto 0);
@@ -171,6 +174,8 @@ architecture rtl of firm_dhcp_client is
   signal overload_r   : std_logic_vector(1 downto 0) := (others => '0');
   signal has_lease_r  : std_logic;
   signal has_server_r : std_logic;
+  signal chosen_r     : std_logic;  -- it is that of the offer chosen
+  signal proper_r     : std_logic;  -- it is a server that may answer
   signal has_renew_r  : std_logic;
   signal has_rebind_r : std_logic;
   signal same_r       : std_logic;  -- it has the address that the board knows
@@ -192,17 +197,10 @@ architecture rtl of firm_dhcp_client is
   signal is_time      : std_logic;
 
   -- A pass over four bytes of times: what is computed of which of them.
-  constant CLEAR_PASS    : natural := 0;
-  constant RENEW_PASS    : natural := 1;  -- half of the lease
-  constant HALF_PASS     : natural := 2;
-  constant QUARTER_PASS  : natural := 3;
-  constant EIGHTH_PASS   : natural := 4;
-  constant REBIND_PASS   : natural := 5;  -- seven eighths
-  constant ELAPSE_PASS   : natural := 8;
-  constant EXPIRED_PASS  : natural := 9;
-  constant TO_REBIND     : natural := 10;
-  constant TO_RENEW      : natural := 11;
-  signal pass_r          : unsigned(3 downto 0) := (others => '0');
+  -- RENEW finds half of the lease; HALF, QUARTER, EIGHTH and REBIND find seven eighths of it. CLEAR begins with the
+  -- seconds since the request. ELAPSE adds a second; the others compare.
+  type pass_t is (CLEAR, RENEW, HALF, QUARTER, EIGHTH, REBIND, ELAPSE, EXPIRED, TO_REBIND, TO_RENEW);
+  signal pass_r          : pass_t;
   signal first_base      : time_t;
   signal second_base     : time_t;
   signal target_base     : time_t;
@@ -233,7 +231,10 @@ architecture rtl of firm_dhcp_client is
   constant LAST_REQUEST   : natural := 2;
 
   signal ms_r          : unsigned(MS_BITS-1 downto 0) := (others => '0');
-  signal second_r      : std_logic;  -- a second has passed
+  -- Seconds that have passed with an address, but are not counted yet: a packet may wait for its turn for long.
+  signal owed_r        : unsigned(15 downto 0) := (others => '0');
+  signal second_r      : std_logic;                              -- there is one of them
+  signal since_r       : unsigned(6 downto 0)  := (others => '0');  -- since the last packet
   signal conflict_r    : std_logic;
   signal random_r      : std_logic_vector(31 downto 0) := (others => '1');
   signal wait_r        : unsigned(PAUSE_BITS+MS_BITS-1 downto 0) := (others => '0');
@@ -268,6 +269,26 @@ architecture rtl of firm_dhcp_client is
     end loop;
     return false;
   end function differs;
+
+  function after_pass(pass : pass_t) return pass_t is
+  begin
+    if pass = CLEAR then
+      return RENEW;
+    elsif pass = RENEW then
+      return HALF;
+    elsif pass = HALF then
+      return QUARTER;
+    elsif pass = QUARTER then
+      return EIGHTH;
+    elsif pass = EIGHTH then
+      return REBIND;
+    elsif pass = ELAPSE then
+      return EXPIRED;
+    elsif pass = EXPIRED then
+      return TO_REBIND;
+    end if;
+    return TO_RENEW;
+  end function after_pass;
 
   function byte_of(number : std_logic_vector(47 downto 0); index : natural) return byte_t is
   begin
@@ -399,8 +420,10 @@ begin
   is_selecting <= '1' when state_r = SELECTING else '0';
   is_server    <= '1' when option_r = SERVER else '0';
 
-  -- A frame that comes is compared with the number of the request, and one that is read with the address.
-  read_slot  <= to_unsigned(OFFERED_SLOT, 5) + count_r(1 downto 0) when got_r = '1' else
+  -- A frame that comes is compared with the number of the request, and one that is read with the address, and with the
+  -- server.
+  read_slot  <= to_unsigned(SERVER_SLOT, 5) + count_r(1 downto 0) when step_r = VALUE else
+                to_unsigned(OFFERED_SLOT, 5) + count_r(1 downto 0) when got_r = '1' else
                 to_unsigned(XID_SLOT, 5) + place_r(1 downto 0);
   read_known <= known(to_integer(read_slot));
   own_slot   <= unsigned(own_select(4 downto 0));
@@ -424,7 +447,11 @@ begin
     variable byte : byte_t;
   begin
     byte := own_known;
-    if own_slot = TYPE_SLOT then
+    if own_slot = END_SLOT and own_type = DECLINE then
+      byte := std_logic_vector(to_unsigned(END_TAG, 8));
+    elsif own_slot = END_SLOT then
+      byte := (others => '0');
+    elsif own_slot = TYPE_SLOT then
       byte := std_logic_vector(resize(own_type, 8));
     end if;
     if own_select(6 downto 5) = "11" then
@@ -442,27 +469,27 @@ begin
 
   -- ------------------------------------------------------------------ times
 
-  halves <= '1' when pass_r = RENEW_PASS or pass_r = HALF_PASS or pass_r = QUARTER_PASS or pass_r = EIGHTH_PASS else
+  halves <= '1' when pass_r = RENEW or pass_r = HALF or pass_r = QUARTER or pass_r = EIGHTH else
             '0';
-  first_base  <= to_unsigned(ELAPSED_TIME, 4) when pass_r(3) = '1' else
-                 to_unsigned(REBIND_TIME, 4) when pass_r = QUARTER_PASS or pass_r = EIGHTH_PASS else
+  first_base  <= to_unsigned(ELAPSED_TIME, 4) when pass_r >= ELAPSE else
+                 to_unsigned(REBIND_TIME, 4) when pass_r = QUARTER or pass_r = EIGHTH else
                  to_unsigned(LEASE_TIME, 4);
-  second_base <= to_unsigned(LEASE_TIME, 4) when pass_r = EXPIRED_PASS else
+  second_base <= to_unsigned(LEASE_TIME, 4) when pass_r = EXPIRED else
                  to_unsigned(RENEW_TIME, 4) when pass_r = TO_RENEW else
                  to_unsigned(REBIND_TIME, 4);
-  target_base <= to_unsigned(RENEW_TIME, 4) when pass_r = RENEW_PASS else
-                 to_unsigned(ELAPSED_TIME, 4) when pass_r = CLEAR_PASS or pass_r = ELAPSE_PASS else
+  target_base <= to_unsigned(RENEW_TIME, 4) when pass_r = RENEW else
+                 to_unsigned(ELAPSED_TIME, 4) when pass_r = CLEAR or pass_r = ELAPSE else
                  to_unsigned(REBIND_TIME, 4);
   -- The lowest byte is the last one.
   offset <= count_r(1 downto 0) when halves = '1' else not count_r(1 downto 0);
   first  <= unsigned(times(to_integer(first_base + offset)));
-  second <= x"00" when pass_r = ELAPSE_PASS else not unsigned(times(to_integer(second_base + offset)));
+  second <= x"00" when pass_r = ELAPSE else not unsigned(times(to_integer(second_base + offset)));
   carry  <= carry_r when count_r(1 downto 0) /= 0 else
             "0" when halves = '1' else
             "1";
   total  <= resize(first, 9) + second + carry;
 
-  writes_times <= not (pass_r(3) and (pass_r(1) or pass_r(0))) when step_r = COUNTING else
+  writes_times <= '1' when step_r = COUNTING and pass_r <= ELAPSE else
                   writes_r and ready_r and is_time and not at_limit when step_r = VALUE else
                   '0';
 
@@ -472,7 +499,8 @@ begin
                to_unsigned(RENEW_TIME, 4) + count_r(1 downto 0) when option_r = RENEWAL else
                to_unsigned(REBIND_TIME, 4) + count_r(1 downto 0);
   time_data <= data_r when step_r /= COUNTING else
-               x"00" when pass_r = CLEAR_PASS else
+               std_logic_vector(resize(since_r, 8)) when pass_r = CLEAR and count_r(1 downto 0) = 0 else
+               x"00" when pass_r = CLEAR else
                std_logic_vector(carry & first(7 downto 1)) when halves = '1' else
                std_logic_vector(total(7 downto 0));
 
@@ -498,7 +526,7 @@ begin
               '1' when area_r = SERVER_NAME and place_r = FILE_PLACE else
               '0';
 
-  wants_message      <= '1' when step_r = SENDING and state_r /= BOUND and state_r /= RENEWING else '0';
+  wants_broadcast    <= '1' when step_r = SENDING and state_r /= BOUND and state_r /= RENEWING else '0';
   wants_renewal      <= '1' when step_r = SENDING and state_r = RENEWING else '0';
   wants_announcement <= '1' when step_r = SENDING and state_r = BOUND else '0';
 
@@ -508,6 +536,8 @@ begin
     variable length  : pause_t;
     variable jumps   : boolean;                      -- to another place
     variable target  : natural range 0 to 2**PLACE_BITS-1;
+    variable passes  : boolean;                      -- a second passes
+    variable counts  : boolean;                      -- one is counted
 
     procedure pause(pause_length : in natural) is
     begin
@@ -546,22 +576,33 @@ begin
       target  := FIRST_PLACE;
       tries   := tries_r;
 
-      -- A register with a period of 2**32 - 1, disturbed by what the line brings. Boards that start together differ by
-      -- their addresses.
-      random_r <= random_r(30 downto 0)
-                  & (random_r(31) xor random_r(21) xor random_r(1) xor random_r(0)
-                     xor (s_axis_tvalid and s_axis_tdata(0)));
+      -- A register with a period of 2**32 - 1, disturbed by what the line brings and by the MAC address, so that boards
+      -- which start together differ. It stays in a reset: the numbers after it are not those after the last one.
+      if rst_n = '1' then
+        random_r <= random_r(30 downto 0)
+                    & (random_r(31) xor random_r(21) xor random_r(1) xor random_r(0)
+                       xor mac(to_integer(ms_r(4 downto 0)))
+                       xor (s_axis_tvalid and s_axis_tdata(0)));
+      end if;
 
+      passes := false;
+      counts := false;
       if tick = '1' then
+        ms_r <= ms_r + 1;
         if ms_r = LAST_MS then
-          ms_r     <= (others => '0');
-          second_r <= '1';
-        else
-          ms_r <= ms_r + 1;
+          ms_r    <= (others => '0');
+          since_r <= since_r + 1;
+          passes  := true;
         end if;
       end if;
-      if is_taken = '1' and (state_r = CHECKING or bound_r = '1') then
+      if is_taken = '1' then
         conflict_r <= '1';
+      end if;
+      proper_r <= has_server_r;
+      if state_r = RENEWING then
+        proper_r <= '1';
+      elsif state_r = REQUESTING then
+        proper_r <= has_server_r and chosen_r;
       end if;
 
       jumps := idles = '1';
@@ -582,8 +623,8 @@ begin
             step_r <= SENDING;
           end if;
         elsif second_r = '1' then
-          second_r <= '0';
-          pass_r   <= to_unsigned(ELAPSE_PASS, 4);
+          pass_r <= ELAPSE;
+          counts := true;
           if state_r = CHECKING or bound_r = '1' then
             step_r <= COUNTING;
           end if;
@@ -633,6 +674,7 @@ begin
           step_r <= SENDING;
         end if;
       elsif step_r = SENDING then
+        since_r <= (others => '0');
         if is_sent = '1' then
           step_r <= RESTING;
         end if;
@@ -706,6 +748,11 @@ begin
             has_lease_r <= '1';
           elsif option_r = SERVER then
             has_server_r <= '1';
+            if data_r /= read_known then
+              chosen_r <= '0';
+            elsif count_r = 0 then
+              chosen_r <= '1';
+            end if;
           elsif option_r = RENEWAL then
             has_renew_r <= '1';
           elsif option_r = REBINDING then
@@ -726,7 +773,7 @@ begin
         else
           got_r   <= '0';
           count_r <= (others => '0');
-          pass_r  <= to_unsigned(CLEAR_PASS, 4);
+          pass_r  <= CLEAR;
           step_r  <= COUNTING;
           if state_r = SELECTING then
             state_r <= REQUESTING;
@@ -739,13 +786,14 @@ begin
         writes_r <= '1';
         jump(SENDER_PLACE);
         count_r  <= (others => '0');
-        if (state_r = SELECTING and type_r = OFFER and has_server_r = '1' and legal_r = '1')
-           or (state_r /= SELECTING and type_r = ACK and has_lease_r = '1' and same_r = '1') then
+        if proper_r = '1' and ((state_r = SELECTING and type_r = OFFER and legal_r = '1')
+                               or (state_r /= SELECTING and type_r = ACK and has_lease_r = '1' and same_r = '1')) then
           step_r <= SENDER;
         else
           got_r  <= '0';
           step_r <= RESTING;
-          if state_r /= SELECTING and (type_r = NAK or (type_r = ACK and has_lease_r = '1')) then
+          if state_r /= SELECTING and proper_r = '1'
+             and (type_r = NAK or (type_r = ACK and has_lease_r = '1')) then
             lose(START_PAUSE);
           end if;
         end if;
@@ -757,12 +805,12 @@ begin
       elsif step_r = DECIDING then
         count_r <= (others => '0');
         step_r  <= COUNTING;
-        pass_r  <= pass_r + 1;
-        if pass_r = CLEAR_PASS and has_renew_r = '1' then
-          pass_r <= to_unsigned(HALF_PASS, 4);
+        pass_r  <= after_pass(pass_r);
+        if pass_r = CLEAR and has_renew_r = '1' then
+          pass_r <= HALF;
         end if;
-        if pass_r = REBIND_PASS
-           or (has_rebind_r = '1' and (pass_r = RENEW_PASS or (pass_r = CLEAR_PASS and has_renew_r = '1'))) then
+        if pass_r = REBIND
+           or (has_rebind_r = '1' and (pass_r = RENEW or (pass_r = CLEAR and has_renew_r = '1'))) then
           step_r <= RESTING;
           if state_r = REQUESTING then
             state_r <= CHECKING;
@@ -771,7 +819,7 @@ begin
             state_r <= BOUND;
             tries   := to_unsigned(LAST_TRY, tries'length);
           end if;
-        elsif pass_r = EXPIRED_PASS and carry_r = 1 then
+        elsif pass_r = EXPIRED and carry_r = 1 then
           lose(START_PAUSE);
           step_r <= RESTING;
         elsif pass_r = TO_REBIND and carry_r = 1 and (state_r = BOUND or state_r = RENEWING) then
@@ -782,6 +830,18 @@ begin
             ask(RENEWING);
           end if;
         end if;
+      end if;
+
+      second_r <= '0';
+      if owed_r /= 0 then
+        second_r <= '1';
+      end if;
+      if bound_r = '0' and state_r /= CHECKING then
+        owed_r <= (others => '0');
+      elsif passes and not counts and owed_r(owed_r'high) = '0' then
+        owed_r <= owed_r + 1;
+      elsif counts and not passes then
+        owed_r <= owed_r - 1;
       end if;
 
       settles_r <= '0';
@@ -821,7 +881,6 @@ begin
         due_r      <= '0';
         pauses_r   <= false;
         wait_r     <= to_unsigned(START_PAUSE, PAUSE_BITS) & unsigned(mac(MS_BITS-1 downto 0));
-        random_r   <= mac(30 downto 0) & '1';
       end if;
     end if;
   end process proceed;

@@ -34,7 +34,7 @@ entity firm_net_link is
     REASSEMBLED  : integer := 16384;
     -- The address comes by DHCP, and the port `address` is not used.
     HAS_DHCP            : boolean := false;
-    MESSAGE_PACKET      : integer := 0;
+    DHCP_PACKET         : integer := 0;
     RENEWAL_PACKET      : integer := 0;
     ANNOUNCEMENT_PACKET : integer := 0
   );
@@ -97,8 +97,8 @@ entity firm_net_link is
     --   4  another node has no room
     --   5  a publisher or subscriber of another node, of a topic of the board, has no room
     --   6  a message of another node has no room, or comes in fragments of RTPS and is too long or the node takes none
-    --   7  a message to send is empty, too long or of no publisher
-    --   8  another host has the address of the board, or a board with DHCP has lost its address
+    --   7  a message to send is empty, too long or of no publisher, or the board has no address yet
+    --   8  another host has the address of the board
     --   9  a packet of RTPS, or a list of parameters in it, is broken
     --  10  a publisher or subscriber of a topic of the board has another type, hash, quality, partition or encoding
     network_error : out std_logic_vector(10 downto 0)
@@ -180,8 +180,11 @@ architecture rtl of firm_net_link is
   signal sample_tvalid : std_logic;
   signal sample_tlast  : std_logic;
   signal sample_tready : std_logic;
-  signal frame_tvalid  : std_logic;
-  signal frame_tready  : std_logic;
+  -- The same while the node runs.
+  signal given_tvalid : std_logic;
+  signal given_tready : std_logic;
+  signal frame_tvalid : std_logic;
+  signal frame_tready : std_logic;
   -- Those that the node takes.
   signal offered_tvalid : std_logic;
   signal offered_tready : std_logic;
@@ -199,14 +202,12 @@ architecture rtl of firm_net_link is
   signal own_select  : std_logic_vector(6 downto 0);
   signal own_byte    : std_logic_vector(7 downto 0);
   signal is_conflict : std_logic;
-  signal is_unbound  : std_logic;  -- a pulse when the address is lost
 
   -- Packets of the node, of its presence, and of DHCP.
   signal node_start    : std_logic;
   signal node_starts   : std_logic;
   signal wants_dhcp    : std_logic;
-  signal dhcp_packet   : std_logic_vector(7 downto 0);
-  signal dhcp_sent     : std_logic;
+  signal client_packet : std_logic_vector(7 downto 0);
   signal node_packet   : std_logic_vector(7 downto 0);
   signal wants_report  : std_logic;
   signal wants_probe   : std_logic;
@@ -244,6 +245,8 @@ architecture rtl of firm_net_link is
   signal is_sample_parted  : std_logic;
   signal is_packet_dropped : std_logic;
   signal is_frame_lost     : std_logic;
+  signal is_frame_refused  : std_logic;
+  signal is_frame_dropped  : std_logic;  -- of the system, without an address
 
 begin
 
@@ -285,15 +288,16 @@ begin
     data_bytes  <= payload_bytes;
     own_byte    <= (others => '0');
     wants_dhcp  <= '0';
-    dhcp_packet <= (others => '0');
-    is_unbound  <= '0';
+    client_packet <= (others => '0');
+    is_frame_dropped <= '0';
   end generate without_dhcp;
 
   with_dhcp : if HAS_DHCP generate
 
-    signal wants_message      : std_logic;
+    signal wants_broadcast    : std_logic;
     signal wants_renewal      : std_logic;
     signal wants_announcement : std_logic;
+    signal dhcp_sent          : std_logic;
     signal is_checking        : std_logic;
     signal is_stopped         : std_logic;
 
@@ -302,7 +306,9 @@ begin
     signal checks_r   : std_logic;
     signal runs_r     : std_logic;
     signal to_r       : std_logic;  -- inside a frame to the system
-    signal from_r     : std_logic;  -- inside a frame from it
+    signal from_r     : std_logic;  -- inside a frame from it that the node takes
+    signal drops_r    : std_logic;  -- inside one that is dropped
+    signal sends_r    : std_logic;  -- a packet of DHCP leaves
     signal rests      : std_logic;
     signal is_own_r   : std_logic;  -- the packet is not the node's
 
@@ -318,7 +324,7 @@ begin
         s_axis_tuser       => received_tuser,
         s_axis_tvalid      => received_tvalid,
         s_axis_tlast       => received_tlast,
-        wants_message      => wants_message,
+        wants_broadcast    => wants_broadcast,
         wants_renewal      => wants_renewal,
         wants_announcement => wants_announcement,
         is_sent            => dhcp_sent,
@@ -329,21 +335,24 @@ begin
         is_checking        => is_checking,
         is_taken           => is_conflict,
         is_stopped         => is_stopped,
-        is_lost            => is_unbound
+        is_lost            => open
       );
 
-    wants_dhcp  <= wants_message or wants_renewal or wants_announcement;
-    dhcp_packet <= number_of(RENEWAL_PACKET) when wants_renewal = '1' else
-                   number_of(ANNOUNCEMENT_PACKET) when wants_announcement = '1' else
-                   number_of(MESSAGE_PACKET);
+    wants_dhcp  <= (wants_broadcast or wants_renewal or wants_announcement) and not sends_r;
+    client_packet <= number_of(RENEWAL_PACKET) when wants_renewal = '1' else
+                     number_of(ANNOUNCEMENT_PACKET) when wants_announcement = '1' else
+                     number_of(DHCP_PACKET);
+    -- The builder reads the bytes of the client up to the end of the packet.
+    dhcp_sent   <= sends_r and not is_busy;
 
     -- The node ends what it has begun, a packet and a frame in each direction. Then it is reset, and the next address
     -- finds a node that announces itself anew.
     node_runs  <= runs_r;
     node_rst_n <= rst_n and runs_r;
     is_stopped <= not runs_r;
-    rests      <= not (is_bound or is_busy or node_start or to_r or sample_tvalid or from_r);
-    node_takes <= runs_r and (is_bound or from_r);
+    rests      <= not (is_bound or is_busy or node_start or to_r or given_tvalid or from_r);
+    -- A frame is taken or dropped as a whole.
+    node_takes <= from_r or (runs_r and is_bound and not drops_r);
 
     -- The presence starts anew with each address. It also probes for the one that is not in use yet.
     watch_rst_n <= rst_n and (hears_r or checks_r);
@@ -363,12 +372,18 @@ begin
         end if;
         if start = '1' then
           is_own_r <= not node_starts;
+          sends_r  <= wants_dhcp and not (node_starts or wants_report or wants_probe);
+        elsif is_busy = '0' then
+          sends_r <= '0';
         end if;
-        if sample_tvalid = '1' and sample_tready = '1' then
+        if given_tvalid = '1' and given_tready = '1' then
           to_r <= not sample_tlast;
         end if;
+        is_frame_dropped <= '0';
         if frame_tvalid = '1' and frame_tready = '1' then
-          from_r <= not out_tlast;
+          from_r           <= node_takes and not out_tlast;
+          drops_r          <= not (node_takes or out_tlast);
+          is_frame_dropped <= out_tlast and not (node_takes or out_tuser(0));
         end if;
         if is_bound = '1' then
           runs_r <= '1';
@@ -381,7 +396,9 @@ begin
           hears_r  <= '0';
           to_r     <= '0';
           from_r   <= '0';
+          drops_r  <= '0';
           runs_r   <= '0';
+          sends_r  <= '0';
         end if;
       end if;
     end process follow_address;
@@ -431,6 +448,7 @@ begin
       tick          => tick_r,
       mac           => mac,
       address       => own_address,
+      is_in_use     => is_bound,
       group_ip      => GROUP_IP,
       s_axis_tdata  => received_tdata,
       s_axis_tuser  => received_tuser,
@@ -509,8 +527,12 @@ begin
 
   -- ------------------------------------------------------------------ the node
 
+  -- A frame that the node does not take is dropped, so that the system goes on.
   offered_tvalid <= frame_tvalid and node_takes;
-  frame_tready   <= offered_tready and node_takes;
+  frame_tready   <= offered_tready or not node_takes;
+  -- In the cycle before its reset, the node may offer another frame, of which the rest would never come.
+  given_tvalid   <= sample_tvalid and node_runs;
+  sample_tready  <= given_tready and node_runs;
 
   prefix <= PREFIX_HEAD & mac & PREFIX_TAIL;
 
@@ -571,7 +593,7 @@ begin
       is_sample_lost      => is_sample_lost,
       is_peer_refused     => network_error(4),
       is_endpoint_refused => network_error(5),
-      is_frame_refused    => network_error(7),
+      is_frame_refused    => is_frame_refused,
       is_sample_parted    => is_sample_parted,
       is_packet_broken    => network_error(9),
       is_endpoint_other   => network_error(10)
@@ -580,12 +602,12 @@ begin
   -- ------------------------------------------------------------------ the status
 
   without_status : if not HAS_STATUS generate
-    in_tdata      <= sample_tdata;
-    in_tvalid     <= sample_tvalid;
-    in_tlast      <= sample_tlast;
-    sample_tready <= in_tready;
-    frame_tvalid  <= out_tvalid;
-    out_tready    <= frame_tready;
+    in_tdata     <= sample_tdata;
+    in_tvalid    <= given_tvalid;
+    in_tlast     <= sample_tlast;
+    given_tready <= in_tready;
+    frame_tvalid <= out_tvalid;
+    out_tready   <= frame_tready;
   end generate without_status;
 
   with_status : if HAS_STATUS generate
@@ -629,9 +651,9 @@ begin
       );
 
     merged_tdata(7 downto 0) <= sample_tdata;
-    merged_tvalid(0)         <= sample_tvalid;
+    merged_tvalid(0)         <= given_tvalid;
     merged_tlast(0)          <= sample_tlast;
-    sample_tready            <= merged_tready(0);
+    given_tready             <= merged_tready(0);
 
     u_requests : entity firm.firm_net_merge
       generic map (
@@ -711,11 +733,10 @@ begin
   node_starts <= node_start and node_runs;
   start       <= node_starts or ((wants_report or wants_probe or wants_dhcp) and not is_busy);
   is_sent     <= not node_starts and (wants_report or wants_probe) and not is_busy;
-  dhcp_sent   <= not (node_starts or wants_report or wants_probe or is_busy);
   packet      <= node_packet when node_starts = '1' else
                  number_of(REPORT_PACKET) when wants_report = '1' else
                  number_of(PROBE_PACKET) when wants_probe = '1' or wants_dhcp = '0' else
-                 dhcp_packet;
+                 client_packet;
 
   u_builder : entity firm.firm_packet_builder
     generic map (
@@ -786,6 +807,7 @@ begin
   network_error(2) <= is_fragment or is_packet_dropped;
   network_error(3) <= is_reply_lost or is_lost or is_frame_lost;
   network_error(6) <= is_sample_lost or is_sample_parted;
-  network_error(8) <= is_conflict or is_unbound;
+  network_error(7) <= is_frame_refused or is_frame_dropped;
+  network_error(8) <= is_conflict;
 
 end architecture rtl;

@@ -2,7 +2,8 @@
 -- Keeps a board's place in its network: it has reports sent that it is a member of its group (IGMP version 2, RFC
 -- 2236), and probes for its own address (ARP, RFC 5227). Both are sent four times, one second apart, and the same
 -- again every 64 seconds, since a PHY or a switch may not be ready at first. A query of a router or switch is
--- answered. A host that uses the board's address is reported.
+-- answered. A host that uses the board's address is reported. Before the board uses the address itself, it only probes
+-- for it, and another host that probes for it, too, is reported as well.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -16,9 +17,10 @@ entity firm_net_presence is
     tick  : in std_logic;  -- a pulse each millisecond
 
     -- This host and its group, the first byte on the line highest.
-    mac      : in std_logic_vector(47 downto 0);
-    address  : in std_logic_vector(31 downto 0);
-    group_ip : in std_logic_vector(31 downto 0);
+    mac       : in std_logic_vector(47 downto 0);
+    address   : in std_logic_vector(31 downto 0);
+    is_in_use : in std_logic := '1';  -- the board uses the address
+    group_ip  : in std_logic_vector(31 downto 0);
 
     -- All frames of firm_mac_receiver.
     s_axis_tdata  : in std_logic_vector(7 downto 0);
@@ -31,7 +33,7 @@ entity firm_net_presence is
     wants_probe  : out std_logic;
     is_sent      : in  std_logic;
 
-    is_taken : out std_logic  -- a pulse for each ARP packet of another host with the board's address
+    is_taken : out std_logic  -- a pulse for each ARP packet of another host that has or wants the board's address
   );
 end entity firm_net_presence;
 
@@ -44,6 +46,7 @@ architecture rtl of firm_net_presence is
   constant IPV4_PLACE      : natural := 14;
   constant PROTOCOL_PLACE  : natural := 23;
   constant SENDER_PLACE    : natural := 22;  -- of ARP: a MAC address and an IPv4 address
+  constant TARGET_PLACE    : natural := 38;  -- its IPv4 address
   constant MAC_BYTES       : natural := 6;
   constant ADDRESS_BYTES   : natural := 4;
   constant SHORTEST_HEADER : natural := 5;  -- of IPv4, in words
@@ -58,12 +61,12 @@ architecture rtl of firm_net_presence is
   subtype byte_t is std_logic_vector(7 downto 0);
   type bytes_t is array (natural range <>) of byte_t;
   -- ARP for Ethernet and IPv4.
-  constant ARP      : bytes_t(12 to 19) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04");
-  constant IPV4     : bytes_t(12 to 13) := (x"08", x"00");
-  constant VERSION  : std_logic_vector(3 downto 0) := x"4";
-  constant IGMP     : byte_t            := x"02";
-  constant QUERY    : byte_t            := x"11";
-  constant NO_GROUP : std_logic_vector(31 downto 0) := (others => '0');
+  constant ARP        : bytes_t(12 to 19) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04");
+  constant IPV4       : bytes_t(12 to 13) := (x"08", x"00");
+  constant VERSION    : std_logic_vector(3 downto 0) := x"4";
+  constant IGMP       : byte_t            := x"02";
+  constant QUERY      : byte_t            := x"11";
+  constant NO_ADDRESS : std_logic_vector(31 downto 0) := (others => '0');
 
   -- Of the frame so far.
   signal place_r  : unsigned(5 downto 0) := (others => '0');
@@ -71,7 +74,8 @@ architecture rtl of firm_net_presence is
   signal recent_r : std_logic_vector(47 downto 0) := (others => '0');  -- the last six bytes
   signal arp_r    : std_logic;
   signal other_r  : std_logic;  -- the ARP packet is of another host
-  signal claims_r : std_logic;  -- it names the board's address as its sender's
+  signal claims_r : std_logic;  -- it names the board's address as its sender's, or probes for it
+  signal probes_r : std_logic;  -- it is a probe
   signal query_r  : std_logic;
   signal meant_r  : std_logic;  -- the query is about the board's group, or all groups
   signal limit_r  : unsigned(8 downto 0) := (others => '0');  -- bits of the delay that the query allows
@@ -136,7 +140,15 @@ begin
           if recent /= mac then
             other_r <= '1';
           end if;
-        elsif place_r = SENDER_PLACE+MAC_BYTES+ADDRESS_BYTES-1 and recent(31 downto 0) = address then
+        elsif place_r = SENDER_PLACE+MAC_BYTES+ADDRESS_BYTES-1 then
+          probes_r <= not is_in_use;
+          if recent(31 downto 0) /= NO_ADDRESS then
+            probes_r <= '0';
+          end if;
+          if recent(31 downto 0) = address then
+            claims_r <= '1';
+          end if;
+        elsif place_r = TARGET_PLACE+ADDRESS_BYTES-1 and recent(31 downto 0) = address and probes_r = '1' then
           claims_r <= '1';
         end if;
         if differs(place_r, s_axis_tdata, IPV4) then
@@ -151,7 +163,7 @@ begin
           query_r <= '0';
         elsif count_r = DELAY_COUNT then
           limit_r <= limit_of(s_axis_tdata);
-        elsif count_r = GROUP_COUNT and (recent(31 downto 0) = NO_GROUP or recent(31 downto 0) = group_ip) then
+        elsif count_r = GROUP_COUNT and (recent(31 downto 0) = NO_ADDRESS or recent(31 downto 0) = group_ip) then
           meant_r <= '1';
         end if;
         if place_r = IPV4_PLACE then
@@ -212,6 +224,10 @@ begin
       if ended_r = '1' and query_r = '1' and meant_r = '1' and (asked_r = '0' or delay < delay_r) then
         asked_r <= '1';
         delay_r <= delay;
+      end if;
+      if is_in_use = '0' then
+        asked_r  <= '0';
+        report_r <= '0';
       end if;
       if rst_n = '0' then
         ms_r      <= 0;

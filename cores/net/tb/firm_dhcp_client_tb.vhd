@@ -5,10 +5,12 @@
 --   1 ms                   nothing, for some milliseconds
 --   2                      nothing, until the client has sent a packet
 --   3                      another host has the address
+--   4                      nothing, until a packet is due
+--   5 ms                   the builder is busy, for some milliseconds from now on
 --
 -- A row of the results is a millisecond and an event: `checking`, `bound` or `lost`, or a packet, `message`, `renewal`
 -- or `announcement`, with the bytes that the builder gets: the type, the current address, the option with the address,
--- the option with the server, the MAC address of the server, the address and the number.
+-- the option with the server, the MAC address of the server, the address, the number, and an end or not.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -24,7 +26,8 @@ entity firm_dhcp_client_tb is
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     SLOW_PERCENT  : integer := 0;  -- the chance, each cycle, that no byte comes
-    TICK_CYCLES   : integer := 8   -- of a millisecond
+    TICK_CYCLES   : integer := 8;  -- of a millisecond
+    STOP_CYCLES   : integer := 40  -- until the user of an address rests
   );
 end entity firm_dhcp_client_tb;
 
@@ -32,10 +35,11 @@ architecture simulation of firm_dhcp_client_tb is
 
   constant RESET_CYCLES : positive := 4;
   constant GAP_CYCLES   : positive := 6;
-  constant STOP_CYCLES  : positive := 40;  -- until the user of an address rests
-  constant OWN_BYTES    : positive := 31;
+  constant OWN_BYTES    : positive := 32;
+  constant NUMBER_PLACE : positive := 27;  -- of the number among them
   constant NUMBER       : positive := 256; -- the first of the bytes that are the client's
   constant MOST_MS      : positive := 150000;
+  constant BYTE_CYCLES  : positive := 3;   -- from a byte of a packet to the next one
 
   type selects_t is array (0 to OWN_BYTES-1) of natural range 0 to 127;
   constant SELECTS : selects_t := (
@@ -44,7 +48,8 @@ architecture simulation of firm_dhcp_client_tb is
     96+22, 96+4, 68, 69, 70, 71,
     12, 13, 14, 15, 16, 17,
     0, 1, 2, 3,
-    8, 9, 10, 11
+    8, 9, 10, 11,
+    30
   );
 
   type number_t is array (0 to 3) of integer range 0 to 255;
@@ -54,7 +59,9 @@ architecture simulation of firm_dhcp_client_tb is
   signal over  : boolean   := false;
   signal tick  : std_logic := '0';
   signal ms    : natural   := 0;
-  signal sent  : natural   := 0;  -- packets
+  signal due   : natural   := 0;  -- packets
+  signal sent  : natural   := 0;
+  signal free  : natural   := 0;  -- the millisecond from which on the builder is not busy
   signal xid   : number_t  := (others => 0);
 
   signal tdata  : std_logic_vector(7 downto 0) := (others => '0');
@@ -62,7 +69,7 @@ architecture simulation of firm_dhcp_client_tb is
   signal tvalid : std_logic := '0';
   signal tlast  : std_logic := '0';
 
-  signal wants_message      : std_logic;
+  signal wants_broadcast    : std_logic;
   signal wants_renewal      : std_logic;
   signal wants_announcement : std_logic;
   signal is_sent            : std_logic := '0';
@@ -89,7 +96,7 @@ begin
       s_axis_tuser       => tuser,
       s_axis_tvalid      => tvalid,
       s_axis_tlast       => tlast,
-      wants_message      => wants_message,
+      wants_broadcast    => wants_broadcast,
       wants_renewal      => wants_renewal,
       wants_announcement => wants_announcement,
       is_sent            => is_sent,
@@ -193,10 +200,22 @@ begin
             report "no packet" severity failure;
           wait until rising_edge(clk);
         end loop;
-      else
+      elsif what = 3 then
         is_taken <= '1';
         wait until rising_edge(clk);
         is_taken <= '0';
+      elsif what = 4 then
+        before := due;
+        start  := ms;
+        while due = before loop
+          assert ms < start + MOST_MS
+            report "no packet is due" severity failure;
+          wait until rising_edge(clk);
+        end loop;
+      else
+        read(row, value);
+        free <= ms + value;
+        wait until rising_edge(clk);
       end if;
     end loop;
     over <= true;
@@ -210,6 +229,7 @@ begin
     variable was_check  : std_logic := '0';
     variable was_bound  : std_logic := '0';
     variable byte       : natural;
+    variable wanted     : std_logic_vector(2 downto 0);
 
     procedure note(what : in string) is
     begin
@@ -243,7 +263,7 @@ begin
         report "an address ends without a word" severity failure;
       was_check := is_checking;
       was_bound := is_bound;
-      if wants_message = '1' or wants_renewal = '1' or wants_announcement = '1' then
+      if wants_broadcast = '1' or wants_renewal = '1' or wants_announcement = '1' then
         if wants_renewal = '1' then
           note("renewal");
         elsif wants_announcement = '1' then
@@ -251,16 +271,26 @@ begin
         else
           note("message");
         end if;
+        wanted := wants_broadcast & wants_renewal & wants_announcement;
+        due    <= due + 1;
+        wait until rising_edge(clk);
         for index in SELECTS'range loop
           own_select <= std_logic_vector(to_unsigned(SELECTS(index), 7));
-          wait until rising_edge(clk);
+          for cycle in 1 to BYTE_CYCLES loop
+            wait until rising_edge(clk);
+          end loop;
           byte := to_integer(unsigned(own_byte));
           write(row, ' ' & integer'image(byte));
-          if index >= OWN_BYTES-4 then
-            xid(index-OWN_BYTES+4) <= byte;
+          if index >= NUMBER_PLACE and index < NUMBER_PLACE+4 then
+            xid(index-NUMBER_PLACE) <= byte;
           end if;
         end loop;
         finish;
+        while ms < free loop
+          wait until rising_edge(clk);
+        end loop;
+        assert wanted = (wants_broadcast & wants_renewal & wants_announcement)
+          report "a packet changes before it is sent" severity failure;
         is_sent <= '1';
         wait until rising_edge(clk);
         is_sent <= '0';

@@ -20,7 +20,8 @@ entity firm_net_presence_tb is
     SEED          : integer := 1;
     SLOW_PERCENT  : integer := 0;    -- the chance, each cycle, that no byte comes
     TICK_CYCLES   : integer := 8;    -- of a millisecond
-    LAST_TICKS    : integer := 1100  -- after the last frame
+    LAST_TICKS    : integer := 1100; -- after the last frame
+    IN_USE        : boolean := true  -- the board uses its address
   );
 end entity firm_net_presence_tb;
 
@@ -44,10 +45,12 @@ architecture simulation of firm_net_presence_tb is
   signal wants_probe  : std_logic;
   signal is_sent      : std_logic := '0';
   signal is_taken     : std_logic;
+  signal is_in_use    : std_logic;
 
 begin
 
-  clk <= not clk after 4 ns when not over else '0';
+  clk       <= not clk after 4 ns when not over else '0';
+  is_in_use <= '1' when IN_USE else '0';
 
   u_presence : entity firm.firm_net_presence
     port map (
@@ -56,6 +59,7 @@ begin
       tick          => tick,
       mac           => MAC,
       address       => x"c0000202",
+      is_in_use     => is_in_use,
       group_ip      => x"efff0001",
       s_axis_tdata  => tdata,
       s_axis_tuser  => tuser,

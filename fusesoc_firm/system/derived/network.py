@@ -143,7 +143,8 @@ def _check_system(written: Specification, scheduling: Scheduling, software: Soft
 def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Network | None:
     """Return the network of a section, or None if it has a fault."""
     mac = _mac(section.mac, faults)
-    network = _no_addresses(section, project, faults) if section.address == DHCP else _addresses(section, faults)
+    addresses = _no_addresses if section.address == DHCP else _addresses
+    network = addresses(section, project, faults)
     hosts = _hosts(section, faults)
     master = None if section.master is None else _master(section.master, hosts, faults)
     name = _name(section, project, faults)
@@ -233,9 +234,12 @@ def _mac(text: Text, faults: Diagnostics) -> bytes | None:
     return mac
 
 
-def _addresses(section: NodeNetwork, faults: Diagnostics) -> tuple[IPv4Address, IPv4Address, IPv4Address | None] | None:
+def _addresses(
+    section: NodeNetwork, project: Project, faults: Diagnostics
+) -> tuple[IPv4Address, IPv4Address, IPv4Address | None] | None:
     """Return address, mask and gateway, or None if one has a fault."""
-    address, netmask = _address(section.address, faults), _netmask(section.netmask, faults)
+    other = f", or '{DHCP}'" if project.interconnect == ETHERNET else ""
+    address, netmask = _address(section.address, faults, other), _netmask(section.netmask, faults)
     gateway = None if section.gateway is None else _address(section.gateway, faults)
     if address is None or netmask is None or (section.gateway is not None and gateway is None):
         return None
@@ -268,13 +272,13 @@ def _no_addresses(
     return _UNUSED_ADDRESS, _UNUSED_ADDRESS, None
 
 
-def _address(text: Text, faults: Diagnostics) -> IPv4Address | None:
+def _address(text: Text, faults: Diagnostics, other: str = "") -> IPv4Address | None:
     if not text:
         return None
     try:
         return IPv4Address(text)
     except AddressValueError:
-        hint = "legal here: four numbers from 0 to 255, such as 192.168.1.20"
+        hint = f"legal here: four numbers from 0 to 255, such as 192.168.1.20{other}"
         faults.error(f"'{text}' is not an IPv4 address", text.source, hint)
         return None
 

@@ -93,8 +93,8 @@ NETWORK_FAULTS = {
     "refused_endpoints": "a publisher or subscriber of another node, of a topic of the board, has no room",
     "lost_messages": "a message of another node has no room, or comes in fragments of RTPS and is too long"
     " or the node takes none",
-    "refused_messages": "a message to send is empty, too long or of no publisher",
-    "taken_addresses": "another host has the address of the board, or a board with DHCP has lost its address",
+    "refused_messages": "a message to send is empty, too long or of no publisher, or the board has no address yet",
+    "taken_addresses": "another host has the address of the board",
     "broken_packets": "a packet of RTPS, or a list of parameters in it, is broken",
     "other_endpoints": "a publisher or subscriber of a topic of the board has another type, hash, quality, partition"
     " or encoding",
