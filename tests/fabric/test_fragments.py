@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import struct
 import zlib
 from collections.abc import Iterable, Sequence
@@ -203,5 +204,5 @@ def test_its_memory_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 def test_a_node_for_short_messages_has_no_reassembly(tmp_path: Path) -> None:
     _library(tmp_path, 4, 1344)
     node = (tmp_path / "turtle_system_node.vhd").read_text(encoding="utf-8")
-    assert "REASSEMBLIES  => 0," in node
-    assert "PAYLOADS      => 4096," in node
+    generics = dict(re.findall(r"^ +([A-Z]+) +=> (\w+),$", node, re.MULTILINE))
+    assert (generics["REASSEMBLIES"], generics["PAYLOADS"]) == ("0", "4096")
