@@ -8,8 +8,8 @@
 --   3 takes        the system takes frames from now on (1), or does not (0)
 --
 -- A row of the results is what happens: `message` and its type, `announced` (an address), `played` (a frame of the
--- line), `error` and its number, or `taken` and the bytes of a frame that
--- the system gets; `part` are those of one that has not ended.
+-- line), `error` and its number, or `taken` and the bytes of a frame that the system gets; `part` are those of one that
+-- has not ended.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
