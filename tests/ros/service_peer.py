@@ -27,7 +27,8 @@ class Ros1Client:
         import rospy
         from sensor_msgs.srv import SetCameraInfo, SetCameraInfoRequest
 
-        rospy.init_node("client", anonymous=True, disable_signals=True)
+        # wait_for_service() may have to try again, and would print that it succeeded to the standard output.
+        rospy.init_node("client", anonymous=True, disable_signals=True, log_level=rospy.WARN)
         rospy.wait_for_service(service)
         self.errors = rospy.ServiceException
         self.make = SetCameraInfoRequest
