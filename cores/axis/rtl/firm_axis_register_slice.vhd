@@ -82,12 +82,15 @@ begin
       if ready_r = '1' then
         skid_r <= arriving;
       end if;
-      if move = '1' and available = '1' then
+      -- Without a beat, it does not matter what moves: so the path to the many registers is short.
+      if move = '1' then
         output_r <= next_beat;
-        -- The output keeps its last beat's `tlast`, so it tells that the next one is a first one.
-        if output_r.tlast = '1' then
-          id_r <= next_beat.tdata(7 downto 0);
-        end if;
+      end if;
+      -- But the output keeps its last beat's `tlast`, so it tells that the next one is a first one.
+      if available = '0' then
+        output_r.tlast <= output_r.tlast;
+      elsif move = '1' and output_r.tlast = '1' then
+        id_r <= next_beat.tdata(7 downto 0);
       end if;
       if rst_n = '0' then
         output_r.tlast <= '1';

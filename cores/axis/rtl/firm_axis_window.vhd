@@ -42,8 +42,8 @@ entity firm_axis_window is
     shown : out std_logic;
     ends  : out std_logic;
 
-    -- Takes the first `take` bytes, at most `available`, or any larger number for all of a frame's last ones. The frame
-    -- is over when `is_last` and all were taken.
+    -- Takes the first `take` bytes, at most `available`, or any larger number up to WIDTH/8 for all of a frame's last
+    -- ones. The frame is over when `is_last` and all were taken.
     take_valid : in std_logic;
     take       : in std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     -- A pulse drops the rest of the frame and overrides `take`; if the window shows no frame, it drops the next one.
@@ -109,17 +109,15 @@ begin
       return 8 * (LANES + step_of(stage) - 1) - 1;
     end function top_of;
 
+    -- Of two numbers up to LANES, a power of two: the highest bit is set in LANES alone, which keeps the rest short.
     -- Yosys makes a carry chain of `<`, which is slower at so few bits.
-    function is_less(number, bound : unsigned) return std_logic is
-      variable low, high : unsigned(COUNT_BITS downto 0);
-      variable is_so     : std_logic := '0';
+    function is_less(number, bound : count_t) return std_logic is
+      variable is_so : std_logic := '0';
     begin
-      low  := resize(number, COUNT_BITS+1);
-      high := resize(bound, COUNT_BITS+1);
-      for place in 0 to COUNT_BITS loop
-        is_so := (not low(place) and high(place)) or (not (low(place) xor high(place)) and is_so);
+      for place in 0 to COUNT_BITS-2 loop
+        is_so := (not number(place) and bound(place)) or (not (number(place) xor bound(place)) and is_so);
       end loop;
-      return is_so;
+      return not number(COUNT_BITS-1) and (bound(COUNT_BITS-1) or is_so);
     end function is_less;
 
     -- LANES bytes from lane `offset` of 2*LANES-1 lanes.
@@ -187,7 +185,8 @@ begin
     signal is_empty   : std_logic;                      -- and holds no byte
     signal move       : std_logic;                      -- the next beat becomes the first
     signal uses_up    : std_logic;                      -- its bytes are taken already
-    signal joined_r   : unsigned(COUNT_BITS downto 0);  -- `joined` of the cycle before
+    signal joined_r   : count_t;                        -- `joined` of the cycle before, unless it overflows
+    signal overflow_r : std_logic;                      -- `overflow` of the cycle before
     signal is_same_r  : std_logic := '0';               -- nothing has moved since
 
     signal s_axis_tready_out : std_logic;
@@ -292,13 +291,15 @@ begin
     -- A frame's beats are full but for the last one.
     shown <= filled_r and not skipping_r
              and (not exceeds
-                  or (has_next and (not next_tlast or (is_same_r and not is_less(joined_r, wanted)))));
+                  or (has_next
+                      and (not next_tlast or (is_same_r and (overflow_r or not is_less(joined_r, wanted))))));
     ends  <= empties when last_r = '1' else
              has_next and next_tlast
-             and ((is_empty and empties) or (is_same_r and not is_less(wanted, joined_r)));
+             and ((is_empty and empties) or (is_same_r and not overflow_r and not is_less(wanted, joined_r)));
 
     move    <= not filled_r or dropping or (take_valid and empties);
-    uses_up <= filled_r and not dropping and ends_next and take_valid and not is_less(wanted, joined);
+    uses_up <= filled_r and not dropping and ends_next and take_valid
+               and not is_less(wanted, joined(COUNT_BITS-1 downto 0));
 
     move_beat : process (clk)
     begin
@@ -320,7 +321,8 @@ begin
           left_r     <= (others => '0');
         else
           skipping_r <= dropping and not (filled_r and last_r);
-          joined_r   <= joined;
+          joined_r   <= joined(COUNT_BITS-1 downto 0);
+          overflow_r <= overflow;
           is_same_r  <= next_tvalid and not move and not take_valid;
           if take_valid = '1' then
             offset_r <= offset_r + wanted(OFFSET_BITS-1 downto 0);
