@@ -17,16 +17,29 @@ DEVICE = "--25k --speed 8 --package CABGA381"
 # The clock of a GMII, in MHz.
 _BAR = 125.0
 _CORES = (*NODE, "cdc/sync", "cdc/cdc")
+# Payloads of up to 3,840 bytes from others, and of 4,096 to others, as fusesoc_firm.system.derived.ethernet sizes them.
+_LONG: Mapping[str, Generic] = {
+    "SAMPLE": 4096,
+    "ASSEMBLED": 4096,
+    "PAYLOADS": 8192,
+    "DISCOVERY": 8192,
+    "REASSEMBLIES": 1,
+    "REASSEMBLED": 4096,
+}
 _TOPICS: Mapping[str, Generic] = {"WRITERS": 3, "READERS": 2, "SOURCES": 16, "SINKS": 24, "SAMPLE": 64}
 _NOTE = """The node consists of the MAC, ARP and ping, IGMP and the probes for its address, UDP, RTPS and the packet
     builder. It has two topics each way, with up to 64 bytes, and room for eight peers with all of them. It is measured
-    without the memories of its program, packets and names. Block RAMs and distributed memories are not counted."""
+    without the memories of its program, packets and names. Block RAMs and distributed memories are not counted. Long
+    messages have up to 4,096 bytes, and come and leave in fragments."""
 
 
 def rows() -> list[Row]:
-    """All rows: the node with MAC, ARP, ICMP, IGMP and UDP, and its two largest parts."""
+    """All rows: the node with MAC, ARP, ICMP, IGMP and UDP, and with what it may have as well; its two largest parts."""
+    node: Mapping[str, Generic] = {"WIDTH": 8, **_TOPICS}
     return [
-        Row("the node", 8, _entity("firm_net_link", {"WIDTH": 8, **_TOPICS}), _BAR),
+        Row("the node", 8, _entity("firm_net_link", node), _BAR),
+        Row("the node with DHCP", 8, _entity("firm_net_link", {**node, "HAS_DHCP": True})),
+        Row("the node with long messages", 8, _entity("firm_net_link", {**node, **_LONG})),
         Row("RTPS in it", 8, _entity("firm_rtps_node", _TOPICS)),
         Row("the packet builder in it", 8, _entity("firm_packet_builder", {})),
     ]
