@@ -6,6 +6,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_net_pkg.all;
 
 entity firm_dhcp_client is
   port (
@@ -65,8 +67,6 @@ architecture rtl of firm_dhcp_client is
   constant FILE_BYTES     : natural := 128;
   constant MAC_BYTES      : natural := 6;
 
-  subtype byte_t is std_logic_vector(7 downto 0);
-  type bytes_t is array (natural range <>) of byte_t;
   constant TYPE_IPV4 : bytes_t(2**PLACE_BITS-2 to 2**PLACE_BITS-1) := (x"08", x"00");
   constant VERSION   : bytes_t(0 to 0) := (others => x"45");       -- IPv4 without options
   constant UDP       : bytes_t(9 to 9) := (others => x"11");
@@ -259,17 +259,6 @@ architecture rtl of firm_dhcp_client is
     return pause;
   end function pause_of;
 
-  -- Whether a byte at `place` is not that of `wanted`.
-  function differs(place : place_t; byte : byte_t; wanted : bytes_t) return boolean is
-  begin
-    for index in wanted'range loop
-      if place = index and byte /= wanted(index) then
-        return true;
-      end if;
-    end loop;
-    return false;
-  end function differs;
-
   function after_pass(pass : pass_t) return pass_t is
   begin
     if pass = CLEAR then
@@ -289,11 +278,6 @@ architecture rtl of firm_dhcp_client is
     end if;
     return TO_RENEW;
   end function after_pass;
-
-  function byte_of(number : std_logic_vector(47 downto 0); index : natural) return byte_t is
-  begin
-    return number(47-8*index downto 40-8*index);
-  end function byte_of;
 
   function option_of(number : unsigned(7 downto 0)) return option_t is
   begin

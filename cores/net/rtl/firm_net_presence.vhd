@@ -9,6 +9,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_net_pkg.all;
 
 entity firm_net_presence is
   port (
@@ -58,8 +59,6 @@ architecture rtl of firm_net_presence is
   constant GROUP_COUNT : natural := 122;  -- of the last byte of the group
   constant LAST_COUNT  : natural := 121;
 
-  subtype byte_t is std_logic_vector(7 downto 0);
-  type bytes_t is array (natural range <>) of byte_t;
   -- ARP for Ethernet and IPv4.
   constant ARP        : bytes_t(12 to 19) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04");
   constant IPV4       : bytes_t(12 to 13) := (x"08", x"00");
@@ -102,17 +101,6 @@ architecture rtl of firm_net_presence is
     end if;
     return "111111111";
   end function limit_of;
-
-  -- Whether a byte at `place` is not that of `wanted`.
-  function differs(place : unsigned; byte : byte_t; wanted : bytes_t) return boolean is
-  begin
-    for index in wanted'range loop
-      if place = index and byte /= wanted(index) then
-        return true;
-      end if;
-    end loop;
-    return false;
-  end function differs;
 
 begin
 
