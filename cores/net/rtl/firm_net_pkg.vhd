@@ -2,7 +2,6 @@
 -- Bytes of a frame, for the cores that compare them one by one as they come.
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.numeric_std.all;
 
 package firm_net_pkg is
 
@@ -13,7 +12,7 @@ package firm_net_pkg is
   function byte_of(word : std_logic_vector; index : natural) return byte_t;
 
   -- Whether a byte at `place` is not that of `wanted`, whose indices are the places of its bytes.
-  function differs(place : unsigned; byte : byte_t; wanted : bytes_t) return boolean;
+  function differs(place : natural; byte : byte_t; wanted : bytes_t) return boolean;
 
 end package firm_net_pkg;
 
@@ -25,7 +24,7 @@ package body firm_net_pkg is
     return BITS(BITS'high-8*index downto BITS'high-8*index-7);
   end function byte_of;
 
-  function differs(place : unsigned; byte : byte_t; wanted : bytes_t) return boolean is
+  function differs(place : natural; byte : byte_t; wanted : bytes_t) return boolean is
   begin
     for index in wanted'range loop
       if place = index and byte /= wanted(index) then

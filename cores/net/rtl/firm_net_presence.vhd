@@ -68,7 +68,7 @@ architecture rtl of firm_net_presence is
   constant NO_ADDRESS : std_logic_vector(31 downto 0) := (others => '0');
 
   -- Of the frame so far.
-  signal place_r  : unsigned(5 downto 0) := (others => '0');
+  signal place_r  : natural range 0 to LAST_PLACE := 0;
   signal count_r  : unsigned(6 downto 0) := (others => '0');
   signal recent_r : std_logic_vector(47 downto 0) := (others => '0');  -- the last six bytes
   signal arp_r    : std_logic;
@@ -156,7 +156,7 @@ begin
         end if;
         if place_r = IPV4_PLACE then
           count_r <= '0' & unsigned(s_axis_tdata(3 downto 0)) & "00";
-        elsif is_below(std_logic_vector(place_r), IPV4_PLACE) = '1' then
+        elsif place_r < IPV4_PLACE then
           count_r <= to_unsigned(LAST_COUNT, 7);
         elsif count_r /= LAST_COUNT then
           count_r <= count_r - 1;
@@ -165,11 +165,11 @@ begin
           place_r <= place_r + 1;
         end if;
         if s_axis_tlast = '1' then
-          place_r <= (others => '0');
+          place_r <= 0;
         end if;
       end if;
       if rst_n = '0' then
-        place_r <= (others => '0');
+        place_r <= 0;
         ended_r <= '0';
       end if;
     end if;

@@ -234,7 +234,7 @@ begin
         echo_r      <= '1';
       end if;
       if is_below(at, MAC_BYTES) = '1' then
-        if differs(unsigned(at), s_axis_tdata, placed(mac, 0)) then
+        if differs(place_r, s_axis_tdata, placed(mac, 0)) then
           direct_r <= '0';
         end if;
         if s_axis_tdata /= x"ff" then
@@ -242,11 +242,11 @@ begin
         end if;
       end if;
 
-      arp_differs  := differs(unsigned(at), s_axis_tdata, ARP_REQUEST)
-                      or differs(unsigned(at), s_axis_tdata, placed(address, TARGET_PLACE+MAC_BYTES));
-      echo_differs := differs(unsigned(at), s_axis_tdata, IPV4)
-                      or differs(unsigned(at), s_axis_tdata, ECHO_REQUEST)
-                      or differs(unsigned(at), s_axis_tdata, placed(address, DESTINATION_PLACE));
+      arp_differs  := differs(place_r, s_axis_tdata, ARP_REQUEST)
+                      or differs(place_r, s_axis_tdata, placed(address, TARGET_PLACE+MAC_BYTES));
+      echo_differs := differs(place_r, s_axis_tdata, IPV4)
+                      or differs(place_r, s_axis_tdata, ECHO_REQUEST)
+                      or differs(place_r, s_axis_tdata, placed(address, DESTINATION_PLACE));
       if place_r = MAC_BYTES then
         -- A group of hosts is not a source.
         arp_differs  := s_axis_tdata(0) = '1' or (direct_r or broadcast_r) = '0';
