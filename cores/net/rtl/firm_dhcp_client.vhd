@@ -47,8 +47,8 @@ end entity firm_dhcp_client;
 
 architecture rtl of firm_dhcp_client is
 
-  -- Places of firm_dhcp_reader that are not in its memory: the end of a message that lacks some options (0 in the
-  -- others), and the type of the message.
+  -- Bytes that firm_dhcp_reader does not hold: the end of a message that lacks some options (0 in the others), and the
+  -- type of the message.
   constant END_PLACE  : natural := 30;
   constant TYPE_PLACE : natural := 31;
   constant END_TAG    : natural := 255;
@@ -95,22 +95,22 @@ architecture rtl of firm_dhcp_client is
   signal chooses      : std_logic;  -- the message tells the address and the server
 
   -- Of firm_dhcp_lease.
-  signal second     : std_logic;
-  signal is_asked   : std_logic;
-  signal begins_r   : std_logic;
-  signal counts_r   : std_logic;
-  signal is_done    : std_logic;
-  signal is_held    : std_logic;
-  signal is_owed    : std_logic;
-  signal ends       : std_logic;
-  signal rebinds    : std_logic;
-  signal renews     : std_logic;
+  signal second   : std_logic;
+  signal is_asked : std_logic;
+  signal begins_r : std_logic;
+  signal counts_r : std_logic;
+  signal is_done  : std_logic;
+  signal is_held  : std_logic;
+  signal is_owed  : std_logic;
+  signal ends     : std_logic;
+  signal rebinds  : std_logic;
+  signal renews   : std_logic;
 
   -- ------------------------------------------------------------------ time
 
-  constant MS_BITS     : natural := 10;
-  constant LAST_MS     : natural := 999;
-  constant PAUSE_BITS  : natural := 7;
+  constant MS_BITS    : natural := 10;
+  constant LAST_MS    : natural := 999;
+  constant PAUSE_BITS : natural := 7;
   subtype tries_t is unsigned(2 downto 0);
   -- Pauses, in 1024 ms, to which up to 1023 ms are added.
   subtype pause_t is unsigned(PAUSE_BITS-1 downto 0);
@@ -121,14 +121,14 @@ architecture rtl of firm_dhcp_client is
   constant LAST_TRY       : natural := 4;
   constant LAST_REQUEST   : natural := 2;
 
-  signal ms_r          : unsigned(MS_BITS-1 downto 0) := (others => '0');
-  signal conflict_r    : std_logic;
-  signal random_r      : std_logic_vector(31 downto 0) := (others => '1');
-  signal wait_r        : unsigned(PAUSE_BITS+MS_BITS-1 downto 0) := (others => '0');
-  signal due_r         : std_logic;
-  signal pauses_r      : boolean;                       -- a pause begins
-  signal pause_r       : pause_t := (others => '0');  -- its length; 0 for that before the next try
-  signal tries_r       : tries_t := (others => '0');
+  signal ms_r       : unsigned(MS_BITS-1 downto 0) := (others => '0');
+  signal conflict_r : std_logic;
+  signal random_r   : std_logic_vector(31 downto 0) := (others => '1');
+  signal wait_r     : unsigned(PAUSE_BITS+MS_BITS-1 downto 0) := (others => '0');
+  signal due_r      : std_logic;
+  signal pauses_r   : boolean;                     -- a pause begins
+  signal pause_r    : pause_t := (others => '0');  -- its length; 0 for that before the next try
+  signal tries_r    : tries_t := (others => '0');
 
   -- Four seconds, doubled with each try, and up to one second less or more: up to one second is added, and half of the
   -- pauses are one second shorter.
@@ -224,9 +224,9 @@ begin
 
   -- ------------------------------------------------------------------ the lease
 
-  second     <= tick when ms_r = LAST_MS else '0';
-  is_asked   <= '1' when step_r = SENDING else '0';
-  is_held    <= '1' when bound_r = '1' or state_r = CHECKING else '0';
+  second   <= tick when ms_r = LAST_MS else '0';
+  is_asked <= '1' when step_r = SENDING else '0';
+  is_held  <= '1' when bound_r = '1' or state_r = CHECKING else '0';
 
   u_lease : entity firm.firm_dhcp_lease
     port map (
@@ -254,9 +254,9 @@ begin
   wants_announcement <= '1' when step_r = SENDING and state_r = BOUND else '0';
 
   proceed : process (clk)
-    variable tries   : tries_t;
-    variable pauses  : boolean;                      -- a pause begins
-    variable length  : pause_t;
+    variable tries  : tries_t;
+    variable pauses : boolean;  -- a pause begins
+    variable length : pause_t;
 
     procedure pause(pause_length : in natural) is
     begin

@@ -21,20 +21,20 @@ entity firm_dhcp_reader is
     s_axis_tvalid : in std_logic;
     s_axis_tlast  : in std_logic;
 
-    -- The number of requests is drawn from random bytes, up to `is_drawn`. What comes until then answers the one before,
-    -- and is dropped.
+    -- While `draws` is high, up to `is_drawn`, the number of requests is drawn from random bytes. What comes until then
+    -- answers the number before, and is dropped.
     draws    : in  std_logic;
     random   : in  byte_t;
     is_drawn : out std_logic;
 
-    -- A message waits, or is read; it is dropped unless one is `wanted`. It is read as soon as `reads` is high.
+    -- `has_message`: a message waits until `reads` is high, and is read then. Without `is_wanted`, it is dropped.
     is_wanted    : in  std_logic;
-    is_selecting : in  std_logic;  -- an offer is wanted: its address is taken, and that of other messages compared
+    is_selecting : in  std_logic;  -- an offer is wanted, whose address is taken; that of another message is compared
     has_message  : out std_logic;
     reads        : in  std_logic;
 
-    -- It is judged, in one cycle: `takes` has it read for the second time. When `has_message` falls, `is_taken` tells
-    -- whether it was.
+    -- The message can be judged for one cycle, in which `takes` has it read for the second time. When `has_message`
+    -- falls, `is_taken` tells whether it was.
     is_judged    : out std_logic;
     takes        : in  std_logic;
     is_taken     : out std_logic;

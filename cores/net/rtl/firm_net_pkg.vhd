@@ -1,11 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Bytes of a frame, for the cores that compare them one by one as they come.
+-- Bytes of a frame, for cores that compare each one as it comes.
 library ieee;
 use ieee.std_logic_1164.all;
 
 package firm_net_pkg is
 
   subtype byte_t is std_logic_vector(7 downto 0);
+
   type bytes_t is array (natural range <>) of byte_t;
 
   -- Byte `index` of a word, counted as on the line: byte 0 is the highest.

@@ -110,7 +110,7 @@ begin
       is_lost            => is_lost
     );
 
-  count_ms : keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
+  keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
 
   rest_user : process (clk)
     variable rest : natural := 0;

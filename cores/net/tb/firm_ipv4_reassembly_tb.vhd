@@ -90,7 +90,7 @@ begin
       over          => over
     );
 
-  count_ms : keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
+  keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
 
   u_record : entity firm.firm_sim_record
     generic map (

@@ -88,7 +88,7 @@ begin
       over          => over
     );
 
-  count_ms : keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
+  keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
 
   record_presence : process
     file results      : text open write_mode is RESULT_FILE;
