@@ -323,6 +323,7 @@ begin
         elsif is_owed = '1' then
           counts_r <= '1';
           step_r   <= COUNTING;
+        -- Without `is_wanted`, the reader is about to drop it.
         elsif has_message = '1' and is_wanted = '1' then
           step_r <= READING;
         elsif due_r = '1' then
