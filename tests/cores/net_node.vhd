@@ -68,7 +68,7 @@ architecture rtl of net_node is
   signal names_data    : std_logic_vector(8*ENDPOINTS-1 downto 0);
 
   signal control_enable  : std_logic;
-  signal control_address : std_logic_vector(10 downto 0);
+  signal control_address : std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
   signal control_word    : std_logic_vector(35 downto 0);
 
   signal start           : std_logic;

@@ -13,6 +13,8 @@
 #include "bench.h"
 
 static const unsigned LOOP_CYCLES = 24, IDLE_LOOPS = 50;
+// Until the node takes a byte, or comes to rest: ten times what the longest messages of the tests take.
+static const uint64_t MOST_CYCLES = 3000000;
 enum Kind { PACKET, ABORTED_PACKET, TICKS, FRAME, ABORTED_FRAME, RUSHED };
 
 class World {
@@ -50,7 +52,7 @@ class World {
       top_.sample_tlast = place + 1 == bytes.size();
       top_.sample_tuser = top_.sample_tlast && is_aborted;
       top_.eval();
-      while (!top_.sample_tready) step();
+      run_until([this] { return top_.sample_tready; }, "the node takes no byte of a frame");
       step();
     }
     top_.sample_tvalid = 0;
@@ -58,7 +60,8 @@ class World {
     awaits_ = sent_.empty();
   }
   void wait() {
-    for (idle_ = 0; idle_ < IDLE_LOOPS;) step();
+    idle_ = 0;
+    run_until([this] { return idle_ >= IDLE_LOOPS; }, "the node does not come to rest");
   }
   void step() {
     top_.frame_tready = random_() % 100 >= stall_;
@@ -67,6 +70,7 @@ class World {
     watch();
     top_.clk = 1;
     top_.eval();
+    ++cycle;
   }
 
   void done() const {
@@ -75,6 +79,11 @@ class World {
   }
 
  private:
+  template <typename Condition> void run_until(Condition is_met, const char* fault) {
+    for (const uint64_t end = cycle + MOST_CYCLES; !is_met(); step()) {
+      if (cycle == end) fail(fault);
+    }
+  }
   void watch() {
     ++since_main_;
     ++cycles_;
@@ -119,7 +128,7 @@ int main(int, char** arguments) {
     std::vector<int> bytes;
     while (row >> byte) bytes.push_back(byte);
     if (before < 0) world.wait();
-    for (int cycle = 0; cycle < before; ++cycle) world.step();
+    for (int count = 0; count < before; ++count) world.step();
     if (kind == TICKS) {
       for (int count = 0; count < size; ++count) world.tick();
     } else if (kind == RUSHED) {

@@ -46,7 +46,7 @@ entity rtps_world is
 
     is_busy         : out std_logic;
     program_enable  : out std_logic;
-    program_address : out std_logic_vector(10 downto 0);
+    program_address : out std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
 
     peer_count   : out std_logic_vector(7 downto 0);
     source_count : out std_logic_vector(7 downto 0);
@@ -67,7 +67,7 @@ architecture rtl of rtps_world is
   signal names_address   : std_logic_vector(9 downto 0);
   signal names_data      : std_logic_vector(8*ENDPOINTS-1 downto 0);
   signal control_enable  : std_logic;
-  signal control_address : std_logic_vector(10 downto 0);
+  signal control_address : std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
   signal control_word    : std_logic_vector(35 downto 0);
   signal packets_enable  : std_logic;
   signal packets_address : std_logic_vector(PROGRAM_BITS-1 downto 0);

@@ -31,7 +31,7 @@ from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
 SEED = 20261127
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/dhcp")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/package", "net/dhcp")
 TICK_CYCLES = 2
 NEXT, TAKEN, DUE = "2\n", "3\n", "4\n"
 NOTHING = bytes(4)
@@ -378,7 +378,8 @@ def test_messages_of_all_kinds_do_what_the_model_says(library: Library, tmp_path
 def test_the_netlist_does_the_same(tmp_path: Path) -> None:
     library = _library(tmp_path)
     assert library.latches("firm_dhcp_client") == []
-    assert loops("firm_dhcp_client", tmp_path, core_files("net/dhcp")) == []
+    hardware = core_files("net/package", "net/dhcp")
+    assert loops("firm_dhcp_client", tmp_path, hardware, hardware) == []
     library.replace_by_netlist("firm_dhcp_client", {})
-    library.analyse(core_files("net/dhcp", fileset="tb"))
+    library.analyse(path for path in core_files("net/dhcp", fileset="tb") if path.stem == "firm_dhcp_client_tb")
     _concerns(library, tmp_path, SEED, 8, 0)

@@ -19,6 +19,7 @@ NODE = (
     "axis/axis",
     "net/mac",
     "net/streams",
+    "net/package",
     "net/responder",
     "net/reassembly",
     "net/presence",

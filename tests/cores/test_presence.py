@@ -19,7 +19,7 @@ from tests.hdl.ghdl import Generic, Library, core_files
 
 SEED = 20261127
 TICK_CYCLES = 8
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/presence")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/package", "net/presence")
 # The lower bits of the MAC address tell the delay of an answer.
 DELAY = 8 * (MAC[-1] & 63)
 NETWORK = Network(MAC, IPv4Address(ADDRESS), IPv4Address("255.255.255.0"), None, "board", "/", 0)

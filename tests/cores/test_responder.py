@@ -26,8 +26,8 @@ from tests.hdl.verilog import loops, netlist
 
 SEED = 20261125
 HERE = Path(__file__).parent
-HARDWARE = core_files("axis/package", "axis/axis", "net/mac", "net/responder")
-CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/responder")
+HARDWARE = core_files("axis/package", "axis/axis", "net/mac", "net/package", "net/responder")
+CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/package", "net/responder")
 
 
 @pytest.fixture(scope="module")

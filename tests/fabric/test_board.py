@@ -25,7 +25,7 @@ from tests.hdl.verilog import netlist
 from tests.ros.cpp_nodes import ros2
 
 CORES = HERE.parent / "cores"
-PARTS = ("axis/package", "axis/axis", "net/mac", "net/responder", "net/udp", "net/rtps", "net/builder")
+PARTS = ("axis/package", "axis/axis", "net/mac", "net/package", "net/responder", "net/udp", "net/rtps", "net/builder")
 HARDWARE = [*core_files(*PARTS), REPOSITORY / "cores/net/rtl/firm_net_merge.vhd"]
 SAMPLES = 200
 # Samples that a peer sends at once. The TAP device drops frames after 500, and nobody sends them again at best effort.

@@ -53,7 +53,7 @@ entity firm_net_link is
 
     -- The memories that fusesoc_firm.fabric.control, fusesoc_firm.fabric.packets and fusesoc_firm.fabric.names make.
     control_enable  : out std_logic;
-    control_address : out std_logic_vector(10 downto 0);
+    control_address : out std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
     control_word    : in  std_logic_vector(35 downto 0);
     packet          : out std_logic_vector(7 downto 0);
     entry           : in  std_logic_vector(PROGRAM_BITS-1 downto 0);

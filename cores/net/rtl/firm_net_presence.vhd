@@ -9,6 +9,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_net_pkg.all;
 
 entity firm_net_presence is
   port (
@@ -58,8 +59,6 @@ architecture rtl of firm_net_presence is
   constant GROUP_COUNT : natural := 122;  -- of the last byte of the group
   constant LAST_COUNT  : natural := 121;
 
-  subtype byte_t is std_logic_vector(7 downto 0);
-  type bytes_t is array (natural range <>) of byte_t;
   -- ARP for Ethernet and IPv4.
   constant ARP        : bytes_t(12 to 19) := (x"08", x"06", x"00", x"01", x"08", x"00", x"06", x"04");
   constant IPV4       : bytes_t(12 to 13) := (x"08", x"00");
@@ -69,7 +68,7 @@ architecture rtl of firm_net_presence is
   constant NO_ADDRESS : std_logic_vector(31 downto 0) := (others => '0');
 
   -- Of the frame so far.
-  signal place_r  : unsigned(5 downto 0) := (others => '0');
+  signal place_r  : natural range 0 to LAST_PLACE := 0;
   signal count_r  : unsigned(6 downto 0) := (others => '0');
   signal recent_r : std_logic_vector(47 downto 0) := (others => '0');  -- the last six bytes
   signal arp_r    : std_logic;
@@ -102,17 +101,6 @@ architecture rtl of firm_net_presence is
     end if;
     return "111111111";
   end function limit_of;
-
-  -- Whether a byte at `place` is not that of `wanted`.
-  function differs(place : unsigned; byte : byte_t; wanted : bytes_t) return boolean is
-  begin
-    for index in wanted'range loop
-      if place = index and byte /= wanted(index) then
-        return true;
-      end if;
-    end loop;
-    return false;
-  end function differs;
 
 begin
 
@@ -168,7 +156,7 @@ begin
         end if;
         if place_r = IPV4_PLACE then
           count_r <= '0' & unsigned(s_axis_tdata(3 downto 0)) & "00";
-        elsif is_below(std_logic_vector(place_r), IPV4_PLACE) = '1' then
+        elsif place_r < IPV4_PLACE then
           count_r <= to_unsigned(LAST_COUNT, 7);
         elsif count_r /= LAST_COUNT then
           count_r <= count_r - 1;
@@ -177,11 +165,11 @@ begin
           place_r <= place_r + 1;
         end if;
         if s_axis_tlast = '1' then
-          place_r <= (others => '0');
+          place_r <= 0;
         end if;
       end if;
       if rst_n = '0' then
-        place_r <= (others => '0');
+        place_r <= 0;
         ended_r <= '0';
       end if;
     end if;

@@ -11,6 +11,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_net_pkg.all;
 
 entity firm_net_responder is
   generic (
@@ -41,9 +42,6 @@ entity firm_net_responder is
 end entity firm_net_responder;
 
 architecture rtl of firm_net_responder is
-
-  subtype byte_t is std_logic_vector(7 downto 0);
-  type bytes_t is array (natural range <>) of byte_t;
 
   -- Places in a frame, of the first byte of a field.
   constant LENGTH_PLACE      : natural := 16;  -- of IPv4
@@ -128,24 +126,6 @@ architecture rtl of firm_net_responder is
   signal chosen_tuser  : std_logic_vector(0 downto 0);
   signal chosen_tvalid : std_logic;
   signal chosen_tlast  : std_logic;
-
-  -- Byte `index` of a word, counted as on the line.
-  function byte_of(word : std_logic_vector; index : natural) return byte_t is
-    constant BITS : std_logic_vector(word'length-1 downto 0) := word;
-  begin
-    return BITS(BITS'high-8*index downto BITS'high-8*index-7);
-  end function byte_of;
-
-  -- Whether a byte at `place` is not that of `wanted`.
-  function differs(place : natural; byte : byte_t; wanted : bytes_t) return std_logic is
-  begin
-    for index in wanted'range loop
-      if place = index and byte /= wanted(index) then
-        return '1';
-      end if;
-    end loop;
-    return '0';
-  end function differs;
 
   -- The bytes of a word as they are in a frame from `place` on.
   function placed(word : std_logic_vector; place : natural) return bytes_t is
@@ -243,8 +223,8 @@ begin
   end process follow;
 
   match : process (clk)
-    variable arp_differs  : std_logic;
-    variable echo_differs : std_logic;
+    variable arp_differs  : boolean;
+    variable echo_differs : boolean;
   begin
     if rising_edge(clk) and s_axis_tvalid = '1' then
       if place_r = 0 then
@@ -254,7 +234,7 @@ begin
         echo_r      <= '1';
       end if;
       if is_below(at, MAC_BYTES) = '1' then
-        if differs(place_r, s_axis_tdata, placed(mac, 0)) = '1' then
+        if differs(place_r, s_axis_tdata, placed(mac, 0)) then
           direct_r <= '0';
         end if;
         if s_axis_tdata /= x"ff" then
@@ -269,19 +249,19 @@ begin
                       or differs(place_r, s_axis_tdata, placed(address, DESTINATION_PLACE));
       if place_r = MAC_BYTES then
         -- A group of hosts is not a source.
-        arp_differs  := s_axis_tdata(0) or not (direct_r or broadcast_r);
-        echo_differs := s_axis_tdata(0) or not direct_r;
+        arp_differs  := s_axis_tdata(0) = '1' or (direct_r or broadcast_r) = '0';
+        echo_differs := s_axis_tdata(0) = '1' or direct_r = '0';
       elsif place_r = FRAGMENT_PLACE and (s_axis_tdata and FRAGMENT) /= x"00" then
-        echo_differs := '1';
+        echo_differs := true;
       elsif place_r = FRAGMENT_PLACE+1 and s_axis_tdata /= x"00" then
-        echo_differs := '1';
+        echo_differs := true;
       elsif place_r = PROTOCOL_PLACE and s_axis_tdata /= ICMP then
-        echo_differs := '1';
+        echo_differs := true;
       end if;
-      if arp_differs = '1' then
+      if arp_differs then
         arp_r <= '0';
       end if;
-      if echo_differs = '1' then
+      if echo_differs then
         echo_r <= '0';
       end if;
       aborted_r <= s_axis_tuser(0);

@@ -22,7 +22,7 @@ entity firm_rtps_control is
 
     -- The memory of the program.
     program_enable  : out std_logic;
-    program_address : out std_logic_vector(10 downto 0);
+    program_address : out std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
     program_word    : in  std_logic_vector(35 downto 0);
 
     -- Of firm_rtps_inbox, firm_rtps_locators and firm_rtps_endpoint.

@@ -35,7 +35,7 @@ entity firm_rtps_node is
 
     -- The memory that fusesoc_firm.fabric.control makes.
     program_enable  : out std_logic;
-    program_address : out std_logic_vector(10 downto 0);
+    program_address : out std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
     program_word    : in  std_logic_vector(35 downto 0);
 
     -- Payloads of firm_udp_receiver.

@@ -92,6 +92,8 @@ package firm_rtps_pkg is
   constant RTPS_BANK_BITS : positive := 4;
   constant RTPS_OWN_BANK  : std_logic_vector(RTPS_BANK_BITS-1 downto 0) := x"f";
 
+  constant RTPS_CONTROL_BITS : positive := 11;  -- of an address in the program of firm_rtps_sequencer
+
   -- Cycles from the last word of an announcement until firm_rtps_endpoint tells what it was.
   constant RTPS_JUDGED : positive := 7;
 

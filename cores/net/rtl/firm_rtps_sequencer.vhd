@@ -22,7 +22,7 @@ entity firm_rtps_sequencer is
 
     -- The program: a memory that shows the word one cycle after `program_enable`, and keeps it.
     program_enable  : out std_logic;
-    program_address : out std_logic_vector(10 downto 0);
+    program_address : out std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
     program_word    : in  std_logic_vector(35 downto 0);
 
     -- Words of firm_rtps_inbox, which TAKE moves up to the end of a submessage, and what they write to the record.
@@ -87,7 +87,7 @@ architecture rtl of firm_rtps_sequencer is
 
   subtype byte_t is std_logic_vector(7 downto 0);
   subtype address_t is unsigned(ADDRESS_BITS-1 downto 0);
-  subtype program_t is unsigned(10 downto 0);
+  subtype program_t is unsigned(RTPS_CONTROL_BITS-1 downto 0);
   type memory_t is array (natural range 0 to 2**MEMORY_BITS-1) of byte_t;
   type stack_t is array (natural range 0 to 2**STACK_BITS-1) of program_t;
 
@@ -263,7 +263,7 @@ begin
 
   address <= program_r when turns = '0' else
              stack(to_integer(depth_r - 1)) when kind = OP_RETURN else
-             unsigned(word_r(10 downto 0));
+             unsigned(word_r(RTPS_CONTROL_BITS-1 downto 0));
   fetches <= '0' when hold = '1' else
              '1' when state_r = FETCH else
              turns or is_over;

@@ -110,18 +110,12 @@ begin
       is_lost            => is_lost
     );
 
-  keep_time : process (clk)
-    variable cycle : natural := 0;
-    variable rest  : natural := 0;
+  keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
+
+  rest_user : process (clk)
+    variable rest : natural := 0;
   begin
     if rising_edge(clk) and rst_n = '1' then
-      tick  <= '0';
-      cycle := cycle + 1;
-      if cycle = TICK_CYCLES then
-        cycle := 0;
-        tick  <= '1';
-        ms    <= ms + 1;
-      end if;
       rest := rest + 1;
       if is_bound = '1' then
         rest := 0;
@@ -131,7 +125,7 @@ begin
         is_stopped <= '1';
       end if;
     end if;
-  end process keep_time;
+  end process rest_user;
 
   play : process
     file rows         : text open read_mode is FRAME_FILE;

@@ -5,6 +5,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
+use firm.firm_sim_pkg.keep_time;
 
 entity firm_ipv4_reassembly_tb is
   generic (
@@ -30,6 +31,7 @@ architecture simulation of firm_ipv4_reassembly_tb is
   signal rst_n : std_logic;
   signal over  : boolean;
   signal tick  : std_logic := '0';
+  signal ms    : natural   := 0;
 
   signal s_tdata    : std_logic_vector(7 downto 0);
   signal s_tuser    : std_logic_vector(0 downto 0);
@@ -88,18 +90,7 @@ begin
       over          => over
     );
 
-  keep_time : process (clk)
-    variable cycle : natural := 0;
-  begin
-    if rising_edge(clk) then
-      tick  <= '0';
-      cycle := cycle + 1;
-      if cycle = TICK_CYCLES then
-        cycle := 0;
-        tick  <= '1';
-      end if;
-    end if;
-  end process keep_time;
+  keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
 
   u_record : entity firm.firm_sim_record
     generic map (

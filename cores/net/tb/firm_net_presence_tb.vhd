@@ -88,19 +88,7 @@ begin
       over          => over
     );
 
-  keep_time : process (clk)
-    variable cycle : natural := 0;
-  begin
-    if rising_edge(clk) and rst_n = '1' then
-      tick  <= '0';
-      cycle := cycle + 1;
-      if cycle = TICK_CYCLES then
-        cycle := 0;
-        tick  <= '1';
-        ms    <= ms + 1;
-      end if;
-    end if;
-  end process keep_time;
+  keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
 
   record_presence : process
     file results      : text open write_mode is RESULT_FILE;

@@ -75,7 +75,7 @@ architecture simulation of firm_rtps_node_tb is
   signal names_address   : std_logic_vector(9 downto 0);
   signal names_data      : std_logic_vector(8*ENDPOINTS-1 downto 0);
   signal program_enable  : std_logic;
-  signal program_address : std_logic_vector(10 downto 0);
+  signal program_address : std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
   signal program_word    : std_logic_vector(35 downto 0) := (others => '0');
   signal packets_enable  : std_logic;
   signal packets_address : std_logic_vector(12 downto 0);

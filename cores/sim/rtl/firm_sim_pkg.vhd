@@ -64,6 +64,15 @@ package firm_sim_pkg is
   function existing(path : string) return string;
   procedure write_result(file results : text; file expected : text; path : in string; row : inout line);
 
+  -- As a concurrent call: gives a pulse each millisecond after the reset, and counts them.
+  procedure keep_time(
+    signal   clk    : in std_logic;
+    signal   rst_n  : in std_logic;
+    constant cycles : in positive;  -- of a millisecond
+    signal   tick   : out std_logic;
+    signal   ms     : inout natural
+  );
+
   -- Frame `number`, counted from 0, in the order of the file; null if there are fewer.
   procedure find_frame(content : inout frame_file_t; number : in natural; frame : out frame_ptr_t);
 
@@ -170,6 +179,24 @@ package body firm_sim_pkg is
     end if;
     writeline(results, row);
   end procedure write_result;
+
+  procedure keep_time(
+    signal   clk    : in std_logic;
+    signal   rst_n  : in std_logic;
+    constant cycles : in positive;
+    signal   tick   : out std_logic;
+    signal   ms     : inout natural
+  ) is
+  begin
+    loop
+      for cycle in 1 to cycles loop
+        wait until rising_edge(clk) and rst_n = '1';
+        tick <= '0';
+      end loop;
+      tick <= '1';
+      ms   <= ms + 1;
+    end loop;
+  end procedure keep_time;
 
   procedure fail_at(path : in string; line_number : in natural; what : in string) is
   begin
