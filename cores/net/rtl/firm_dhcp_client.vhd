@@ -91,8 +91,9 @@ architecture rtl of firm_dhcp_client is
   signal told_byte    : byte_t;
   signal own_place    : unsigned(4 downto 0);
   signal own_known    : byte_t;
-  signal own_type     : type_t;
-  signal chooses      : std_logic;  -- the message tells the address and the server
+  -- Of the message that leaves, for as long as it does.
+  signal own_type_r   : type_t := DISCOVER;
+  signal chooses_r    : std_logic;  -- it tells the address and the server
 
   -- Of firm_dhcp_lease.
   signal second   : std_logic;
@@ -194,26 +195,38 @@ begin
   -- ------------------------------------------------------------------ messages to servers
 
   own_place <= unsigned(own_select(4 downto 0));
-  own_type  <= DISCOVER when state_r = SELECTING else
-               DECLINE when state_r = STARTING else
-               REQUEST;
-  chooses   <= '1' when state_r = REQUESTING or state_r = STARTING else '0';
 
-  show : process (own_select, own_place, own_known, own_type, bound_r, chooses)
+  note_type : process (clk)
+  begin
+    if rising_edge(clk) then
+      own_type_r <= REQUEST;
+      chooses_r  <= '0';
+      if state_r = SELECTING then
+        own_type_r <= DISCOVER;
+      elsif state_r = REQUESTING then
+        chooses_r <= '1';
+      elsif state_r = STARTING then
+        own_type_r <= DECLINE;
+        chooses_r  <= '1';
+      end if;
+    end if;
+  end process note_type;
+
+  show : process (own_select, own_place, own_known, own_type_r, bound_r, chooses_r)
     variable byte : byte_t;
   begin
     byte := own_known;
-    if own_place = END_PLACE and own_type = DECLINE then
+    if own_place = END_PLACE and own_type_r = DECLINE then
       byte := std_logic_vector(to_unsigned(END_TAG, 8));
     elsif own_place = END_PLACE then
       byte := (others => '0');
     elsif own_place = TYPE_PLACE then
-      byte := std_logic_vector(resize(own_type, 8));
+      byte := std_logic_vector(resize(own_type_r, 8));
     end if;
     if own_select(6 downto 5) = "11" then
       byte := "00" & own_select(4) & own_select(4 downto 0);
     end if;
-    if (own_select(6 downto 5) = "01" and bound_r = '0') or (own_select(6) = '1' and chooses = '0') then
+    if (own_select(6 downto 5) = "01" and bound_r = '0') or (own_select(6) = '1' and chooses_r = '0') then
       byte := (others => '0');
     end if;
     own_byte <= byte;
