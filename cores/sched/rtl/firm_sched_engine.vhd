@@ -341,12 +341,12 @@ begin
   waiting_key <= first_key when first_valid = '1' else b_key;
   next_key    <= waiting_key when (first_valid or b_valid_r) = '1' else a_key;
   available   <= first_valid or may_take_b or may_take_a;
-  -- If the task that finishes is the only one left, it is also the next.
-  grant_moves <= of_case(beat, last, moves_if_paused and available, may_preempt and available, available);
 
   given_if_paused <= available and not running_r;
   -- The task that finishes may be first of the arrivals.
   given_if_ended  <= first_valid or may_take_b or (may_take_a and not a_is_own);
+  -- Where the root preempts, there is a next task.
+  grant_moves     <= of_case(beat, last, may_preempt or given_if_paused, may_preempt, given_if_ended);
 
   preemptive : if not HAS_STAMPS generate
     signal root_is_before : std_logic;

@@ -210,10 +210,10 @@ begin
     end loop;
   end process hand_down;
 
-  -- The comparison is the last to arrive.
+  -- The comparison is the last to arrive. An item is stored in an empty node, or in the place of one that it precedes.
   choose_write : process (item, node, insert_r, clear_r, id_r, node_first, hole, hole_right,
                           filler_valid, filler_id, filler_key)
-    variable keep_item : std_logic;
+    variable stores : std_logic;  -- the node is empty
   begin
     write_node <= item;
     if hole = '1' then
@@ -223,9 +223,11 @@ begin
         write_node(place) <= filler_id(place);
       end loop;
     end if;
-    keep_item   := not (node(NODE_BITS-1) and node_first);
-    write_left  <= (insert_r and not id_r(SIDE) and keep_item) or (clear_r or (hole and not hole_right));
-    write_right <= (insert_r and id_r(SIDE) and keep_item) or (clear_r or (hole and hole_right));
+    stores      := insert_r and not node(NODE_BITS-1);
+    write_left  <= ((stores and not id_r(SIDE)) or clear_r or (hole and not hole_right)) or
+                   ((insert_r and not id_r(SIDE)) and not node_first);
+    write_right <= ((stores and id_r(SIDE)) or clear_r or (hole and hole_right)) or
+                   ((insert_r and id_r(SIDE)) and not node_first);
   end process choose_write;
 
 end architecture rtl;
