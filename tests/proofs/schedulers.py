@@ -250,7 +250,7 @@ def _edf_resources() -> tuple[Proof, ...]:
                 ("at_most_one_grant",),
                 _THREE,
             ),
-            Mutation(file, "given_if_ended or (grant_valid_r and empty)", "'1'", ("no_grant_unasked",)),
+            Mutation(file, "given_if_paused or (grant_valid_r and (running_r or empty))", "'1'", ("no_grant_unasked",)),
         ),
         "scheduler_preemption": (
             Mutation(
