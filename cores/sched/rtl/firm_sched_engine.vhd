@@ -65,11 +65,11 @@ architecture rtl of firm_sched_engine is
   subtype key_t is std_logic_vector(KEY_BITS-1 downto 0);
 
   -- Selects what was prepared for a cycle without a beat, with a beat that is not its task's last, and with the last.
-  function of_case(beat, last, paused, sent, ended : std_logic) return std_logic is
+  function of_case(has_beat, is_last, paused, sent, ended : std_logic) return std_logic is
   begin
-    if beat = '0' then
+    if has_beat = '0' then
       return paused;
-    elsif last = '0' then
+    elsif is_last = '0' then
       return sent;
     end if;
     return ended;
