@@ -250,7 +250,7 @@ def _edf_resources() -> tuple[Proof, ...]:
                 ("at_most_one_grant",),
                 _THREE,
             ),
-            Mutation(file, "if given = '1' then", "if choose = '1' then", ("no_grant_unasked",)),
+            Mutation(file, "given_if_paused or (grant_valid_r and (running_r or empty))", "'1'", ("no_grant_unasked",)),
         ),
         "scheduler_preemption": (
             Mutation(
@@ -263,8 +263,8 @@ def _edf_resources() -> tuple[Proof, ...]:
         "scheduler_service": (
             Mutation(
                 file,
-                "choose <= finished or not (running_r or beat)",
-                "choose <= not (running_r or beat)",
+                "given_if_paused or running_r, '1', given_if_ended)",
+                "given_if_paused or running_r, '1', '1')",
                 ("no_deadlock",),
             ),
         ),

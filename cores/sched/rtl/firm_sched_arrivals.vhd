@@ -86,6 +86,8 @@ architecture rtl of firm_sched_arrivals is
   signal is_in_next      : std_logic;  -- the one that may finish is in the next row
   signal own_of_next     : columns_t;  -- its column, if it is
   signal own_of_batch    : columns_t;  -- the same, if it is in the row of the batch
+  signal batch_or_row    : columns_t;  -- the batch without what happens in this cycle
+  signal own_column      : columns_t;  -- of the one that may finish, if it is among these
   signal is_known        : std_logic;
 
   -- A task that has finished in the last cycle and was known is recorded in this one.
@@ -210,25 +212,20 @@ begin
       read_word_2  => read_finished
     );
 
+  -- Whether all have left, and which columns are the finished requester's, is known before the late inputs.
+  batch_or_row <= row_new when load = '1' else batch_r;
+  own_column   <= own_of_next when load = '1' else own_of_batch;
+
   hold_batch : process (clk)
-    variable staying : columns_t;
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
         batch_r <= (others => '0');
         row_r   <= (others => '1');
       else
-        staying := batch_r;
-        if leaves = '1' then
-          staying := staying and not is_first;
-        end if;
-        if finished = '1' then
-          staying := staying and not own_of_batch;
-        end if;
-        batch_r <= staying;
+        batch_r <= batch_or_row and not gated(is_first, leaves) and not gated(own_column, finished);
         if load = '1' then
-          batch_r <= row_new and not gated(own_of_next, finished);
-          row_r   <= next_row_r;
+          row_r <= next_row_r;
         end if;
       end if;
     end if;

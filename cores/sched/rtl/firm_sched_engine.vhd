@@ -11,7 +11,7 @@
 -- first if the root can preempt it after a beat; otherwise there is no grant.
 -- A task with a smaller key (EDF, LST) takes the grant; the preempted one goes back into the queue through B.
 -- `beat` and `last` pass through the Manager's multiplexer and arrive late. What they decide is therefore prepared for
--- both cases, that the next grant is chosen and that the task goes on; they only select.
+-- each case; they only select, for keys a cycle later.
 -- Keys are compared as numbers that wrap around. They must stay less than half their range apart for any behaviour of
 -- the host. Time therefore stops while the key of the current task or of the root is overdue.
 library ieee;
@@ -64,6 +64,17 @@ architecture rtl of firm_sched_engine is
   subtype id_t is std_logic_vector(ID_BITS-1 downto 0);
   subtype key_t is std_logic_vector(KEY_BITS-1 downto 0);
 
+  -- Selects what was prepared for a cycle without a beat, with a beat that is not its task's last, and with the last.
+  function of_case(has_beat, is_last, paused, sent, ended : std_logic) return std_logic is
+  begin
+    if has_beat = '0' then
+      return paused;
+    elsif is_last = '0' then
+      return sent;
+    end if;
+    return ended;
+  end function of_case;
+
   -- The first task of the arrivals, A.
   signal a_valid    : std_logic;
   signal a_id       : id_t;
@@ -72,13 +83,20 @@ architecture rtl of firm_sched_engine is
   signal a_key      : key_t;
   signal a_is_own   : std_logic;  -- of the requester that has the grant
   signal a_leaves   : std_logic;
-  signal a_enters_b : std_logic;
   signal key_ready  : std_logic;
 
-  signal b_valid_r : std_logic;
-  signal b_id_r    : id_t;
-  signal b_key_r   : key_t;
-  signal b_is_free : std_logic;  -- is empty or leaves
+  -- B is the arrived task or the preempted one; which one is known only late in the cycle in which it enters.
+  signal b_valid_r      : std_logic;
+  signal b_preempted_r  : std_logic;
+  signal b_after_beat_r : std_logic;  -- the preempted task sent a beat in its last cycle
+  signal arrived_id_r   : id_t;
+  signal arrived_key_r  : key_t;
+  signal left_id_r      : id_t;
+  signal left_key_r     : key_t;      -- without a beat in the last cycle
+  signal left_later_r   : key_t;      -- with a beat in it
+  signal b_id           : id_t;
+  signal b_key          : key_t;
+  signal b_is_free      : std_logic;  -- is empty or leaves
 
   signal insert       : std_logic;
   signal insert_ready : std_logic;
@@ -94,36 +112,47 @@ architecture rtl of firm_sched_engine is
   signal grant_select_r : id_t;
   signal running_r      : std_logic;  -- the grant is a task's, not parked
   signal keyed_r        : std_logic;  -- and the task has a key
-  signal key_r          : key_t;
-  signal sent_key       : key_t;      -- the current task's key after this cycle
+  signal key            : key_t;      -- the current task's key
   signal key_after_beat : key_t;      -- the same after a beat
   signal gets_key       : std_logic;  -- the current task gets its key
-  signal key_if_sent    : key_t;      -- the next key after a beat that is not the last
-  signal key_if_paused  : key_t;      -- and after a cycle without a beat
 
-  signal finished    : std_logic;
-  signal choose      : std_logic;  -- no task is entitled to the grant in the next cycle
-  signal moves       : std_logic;  -- the next grant replaces the current one, unless there is none
-  signal gives_way   : std_logic;  -- the queue yields to an item that is about to enter it
-  signal may_take_b  : std_logic;
-  signal may_take_a  : std_logic;
-  signal next_id     : id_t;
-  signal next_key    : key_t;
-  signal available   : std_logic;  -- there is a next task
-  signal grant_moves : std_logic;  -- the grant moves to it
-  signal given       : std_logic;  -- the choice finds a task
-  signal pop         : std_logic;
-  signal may_leave   : std_logic;
-  signal may_preempt : std_logic;  -- the root preempts the task if this goes on
-  signal preempt     : std_logic;
+  -- Its candidates of the last cycle: after a choice, or of a task that went on, with a beat or without.
+  signal chose_r         : std_logic;
+  signal beat_r          : std_logic;
+  signal key_if_chosen_r : key_t;
+  signal key_if_sent_r   : key_t;
+  signal key_if_paused_r : key_t;
 
-  -- What happens to arriving tasks if the next grant is chosen, and if the task goes on.
+  signal finished        : std_logic;
+  signal choose          : std_logic;  -- no task is entitled to the grant in the next cycle
+  signal gives_way       : std_logic;  -- the queue yields to an item that is about to enter it
+  signal may_take_b      : std_logic;
+  signal may_take_a      : std_logic;
+  signal next_id         : id_t;
+  signal waiting_key     : key_t;
+  signal next_key        : key_t;
+  signal available       : std_logic;  -- there is a next task
+  signal grant_moves     : std_logic;  -- the grant moves to it
+  signal moves_if_paused : std_logic;
+  signal given_if_paused : std_logic;  -- the choice finds a task
+  signal given_if_ended  : std_logic;
+  signal keyed_if_kept   : std_logic;
+  signal pop             : std_logic;
+  signal may_leave       : std_logic;
+  signal may_preempt     : std_logic;  -- the root preempts the task if this goes on
+  signal preempt         : std_logic;
+
+  -- What happens to arriving tasks if the next grant is chosen, at the end of a task, and if the task goes on.
   signal b_is_free_if_chosen : std_logic;
   signal b_is_free_if_kept   : std_logic;
   signal leaves_if_chosen    : std_logic;
   signal leaves_if_kept      : std_logic;
   signal enters_if_chosen    : std_logic;
   signal enters_if_kept      : std_logic;
+  signal enters_if_ended     : std_logic;
+  signal b_valid_if_kept     : std_logic;
+  signal b_valid_if_chosen   : std_logic;
+  signal b_valid_if_ended    : std_logic;
 
   signal advance : std_logic;  -- time advances
 
@@ -208,7 +237,7 @@ begin
 
     -- The heap after reset; B may wait for it.
     is_clearing   <= empty and not insert_ready;
-    current_waits <= running_r and keyed_r and is_overdue(key_r, time_r);
+    current_waits <= running_r and keyed_r and is_overdue(key, time_r);
     root_waits    <= root_valid and is_overdue(root_key, time_r);
     advance       <= not (is_clearing or current_waits or root_waits);
 
@@ -258,8 +287,8 @@ begin
         insert_valid => b_valid_r,
         insert_ready => insert_ready,
         insert       => insert,
-        insert_id    => b_id_r,
-        insert_key   => b_key_r,
+        insert_id    => b_id,
+        insert_key   => b_key,
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
@@ -283,8 +312,8 @@ begin
         insert_valid => b_valid_r,
         insert_ready => insert_ready,
         insert       => insert,
-        insert_id    => b_id_r,
-        insert_key   => b_key_r,
+        insert_id    => b_id,
+        insert_key   => b_key,
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
@@ -298,33 +327,37 @@ begin
 
   -- The next grant.
 
-  choose <= finished or not (running_r or beat);
-  moves  <= choose or may_preempt;
-  pop    <= moves and first_valid;
+  choose          <= of_case(beat, last, not running_r, '0', '1');
+  moves_if_paused <= may_preempt or not running_r;
+  pop             <= of_case(beat, last, moves_if_paused and first_valid, may_preempt and first_valid, first_valid);
 
   may_take_b <= gives_way and b_valid_r;
   may_take_a <= gives_way and a_valid and not b_valid_r;
 
   next_id  <= first_id when first_valid = '1' else
-              b_id_r when b_valid_r = '1' else
+              b_id when b_valid_r = '1' else
               a_id;
-  next_key <= first_key when first_valid = '1' else
-              b_key_r when b_valid_r = '1' else
-              a_key;
-  available <= first_valid or may_take_b or may_take_a;
+  -- The key of A is the last to arrive.
+  waiting_key <= first_key when first_valid = '1' else b_key;
+  next_key    <= waiting_key when (first_valid or b_valid_r) = '1' else a_key;
+  available   <= first_valid or may_take_b or may_take_a;
+
+  given_if_paused <= available and not running_r;
   -- The task that finishes may be first of the arrivals.
-  given    <= choose and (first_valid or may_take_b or (may_take_a and not (finished and a_is_own)));
+  given_if_ended  <= first_valid or may_take_b or (may_take_a and not a_is_own);
+  -- Where the root preempts, there is a next task.
+  grant_moves     <= of_case(beat, last, may_preempt or given_if_paused, may_preempt, given_if_ended);
 
   preemptive : if not HAS_STAMPS generate
     signal root_is_before : std_logic;
     signal b_has_room     : std_logic;
   begin
-    root_is_before <= root_valid and is_before(root_key, key_r);
+    root_is_before <= root_valid and is_before(root_key, key);
     b_has_room     <= '1' when IS_SORTED else not b_valid_r;
     -- A possibly wrong task is better than none, since the right one preempts it after a beat.
     gives_way      <= not first_valid when SHORTEST_RUN <= 1 else empty;
     may_preempt    <= running_r and keyed_r and root_is_before and b_has_room and may_leave;
-    preempt        <= may_preempt and not choose;
+    preempt        <= may_preempt and not finished;
   end generate preemptive;
   non_preemptive : if HAS_STAMPS generate
     gives_way   <= empty;
@@ -358,7 +391,10 @@ begin
 
   -- A choice pops the heap if it can, which then accepts no item; B is taken only if the choice cannot pop.
   heap_inserts : if not IS_SORTED generate
-    insert              <= b_valid_r and insert_ready and not choose;
+    signal offers : std_logic;
+  begin
+    offers              <= b_valid_r and insert_ready;
+    insert              <= of_case(beat, last, offers and running_r, offers, '0');
     b_is_free_if_chosen <= gives_way or not b_valid_r;
   end generate heap_inserts;
   sorted_queue_inserts : if IS_SORTED generate
@@ -373,9 +409,17 @@ begin
   leaves_if_chosen <= may_take_a or enters_if_chosen;
   leaves_if_kept   <= gets_key or enters_if_kept;
 
-  a_leaves   <= leaves_if_chosen when choose = '1' else leaves_if_kept;
-  a_enters_b <= enters_if_chosen and not (finished and a_is_own) when choose = '1' else enters_if_kept;
-  b_is_free  <= b_is_free_if_chosen when choose = '1' else b_is_free_if_kept;
+  a_leaves <= of_case(beat, last, (leaves_if_kept and running_r) or (leaves_if_chosen and not running_r),
+                      leaves_if_kept, leaves_if_chosen);
+  -- A task that finishes is dropped.
+  enters_if_ended <= enters_if_chosen and not a_is_own;
+
+  b_is_free <= of_case(beat, last, (b_is_free_if_kept and running_r) or (b_is_free_if_chosen and not running_r),
+                       b_is_free_if_kept, b_is_free_if_chosen);
+
+  b_valid_if_kept   <= may_preempt or enters_if_kept or not b_is_free_if_kept;
+  b_valid_if_chosen <= enters_if_chosen or not b_is_free_if_chosen;
+  b_valid_if_ended  <= enters_if_ended or not b_is_free_if_chosen;
 
   hold_b : process (clk)
   begin
@@ -383,49 +427,66 @@ begin
       if rst_n = '0' then
         b_valid_r <= '0';
       else
-        b_valid_r <= preempt or a_enters_b or not b_is_free;
+        b_valid_r <= of_case(beat, last, (b_valid_if_kept and running_r) or (b_valid_if_chosen and not running_r),
+                             b_valid_if_kept, b_valid_if_ended);
       end if;
-      if preempt = '1' then
-        b_id_r  <= grant_select_r;
-        b_key_r <= sent_key;
-      elsif a_enters_b = '1' then
-        b_id_r  <= a_id;
-        b_key_r <= a_key;
+      -- Without a task in B, its content does not matter.
+      if b_is_free = '1' then
+        b_preempted_r  <= preempt;
+        b_after_beat_r <= beat;
+        arrived_id_r   <= a_id;
+        arrived_key_r  <= a_key;
+      end if;
+      if IS_SORTED or b_valid_r = '0' then
+        left_id_r    <= grant_select_r;
+        left_key_r   <= key;
+        left_later_r <= key_after_beat;
       end if;
     end if;
   end process hold_b;
 
+  b_id  <= left_id_r when b_preempted_r = '1' else arrived_id_r;
+  b_key <= arrived_key_r when b_preempted_r = '0' else
+           left_later_r when b_after_beat_r = '1' else
+           left_key_r;
+
   sends_own_time : if POLICY = LST generate
-    signal one_later : key_t;
+    signal step : unsigned(0 downto 0);
   begin
-    one_later      <= std_logic_vector(unsigned(key_r) + 1);
-    key_after_beat <= one_later when advance = '1' else key_r;
+    step(0)        <= advance;
+    key_after_beat <= std_logic_vector(unsigned(key) + step);
   end generate sends_own_time;
   keeps_key : if POLICY /= LST generate
-    key_after_beat <= key_r;
+    key_after_beat <= key;
   end generate keeps_key;
-  sent_key <= key_after_beat when beat = '1' else key_r;
 
-  gets_key      <= a_valid and a_is_own;
-  key_if_paused <= next_key when running_r = '0' or may_preempt = '1' else
-                   a_key when gets_key = '1' else
-                   key_r;
-  key_if_sent   <= next_key when may_preempt = '1' else
-                   a_key when gets_key = '1' else
-                   key_after_beat;
+  gets_key <= a_valid and a_is_own;
 
-  -- The same as moves and available, with beat and last in the last multiplexer, since they are late and this enables
-  -- many bits. If the task that finishes is the only one left, it is also the next.
-  move_grant : process (beat, last, available, may_preempt, running_r)
+  -- Without a task that has a key, its content does not matter.
+  hold_keys : process (clk)
   begin
-    if beat = '0' then
-      grant_moves <= available and (may_preempt or not running_r);
-    elsif last = '0' then
-      grant_moves <= available and may_preempt;
-    else
-      grant_moves <= available;
+    if rising_edge(clk) then
+      chose_r         <= choose;
+      beat_r          <= beat;
+      key_if_chosen_r <= next_key;
+      if keyed_r = '0' then
+        key_if_sent_r   <= a_key;
+        key_if_paused_r <= a_key;
+      elsif may_preempt = '1' then
+        key_if_sent_r   <= root_key;
+        key_if_paused_r <= root_key;
+      else
+        key_if_sent_r   <= key_after_beat;
+        key_if_paused_r <= key;
+      end if;
     end if;
-  end process move_grant;
+  end process hold_keys;
+
+  key <= key_if_chosen_r when chose_r = '1' else
+         key_if_sent_r when beat_r = '1' else
+         key_if_paused_r;
+
+  keyed_if_kept <= keyed_r or gets_key;
 
   grant : process (clk)
   begin
@@ -439,21 +500,11 @@ begin
         if grant_moves = '1' then
           grant_select_r <= next_id;
         end if;
-        if given = '1' then
-          grant_valid_r <= '1';
-        elsif choose = '1' and empty = '0' then
-          grant_valid_r <= '0';
-        end if;
-        running_r <= given or not choose;
-        keyed_r   <= given or (not choose and (keyed_r or gets_key));
-      end if;
-      -- Without a task that has a key, its content does not matter.
-      if finished = '1' then
-        key_r <= next_key;
-      elsif beat = '1' then
-        key_r <= key_if_sent;
-      else
-        key_r <= key_if_paused;
+        grant_valid_r <= of_case(beat, last, given_if_paused or (grant_valid_r and (running_r or empty)), grant_valid_r,
+                                 given_if_ended or (grant_valid_r and empty));
+        running_r     <= of_case(beat, last, given_if_paused or running_r, '1', given_if_ended);
+        keyed_r       <= of_case(beat, last, given_if_paused or (keyed_if_kept and running_r), keyed_if_kept,
+                                 given_if_ended);
       end if;
     end if;
   end process grant;

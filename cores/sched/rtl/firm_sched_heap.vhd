@@ -98,13 +98,7 @@ begin
         if clearing = '1' then
           cleared_r <= cleared_r + 2;
         end if;
-        if pop = '1' then
-          root_valid_r <= '0';
-        elsif filling_r = '1' then
-          root_valid_r <= up_valid(0);
-        elsif insert = '1' then
-          root_valid_r <= '1';
-        end if;
+        root_valid_r <= not pop and ((filling_r and up_valid(0)) or (not filling_r and (root_valid_r or insert)));
       end if;
       -- `pop` and `insert` arrive late. Where an offered item does not enter, there is no root in the next cycle, or
       -- it is being filled, so its content does not depend on them.

@@ -60,8 +60,9 @@ architecture rtl of firm_sched_heap_level is
   -- A node: valid, key, the low bits of its item's index.
   constant NODE_BITS    : positive := 1 + KEY_BITS + LOW_BITS;
   subtype node_t is std_logic_vector(NODE_BITS-1 downto 0);
-  -- The compared bits: key, side and low bits of the index.
-  subtype rank_t is std_logic_vector(KEY_BITS+LOW_BITS downto 0);
+  -- The compared bits of items on one path: key and low bits of the index.
+  subtype rank_t is std_logic_vector(NODE_BITS-2 downto 0);
+  subtype key_of_node_t is std_logic_vector(NODE_BITS-2 downto LOW_BITS);
 
   signal insert_r : std_logic;
   signal fill_r   : std_logic;
@@ -77,25 +78,9 @@ architecture rtl of firm_sched_heap_level is
   signal write_left  : std_logic;
   signal write_right : std_logic;
 
-  -- The two compared items: INSERT the item with its node, FILL left with right.
-  signal first        : node_t;
-  signal second       : node_t;
-  signal second_right : std_logic;
-  signal first_rank   : rank_t;
-  signal second_rank  : rank_t;
-  signal second_first : std_logic;
-  signal takes_second : std_logic;
-
-  function rank(of_node : node_t; is_right : std_logic) return rank_t is
-    variable result : rank_t;
-  begin
-    result(KEY_BITS+LOW_BITS downto LOW_BITS+1) := of_node(KEY_BITS+LOW_BITS-1 downto LOW_BITS);
-    result(LOW_BITS)                            := is_right;
-    for place in 0 to LOW_BITS-1 loop
-      result(place) := of_node(place);
-    end loop;
-    return result;
-  end function rank;
+  signal right_key_first : std_logic;
+  signal takes_right     : std_logic;  -- FILL: the right one of the pair goes first
+  signal node_first      : std_logic;  -- INSERT: the node goes before the item, if there is one
 
 begin
 
@@ -174,46 +159,42 @@ begin
 
   node <= right when id_r(SIDE) = '1' else left;
 
+  -- FILL compares left with right, INSERT its item with the node. These are two comparisons, since one would need
+  -- multiplexers between the memories and its carry chain. If the keys of a pair are equal, the left one goes first.
+  right_key_first <= is_before(right(key_of_node_t'range), left(key_of_node_t'range));
+  takes_right     <= right(NODE_BITS-1) and (right_key_first or not left(NODE_BITS-1));
+
   -- A leaf only holds the item of its own index, so an arriving item finds it empty.
   leaves : if LOW_BITS = 0 generate
-    first        <= left;
-    second       <= right;
-    second_right <= '1';
+    node_first <= '0';
   end generate leaves;
   inner_nodes : if LOW_BITS > 0 generate
-    first        <= left when fill_r = '1' else item;
-    second       <= right when fill_r = '1' or id_r(SIDE) = '1' else left;
-    second_right <= fill_r or id_r(SIDE);
+    node_first <= not is_before(item(rank_t'range), node(rank_t'range));
   end generate inner_nodes;
-  first_rank   <= rank(first, not fill_r and id_r(SIDE));
-  second_rank  <= rank(second, second_right);
-  second_first <= is_before(second_rank, first_rank);
-  -- The comparison is the last to arrive. An INSERT has an item, so only a FILL may find the first one empty.
-  takes_second <= (second_first and second(NODE_BITS-1)) or
-                  (fill_r and right(NODE_BITS-1) and not left(NODE_BITS-1));
 
-  hand_up : process (left, right, takes_second, id_r)
+  hand_up : process (left, right, takes_right, id_r)
     variable smaller : node_t;
   begin
     smaller := left;
-    if takes_second = '1' then
+    if takes_right = '1' then
       smaller := right;
     end if;
     smaller_valid    <= left(NODE_BITS-1) or right(NODE_BITS-1);
     smaller_key      <= smaller(NODE_BITS-2 downto LOW_BITS);
     smaller_id       <= id_r;
-    smaller_id(SIDE) <= takes_second;
+    smaller_id(SIDE) <= takes_right;
     for place in 0 to LOW_BITS-1 loop
       smaller_id(place) <= smaller(place);
     end loop;
   end process hand_up;
 
   -- Only the path to a FILL's hole continues. After the last level, nothing else remains to be done.
-  hand_down : process (item, node, left, right, takes_second, insert_r, fill_r, clear_r, id_r)
+  -- The item matters for an INSERT that finds one, and for a CLEAR, which hands down its index.
+  hand_down : process (item, node, left, right, takes_right, node_first, insert_r, fill_r, clear_r, id_r)
     variable larger : node_t;
   begin
     larger := node;
-    if takes_second = '1' or clear_r = '1' then
+    if node_first = '1' or clear_r = '1' then
       larger := item;
     end if;
     below_insert <= insert_r and node(NODE_BITS-1);
@@ -222,17 +203,17 @@ begin
     below_key    <= larger(NODE_BITS-2 downto LOW_BITS);
     below_id     <= id_r;
     if fill_r = '1' then
-      below_id(SIDE) <= takes_second;
+      below_id(SIDE) <= takes_right;
     end if;
     for place in 0 to LOW_BITS-1 loop
       below_id(place) <= larger(place);
     end loop;
   end process hand_down;
 
-  -- The comparison is the last to arrive, and an INSERT has an item: its node stays only if it goes first.
-  choose_write : process (item, node, insert_r, clear_r, id_r, second_first, hole, hole_right,
+  -- The comparison is the last to arrive. An item is stored in an empty node, or in the place of one that it precedes.
+  choose_write : process (item, node, insert_r, clear_r, id_r, node_first, hole, hole_right,
                           filler_valid, filler_id, filler_key)
-    variable keep_item : std_logic;
+    variable stores : std_logic;  -- the node is empty
   begin
     write_node <= item;
     if hole = '1' then
@@ -242,9 +223,11 @@ begin
         write_node(place) <= filler_id(place);
       end loop;
     end if;
-    keep_item   := not (node(NODE_BITS-1) and second_first);
-    write_left  <= (insert_r and not id_r(SIDE) and keep_item) or (clear_r or (hole and not hole_right));
-    write_right <= (insert_r and id_r(SIDE) and keep_item) or (clear_r or (hole and hole_right));
+    stores      := insert_r and not node(NODE_BITS-1);
+    write_left  <= ((stores and not id_r(SIDE)) or clear_r or (hole and not hole_right)) or
+                   ((insert_r and not id_r(SIDE)) and not node_first);
+    write_right <= ((stores and id_r(SIDE)) or clear_r or (hole and hole_right)) or
+                   ((insert_r and id_r(SIDE)) and not node_first);
   end process choose_write;
 
 end architecture rtl;

@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A memory with one port and an asynchronous read, for which FPGAs use LUTs as RAM. Reset does not clear it.
 -- If the address is a register, synthesis may use a block RAM for many bits, which is slower. The words are therefore
--- divided among memories of at most 1024 bits.
+-- divided among memories of at most 1024 bits, whose words have a multiple of the 7 bits that a memory of LUTs holds in
+-- an UltraScale+.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -25,7 +26,8 @@ end entity firm_sched_ram;
 
 architecture rtl of firm_sched_ram is
 
-  constant SLICE_BITS : positive := max(1, 1024 / 2**ADDRESS_BITS);
+  constant MOST_BITS  : positive := max(1, 1024 / 2**ADDRESS_BITS);
+  constant SLICE_BITS : positive := max(MOST_BITS - MOST_BITS mod 7, MOST_BITS mod 7);
   constant SLICES     : positive := (WORD_BITS + SLICE_BITS - 1) / SLICE_BITS;
 
 begin
