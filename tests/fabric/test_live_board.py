@@ -6,6 +6,7 @@ import importlib.util
 import random
 import shutil
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any
 import pytest
 
 from tests.fabric.live import Lab, Round, exchange, settled, skip_without_peers
-from tests.fabric.test_peers import HERE, Peer
+from tests.fabric.test_peers import HERE, Peer, is_in, of
 
 SYSTEM = HERE.parents[1] / "specs" / "quat2euler"
 SEED = 20261127
@@ -22,6 +23,8 @@ CORES = ("robot:acc:firm_cordic:0.2.0", "robot:acc:firm_float64:0.2.0")
 CLOCKS = {"rmii": "50 MHz", "rgmii": "125 MHz"}
 # Quaternions and points that each peer sends before both wait for all results.
 LOT, LOTS = 10, 5
+# Quaternions of each peer, and the seconds from one to the next.
+COUNT, PERIOD = 1000, 0.01
 # Points come back as they are.
 POINTS = """\
   - {name: points, middleware: ROS2, mode: subscriber, message: geometry_msgs/Point, topic: /point_in,
@@ -46,7 +49,7 @@ def specification(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempP
         "clock: 50 MHz": f"clock: {CLOCKS[request.param]}",
         "name: quat2euler, phy: rmii": f"name: board, phy: {request.param}",
         "topic: quaternion": "topic: /quaternion_in",
-        "topic: euler": "topic: /euler_out",
+        "topic: euler\n    qos: {profile: default}": "topic: /euler_out\n    qos: {depth: 100}",
     }.items():
         assert text.count(old) == 1
         text = text.replace(old, new)
@@ -104,6 +107,27 @@ def test_messages_of_both_peers_come_back_to_both(lab: Lab) -> None:
     assert ["/euler_out", ["geometry_msgs/msg/Point"]] in graph["topics"]
     board.send_signal(signal.SIGINT)
     assert board.wait() == 0
+
+
+@pytest.mark.thorough
+def test_a_thousand_quaternions_of_each_peer_at_100_hertz(lab: Lab) -> None:
+    print(f"seed {SEED}")
+    chance, model = random.Random(SEED), _model()
+    lab.board()
+    peers = _peers(lab, chance)
+    sent = {name: [[chance.uniform(-1, 1) for _ in range(4)] for _ in range(COUNT)] for name in peers}
+    begun = time.monotonic()
+    for number in range(COUNT):
+        time.sleep(max(0.0, begun + number * PERIOD - time.monotonic()))
+        for name, peer in peers.items():
+            peer.send([("quaternion", sent[name][number])])
+    wanted = {name: [list(model.quaternion_to_euler(*values)) for values in own] for name, own in sent.items()}
+    for peer in peers.values():
+        found = of("euler", peer.take(COUNT * len(peers)))
+        assert sorted(found) == sorted(angles for own in wanted.values() for angles in own)
+        assert all(is_in(own, found) for own in wanted.values())
+        assert peer.next_sample(1.0) is None
+    print(f"{COUNT} of each peer in {time.monotonic() - begun:.1f} s")
 
 
 def test_a_switch_with_snooping_knows_the_board_as_a_member(lab: Lab) -> None:
