@@ -31,7 +31,7 @@ def _halves_rate(*violates: str) -> Mutation:
 
 
 def _loses_id(*violates: str) -> Mutation:
-    return Mutation(_SLICE, "if output_r.tlast = '1' then", "if output_r.tlast = '0' then", violates)
+    return Mutation(_SLICE, "and output_r.tlast = '1' then", "and output_r.tlast = '0' then", violates)
 
 
 # What both kinds of the Manager owe the publishers and the scheduler.
