@@ -85,18 +85,11 @@ architecture rtl of firm_sched_engine is
   signal a_leaves   : std_logic;
   signal key_ready  : std_logic;
 
-  -- B is the arrived task or the preempted one; which one is known only late in the cycle in which it enters.
-  signal b_valid_r      : std_logic;
-  signal b_preempted_r  : std_logic;
-  signal b_after_beat_r : std_logic;  -- the preempted task sent a beat in its last cycle
-  signal arrived_id_r   : id_t;
-  signal arrived_key_r  : key_t;
-  signal left_id_r      : id_t;
-  signal left_key_r     : key_t;      -- without a beat in the last cycle
-  signal left_later_r   : key_t;      -- with a beat in it
-  signal b_id           : id_t;
-  signal b_key          : key_t;
-  signal b_is_free      : std_logic;  -- is empty or leaves
+  -- B is the arrived task or the preempted one.
+  signal b_valid_r : std_logic;
+  signal b_id      : id_t;
+  signal b_key     : key_t;
+  signal b_is_free : std_logic;  -- is empty or leaves
 
   signal insert       : std_logic;
   signal insert_ready : std_logic;
@@ -430,25 +423,68 @@ begin
         b_valid_r <= of_case(beat, last, (b_valid_if_kept and running_r) or (b_valid_if_chosen and not running_r),
                              b_valid_if_kept, b_valid_if_ended);
       end if;
-      -- Without a task in B, its content does not matter.
-      if b_is_free = '1' then
-        b_preempted_r  <= preempt;
-        b_after_beat_r <= beat;
-        arrived_id_r   <= a_id;
-        arrived_key_r  <= a_key;
-      end if;
-      if IS_SORTED or b_valid_r = '0' then
-        left_id_r    <= grant_select_r;
-        left_key_r   <= key;
-        left_later_r <= key_after_beat;
-      end if;
     end if;
   end process hold_b;
 
-  b_id  <= left_id_r when b_preempted_r = '1' else arrived_id_r;
-  b_key <= arrived_key_r when b_preempted_r = '0' else
-           left_later_r when b_after_beat_r = '1' else
-           left_key_r;
+  -- Without a task in B, its content does not matter. Which task it is, is known late in the cycle in which it enters.
+  selected_later : if not IS_SORTED generate
+    signal preempted_r   : std_logic;
+    signal after_beat_r  : std_logic;  -- the preempted task sent a beat in its last cycle
+    signal arrived_id_r  : id_t;
+    signal arrived_key_r : key_t;
+    signal left_id_r     : id_t;
+    signal left_key_r    : key_t;      -- without a beat in the last cycle
+    signal left_later_r  : key_t;      -- with a beat in it
+  begin
+
+    hold_both : process (clk)
+    begin
+      if rising_edge(clk) then
+        if b_is_free = '1' then
+          preempted_r   <= preempt;
+          after_beat_r  <= beat;
+          arrived_id_r  <= a_id;
+          arrived_key_r <= a_key;
+        end if;
+        if b_valid_r = '0' then
+          left_id_r    <= grant_select_r;
+          left_key_r   <= key;
+          left_later_r <= key_after_beat;
+        end if;
+      end if;
+    end process hold_both;
+
+    b_id  <= left_id_r when preempted_r = '1' else arrived_id_r;
+    b_key <= arrived_key_r when preempted_r = '0' else
+             left_later_r when after_beat_r = '1' else
+             left_key_r;
+
+  end generate selected_later;
+  -- The sorted queue compares B with each of its items: a selection before that would be repeated in all of them.
+  selected_at_once : if IS_SORTED generate
+    signal id_r  : id_t;
+    signal key_r : key_t;
+  begin
+
+    hold_one : process (clk)
+    begin
+      if rising_edge(clk) then
+        id_r  <= a_id;
+        key_r <= a_key;
+        if preempt = '1' then
+          id_r  <= grant_select_r;
+          key_r <= key;
+          if beat = '1' then
+            key_r <= key_after_beat;
+          end if;
+        end if;
+      end if;
+    end process hold_one;
+
+    b_id  <= id_r;
+    b_key <= key_r;
+
+  end generate selected_at_once;
 
   sends_own_time : if POLICY = LST generate
     signal step : unsigned(0 downto 0);
