@@ -34,7 +34,7 @@ _NOTE = """The node consists of the MAC, ARP and ping, IGMP and the probes for i
 
 
 def rows() -> list[Row]:
-    """All rows: the node with MAC, ARP, ICMP, IGMP and UDP, and with what it may have as well; its two largest parts."""
+    """All rows: the node with MAC, ARP, ICMP, IGMP and UDP, with what it may have as well, and two parts of it."""
     node: Mapping[str, Generic] = {"WIDTH": 8, **_TOPICS}
     return [
         Row("the node", 8, _entity("firm_net_link", node), _BAR),
