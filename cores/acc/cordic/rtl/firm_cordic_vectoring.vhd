@@ -110,7 +110,6 @@ architecture rtl of firm_cordic_vectoring is
   signal count_r      : count_t;
   signal busy_r       : std_logic;
   signal folding_r    : std_logic;  -- the vector was loaded in the cycle before
-  signal on_axis_r    : std_logic;  -- the first rotation: the vector is on the y axis
   signal done_r       : std_logic;
   signal ready        : std_logic;
 
@@ -165,11 +164,6 @@ begin
         busy_r <= '0';
         done_r <= '1';
       end if;
-      -- A comparison of many bits, so its result is used a cycle later.
-      on_axis_r <= '0';
-      if folding_r = '1' and x_negative_r = '0' and magnitude_r = 0 then
-        on_axis_r <= '1';
-      end if;
       -- Without `ready`, which arrives late: the table of angles comes after the count.
       if folding_r = '1' then
         count_r <= (others => '0');
@@ -192,12 +186,21 @@ begin
         scaled_r     <= resize(absolute(in_y), WIDTH+1);
         angle_r      <= (others => '0');
       elsif folding_r = '1' then
-        -- A cycle of its own, since the input may come late, and is compared with 0 in it.
+        -- A cycle of its own, since the input may come late and is compared with 0 here.
         aligned_r <= scaled_r;
         if x_negative_r = '1' then
           angle_r <= pi;
           if y_negative_r = '1' then
             angle_r <= -pi;
+          end if;
+        elsif magnitude_r = 0 then
+          -- On the y axis: turned onto the x axis at once, which is exact.
+          scaled_r  <= (others => '0');
+          aligned_r <= (others => '0');
+          if y_negative_r = '1' then
+            angle_r <= -half_pi;
+          elsif scaled_r /= 0 then
+            angle_r <= half_pi;
           end if;
         end if;
       elsif busy_r = '1' then
@@ -219,16 +222,6 @@ begin
             angle_r <= angle_r + step;
           end if;
         end if;
-        if on_axis_r = '1' then
-          -- The angle is exact at once. The rest turns this vector by 45 degrees and back, which gives its length.
-          exact_r <= '1';
-          angle_r <= (others => '0');
-          if y_negative_r = '1' then
-            angle_r <= -half_pi;
-          elsif scaled_r /= 0 then
-            angle_r <= half_pi;
-          end if;
-        end if;
       end if;
     end if;
   end process rotate;
@@ -245,6 +238,10 @@ begin
         sign        := (others => scaled_r(WIDTH));
         distance    := shift_right(unsigned(aligned_r) xor sign, to_integer(count_r(FINE_WIDTH-1 downto 0) & '0'));
         magnitude_r <= magnitude_r + signed(distance(WIDTH-1 downto 0));
+      elsif busy_r = '1' then
+        if x_negative_r = '0' and magnitude_r = 0 then
+          magnitude_r <= scaled_r(WIDTH-1 downto 0);
+        end if;
       elsif ready = '1' and in_valid = '1' then
         magnitude_r <= absolute(in_x);
       end if;
