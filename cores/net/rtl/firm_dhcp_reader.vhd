@@ -83,6 +83,7 @@ architecture rtl of firm_dhcp_reader is
   constant UDP       : bytes_t(9 to 9) := (others => x"11");
   constant PORT_68   : bytes_t(22 to 23) := (x"00", x"44");
   constant REPLY     : bytes_t(28 to 30) := (x"02", x"01", x"06"); -- a reply, to an address of Ethernet
+  constant ALL_HOSTS : bytes_t(FIRST_PLACE to FIRST_PLACE+MAC_BYTES-1) := (others => x"ff");
   constant MAGIC     : bytes_t(MAGIC_PLACE to MAGIC_PLACE+3) := (x"63", x"82", x"53", x"63");
   constant FRAGMENT  : byte_t := x"3f";                             -- the flag for more fragments, and the offset
   constant LOOPBACK  : byte_t := x"7f";
@@ -231,21 +232,17 @@ begin
                  or differs(to_integer(place_r), s_axis_tdata, PORT_68)
                  or differs(to_integer(place_r), s_axis_tdata, REPLY)
                  or differs(to_integer(place_r), s_axis_tdata, MAGIC)
+                 or differs(to_integer(place_r), s_axis_tdata, placed(mac, HARDWARE_PLACE))
                  or (place_r = SENDER_PLACE and (s_axis_tdata(GROUP_BIT) = '1' or (direct_r or all_r) = '0'))
                  or (place_r = FRAGMENT_PLACE and (s_axis_tdata and FRAGMENT) /= x"00")
                  or (place_r = FRAGMENT_PLACE+1 and s_axis_tdata /= x"00")
                  or (place_r(PLACE_BITS-1 downto 2) = XID_PLACE/4 and s_axis_tdata /= read_known);
-        for index in 0 to MAC_BYTES-1 loop
-          if place_r = FIRST_PLACE+index and s_axis_tdata /= byte_of(mac, index) then
-            direct_r <= '0';
-          end if;
-          if place_r = FIRST_PLACE+index and s_axis_tdata /= x"ff" then
-            all_r <= '0';
-          end if;
-          if place_r = HARDWARE_PLACE+index and s_axis_tdata /= byte_of(mac, index) then
-            wrong := true;
-          end if;
-        end loop;
+        if differs(to_integer(place_r), s_axis_tdata, placed(mac, FIRST_PLACE)) then
+          direct_r <= '0';
+        end if;
+        if differs(to_integer(place_r), s_axis_tdata, ALL_HOSTS) then
+          all_r <= '0';
+        end if;
         if wrong then
           meant_r <= '0';
         end if;

@@ -12,6 +12,9 @@ package firm_net_pkg is
   -- Byte `index` of a word, counted as on the line: byte 0 is the highest.
   function byte_of(word : std_logic_vector; index : natural) return byte_t;
 
+  -- The bytes of a word as they are in a frame from `place` on.
+  function placed(word : std_logic_vector; place : natural) return bytes_t;
+
   -- Whether a byte at `place` is not that of `wanted`, whose indices are the places of its bytes.
   function differs(place : natural; byte : byte_t; wanted : bytes_t) return boolean;
 
@@ -24,6 +27,15 @@ package body firm_net_pkg is
   begin
     return BITS(BITS'high-8*index downto BITS'high-8*index-7);
   end function byte_of;
+
+  function placed(word : std_logic_vector; place : natural) return bytes_t is
+    variable bytes : bytes_t(place to place+word'length/8-1);
+  begin
+    for index in bytes'range loop
+      bytes(index) := byte_of(word, index - place);
+    end loop;
+    return bytes;
+  end function placed;
 
   function differs(place : natural; byte : byte_t; wanted : bytes_t) return boolean is
   begin

@@ -127,16 +127,6 @@ architecture rtl of firm_net_responder is
   signal chosen_tvalid : std_logic;
   signal chosen_tlast  : std_logic;
 
-  -- The bytes of a word as they are in a frame from `place` on.
-  function placed(word : std_logic_vector; place : natural) return bytes_t is
-    variable bytes : bytes_t(place to place+word'length/8-1);
-  begin
-    for index in bytes'range loop
-      bytes(index) := byte_of(word, index - place);
-    end loop;
-    return bytes;
-  end function placed;
-
   -- What the byte at `place` of a reply is.
   function origin_of(place : natural; is_arp : std_logic) return origin_t is
     constant BITS : std_logic_vector(PLACE_BITS-1 downto 0) := std_logic_vector(to_unsigned(place, PLACE_BITS));

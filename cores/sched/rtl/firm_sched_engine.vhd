@@ -460,7 +460,8 @@ begin
              left_key_r;
 
   end generate selected_later;
-  -- The sorted queue compares B with each of its items: a selection before that would be repeated in all of them.
+  -- The sorted queue compares B with each of its items: a selection before that would be repeated in all of them. With
+  -- EDF, a beat does not change the key.
   selected_at_once : if IS_SORTED generate
     signal id_r  : id_t;
     signal key_r : key_t;
@@ -474,9 +475,6 @@ begin
         if preempt = '1' then
           id_r  <= grant_select_r;
           key_r <= key;
-          if beat = '1' then
-            key_r <= key_after_beat;
-          end if;
         end if;
       end if;
     end process hold_one;
