@@ -290,8 +290,8 @@ def test_another_node_with_its_name_takes_its_place(running: Clocked) -> None:
         # The hardware stops for good.
         running.board.wait_until(lambda: running.board.listening() == 0)
         running.board.wait_until(lambda: "/place" not in _tool(ros, "rostopic", "list").stdout)
-        listed = _tool(ros, "rostopic", "list", "-v").stdout
-        assert " * /turn [geometry_msgs/Quaternion] 1 publisher" in listed
+        turn = " * /turn [geometry_msgs/Quaternion] 1 publisher"
+        running.board.wait_until(lambda: turn in _tool(ros, "rostopic", "list", "-v").stdout)
         assert f"Pid: {other.pid}" in _tool(ros, "rosnode", "info", "/fabric").stdout
 
 
