@@ -1,4 +1,4 @@
-"""How fast the clock may be: of converters, whole systems, schedulers and the Manager, placed and routed on an ECP5.
+"""How fast the clock may be: of converters, whole systems, and the Manager with schedulers, in a placed ECP5.
 
 Each row can be measured alone. The others then keep the figures of docs/figures, or are marked as not measured.
 """
@@ -28,16 +28,12 @@ from tests.hdl.ghdl import GhdlError, Library, core_files
 from tests.hdl.verilog import netlist
 from tests.system.simulated.systems import HARDWARE, generate_system
 
-CHANNELS = (8, 32, 256)
-# MHz, by the number of channels.
-BARS = {32: 100.0, 256: 80.0}
+# Bar and stretch in MHz, by the number of channels.
 LOOP_BARS = {32: (125.0, 150.0), 256: (100.0, 125.0)}
 MANAGER_WIDTH = 8
 
 _CONVERTERS_TITLE = "Converters of ROS 2 messages, MHz"
 _SYSTEMS_TITLE = "Clock of whole systems, MHz"
-_SCHEDULERS_TITLE = "Schedulers, MHz"
-_MANAGER_TITLE = f"Manager without its scheduler, {MANAGER_WIDTH} bits, MHz"
 _ARITHMETIC_TITLE = "Arithmetic of accelerators, MHz"
 _LOOP_TITLE = f"Manager with its scheduler, {MANAGER_WIDTH} bits, MHz"
 _COLUMNS = ("design", "bits", "MHz", "of each seed", "LUT4", "FF", "bar", "result", "stretch")
@@ -125,8 +121,6 @@ def rows() -> dict[str, list[Row]]:
     return {
         _CONVERTERS_TITLE: [*_converters()],
         _SYSTEMS_TITLE: [*_systems()],
-        _SCHEDULERS_TITLE: [*_schedulers()],
-        _MANAGER_TITLE: [*_managers()],
         _LOOP_TITLE: [*_loops(), *_trees()],
         _ARITHMETIC_TITLE: [*_arithmetic()],
     }
@@ -249,35 +243,9 @@ def _demo(name: str) -> Callable[[Path], Design]:
     return make
 
 
-def _schedulers() -> Iterator[Row]:
-    for policy in POLICIES:
-        for channels in CHANNELS:
-            yield Row(_label(policy, channels), None, _scheduler(policy, channels), BARS.get(channels))
-
-
-def _scheduler(policy: str, channels: int) -> Callable[[Path], Design]:
-    return lambda folder: _synthesised(Subject(*schedulers.analysed(folder, policy, channels)))
-
-
-def _managers() -> Iterator[Row]:
-    for channels in CHANNELS:
-        yield Row(_label("firm_manager", channels), None, _manager(channels), BARS.get(channels))
-
-
-def _manager(channels: int) -> Callable[[Path], Design]:
-    def make(folder: Path) -> Design:
-        library = Library("firm", folder)
-        library.analyse(core_files("axis/package", "axis/axis", "manager/manager"))
-        generics = {"WIDTH": MANAGER_WIDTH, "SUBSCRIBERS": channels, "PUBLISHERS": channels}
-        return _synthesised(Subject(library, "firm_manager", generics))
-
-    return make
-
-
 def _loops() -> Iterator[Row]:
     for policy in POLICIES:
-        for channels in CHANNELS:
-            bar, stretch = LOOP_BARS.get(channels, (None, None))
+        for channels, (bar, stretch) in LOOP_BARS.items():
             yield Row(_label(f"Manager, {policy}", channels), None, _loop(policy, channels), bar, stretch)
 
 
