@@ -25,6 +25,8 @@ SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
 # VHDL counts the bits of a publisher's frame, including up to three bytes before the frame, up to 2**31-1.
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
+# A single multiplexer of more beats would be slow.
+_MANY_BEATS = 128
 _CODE_BITS = 4
 # The number of a literal's bytes on each line.
 _ROW = 16
@@ -81,6 +83,8 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
     return {
         **_common(frame, stream, entity or publisher_entity(frame), "in"),
         "is_one_beat": beats == 1,
+        "is_long": beats > _MANY_BEATS,
+        "next_bits": (start + 1) * width,
         "first_position": start,
         # The number of bytes before the frame.
         "start_bits": start * width,

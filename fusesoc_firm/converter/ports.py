@@ -15,9 +15,10 @@ _TAKEN = """
     m_axis_tdata m_axis_tkeep m_axis_tuser m_axis_tvalid m_axis_tlast m_axis_tready
     segment_valid msg_valid msg_ready frame_error frame_error_code
     id code_t no_fault bad_length short_frame long_frame bad_encoding no_length frame_beats first_position last_position
-    position_t position_r position_last withdrawn next_position broken ended complete beyond is_first is_waiting is_told
+    position_t position_r position_last withdrawn beat_taken goes_on ahead_word u_ahead next_position
+    broken ended complete beyond is_first is_waiting is_told
     broken_beat are_ones match match_r compare fault ready beat store fields_r frame check follow receive send
-    u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
+    u_select rtl firm firm_axis_select firm_axis_select_ahead ieee work std numeric_std std_logic_1164
     std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
 """.split()
 # The names of each store if there are several stores.

@@ -83,6 +83,19 @@ def test_cordic(library: Library, tmp_path: Path, width: int, fraction: int, ite
         assert abs(magnitude - length * gain) <= shortfall
 
 
+def test_vectors_on_the_axes_have_the_same_length_and_exact_angles(library: Library, tmp_path: Path) -> None:
+    """Lengths 1 to 40, where roundings differ most, and the longest ones."""
+    lengths = [*range(1, 41), *(2**61 + beside for beside in (-1, 0, 1))]
+    vectors = [vector for n in lengths for vector in ((n, 0), (0, n), (-n, 0), (0, -n))]
+    (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, 64)} {binary(y, 64)}\n" for x, y in vectors))
+    run(library, "firm_cordic_vectoring_tb", files(tmp_path, "vectors", "results"))
+    results = [tuple(map(signed, line.split())) for line in (tmp_path / "results.txt").read_text().splitlines()]
+    half_pi = 2 * round(PI / 4 * 2**60)
+    for first, second, third, fourth in zip(*[iter(results)] * 4, strict=True):
+        assert {second[0], third[0], fourth[0]} == {first[0]}
+        assert (first[1], second[1], third[1], fourth[1]) == (0, half_pi, 2 * half_pi, -half_pi)
+
+
 def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Library, tmp_path: Path) -> None:
     print(f"seed {SEED}")
     generator = random.Random(SEED)

@@ -205,7 +205,7 @@ def test_tasks_follow_each_other(library: Library, tmp_path: Path, policy: str, 
 
 @pytest.mark.one_in(7)
 @pytest.mark.parametrize("shortest_run", [1, 3])
-@pytest.mark.parametrize(("policy", "requesters"), SIZES)
+@pytest.mark.parametrize(("policy", "requesters"), [*SIZES, ("lru", 256), ("lst", 256)])
 def test_the_netlist_does_the_same(
     library: Library, tmp_path: Path, policy: str, requesters: int, shortest_run: int
 ) -> None:

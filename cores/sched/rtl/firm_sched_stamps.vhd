@@ -3,10 +3,11 @@
 --
 -- The count wraps around, so stamps must not grow too old. A sweep renews those that are older than
 -- a quarter of the range; the count advances at most four times per step of the sweep. Requesters that were idle for so
--- long have no order among each other, but go before all others. The memory has one port: a completion has priority,
--- then a sweep that is due, then a read. A step of the sweep reads a stamp in one cycle and writes it, if necessary, in
--- a later one, which keeps the path through the memory short. A completion arrives late, and is recorded in the next
--- cycle; no task of its requester can be read before.
+-- long have no order among each other, but go before all others. The memory is used once per cycle: a completion has
+-- priority, then a sweep that is due, then a read. A step of the sweep reads a stamp in one cycle and writes it, if
+-- necessary, in a later one, which keeps the path through the memory short. A completion arrives late, and is recorded
+-- in the next cycle; no task of its requester can be read before. Writes have an address of their own, so that a read's
+-- depends on few signals.
 -- A requester without a stamp since reset uses its index: lower ones count as less recently used. Marks record which
 -- requesters have stamps, in rows like those of firm_sched_arrivals. After reset they are cleared, one row per cycle,
 -- while no task arrives.
@@ -57,23 +58,27 @@ architecture rtl of firm_sched_stamps is
   signal steps_r : unsigned(2 downto 0);           -- of the count since the last one of the sweep, at most four
   signal due     : std_logic;
 
-  signal clearing     : std_logic;
-  signal reads        : std_logic;
-  signal sweeps       : std_logic;
-  signal address      : id_t;
-  signal row          : std_logic_vector(ROW_BITS-1 downto 0);
-  signal column       : std_logic_vector(COLUMN_BITS-1 downto 0);
-  signal read_word    : std_logic_vector(STAMP_BITS-1 downto 0);
-  signal write_word   : std_logic_vector(STAMP_BITS-1 downto 0);
-  signal write_enable : std_logic;
-  signal marks        : columns_t;
-  signal new_marks    : columns_t;
-  signal write_marks  : std_logic;
-  signal is_marked    : std_logic_vector(0 downto 0);
-  signal found_stamp  : std_logic_vector(STAMP_BITS-1 downto 0);
-  signal age          : unsigned(STAMP_BITS-1 downto 0);  -- of the sweep's stamp
-  signal is_old       : std_logic;
-  signal moves        : std_logic;  -- the sweep moves to the next requester
+  signal clearing      : std_logic;
+  signal reads         : std_logic;
+  signal sweeps        : std_logic;
+  signal read_address  : id_t;
+  signal write_address : id_t;
+  signal read_row      : std_logic_vector(ROW_BITS-1 downto 0);
+  signal read_column   : std_logic_vector(COLUMN_BITS-1 downto 0);
+  signal write_row     : std_logic_vector(ROW_BITS-1 downto 0);
+  signal write_column  : std_logic_vector(COLUMN_BITS-1 downto 0);
+  signal read_word     : std_logic_vector(STAMP_BITS-1 downto 0);
+  signal write_word    : std_logic_vector(STAMP_BITS-1 downto 0);
+  signal write_enable  : std_logic;
+  signal marks         : columns_t;  -- of the row that is read
+  signal old_marks     : columns_t;  -- of the row that is written
+  signal new_marks     : columns_t;
+  signal write_marks   : std_logic;
+  signal is_marked     : std_logic_vector(0 downto 0);
+  signal found_stamp   : std_logic_vector(STAMP_BITS-1 downto 0);
+  signal age           : unsigned(STAMP_BITS-1 downto 0);  -- of the sweep's stamp
+  signal is_old        : std_logic;
+  signal moves         : std_logic;  -- the sweep moves to the next requester
 
 begin
 
@@ -90,39 +95,47 @@ begin
   reads    <= read and not (completed_r or due);
   sweeps   <= not (completed_r or reads);
 
-  address <= std_logic_vector(resize(unsigned(completed_id_r), ID_BITS)) when completed_r = '1' else
-             std_logic_vector(resize(unsigned(read_id), ID_BITS)) when reads = '1' else
-             std_logic_vector(sweep_r(ID_BITS-1 downto 0));
-  row     <= address(ID_BITS-1 downto COLUMN_BITS);
-  column  <= address(COLUMN_BITS-1 downto 0);
+  write_address <= std_logic_vector(resize(unsigned(completed_id_r), ID_BITS)) when completed_r = '1' else
+                   std_logic_vector(sweep_r(ID_BITS-1 downto 0));
+  -- A word that is read together with a completion is not used.
+  read_address  <= std_logic_vector(resize(unsigned(read_id), ID_BITS)) when read = '1' and due = '0' else
+                   std_logic_vector(sweep_r(ID_BITS-1 downto 0));
+  write_row     <= write_address(ID_BITS-1 downto COLUMN_BITS);
+  write_column  <= write_address(COLUMN_BITS-1 downto 0);
+  read_row      <= read_address(ID_BITS-1 downto COLUMN_BITS);
+  read_column   <= read_address(COLUMN_BITS-1 downto 0);
 
-  u_stamps : entity firm.firm_sched_ram
+  u_stamps : entity firm.firm_sched_ram_2
     generic map (
       ADDRESS_BITS => ID_BITS,
       WORD_BITS    => STAMP_BITS
     )
     port map (
       clk          => clk,
-      address      => address,
-      read_word    => read_word,
+      address      => write_address,
+      read_word    => open,
       write_enable => write_enable,
-      write_word   => write_word
+      write_word   => write_word,
+      address_2    => read_address,
+      read_word_2  => read_word
     );
 
-  new_marks   <= marks or decode(column, '1', COLUMNS) when clearing = '0' else (others => '0');
+  new_marks   <= old_marks or decode(write_column, '1', COLUMNS) when clearing = '0' else (others => '0');
   write_marks <= write_enable or clearing;
 
-  u_marks : entity firm.firm_sched_ram
+  u_marks : entity firm.firm_sched_ram_2
     generic map (
       ADDRESS_BITS => ROW_BITS,
       WORD_BITS    => COLUMNS
     )
     port map (
       clk          => clk,
-      address      => row,
-      read_word    => marks,
+      address      => write_row,
+      read_word    => old_marks,
       write_enable => write_marks,
-      write_word   => new_marks
+      write_word   => new_marks,
+      address_2    => read_row,
+      read_word_2  => marks
     );
 
   u_is_marked : entity firm.firm_axis_select
@@ -132,11 +145,11 @@ begin
     )
     port map (
       words_in => marks,
-      index    => column,
+      index    => read_column,
       word     => is_marked
     );
 
-  found_stamp <= read_word when is_marked(0) = '1' else std_logic_vector(resize(unsigned(address), STAMP_BITS));
+  found_stamp <= read_word when is_marked(0) = '1' else std_logic_vector(resize(unsigned(read_address), STAMP_BITS));
 
   age    <= count_r - unsigned(swept_r);
   is_old <= age(STAMP_BITS-1) or age(STAMP_BITS-2);

@@ -104,10 +104,10 @@ architecture rtl of firm_cordic_vectoring is
   -- Multiples of the first angle, so that folding and rotating agree to the bit. Signals, set bit by bit:
   -- ghdl 2.0 translates a constant of more than 32 bits to a Verilog string.
   signal quarter_pi  : angle_t;
-  signal half_pi     : angle_t;
   signal pi          : angle_t;
 
   signal count_r      : count_t;
+  signal turn_r       : count_t;    -- the angle of this rotation: the count, or one less for a vector on the y axis
   signal busy_r       : std_logic;
   signal folding_r    : std_logic;  -- the vector was loaded in the cycle before
   signal done_r       : std_logic;
@@ -122,6 +122,9 @@ architecture rtl of firm_cordic_vectoring is
   signal y_negative_r : std_logic;
   -- y has been 0, so the angle no longer changes.
   signal exact_r      : std_logic;
+  -- The vector is on the y axis: in its first rotation, and in all others, in which `scaled_r` is the one's complement.
+  signal on_axis_r    : std_logic;
+  signal inverted_r   : std_logic;
 
 begin
 
@@ -139,8 +142,7 @@ begin
   multiples : for k in quarter_pi'range generate
     quarter_pi(k) <= ANGLES(0)(k);
   end generate multiples;
-  half_pi <= shift_left(quarter_pi, 1);
-  pi      <= shift_left(quarter_pi, 2);
+  pi <= shift_left(quarter_pi, 2);
 
   ready         <= not busy_r and (not done_r or out_ready);
   in_ready      <= ready;
@@ -164,17 +166,27 @@ begin
         busy_r <= '0';
         done_r <= '1';
       end if;
+      -- A comparison of many bits, so its result is used a cycle later.
+      on_axis_r <= '0';
+      if folding_r = '1' and magnitude_r = 0 then
+        on_axis_r <= '1';
+      end if;
       -- Without `ready`, which arrives late: the table of angles comes after the count.
       if folding_r = '1' then
         count_r <= (others => '0');
+        turn_r  <= (others => '0');
       elsif busy_r = '1' then
         count_r <= count_r + 1;
+        if on_axis_r = '0' then
+          turn_r <= turn_r + 1;
+        end if;
       end if;
     end if;
   end process control;
 
   rotate : process (clk)
     variable below    : boolean;
+    variable sum      : signed(WIDTH+1 downto 0);
     variable scaled   : scaled_t;
     variable step     : angle_t;
   begin
@@ -183,39 +195,38 @@ begin
         x_negative_r <= in_x(WIDTH-1);
         y_negative_r <= in_y(WIDTH-1);
         exact_r      <= '0';
+        inverted_r   <= '0';
         scaled_r     <= resize(absolute(in_y), WIDTH+1);
         angle_r      <= (others => '0');
       elsif folding_r = '1' then
-        -- A cycle of its own, since the input may come late and is compared with 0 here.
+        -- A cycle of its own, since the input may come late and is compared with 0 then.
         aligned_r <= scaled_r;
         if x_negative_r = '1' then
           angle_r <= pi;
           if y_negative_r = '1' then
             angle_r <= -pi;
           end if;
-        elsif magnitude_r = 0 then
-          -- On the y axis: turned onto the x axis at once, which is exact.
-          scaled_r  <= (others => '0');
-          aligned_r <= (others => '0');
-          if y_negative_r = '1' then
-            angle_r <= -half_pi;
-          elsif scaled_r /= 0 then
-            angle_r <= half_pi;
-          end if;
         end if;
       elsif busy_r = '1' then
+        -- A vector on the y axis turns by the first angle twice, which is exact. Its length is that of a vector on the
+        -- x axis: the first rotation makes x of |y|, and -2 * |y| of y. The one's complement of that is 2 * |y| - 1; it
+        -- turns like a y of the other sign, and gets a '1' from the right.
         below := scaled_r(WIDTH) = '1';
-        scaled := shift_left(scaled_r - magnitude_r, 1);
+        sum   := (scaled_r & inverted_r) - (magnitude_r & on_axis_r);
         if below then
-          scaled := shift_left(scaled_r + magnitude_r, 1);
+          sum := (scaled_r & inverted_r) + (magnitude_r & '0');
         end if;
+        scaled    := sum(WIDTH downto 0);
         scaled_r  <= scaled;
         aligned_r <= aligned(scaled, count_r + 1);
 
-        step := ANGLES(to_integer(count_r));
-        if scaled_r = 0 then
+        inverted_r <= inverted_r or on_axis_r;
+
+        step := ANGLES(to_integer(turn_r));
+        if scaled_r = 0 or inverted_r = '1' then
           exact_r <= '1';
-        elsif exact_r = '0' then
+        end if;
+        if scaled_r /= 0 and exact_r = '0' then
           if below xor (x_negative_r /= y_negative_r) then
             angle_r <= angle_r - step;
           else
@@ -238,10 +249,6 @@ begin
         sign        := (others => scaled_r(WIDTH));
         distance    := shift_right(unsigned(aligned_r) xor sign, to_integer(count_r(FINE_WIDTH-1 downto 0) & '0'));
         magnitude_r <= magnitude_r + signed(distance(WIDTH-1 downto 0));
-      elsif busy_r = '1' then
-        if x_negative_r = '0' and magnitude_r = 0 then
-          magnitude_r <= scaled_r(WIDTH-1 downto 0);
-        end if;
       elsif ready = '1' and in_valid = '1' then
         magnitude_r <= absolute(in_x);
       end if;
