@@ -112,9 +112,14 @@ architecture rtl of firm_ipv4_reassembly is
   signal free_r     : slot_t := (others => '0');            -- the place that it gets if it is a first one
   signal has_free_r : std_logic;
 
-  signal found : slots_t;                                   -- the packet of the fragment
-  signal known : slot_t;
-  signal fed   : slots_t;                                   -- the packet whose fragment is under way
+  -- The packet of the fragment, which is known before the header ends.
+  signal found_r   : slots_t;
+  signal known     : slot_t;
+  signal size_r    : size_t := (others => '0');
+  signal repeats_r : std_logic;                             -- the fragment has come before
+  signal follows_r : std_logic;                             -- it is the next one
+  signal is_long_r : std_logic;                             -- the packet has no room
+  signal fed       : slots_t;                               -- it is not given up: its fragment is under way
 
   -- The beat one cycle later, and what is done with it.
   signal beat_r    : byte_t := (others => '0');
@@ -258,17 +263,33 @@ begin
     end if;
   end process read_header;
 
-  compare_keys : process (used_r, whole_r, keys_r, key_r)
+  -- The key is complete four beats before the first one after the header: there is time for these.
+  find_packet : process (clk)
   begin
-    for index in 0 to PACKETS-1 loop
-      found(index) <= '0';
-      if used_r(index) = '1' and whole_r(index) = '0' and keys_r(index) = key_r then
-        found(index) <= '1';
+    if rising_edge(clk) then
+      for index in 0 to PACKETS-1 loop
+        found_r(index) <= '0';
+        if used_r(index) = '1' and whole_r(index) = '0' and keys_r(index) = key_r then
+          found_r(index) <= '1';
+        end if;
+      end loop;
+      size_r    <= sizes_r(to_integer(known));
+      repeats_r <= '0';
+      if end_r <= size_r then
+        repeats_r <= '1';
       end if;
-    end loop;
-  end process compare_keys;
+      follows_r <= '0';
+      if offset_r = size_r then
+        follows_r <= '1';
+      end if;
+      is_long_r <= '0';
+      if end_r > BYTES or end_r > LONGEST-IPV4_BYTES then
+        is_long_r <= '1';
+      end if;
+    end if;
+  end process find_packet;
 
-  known <= lowest(found);
+  known <= lowest(found_r);
 
   -- ------------------------------------------------------------------ the fragment
 
@@ -298,22 +319,22 @@ begin
         left_r  <= bytes_r;
         write_r <= offset_r;
         slot_r  <= known;
-        if found /= NO_SLOT and end_r <= sizes_r(to_integer(known)) then
+        if found_r /= NO_SLOT and repeats_r = '1' then
           -- It has come before.
           null;
-        elsif end_r > BYTES or end_r > LONGEST-IPV4_BYTES then
+        elsif is_long_r = '1' then
           refused_r <= '1';
           broken_r  <= '1';
-        elsif found /= NO_SLOT and offset_r = sizes_r(to_integer(known)) then
+        elsif found_r /= NO_SLOT and follows_r = '1' then
           taken_r <= '1';
-        elsif found = NO_SLOT and offset_r = 0 and has_free_r = '1' then
+        elsif found_r = NO_SLOT and offset_r = 0 and has_free_r = '1' then
           taken_r <= '1';
           slot_r  <= free_r;
         else
           refused_r <= '1';
           broken_r  <= '1';
         end if;
-        if found = NO_SLOT then
+        if found_r = NO_SLOT then
           broken_r <= '0';
         end if;
       end if;
@@ -354,8 +375,10 @@ begin
   end process access_head;
 
   is_good <= ends_r and not aborted_r;
-  -- A packet is not given up while its fragment comes.
-  fed     <= found when mine_r = '1' and (place_r >= DATA_PLACE or ends_r = '1') else NO_SLOT;
+  -- A packet is not given up while its fragment comes, and none while that one's packet is found.
+  fed     <= (others => '1') when place_r >= SOURCE_PLACE+4 and place_r <= DATA_PLACE else
+             found_r when mine_r = '1' and (place_r > DATA_PLACE or ends_r = '1') else
+             NO_SLOT;
 
   keep_packets : process (clk)
   begin

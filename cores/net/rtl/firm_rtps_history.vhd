@@ -52,7 +52,8 @@ entity firm_rtps_history is
     is_last_part : out std_logic;
     is_beyond    : out std_logic;
 
-    -- Shows the payload of a slot, or of the last sample that has come, and its size, from two cycles after `shows` on.
+    -- Shows the payload of a slot, or of the last sample that has come, from three cycles after `shows` on, and its size
+    -- from two cycles on.
     shows         : in  std_logic;
     shows_new     : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
@@ -104,6 +105,7 @@ architecture rtl of firm_rtps_history is
   signal shown_r : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
   signal place_r : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
   signal shows_r : std_logic := '0';
+  signal steps   : std_logic;                                          -- to the next byte
   signal byte_r  : std_logic_vector(7 downto 0) := (others => '0');
 
   -- The fragment that the program chose.
@@ -208,7 +210,7 @@ begin
     if rising_edge(clk) then
       shows_r <= shows;
       shown_r <= sizes(to_integer(slot_r));
-      if shows_r = '1' or m_axis_tready = '1' then
+      if steps = '1' then
         byte_r  <= bytes(to_integer(slot_r & place_r));
         place_r <= place_r + 1;
       end if;
@@ -227,9 +229,26 @@ begin
     end if;
   end process read_payload;
 
-  m_axis_tdata <= byte_r;
-
   with_fragments : if HAS_FRAGMENTS generate
+
+    -- The memory has many blocks, so it shows its bytes late in the cycle.
+    signal shows_2r : std_logic := '0';
+    signal data_r   : std_logic_vector(7 downto 0) := (others => '0');
+
+  begin
+
+    delay_byte : process (clk)
+    begin
+      if rising_edge(clk) then
+        shows_2r <= shows_r;
+        if steps = '1' then
+          data_r <= byte_r;
+        end if;
+      end if;
+    end process delay_byte;
+
+    steps        <= shows_r or shows_2r or m_axis_tready;
+    m_axis_tdata <= data_r;
 
     u_fragment : entity firm.firm_rtps_fragment
       port map (
@@ -255,6 +274,8 @@ begin
 
   without_fragments : if not HAS_FRAGMENTS generate
 
+    steps         <= shows_r or m_axis_tready;
+    m_axis_tdata  <= byte_r;
     size          <= (others => '0');
     start         <= (others => '0');
     part_bytes    <= (others => '0');
