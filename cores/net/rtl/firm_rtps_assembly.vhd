@@ -98,6 +98,10 @@ architecture rtl of firm_rtps_assembly is
   signal kind_r     : std_logic;                      -- it is one, and not of a key
   signal other_r    : std_logic;                      -- the sample's number differs from that of the assembly
   signal differs_r  : std_logic;                      -- so do a size, or the number of the next fragment
+  signal differs    : std_logic;                      -- with the last byte
+  signal compares_r : std_logic;                      -- the last byte is one of them
+  signal field_r    : std_logic_vector(7 downto 0) := (others => '0');
+  signal wanted_r   : std_logic_vector(7 downto 0) := (others => '0');
   signal later_r    : std_logic;                      -- it is not the first one of its sample
   signal size_r     : half_t := (others => '0');
   signal high_r     : std_logic;                      -- the size has more than 16 bits
@@ -111,6 +115,7 @@ architecture rtl of firm_rtps_assembly is
   signal continues  : std_logic;
   signal begins     : std_logic;
   signal inside_r   : std_logic;                      -- a byte of the payload has come
+  signal is_first   : std_logic;                      -- this is the first one
   signal taken_r    : std_logic;                      -- its bytes are taken
   signal closed_r   : std_logic;                      -- its sample, or the count of fragments, is full
   signal between_r  : std_logic;                      -- the bytes so far are whole fragments
@@ -120,8 +125,27 @@ architecture rtl of firm_rtps_assembly is
   signal ends_part  : std_logic;                      -- this is the last byte of a fragment
   signal ends_all   : std_logic;                      -- and of the sample
   signal is_end     : std_logic;                      -- all of the sample has come
-  signal part_r     : half_t := (others => '0');      -- bytes of the fragment to come
-  signal parts_r    : half_t := (others => '0');      -- fragments to come
+  -- To come: bytes of the fragment, fragments, and bytes of the sample; whether one of them is left, or none.
+  signal part_r     : half_t := (others => '0');
+  signal parts_r    : half_t := (others => '0');
+  signal left_r     : half_t := (others => '0');
+  signal one_part_r  : std_logic;
+  signal one_parts_r : std_logic;
+  signal one_left_r  : std_logic;
+  signal none_left_r : std_logic;
+  -- The same before the first byte.
+  signal rest_r      : half_t := (others => '0');
+  signal one_each_r  : std_logic;
+  signal one_count_r : std_logic;
+  signal one_rest_r  : std_logic;
+
+  -- One cycle after the end of a submessage or a packet, when its last byte has been written.
+  signal completes    : std_logic;                    -- the submessage ends the sample, which has a place
+  signal submessage_r : std_logic;
+  signal completes_r  : std_logic;
+  signal overflows_r  : std_logic;                    -- it has none
+  signal ends_r       : std_logic;
+  signal spoils_r     : std_logic;
 
   -- ------------------------------------------------------------------ the sample
   signal used_r   : std_logic;
@@ -141,6 +165,14 @@ architecture rtl of firm_rtps_assembly is
   signal read_r : unsigned(PLACE_BITS-1 downto 0) := (others => '0');
   signal read   : unsigned(PLACE_BITS-1 downto 0);
 
+  function is_number(value : half_t; number : natural) return std_logic is
+  begin
+    if value = number then
+      return '1';
+    end if;
+    return '0';
+  end function is_number;
+
   -- A byte of a number, the lowest at place 0.
   function byte_of(value : unsigned; place : natural) return std_logic_vector is
   begin
@@ -159,10 +191,12 @@ begin
   -- ------------------------------------------------------------------ the fields
 
   read_fields : process (clk)
-    variable compared : std_logic_vector(7 downto 0);
   begin
     if rising_edge(clk) then
-      kind_r <= '0';
+      field_r    <= field_data;
+      compares_r <= '0';
+      differs_r  <= differs;
+      kind_r     <= '0';
       if kind = RTPS_DATA_FRAG then
         kind_r <= not flags(RTPS_FRAGMENT_KEY);
       end if;
@@ -196,38 +230,103 @@ begin
               and field_data /= x"00" then
           later_r <= '1';
         end if;
-        compared := x"00";
+        wanted_r <= x"00";
         for place in 0 to 1 loop
           if unsigned(field_address) = FIRST_PLACE+place then
-            compared := byte_of(counts_r.fragment, place);
+            wanted_r <= byte_of(counts_r.fragment, place);
           elsif unsigned(field_address) = EACH_PLACE+place then
-            compared := byte_of(length_r, place);
+            wanted_r <= byte_of(length_r, place);
           elsif unsigned(field_address) = SIZE_PLACE+place then
-            compared := byte_of(bytes_r, place);
+            wanted_r <= byte_of(bytes_r, place);
           end if;
         end loop;
         if is_in(field_address, RECORD_FRAGMENTS, 12) = '1' and unsigned(field_address) /= COUNT_PLACE
-           and unsigned(field_address) /= COUNT_PLACE+1 and field_data /= compared then
-          differs_r <= '1';
+           and unsigned(field_address) /= COUNT_PLACE+1 then
+          compares_r <= '1';
         end if;
       end if;
     end if;
   end process read_fields;
 
+  differs   <= '1' when compares_r = '1' and field_r /= wanted_r else differs_r;
   fits      <= '1' when high_r = '0' and size_r <= BYTES else '0';
   has_bytes <= '1' when size_r /= 0 and each_r /= 0 and count_r /= 0 else '0';
   is_holder <= '1' when source = source_r else '0';
   is_free   <= not (whole_r or ended_r);
   is_same   <= used_r and is_holder and not other_r;
-  continues <= is_free and is_same and has_bytes and not differs_r;
+  continues <= is_free and is_same and has_bytes and not differs;
   begins    <= is_free and is_next and fits and has_bytes and not later_r and (not used_r or (is_holder and other_r));
 
   -- ------------------------------------------------------------------ the bytes
 
+  is_first  <= payload_valid and not inside_r;
   writes    <= valid_r and taken_r and not closed_r;
-  ends_all  <= '1' when writes = '1' and spot_r.place + 1 = bytes_r else '0';
-  ends_part <= '1' when writes = '1' and (part_r = 1 or ends_all = '1') else '0';
-  is_end    <= '1' when taken_r = '1' and (ends_all = '1' or spot_r.place = bytes_r) else '0';
+  ends_all  <= writes and one_left_r;
+  ends_part <= writes and (one_part_r or one_left_r);
+  is_end    <= ends_all or (taken_r and none_left_r and between_r);
+  completes <= submessage and is_end and has_place;
+
+  -- More cycles are between these numbers and the first byte.
+  look_ahead : process (clk)
+  begin
+    if rising_edge(clk) then
+      rest_r      <= bytes_r - counts_r.place(15 downto 0);
+      one_each_r  <= is_number(each_r, 1);
+      one_count_r <= is_number(count_r, 1);
+      one_rest_r  <= is_number(rest_r, 1);
+    end if;
+  end process look_ahead;
+
+  count_bytes : process (clk)
+  begin
+    if rising_edge(clk) then
+      if writes = '1' then
+        between_r   <= ends_part;
+        closed_r    <= one_left_r or (one_part_r and one_parts_r);
+        none_left_r <= one_left_r;
+        one_left_r  <= is_number(left_r, 2);
+        one_part_r  <= is_number(part_r, 2);
+        left_r      <= left_r - 1;
+        part_r      <= part_r - 1;
+        if ends_part = '1' then
+          one_part_r  <= one_each_r;
+          one_parts_r <= is_number(parts_r, 2);
+          part_r      <= length_r;
+          parts_r     <= parts_r - 1;
+        end if;
+      elsif inside_r = '0' then
+        between_r   <= '1';
+        closed_r    <= '0';
+        none_left_r <= '0';
+        one_left_r  <= one_rest_r;
+        one_part_r  <= one_each_r;
+        one_parts_r <= one_count_r;
+        left_r      <= rest_r;
+        part_r      <= each_r;
+        parts_r     <= count_r;
+        -- If its bytes are taken, they begin a sample.
+        if is_same = '0' then
+          one_left_r <= is_number(size_r, 1);
+          left_r     <= size_r;
+        end if;
+      end if;
+    end if;
+  end process count_bytes;
+
+  note_ends : process (clk)
+  begin
+    if rising_edge(clk) then
+      submessage_r <= submessage;
+      completes_r  <= completes;
+      overflows_r  <= submessage and is_end and not has_place;
+      ends_r       <= ends;
+      spoils_r     <= spoils;
+      if rst_n = '0' then
+        submessage_r <= '0';
+        ends_r       <= '0';
+      end if;
+    end if;
+  end process note_ends;
 
   write_byte : process (clk)
   begin
@@ -244,91 +343,58 @@ begin
           read_r;
 
   take_fragment : process (clk)
-    variable spot    : spot_t;
     variable counts  : spot_t;
     variable gives   : std_logic;  -- the sample is given up
     variable used    : std_logic;
     variable began   : std_logic;
     variable fed     : std_logic;
     variable ended   : std_logic;
-    variable between : std_logic;
   begin
     if rising_edge(clk) then
       read_r  <= read;
       byte_r  <= payload_data;
       valid_r <= payload_valid;
-      spot    := spot_r;
       counts  := counts_r;
       used    := used_r;
       began   := began_r;
       fed     := fed_r;
       ended   := ended_r;
-      between := between_r;
       gives   := '0';
 
       -- A byte.
       if writes = '1' then
-        spot.place := spot_r.place + 1;
-        part_r     <= part_r - 1;
-        between    := ends_part;
+        spot_r.place <= spot_r.place + 1;
         if ends_part = '1' then
-          spot.fragment := spot_r.fragment + 1;
-          part_r        <= length_r;
-          parts_r       <= parts_r - 1;
-        end if;
-        if ends_all = '1' or (ends_part = '1' and parts_r = 1) then
-          closed_r <= '1';
+          spot_r.fragment <= spot_r.fragment + 1;
         end if;
       end if;
 
       -- The end of a submessage.
-      if submessage = '1' then
-        if taken_r = '1' and between = '1' then
-          counts := spot;
+      if submessage_r = '1' then
+        if taken_r = '1' and between_r = '1' then
+          counts := spot_r;
           fed    := '1';
-          ended  := is_end and has_place;
-          gives  := is_end and not has_place;
+          ended  := completes_r;
+          gives  := overflows_r;
         end if;
         taken_r  <= '0';
         inside_r <= '0';
-      end if;
-
-      -- The first byte of a payload.
-      if payload_valid = '1' and inside_r = '0' then
-        inside_r  <= '1';
-        taken_r   <= kind_r and is_wanted and (continues or begins);
-        closed_r  <= '0';
-        between   := '1';
-        part_r    <= each_r;
-        parts_r   <= count_r;
-        spot      := counts_r;
-        if kind_r = '1' and is_wanted = '1' and begins = '1' then
-          used     := '1';
-          began    := '1';
-          age_r    <= 0;
-          source_r <= source;
-          number_r <= number;
-          bytes_r  <= size_r;
-          length_r <= each_r;
-          spot     := BEGINNING;
-          counts   := BEGINNING;
-        end if;
       end if;
 
       -- A sample that is whole is known to be one of the writer before.
       if renews = '1' and renewed = source_r and whole_r = '0' then
-        began := began or ended;
-        gives := gives or not ended;
+        began := began or ended or completes;
+        gives := gives or not (ended or completes);
       end if;
 
       -- The end of a packet.
-      if ends = '1' then
+      if ends_r = '1' then
         taken_r  <= '0';
         inside_r <= '0';
-        if spoils = '1' then
+        if spoils_r = '1' then
           counts := kept_r;
           gives  := gives or began;
-        elsif began = '1' and counts.place = 0 then
+        elsif began = '1' and fed = '0' then
           -- The first fragment was cut.
           gives := '1';
         else
@@ -344,7 +410,7 @@ begin
       elsif tick = '1' and used_r = '1' and is_free = '1' then
         if age_r /= TICKS-1 then
           age_r <= age_r + 1;
-        elsif taken_r = '0' and began = '0' and fed = '0' then
+        elsif taken_r = '0' and began_r = '0' and fed_r = '0' and is_first = '0' then
           gives := '1';
         end if;
       end if;
@@ -352,19 +418,39 @@ begin
         whole_r <= '0';
         gives   := '1';
       end if;
+      -- The first byte of a payload.
+      if is_first = '1' then
+        inside_r  <= '1';
+        taken_r   <= kind_r and is_wanted and (continues or begins);
+        spot_r    <= counts_r;
+        if is_same = '0' then
+          spot_r <= BEGINNING;
+        end if;
+        if kind_r = '1' and is_wanted = '1' and begins = '1' then
+          used     := '1';
+          began    := '1';
+          fed      := '0';
+          source_r <= source;
+          number_r <= number;
+          bytes_r  <= size_r;
+          length_r <= each_r;
+          counts   := BEGINNING;
+        end if;
+      end if;
+
       if gives = '1' then
         used    := '0';
         began   := '0';
         taken_r <= '0';
-        age_r   <= 0;
       end if;
-      spot_r    <= spot;
+      if used_r = '0' then
+        age_r <= 0;
+      end if;
       counts_r  <= counts;
       used_r    <= used;
       began_r   <= began;
       fed_r     <= fed;
       ended_r   <= ended;
-      between_r <= between;
       if rst_n = '0' then
         valid_r  <= '0';
         inside_r <= '0';
@@ -379,7 +465,7 @@ begin
     end if;
   end process take_fragment;
 
-  is_complete <= submessage and is_end and (between_r or ends_part);
+  is_complete <= submessage and is_end;
   is_long     <= submessage and kind_r and not fits;
   is_dropped  <= submessage and kind_r and is_next and fits and not (taken_r or is_same);
   size        <= std_logic_vector(bytes_r);
