@@ -8,6 +8,10 @@
 --
 -- A fragment counts when its submessage has ended without a part of one, and its packet is known to be good. Until
 -- then, its bytes are behind those that count, where the fragment can be written again.
+--
+-- A DATA whose payload finds no room among those that wait is a sample, too: it is known to need the assembly when it
+-- ends, so each DATA takes the assembly if it is free, and returns it if there was room. It takes that of an older
+-- sample of its writer, of which no more will come.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -37,7 +41,9 @@ entity firm_rtps_assembly is
 
     -- Of the submessage that arrives, from the first byte of its payload on.
     is_wanted : in std_logic;  -- it is a sample for a reader of the node
+    -- At least from one cycle later on; of a fragment, from its first byte on.
     is_next   : in std_logic;  -- the reader takes a sample with this number
+    is_new    : in std_logic;  -- it has not taken this sample or a later one
     source    : in unsigned(SOURCE_BITS-1 downto 0);
     number    : in std_logic_vector(47 downto 0);
 
@@ -46,6 +52,7 @@ entity firm_rtps_assembly is
     ends        : in  std_logic;
     spoils      : in  std_logic;
     has_place   : in  std_logic;                      -- for a sample among those that wait
+    has_room    : in  std_logic;                      -- so has the payload, and waits there
     is_complete : out std_logic;                      -- with `submessage`: it ends the sample
     is_long     : out std_logic;                      -- with `submessage`: it belongs to a sample that is too long
     is_dropped  : out std_logic;                      -- with `submessage`: it belongs to a sample without room
@@ -96,6 +103,7 @@ architecture rtl of firm_rtps_assembly is
 
   -- ------------------------------------------------------------------ the fragment that arrives
   signal kind_r     : std_logic;                      -- it is one, and not of a key
+  signal data_r     : std_logic;                      -- it is a payload of DATA
   signal other_r    : std_logic;                      -- the sample's number differs from that of the assembly
   signal differs_r  : std_logic;                      -- so do a size, or the number of the next fragment
   signal later_r    : std_logic;                      -- it is not the first one of its sample
@@ -117,6 +125,12 @@ architecture rtl of firm_rtps_assembly is
   signal byte_r     : std_logic_vector(7 downto 0) := (others => '0');
   signal valid_r    : std_logic;
   signal writes     : std_logic;
+  signal first_r    : std_logic;                      -- this is the first byte of DATA, and there may be room
+  signal succeeds_r : std_logic;                      -- if its sample takes the place of an older one
+  signal takes      : std_logic;                      -- its bytes are taken from this one on
+  signal came_r     : place_t := (others => '0');     -- bytes of the payload
+  signal over_r     : std_logic;                      -- these are too many
+  signal is_placed  : std_logic;                      -- a DATA that ends is the sample, if there is a place for it
   signal ends_part  : std_logic;                      -- this is the last byte of a fragment
   signal ends_all   : std_logic;                      -- and of the sample
   signal is_end     : std_logic;                      -- all of the sample has come
@@ -165,6 +179,10 @@ begin
       kind_r <= '0';
       if kind = RTPS_DATA_FRAG then
         kind_r <= not flags(RTPS_FRAGMENT_KEY);
+      end if;
+      data_r <= '0';
+      if kind = RTPS_DATA then
+        data_r <= flags(RTPS_PAYLOAD);
       end if;
       if field_valid = '1' then
         if unsigned(field_address) = RECORD_KIND then
@@ -224,10 +242,13 @@ begin
 
   -- ------------------------------------------------------------------ the bytes
 
-  writes    <= valid_r and taken_r and not closed_r;
-  ends_all  <= '1' when writes = '1' and spot_r.place + 1 = bytes_r else '0';
-  ends_part <= '1' when writes = '1' and (part_r = 1 or ends_all = '1') else '0';
-  is_end    <= '1' when taken_r = '1' and (ends_all = '1' or spot_r.place = bytes_r) else '0';
+  -- The number of DATA may be compared one cycle after its payload begins.
+  takes     <= first_r and (is_next or (is_new and not succeeds_r));
+  writes    <= (valid_r and taken_r and not closed_r) or takes;
+  ends_all  <= '1' when kind_r = '1' and writes = '1' and spot_r.place + 1 = bytes_r else '0';
+  ends_part <= '1' when kind_r = '1' and writes = '1' and (part_r = 1 or ends_all = '1') else '0';
+  is_end    <= '1' when kind_r = '1' and taken_r = '1' and (ends_all = '1' or spot_r.place = bytes_r) else '0';
+  is_placed <= data_r and (taken_r or takes) and not has_room and not over_r;
 
   write_byte : process (clk)
   begin
@@ -248,6 +269,7 @@ begin
     variable counts  : spot_t;
     variable gives   : std_logic;  -- the sample is given up
     variable used    : std_logic;
+    variable taken   : std_logic;
     variable began   : std_logic;
     variable fed     : std_logic;
     variable ended   : std_logic;
@@ -264,7 +286,18 @@ begin
       fed     := fed_r;
       ended   := ended_r;
       between := between_r;
+      taken   := taken_r or takes;
       gives   := '0';
+
+      -- The first byte of DATA.
+      if takes = '1' then
+        used     := '1';
+        began    := '1';
+        age_r    <= 0;
+        source_r <= source;
+        number_r <= number;
+        counts   := BEGINNING;
+      end if;
 
       -- A byte.
       if writes = '1' then
@@ -283,25 +316,41 @@ begin
 
       -- The end of a submessage.
       if submessage = '1' then
-        if taken_r = '1' and between = '1' then
+        if data_r = '1' and taken = '1' then
+          counts := spot;
+          ended  := is_placed and has_place;
+          gives  := not ended;
+        elsif kind_r = '1' and taken = '1' and between = '1' then
           counts := spot;
           fed    := '1';
           ended  := is_end and has_place;
           gives  := is_end and not has_place;
         end if;
-        taken_r  <= '0';
+        taken    := '0';
         inside_r <= '0';
       end if;
 
       -- The first byte of a payload.
+      first_r <= '0';
+      if payload_valid = '1' then
+        came_r <= came_r + 1;
+        over_r <= over_r or came_r(PLACE_BITS);
+      end if;
       if payload_valid = '1' and inside_r = '0' then
-        inside_r  <= '1';
-        taken_r   <= kind_r and is_wanted and (continues or begins);
-        closed_r  <= '0';
-        between   := '1';
-        part_r    <= each_r;
-        parts_r   <= count_r;
-        spot      := counts_r;
+        inside_r   <= '1';
+        taken      := kind_r and is_wanted and (continues or begins);
+        first_r    <= data_r and is_wanted and is_free and (not used_r or (is_holder and other_r));
+        succeeds_r <= used_r;
+        came_r     <= to_unsigned(1, 17);
+        over_r     <= '0';
+        closed_r   <= '0';
+        between    := '1';
+        part_r     <= each_r;
+        parts_r    <= count_r;
+        spot       := counts_r;
+        if data_r = '1' then
+          spot := BEGINNING;
+        end if;
         if kind_r = '1' and is_wanted = '1' and begins = '1' then
           used     := '1';
           began    := '1';
@@ -323,7 +372,7 @@ begin
 
       -- The end of a packet.
       if ends = '1' then
-        taken_r  <= '0';
+        taken    := '0';
         inside_r <= '0';
         if spoils = '1' then
           counts := kept_r;
@@ -344,7 +393,7 @@ begin
       elsif tick = '1' and used_r = '1' and is_free = '1' then
         if age_r /= TICKS-1 then
           age_r <= age_r + 1;
-        elsif taken_r = '0' and began = '0' and fed = '0' then
+        elsif taken = '0' and began = '0' and fed = '0' then
           gives := '1';
         end if;
       end if;
@@ -353,14 +402,15 @@ begin
         gives   := '1';
       end if;
       if gives = '1' then
-        used    := '0';
-        began   := '0';
-        taken_r <= '0';
-        age_r   <= 0;
+        used  := '0';
+        began := '0';
+        taken := '0';
+        age_r <= 0;
       end if;
       spot_r    <= spot;
       counts_r  <= counts;
       used_r    <= used;
+      taken_r   <= taken;
       began_r   <= began;
       fed_r     <= fed;
       ended_r   <= ended;
@@ -368,6 +418,7 @@ begin
       if rst_n = '0' then
         valid_r  <= '0';
         inside_r <= '0';
+        first_r  <= '0';
         taken_r  <= '0';
         used_r   <= '0';
         began_r  <= '0';
@@ -379,10 +430,11 @@ begin
     end if;
   end process take_fragment;
 
-  is_complete <= submessage and is_end and (between_r or ends_part);
-  is_long     <= submessage and kind_r and not fits;
-  is_dropped  <= submessage and kind_r and is_next and fits and not (taken_r or is_same);
-  size        <= std_logic_vector(bytes_r);
+  is_complete <= submessage and (is_placed or (is_end and (between_r or ends_part)));
+  is_long     <= submessage and ((kind_r and not fits) or (data_r and (taken_r or takes) and over_r and not has_room));
+  is_dropped  <= submessage and ((kind_r and is_next and fits and not (taken_r or is_same))
+                                 or (data_r and is_new and not (taken_r or takes or has_room)));
+  size        <= std_logic_vector(came_r(15 downto 0)) when data_r = '1' else std_logic_vector(bytes_r);
   is_whole    <= whole_r;
 
   is_open        <= used_r and is_free and not began_r;
