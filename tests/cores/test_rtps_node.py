@@ -40,6 +40,8 @@ NODE = a_node()
 # Peers, stall and seed of a case in which all happens, and the events of such a case.
 FULL = (9, 30, SEED + 2)
 EVENTS = 2000
+# Bytes of payloads that wait, of which there are fewer than in the longest samples.
+SHORT = 1024
 # The same of cases in which samples are sent in fragments, also of the longest ones.
 LONG_CASES = [(2, 0, SEED + 3), (5, 30, SEED + 1), (1, 10, SEED + 6)]
 
@@ -197,6 +199,22 @@ def test_samples_in_fragments_are_put_together(peers: int, stall: int, seed: int
 
 
 @pytest.mark.check
+@pytest.mark.parametrize(("peers", "stall", "seed"), [(2, 0, SEED), (4, 30, SEED + 1), (1, 10, SEED + 2)])
+def test_samples_that_find_no_room_are_put_together(peers: int, stall: int, seed: int) -> None:
+    """Samples of all sizes in one submessage each, between fragments; what finds no room at all is counted."""
+    print(f"seed {seed}")
+    events = Peers(peers, seed, is_long=True, waiting=SHORT).run(3000)
+    wanted = expected(events, ASSEMBLED, waiting=SHORT)
+    sizes = Counter(len(frame) - 5 for frame in wanted.frames)
+    print(sizes, wanted.lossy)
+    assert min(sizes[SHORT], sizes[SHORT + 1], sizes[ASSEMBLED], sizes[1]) >= 5 and wanted.lossy >= 20
+    with World(stall, assembled=ASSEMBLED, waiting=SHORT) as world:
+        found = world.all(events)
+    _check(found, wanted)
+    assert found.lossy == wanted.lossy
+
+
+@pytest.mark.check
 @pytest.mark.parametrize(("peers", "stall", "seed"), LONG_CASES)
 def test_long_samples_are_sent_in_fragments(peers: int, stall: int, seed: int) -> None:
     """All sizes from 4 to 65,536 bytes, and longer ones are refused; peers ask for samples and fragments again."""
@@ -234,16 +252,22 @@ def test_a_list_of_very_many_encodings_counts() -> None:
         _check(world.all(events), expected(events))
 
 
+def _assembled(sample: int) -> int:
+    """A node that sends long messages takes them, too."""
+    return ASSEMBLED if sample > SAMPLE else 0
+
+
 @pytest.mark.parametrize("sample", [SAMPLE, 2048])
 def test_the_node_has_no_latch(library: Library, sample: int) -> None:
-    assert library.latches("firm_rtps_node", {**SIZES, "SAMPLE": sample}) == []
+    assert library.latches("firm_rtps_node", {**SIZES, "SAMPLE": sample, "ASSEMBLED": _assembled(sample)}) == []
 
 
 @pytest.mark.check
 @pytest.mark.parametrize("sample", [SAMPLE, 2048])
 def test_the_node_has_no_combinational_loop(tmp_path: Path, sample: int) -> None:
     *others, node = core_files(*HARDWARE)
-    assert loops("firm_rtps_node", tmp_path, [node], others, {"SAMPLE": sample}) == []
+    generics = {"SAMPLE": sample, "ASSEMBLED": _assembled(sample)}
+    assert loops("firm_rtps_node", tmp_path, [node], others, generics) == []
 
 
 @pytest.mark.check

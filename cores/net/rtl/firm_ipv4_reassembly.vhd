@@ -2,7 +2,10 @@
 -- Reassembles the fragments of UDP datagrams (RFC 791). Frames pass through as they come; those with a fragment for
 -- this host are aborted, since only here it is known whether one is missing. When a packet is complete, it is sent as
 -- one frame without fragments. Frames that come meanwhile wait in a store, except fragments, and leave by turns with
--- further packets.
+-- further packets, in the order in which these were complete.
+--
+-- The user has room for the content of one long packet. So the next long one waits until the user rests, but not for
+-- ever; other packets pass it.
 --
 -- Fragments of several packets may be interleaved, but those of each packet come in order, as hosts send them and an
 -- Ethernet keeps them. So the state of a packet is its size so far, whatever the number of fragments. A packet that
@@ -18,7 +21,11 @@ entity firm_ipv4_reassembly is
     PACKETS : integer := 2;     -- that are reassembled at the same time, 1 to 8
     BYTES   : integer := 16384; -- of the longest one, without its header; a power of two, 2048 to 65536
     DEPTH   : integer := 4096;  -- bytes of frames that wait for the end of a packet, a power of two, 4 and more
-    TICKS   : integer := 1000   -- without a fragment, after which a packet is given up, 1 to 65535
+    TICKS   : integer := 1000;  -- without a fragment, after which a packet is given up, 1 to 65535
+    LONG    : integer := 4096;  -- bytes from which on a packet is long, a power of two, 2 and more
+    -- After a long packet, after which the next one leaves anyway, 1 to 65535. The board of a simulation, whose
+    -- millisecond has 250 cycles, needs 262 for the longest message.
+    HOLD_TICKS : integer := 300
   );
   port (
     clk   : in std_logic;
@@ -40,6 +47,8 @@ entity firm_ipv4_reassembly is
     m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
+
+    rests : in std_logic;  -- the user is not busy with the content of packets
 
     -- Pulses.
     is_dropped : out std_logic;  -- a packet that is given up, or a fragment that belongs to none
@@ -69,6 +78,8 @@ architecture rtl of firm_ipv4_reassembly is
   constant MAC_BYTES      : natural := 6;
   constant GAP            : natural := 6;      -- cycles between frames
   constant LONGEST        : natural := 65535;  -- a packet with its header
+  -- Cycles in which the user rests, after which it is not busy: it may take a while until it begins.
+  constant REST           : positive := 256;
 
   subtype byte_t is std_logic_vector(7 downto 0);
   constant UDP     : byte_t := x"11";
@@ -84,6 +95,7 @@ architecture rtl of firm_ipv4_reassembly is
   type keys_t is array (natural range 0 to PACKETS-1) of key_t;
   type sizes_t is array (natural range 0 to PACKETS-1) of size_t;
   type sums_t is array (natural range 0 to PACKETS-1) of sum_t;
+  type orders_t is array (natural range 0 to PACKETS-1) of slots_t;
   type ages_t is array (natural range 0 to PACKETS-1) of natural range 0 to 65535;
   constant NO_SLOT : slots_t := (others => '0');
 
@@ -93,6 +105,8 @@ architecture rtl of firm_ipv4_reassembly is
   -- Of each packet.
   signal used_r  : slots_t;                                 -- it has fragments
   signal whole_r : slots_t;                                 -- it waits to be sent
+  signal long_r  : slots_t;                                 -- and is long
+  signal older_r : orders_t := (others => NO_SLOT);         -- those that were whole before
   signal keys_r  : keys_t;
   signal sizes_r : sizes_t := (others => (others => '0'));  -- bytes so far
   signal sums_r  : sums_t := (others => (others => '0'));   -- of the words of the header that stay
@@ -138,6 +152,12 @@ architecture rtl of firm_ipv4_reassembly is
   signal is_good   : std_logic;                             -- it has ended, and is not aborted
 
   -- ------------------------------------------------------------------ what leaves
+  signal ready    : slots_t;                                -- those that may be sent, and the first one of them
+  signal next_one : slots_t;
+  signal held_r   : std_logic;                              -- long ones are not sent
+  signal rest_r   : natural range 0 to REST-1;              -- cycles until then
+  signal since_r  : natural range 0 to 65535;               -- the last long one, milliseconds
+
   type state_t is (PASSING, SENDING, RESTING, DRAINING);
   signal state_r     : state_t;
   signal turn_r      : std_logic;                           -- it is the store's turn
@@ -193,6 +213,13 @@ begin
     severity failure;
   assert TICKS >= 1 and TICKS <= 65535
     report "firm_ipv4_reassembly: TICKS is " & integer'image(TICKS) & "; legal: 1 to 65535"
+    severity failure;
+
+  assert LONG >= 2 and 2**clog2(LONG) = LONG
+    report "firm_ipv4_reassembly: LONG is " & integer'image(LONG) & "; legal: powers of two, 2 and more"
+    severity failure;
+  assert HOLD_TICKS >= 1 and HOLD_TICKS <= 65535
+    report "firm_ipv4_reassembly: HOLD_TICKS is " & integer'image(HOLD_TICKS) & "; legal: 1 to 65535"
     severity failure;
 
   -- ------------------------------------------------------------------ the header
@@ -397,6 +424,14 @@ begin
           if taken_r = '1' and is_whole = '1' then
             used_r(index)  <= '1';
             whole_r(index) <= not has_more_r;
+            long_r(index)  <= '0';
+            if end_r >= LONG then
+              long_r(index) <= '1';
+            end if;
+            older_r(index) <= whole_r;
+            for other in 0 to PACKETS-1 loop
+              older_r(other)(index) <= '0';
+            end loop;
             sizes_r(index) <= end_r;
             ages_r(index)  <= 0;
             if offset_r = 0 then
@@ -421,6 +456,46 @@ begin
   end process keep_packets;
 
   -- ------------------------------------------------------------------ what leaves
+
+  find_next : process (whole_r, long_r, held_r, older_r, ready)
+  begin
+    for index in 0 to PACKETS-1 loop
+      ready(index)    <= whole_r(index) and not (long_r(index) and held_r);
+      next_one(index) <= '0';
+      if (older_r(index) and ready) = NO_SLOT then
+        next_one(index) <= ready(index);
+      end if;
+    end loop;
+  end process find_next;
+
+  hold : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rests = '0' then
+        rest_r <= REST-1;
+      elsif rest_r /= 0 then
+        rest_r <= rest_r - 1;
+      end if;
+      if shows_end_r = '1' and long_r(to_integer(out_slot_r)) = '1' then
+        held_r  <= '1';
+        rest_r  <= REST-1;
+        since_r <= 0;
+      elsif rest_r = 0 then
+        held_r <= '0';
+      elsif tick = '1' then
+        since_r <= since_r + 1;
+        if since_r = HOLD_TICKS-1 then
+          held_r  <= '0';
+          since_r <= 0;
+        end if;
+      end if;
+      if rst_n = '0' then
+        held_r  <= '0';
+        rest_r  <= 0;
+        since_r <= 0;
+      end if;
+    end if;
+  end process hold;
 
   waits <= waits_r when place_r /= 0 else
            '0' when state_r = PASSING else
@@ -463,9 +538,9 @@ begin
           gap_r <= GAP-1;
         elsif gap_r /= 0 then
           gap_r <= gap_r - 1;
-        elsif whole_r /= NO_SLOT then
+        elsif ready /= NO_SLOT then
           state_r    <= SENDING;
-          out_slot_r <= lowest(whole_r);
+          out_slot_r <= lowest(next_one);
         end if;
       elsif state_r = SENDING then
         out_last_r  <= sizes_r(to_integer(out_slot_r)) + (DATA_PLACE-1);
@@ -487,11 +562,11 @@ begin
         out_place_r <= (others => '0');
         if gap_r /= 0 then
           gap_r <= gap_r - 1;
-        elsif stored_valid = '1' and (turn_r = '1' or whole_r = NO_SLOT) then
+        elsif stored_valid = '1' and (turn_r = '1' or ready = NO_SLOT) then
           state_r <= DRAINING;
-        elsif whole_r /= NO_SLOT then
+        elsif ready /= NO_SLOT then
           state_r    <= SENDING;
-          out_slot_r <= lowest(whole_r);
+          out_slot_r <= lowest(next_one);
         elsif (place_r = 0 or waits_r = '0') and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
           state_r <= PASSING;
         end if;

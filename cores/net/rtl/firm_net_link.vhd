@@ -472,11 +472,19 @@ begin
   -- Of another number, the part would complain first.
   with_fragments : if REASSEMBLIES >= 1 and REASSEMBLIES <= MOST_REASSEMBLIES generate
 
+    signal rests : std_logic;
+
+  begin
+
+    rests <= not sample_tvalid;
+
     u_reassembly : entity firm.firm_ipv4_reassembly
       generic map (
         -- As many may leave at the same time.
         PACKETS => 2*REASSEMBLIES,
-        BYTES   => REASSEMBLED
+        BYTES   => REASSEMBLED,
+        -- The payload of a shorter one has room among those that wait.
+        LONG    => PAYLOADS
       )
       port map (
         clk           => clk,
@@ -492,6 +500,7 @@ begin
         m_axis_tuser  => whole_tuser,
         m_axis_tvalid => whole_tvalid,
         m_axis_tlast  => whole_tlast,
+        rests         => rests,
         is_dropped    => is_packet_dropped,
         is_lost       => is_frame_lost
       );
