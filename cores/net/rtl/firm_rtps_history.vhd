@@ -52,8 +52,8 @@ entity firm_rtps_history is
     is_last_part : out std_logic;
     is_beyond    : out std_logic;
 
-    -- Shows the payload of a slot, or of the last sample that has come, from three cycles after `shows` on, and its size
-    -- from two cycles on.
+    -- Shows the payload of a slot, or of the last sample that has come: its size from two cycles after `shows` on, its
+    -- first byte from three cycles on.
     shows         : in  std_logic;
     shows_new     : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
@@ -86,28 +86,28 @@ architecture rtl of firm_rtps_history is
   signal nexts : slots_t := (others => (others => '0'));
 
   -- The frame that comes.
-  signal head_r    : unsigned(2 downto 0);
-  signal writer_r  : unsigned(2 downto 0) := (others => '0');
-  signal size_r    : unsigned(BYTE_BITS downto 0) := (others => '0');
-  signal wrong_r   : std_logic;  -- it is refused
-  signal has_r     : std_logic;
-  signal moves     : std_logic;
-  signal is_head   : std_logic;
-  signal is_full   : std_logic;
-  signal writes    : std_logic;
-  signal new_size  : unsigned(BYTE_BITS downto 0);
-  signal next_slot : slot_t;
+  signal head_r      : unsigned(2 downto 0);
+  signal writer_r    : unsigned(2 downto 0) := (others => '0');
+  signal size_r      : unsigned(BYTE_BITS downto 0) := (others => '0');
+  signal wrong_r     : std_logic;  -- it is refused
+  signal has_r       : std_logic;
+  signal moves       : std_logic;
+  signal is_head     : std_logic;
+  signal is_full     : std_logic;
+  signal writes      : std_logic;
+  signal new_size    : unsigned(BYTE_BITS downto 0);
+  signal next_slot   : slot_t;
   signal write_place : place_t;
-  signal is_good   : std_logic;
-  signal ends      : std_logic;
+  signal is_good     : std_logic;
+  signal ends        : std_logic;
 
   -- The payload that leaves.
-  signal slot_r  : slot_t := (others => '0');
-  signal shown_r : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
-  signal place_r : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
+  signal slot_r     : slot_t := (others => '0');
+  signal shown_r    : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
+  signal place_r    : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
   signal read_place : place_t;
-  signal shows_r : std_logic := '0';
-  signal steps   : std_logic;                                          -- to the next byte
+  signal shows_r    : std_logic := '0';
+  signal steps      : std_logic;                                          -- to the next byte
 
   -- The fragment that the program chose.
   signal size       : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- of the sample in the slot
@@ -234,7 +234,7 @@ begin
 
   with_fragments : if HAS_FRAGMENTS generate
 
-    -- A memory of so many blocks shows its bytes late in a cycle. So each bank has a register, and one of them is shown.
+    -- A memory of many blocks shows its bytes late in a cycle. So each bank has a register, and one of them is shown.
     constant BANKS     : positive := max(1, SLOTS*SAMPLE/16384);
     constant BANK      : positive := SLOTS*SAMPLE/BANKS;  -- bytes
     constant BANK_BITS : positive := clog2(BANK);
