@@ -102,45 +102,46 @@ architecture rtl of firm_rtps_assembly is
   signal memory : memory_t;
 
   -- ------------------------------------------------------------------ the fragment that arrives
-  signal kind_r     : std_logic;                      -- it is one, and not of a key
-  signal data_r     : std_logic;                      -- it is a payload of DATA
-  signal other_r    : std_logic;                      -- the sample's number differs from that of the assembly
-  signal compares_r : std_logic;                      -- the last byte of a field is that of a size, or of the number
-  signal field_r    : std_logic_vector(7 downto 0) := (others => '0');
-  signal wanted_r   : std_logic_vector(7 downto 0) := (others => '0');  -- of the next fragment
-  signal differs    : std_logic;                      -- a size differs, or the number of the next fragment
-  signal differs_r  : std_logic;
-  signal later_r    : std_logic;                      -- it is not the first one of its sample
-  signal size_r     : half_t := (others => '0');
-  signal high_r     : std_logic;                      -- the size has more than 16 bits
-  signal each_r     : half_t := (others => '0');
-  signal count_r    : half_t := (others => '0');
-  signal fits       : std_logic;
-  signal has_bytes  : std_logic;                      -- neither a size nor the number of fragments is zero
-  signal is_holder  : std_logic;                      -- its writer is that of the assembly
-  signal is_same    : std_logic;                      -- and so is its sample
-  signal is_free    : std_logic;                      -- the assembly is not whole
-  signal continues  : std_logic;
-  signal begins     : std_logic;
-  signal inside_r   : std_logic;                      -- a byte of the payload has come
-  signal is_first   : std_logic;                      -- this is the first one
-  signal taken_r    : std_logic;                      -- its bytes are taken
-  signal closed_r   : std_logic;                      -- its sample, or the count of fragments, is full
-  signal between_r  : std_logic;                      -- the bytes so far are whole fragments
-  signal byte_r     : std_logic_vector(7 downto 0) := (others => '0');
-  signal valid_r    : std_logic;
-  signal writes     : std_logic;
-  signal begins_r   : std_logic;                      -- this is the first byte of a fragment, and of its sample
-  signal first_r    : std_logic;                      -- this is the first byte of DATA, and there may be room
-  signal succeeds_r : std_logic;                      -- if its sample takes the place of an older one
-  signal takes      : std_logic;                      -- its bytes are taken from this one on
-  signal taken      : std_logic;                      -- the bytes so far are taken
-  signal came_r     : place_t := (others => '0');     -- bytes of the payload
-  signal over_r     : std_logic;                      -- these are too many
-  signal is_placed  : std_logic;                      -- a DATA that ends is the sample, if there is a place for it
-  signal ends_part  : std_logic;                      -- this is the last byte of a fragment
-  signal ends_all   : std_logic;                      -- and of the sample
-  signal is_end     : std_logic;                      -- all of the sample has come
+  signal kind_r      : std_logic;                      -- it is one, and not of a key
+  signal data_r      : std_logic;                      -- it is a payload of DATA
+  signal other_r     : std_logic;                      -- the sample's number differs from that of the assembly
+  signal compares_r  : std_logic;                      -- the last byte of a field is that of a size, or of the number
+  signal field_r     : std_logic_vector(7 downto 0) := (others => '0');
+  signal wanted_r    : std_logic_vector(7 downto 0) := (others => '0');  -- of the next fragment
+  signal differs     : std_logic;                      -- a size differs, or the number of the next fragment
+  signal differs_r   : std_logic;
+  signal later_r     : std_logic;                      -- it is not the first one of its sample
+  signal size_r      : half_t := (others => '0');
+  signal high_r      : std_logic;                      -- the size has more than 16 bits
+  signal each_r      : half_t := (others => '0');
+  signal count_r     : half_t := (others => '0');
+  signal fits        : std_logic;
+  signal has_bytes   : std_logic;                      -- neither a size nor the number of fragments is zero
+  signal has_parts_r : std_logic;                     -- except for that of the sample
+  signal is_holder   : std_logic;                      -- its writer is that of the assembly
+  signal is_same     : std_logic;                      -- and so is its sample
+  signal is_free     : std_logic;                      -- the assembly is not whole
+  signal continues   : std_logic;
+  signal begins      : std_logic;
+  signal inside_r    : std_logic;                      -- a byte of the payload has come
+  signal is_first    : std_logic;                      -- this is the first one
+  signal taken_r     : std_logic;                      -- its bytes are taken
+  signal closed_r    : std_logic;                      -- its sample, or the count of fragments, is full
+  signal between_r   : std_logic;                      -- the bytes so far are whole fragments
+  signal byte_r      : std_logic_vector(7 downto 0) := (others => '0');
+  signal valid_r     : std_logic;
+  signal continued   : std_logic;                      -- a byte of a sample that has begun
+  signal writes      : std_logic;
+  signal begins_r    : std_logic;                      -- this is the first byte of a fragment, and of its sample
+  signal first_r     : std_logic;                      -- this is the first byte of DATA, and there may be room
+  signal succeeds_r  : std_logic;                      -- if its sample takes the place of an older one
+  signal takes       : std_logic;                      -- its bytes are taken from this one on
+  signal taken       : std_logic;                      -- the bytes so far are taken
+  signal came_r      : place_t := (others => '0');     -- bytes of the payload
+  signal over_r      : std_logic;                      -- these are too many
+  signal is_placed   : std_logic;                      -- a DATA that ends is the sample, if there is a place for it
+  signal ends_part   : std_logic;                      -- this is the last byte of a fragment
+  signal is_end      : std_logic;                      -- all of the sample has come
   -- To come: bytes of the fragment, fragments, and bytes of the sample; and whether that is one, or none.
   signal part_r      : half_t := (others => '0');
   signal parts_r     : half_t := (others => '0');
@@ -271,7 +272,7 @@ begin
 
   differs   <= '1' when compares_r = '1' and field_r /= wanted_r else differs_r;
   fits      <= '1' when high_r = '0' and size_r <= BYTES else '0';
-  has_bytes <= '1' when size_r /= 0 and each_r /= 0 and count_r /= 0 else '0';
+  has_bytes <= has_parts_r when size_r /= 0 else '0';
   is_holder <= '1' when source = source_r else '0';
   is_free   <= not (whole_r or ended_r);
   is_same   <= used_r and is_holder and not other_r;
@@ -284,10 +285,10 @@ begin
   takes     <= first_r and (is_next or (is_new and not succeeds_r));
   taken     <= taken_r or takes;
   is_first  <= payload_valid and not inside_r;
-  writes    <= (valid_r and taken_r and not closed_r) or takes;
-  ends_all  <= kind_r and writes and one_left_r;
-  ends_part <= kind_r and writes and (one_part_r or one_left_r);
-  is_end    <= ends_all or (kind_r and taken_r and none_left_r and between_r);
+  continued <= valid_r and taken_r and not closed_r;
+  writes    <= continued or takes;
+  ends_part <= kind_r and continued and (one_part_r or one_left_r);
+  is_end    <= kind_r and ((continued and one_left_r) or (taken_r and none_left_r and between_r));
   is_placed <= data_r and taken and not has_room and not over_r;
 
   -- More cycles are between these numbers and the first byte.
@@ -298,6 +299,7 @@ begin
       one_each_r  <= is_number(each_r, 1);
       one_count_r <= is_number(count_r, 1);
       one_rest_r  <= is_number(rest_r, 1);
+      has_parts_r <= not (is_number(each_r, 0) or is_number(count_r, 0));
     end if;
   end process look_ahead;
 

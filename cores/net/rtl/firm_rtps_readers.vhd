@@ -435,7 +435,7 @@ begin
       if submessage_r = '1' then
         write_r <= place;
         full_r  <= '0';
-        misses  := misses_r or (is_sample and not pushes) or (is_wanted and fragment_r and is_unplaced);
+        misses  := misses_r or (is_sample and not pushes) or (is_wanted and is_unplaced);
         skips   := skips_r or (is_sample and fragment_r and is_long);
       end if;
       if ends_r = '1' then
@@ -488,7 +488,6 @@ begin
 
     signal is_mine_too    : std_logic;
     signal has_payload_r  : std_logic;  -- it is DATA, and not of a key
-    signal is_old         : std_logic;  -- it is no loss that there is no room for it
     signal is_new_r       : std_logic;
     signal wanted_r       : number_t := (others => '0');
     signal is_strict_r    : std_logic;
@@ -511,9 +510,10 @@ begin
 
   begin
 
-    is_old    <= has_payload_r and not (filled_r or is_complete or is_long or is_unplaced);
-    is_sample <= is_wanted and ((data_r and not is_old) or (fragment_r and (is_complete or is_long)));
-    pushes    <= is_sample and spare_r and not (data_r and is_unplaced);
+    -- A sample whose payload has no room is none if it is old: that is no loss.
+    is_sample <= is_wanted and ((data_r and (filled_r or not has_payload_r))
+                                or ((data_r or fragment_r) and (is_complete or is_long)));
+    pushes    <= is_sample and spare_r;
     fills     <= is_wanted and data_r and filled_r and spare_r;
 
     -- Bytes of a fragment follow its number by twelve or more others, and those of DATA may follow at once.
