@@ -435,7 +435,8 @@ begin
       if submessage_r = '1' then
         write_r <= place;
         full_r  <= '0';
-        misses  := misses_r or (is_sample and not pushes) or (is_wanted and is_unplaced);
+        misses  := misses_r or (is_sample and not pushes)
+                   or (is_wanted and (data_r or fragment_r) and is_unplaced);
         skips   := skips_r or (is_sample and fragment_r and is_long);
       end if;
       if ends_r = '1' then
