@@ -295,7 +295,21 @@ class Peers:
         peer.told[PUBLICATIONS_WRITER] = 11
         return self.events
 
-    def _sure_writer(self, peer: _Peer, entity: bytes) -> bytes:
+    def flood(self, count: int) -> dict[int, Event]:
+        """A peer announces so many writers in one packet, and says so; the events in which it does so one by one."""
+        (peer,), told = self._peers, (DISCOVERY[PUBLICATIONS_WRITER], PUBLICATIONS_WRITER)
+        filler = Parameter.USER_DATA, self._octets(peer, bytes(600))
+        items = [
+            Data(*told, number, self._sure_writer(peer, bytes([0, 0, number, rtps.USER_WRITER]), filler))
+            for number in range(1, count + 1)
+        ]
+        self._come(peer)
+        self._send(peer, self._destination(), *items)
+        self._send(peer, self._destination(), Heartbeat(*told, 1, count, 7, True))
+        writer = Writer(is_little=peer.is_little)
+        return {item.number: Event(Kind.PACKET, writer.message(peer.prefix, item)) for item in items}
+
+    def _sure_writer(self, peer: _Peer, entity: bytes, *others: tuple[int, bytes]) -> bytes:
         """The announcement of a writer that matches the reliable reader."""
         topic, type_, _ = READ[SURE]
         return self._parameters(
@@ -304,6 +318,7 @@ class Peers:
             (Parameter.TOPIC_NAME, self._octets(peer, topic.encode() + b"\0")),
             (Parameter.TYPE_NAME, self._octets(peer, type_.encode() + b"\0")),
             (Parameter.RELIABILITY, self._word(peer, Reliability.RELIABLE) + bytes(8)),
+            *others,
         )
 
     # --- packets -----------------------------------------------------------------------------------------------------
