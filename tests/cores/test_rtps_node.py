@@ -246,6 +246,23 @@ def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
 
 
 @pytest.mark.check
+def test_a_host_that_takes_little_loses_whole_long_samples() -> None:
+    """They come while another one leaves: those that are taken are unchanged, and the loss is counted."""
+    print(f"seed {SEED}")
+    events = Peers(3, SEED, is_sure=False, waiting=SHORT).run(1500)
+    wanted = expected(events, ASSEMBLED, waiting=1 << 17)
+    with World(90, assembled=ASSEMBLED, waiting=SHORT) as world:
+        found = world.all(events)
+    sizes = [len(frame) - 5 for frame in found.frames]
+    print(len(wanted.frames), Counter(sizes), found.lossy)
+    assert found.lossy > 20 and sum(size > SHORT for size in sizes) > 20
+    assert len(found.frames) < len(wanted.frames)
+    sent = b"".join(event.data for event in events)
+    assert all(frame[5:] in sent for frame in found.frames)
+    assert without_counts(found.sent) == without_counts(wanted.sent)
+
+
+@pytest.mark.check
 def test_announcements_that_find_no_room_are_counted_and_asked_for() -> None:
     """A packet has more of them than the memory; the node asks for two at a time."""
     peers = Peers(1, SEED)

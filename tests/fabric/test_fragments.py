@@ -33,6 +33,7 @@ GAP_CYCLES = 12
 # Cycles in which the node acts on an announcement.
 SLOW_CYCLES = 8000
 LONGEST = 8000
+LAST_CYCLES = 20000
 NODE_PREFIX = rtps.VENDOR + bytes.fromhex("020000000002") + bytes(4)
 SPECIFICATION = """\
 project:
@@ -74,14 +75,16 @@ def _generics(folder: Path) -> dict[str, str]:
     return own | dict(re.findall(r"^ +([A-Z]+) +=> (\d+),$", node, re.MULTILINE))
 
 
-def _taken(library: Library, folder: Path, bursts: Iterable[tuple[int, bytes]]) -> list[bytes]:
-    """The frames to the system."""
+def _taken(
+    library: Library, folder: Path, bursts: Iterable[tuple[int, bytes]], last_cycles: int = LAST_CYCLES
+) -> list[bytes]:
+    """The frames to the system, until some cycles after the last burst."""
     rows = []
     for before, frame in bursts:
         sent = PREAMBLE + frame + zlib.crc32(frame).to_bytes(FCS_BYTES, "little")
         rows.append(" ".join(map(str, (before, len(sent), *sent))))
     (folder / "line.txt").write_text("\n".join(rows) + "\n", encoding="ascii")
-    result = library.run("playing_node", {}, directory=folder)
+    result = library.run("playing_node", {"LAST_CYCLES": last_cycles}, directory=folder)
     assert result.exit_code == 0, result.output
     lines = (folder / "taken.txt").read_text(encoding="ascii").splitlines()
     return [bytes(map(int, line.split()[1:])) for line in lines]
@@ -149,11 +152,12 @@ def _bursts(hosts: Sequence[Host], frames: Iterable[bytes]) -> list[tuple[int, b
 
 
 def test_messages_of_all_sizes_arrive_whole(tmp_path: Path) -> None:
+    """Of the last three, each waits until the one before is out, in twice the time in which it comes."""
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     payloads = [_payload(chance, size) for size in (8, 1344, 1400, 1480, 2900, 5001, LONGEST - 1, LONGEST)]
     frames = [frame for number, item in enumerate(payloads, 1) for frame in _sample(HOSTS[0], number, item)]
-    taken = _taken(_library(tmp_path, 1), tmp_path, _bursts(HOSTS[:1], frames))
+    taken = _taken(_library(tmp_path, 1), tmp_path, _bursts(HOSTS[:1], frames), 3 * LAST_CYCLES)
     assert taken == [_as_frame(payload) for payload in payloads]
 
 
