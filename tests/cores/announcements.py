@@ -295,7 +295,21 @@ class Peers:
         peer.told[PUBLICATIONS_WRITER] = 11
         return self.events
 
-    def _sure_writer(self, peer: _Peer, entity: bytes) -> bytes:
+    def flood(self, count: int) -> dict[int, Event]:
+        """A peer announces so many writers in one packet, and says so; the events in which it does so one by one."""
+        (peer,), told = self._peers, (DISCOVERY[PUBLICATIONS_WRITER], PUBLICATIONS_WRITER)
+        filler = Parameter.USER_DATA, self._octets(peer, bytes(600))
+        items = [
+            Data(*told, number, self._sure_writer(peer, bytes([0, 0, number, rtps.USER_WRITER]), filler))
+            for number in range(1, count + 1)
+        ]
+        self._come(peer)
+        self._send(peer, self._destination(), *items)
+        self._send(peer, self._destination(), Heartbeat(*told, 1, count, 7, True))
+        writer = Writer(is_little=peer.is_little)
+        return {item.number: Event(Kind.PACKET, writer.message(peer.prefix, item)) for item in items}
+
+    def _sure_writer(self, peer: _Peer, entity: bytes, *others: tuple[int, bytes]) -> bytes:
         """The announcement of a writer that matches the reliable reader."""
         topic, type_, _ = READ[SURE]
         return self._parameters(
@@ -304,6 +318,7 @@ class Peers:
             (Parameter.TOPIC_NAME, self._octets(peer, topic.encode() + b"\0")),
             (Parameter.TYPE_NAME, self._octets(peer, type_.encode() + b"\0")),
             (Parameter.RELIABILITY, self._word(peer, Reliability.RELIABLE) + bytes(8)),
+            *others,
         )
 
     # --- packets -----------------------------------------------------------------------------------------------------
@@ -587,12 +602,15 @@ class Peers:
             self._send(other, self._destination(), item)
 
     def _whole_samples(self, peer: _Peer) -> None:
-        """Packets of samples of all sizes in one submessage each, and fragments; some are cut, aborted or repeated."""
-        chance = self._chance
+        """Packets of samples of all sizes in one submessage each, and fragments; some are cut, aborted or repeated.
+
+        Unless a reader is reliable, there are no fragments, and the packets come one after the other.
+        """
+        chance, is_sure = self._chance, self._is_sure
         for _ in range(chance.randrange(1, 4)):
             other = [item for item in peer.writers if not item.is_sure] or [_Writer(b"none")]
-            writer = self._sure(peer) if chance.random() < 0.6 else chance.choice(other)
-            parts = self._parts(peer) if chance.random() < 0.3 else []
+            writer = self._sure(peer) if is_sure and chance.random() < 0.6 else chance.choice(other)
+            parts = self._parts(peer) if is_sure and chance.random() < 0.3 else []
             number = max(1, writer.number + chance.choice([1, 1, 1, 1, 1, 0, -1, 2]))
             items: list[Data | DataFrag] = []
             for _ in range(chance.choice([1, 1, 1, 2, 2, 3])):
@@ -604,14 +622,14 @@ class Peers:
             # The reference asks for a sample at once, and not after the packet, which may have it.
             items.sort(key=lambda item: item.number)
             for _ in range(chance.choice([1, 1, 1, 2])):
-                self._send(peer, self._destination(), *items)
+                self._send(peer, self._destination(), *items, is_slow=is_sure)
             # A cut sample takes the place of an older one of its writer, which the reference does not see.
             if len(items) == 1 and chance.random() < 0.2:
                 event = self.events[-1]
                 self.events[-1] = replace(event, data=event.data[: chance.randrange(20, len(event.data))])
             for part in parts:
                 self._send(peer, self._destination(), part)
-            if chance.random() < 0.3:
+            if is_sure and chance.random() < 0.3:
                 told = Heartbeat(rtps.NO_ENTITY, writer.entity, 1, writer.number, 4, chance.random() < 0.5)
                 self._send(peer, self._destination(), told)
 

@@ -10,9 +10,11 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.fabric.control import main_of
+from fusesoc_firm.fabric.rtps import PUBLICATIONS_WRITER
 from tests.cores.announcements import (
     ASSEMBLED,
     LONG,
+    ROOM,
     SAMPLE,
     SURE,
     WRITTEN,
@@ -31,6 +33,7 @@ from tests.cores.rtps_world import HARDWARE, World
 from tests.fabric.dissection import read_alike
 from tests.fabric.memories import bits
 from tests.fabric.messages import AckNack, Data, DataFrag, Gap, Heartbeat, InfoDestination, NackFrag, parse
+from tests.fabric.participant import DISCOVERY_REQUEST
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
@@ -240,6 +243,41 @@ def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
     assert 5 < len(found.frames) < len(wanted.frames)
     assert all(any(frame[5:] in event.data for event in events) for frame in found.frames)
     assert without_counts(found.sent) == without_counts(wanted.sent)
+
+
+@pytest.mark.check
+def test_a_host_that_takes_little_loses_whole_long_samples() -> None:
+    """They come while another one leaves: those that are taken are unchanged, and the loss is counted."""
+    print(f"seed {SEED}")
+    events = Peers(3, SEED, is_sure=False, waiting=SHORT).run(1500)
+    wanted = expected(events, ASSEMBLED, waiting=1 << 17)
+    with World(90, assembled=ASSEMBLED, waiting=SHORT) as world:
+        found = world.all(events)
+    sizes = [len(frame) - 5 for frame in found.frames]
+    print(len(wanted.frames), Counter(sizes), found.lossy)
+    assert found.lossy > 20 and sum(size > SHORT for size in sizes) > 20
+    assert len(found.frames) < len(wanted.frames)
+    sent = b"".join(event.data for event in events)
+    assert all(frame[5:] in sent for frame in found.frames)
+    assert without_counts(found.sent) == without_counts(wanted.sent)
+
+
+@pytest.mark.check
+def test_announcements_that_find_no_room_are_counted_and_asked_for() -> None:
+    """A packet has more of them than the memory; the node asks for two at a time."""
+    peers = Peers(1, SEED)
+    announced = peers.flood(ROOM.sources)
+    with World() as world:
+        world.all(peers.events)
+        assert (world.pulses["lost"], world.entries[1]) == (1, 0)
+        for _ in range(ROOM.sources):
+            sent = world.do(Event(Kind.TICKS, count=DISCOVERY_REQUEST)).sent
+            items = [item for _, packet in sent if (message := parse(packet)) for item in message.submessages]
+            asked = [item for item in items if isinstance(item, AckNack) and item.writer == PUBLICATIONS_WRITER]
+            assert all(item.missing.size <= 2 for item in asked)
+            for number in sorted({number for item in asked for number in item.missing}):
+                world.do(announced[number])
+        assert world.entries[1] == ROOM.sources
 
 
 @pytest.mark.check

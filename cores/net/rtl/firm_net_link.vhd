@@ -27,7 +27,7 @@ entity firm_net_link is
     HAS_STATUS    : boolean := false; -- the system has a status, which is read by UDP
     DISCOVERY     : integer := 4096;  -- bytes of discovery and of payloads that wait, see firm_rtps_node
     PAYLOADS      : integer := 4096;
-    ASSEMBLED     : integer := 0;     -- bytes of the longest message in fragments of RTPS, see firm_rtps_node
+    ASSEMBLED     : integer := 0;     -- bytes of the longest message that is put together, see firm_rtps_node
     -- Packets whose fragments may be interleaved, 0 to 4, and the bytes of the longest one; without them, fragments
     -- are dropped.
     REASSEMBLIES : integer := 0;

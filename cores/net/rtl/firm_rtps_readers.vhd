@@ -79,7 +79,7 @@ entity firm_rtps_readers is
 
     -- A pulse for each good packet with a sample:
     is_lost   : out std_logic; -- without room
-    is_parted : out std_logic  -- in fragments that are skipped
+    is_parted : out std_logic  -- that is skipped: in fragments, or too long
   );
 end entity firm_rtps_readers;
 

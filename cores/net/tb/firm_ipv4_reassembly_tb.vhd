@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends frames to the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether
 -- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a frame that leaves, in the
--- same form without the cycles; or `dropped`, or `lost`. After a long packet has left, the user is busy for some cycles;
--- the next one begins later, or when its time is over.
+-- same form without the cycles; or `dropped`, or `lost`. After a long packet has left, the user is busy for some
+-- cycles; the next one begins later, or when its time is over.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -137,7 +137,7 @@ begin
   end process check_gaps;
 
   be_busy : process (clk)
-    variable bytes   : natural := 0;
+    variable count   : natural := 0;
     variable left    : natural := 0;  -- cycles until the user has taken all of a long packet
     variable since   : natural := 0;  -- milliseconds, when it came
     variable is_late : boolean := false;
@@ -147,18 +147,18 @@ begin
         left := left - 1;
       end if;
       if m_tvalid = '1' then
-        if bytes = 0 then
+        if count = 0 then
           is_late := left = 0 or ms - since >= HOLD_TICKS-1;
         end if;
-        bytes := bytes + 1;
+        count := count + 1;
         if m_tlast = '1' then
-          if bytes >= HEAD+LONG and m_tuser = "0" then
+          if count >= HEAD+LONG and m_tuser = "0" then
             assert is_late
               report "a long packet begins while the user is busy" severity failure;
             left  := REST+BUSY_CYCLES;
             since := ms;
           end if;
-          bytes := 0;
+          count := 0;
         end if;
       end if;
       rests <= '1';
