@@ -175,7 +175,16 @@ architecture rtl of firm_ipv4_reassembly is
   signal shows_end_r : std_logic;
   signal data_r      : byte_t := (others => '0');
   signal head_r      : byte_t := (others => '0');
-  signal sent_byte   : byte_t;
+  -- One cycle later, since memories show their bytes late in a cycle.
+  signal sends_r      : std_logic;                          -- a byte of the packet
+  signal ends_sent_r  : std_logic;
+  signal sent_at_r    : size_t := (others => '0');
+  signal sent_data_r  : byte_t := (others => '0');
+  signal sent_head_r  : byte_t := (others => '0');
+  signal drains_r     : std_logic;                          -- a byte of the store
+  signal ends_store_r : std_logic;
+  signal store_data_r : byte_t := (others => '0');
+  signal sent_byte    : byte_t;
 
   signal user         : std_logic_vector(0 downto 0);        -- of the frame that comes; a fragment is aborted
   signal store_valid  : std_logic;
@@ -586,34 +595,45 @@ begin
   end process choose;
 
   -- Length, fragment and checksum are those of the whole packet.
-  sent_byte <= data_r when shown_at_r >= DATA_PLACE else
-               std_logic_vector(out_total_r(15 downto 8)) when shown_at_r = LENGTH_PLACE else
-               std_logic_vector(out_total_r(7 downto 0)) when shown_at_r = LENGTH_PLACE+1 else
-               x"00" when shown_at_r = FRAGMENT_PLACE or shown_at_r = FRAGMENT_PLACE+1 else
-               std_logic_vector(checksum_r(15 downto 8)) when shown_at_r = CHECKSUM_PLACE else
-               std_logic_vector(checksum_r(7 downto 0)) when shown_at_r = CHECKSUM_PLACE+1 else
-               mac(47 downto 40) when shown_at_r = 0 else
-               head_r;
+  sent_byte <= sent_data_r when sent_at_r >= DATA_PLACE else
+               std_logic_vector(out_total_r(15 downto 8)) when sent_at_r = LENGTH_PLACE else
+               std_logic_vector(out_total_r(7 downto 0)) when sent_at_r = LENGTH_PLACE+1 else
+               x"00" when sent_at_r = FRAGMENT_PLACE or sent_at_r = FRAGMENT_PLACE+1 else
+               std_logic_vector(checksum_r(15 downto 8)) when sent_at_r = CHECKSUM_PLACE else
+               std_logic_vector(checksum_r(7 downto 0)) when sent_at_r = CHECKSUM_PLACE+1 else
+               mac(47 downto 40) when sent_at_r = 0 else
+               sent_head_r;
 
   show : process (clk)
   begin
     if rising_edge(clk) then
+      sends_r      <= shown_r;
+      ends_sent_r  <= shows_end_r;
+      sent_at_r    <= shown_at_r;
+      sent_data_r  <= data_r;
+      sent_head_r  <= head_r;
+      drains_r     <= stored_valid and stored_ready;
+      ends_store_r <= stored_last;
+      store_data_r <= stored_data;
+
       m_axis_tdata  <= s_axis_tdata;
       m_axis_tuser  <= user;
       m_axis_tvalid <= s_axis_tvalid and not waits;
       m_axis_tlast  <= s_axis_tlast;
-      if state_r = SENDING then
+      if sends_r = '1' then
         m_axis_tdata  <= sent_byte;
         m_axis_tuser  <= "0";
-        m_axis_tvalid <= shown_r;
-        m_axis_tlast  <= shows_end_r;
-      elsif state_r = DRAINING then
-        m_axis_tdata  <= stored_data;
+        m_axis_tvalid <= '1';
+        m_axis_tlast  <= ends_sent_r;
+      elsif drains_r = '1' then
+        m_axis_tdata  <= store_data_r;
         m_axis_tuser  <= "0";
-        m_axis_tvalid <= stored_valid;
-        m_axis_tlast  <= stored_last;
+        m_axis_tvalid <= '1';
+        m_axis_tlast  <= ends_store_r;
       end if;
       if rst_n = '0' then
+        sends_r       <= '0';
+        drains_r      <= '0';
         m_axis_tvalid <= '0';
       end if;
     end if;
