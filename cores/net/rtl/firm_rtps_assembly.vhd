@@ -102,46 +102,46 @@ architecture rtl of firm_rtps_assembly is
   signal memory : memory_t;
 
   -- ------------------------------------------------------------------ the fragment that arrives
-  signal kind_r      : std_logic;                      -- it is one, and not of a key
-  signal data_r      : std_logic;                      -- it is a payload of DATA
-  signal other_r     : std_logic;                      -- the sample's number differs from that of the assembly
-  signal compares_r  : std_logic;                      -- the last byte of a field is that of a size, or of the number
+  signal kind_r      : std_logic;                     -- it is one, and not of a key
+  signal data_r      : std_logic;                     -- it is a payload of DATA
+  signal other_r     : std_logic;                     -- the sample's number differs from that of the assembly
+  signal compares_r  : std_logic;                     -- the last byte of a field is one of a size or of that number
   signal field_r     : std_logic_vector(7 downto 0) := (others => '0');
-  signal wanted_r    : std_logic_vector(7 downto 0) := (others => '0');  -- of the next fragment
-  signal differs     : std_logic;                      -- a size differs, or the number of the next fragment
+  signal wanted_r    : std_logic_vector(7 downto 0) := (others => '0');  -- what it has to be
+  signal differs     : std_logic;                     -- a size differs, or the number of the next fragment
   signal differs_r   : std_logic;
-  signal later_r     : std_logic;                      -- it is not the first one of its sample
+  signal later_r     : std_logic;                     -- it is not the first one of its sample
   signal size_r      : half_t := (others => '0');
-  signal high_r      : std_logic;                      -- the size has more than 16 bits
+  signal high_r      : std_logic;                     -- the size has more than 16 bits
   signal each_r      : half_t := (others => '0');
   signal count_r     : half_t := (others => '0');
   signal fits        : std_logic;
-  signal has_bytes   : std_logic;                      -- neither a size nor the number of fragments is zero
+  signal has_bytes   : std_logic;                     -- neither a size nor the number of fragments is zero
   signal has_parts_r : std_logic;                     -- except for that of the sample
-  signal is_holder   : std_logic;                      -- its writer is that of the assembly
-  signal is_same     : std_logic;                      -- and so is its sample
-  signal is_free     : std_logic;                      -- the assembly is not whole
+  signal is_holder   : std_logic;                     -- its writer is that of the assembly
+  signal is_same     : std_logic;                     -- and so is its sample
+  signal is_free     : std_logic;                     -- the assembly is not whole
   signal continues   : std_logic;
   signal begins      : std_logic;
-  signal inside_r    : std_logic;                      -- a byte of the payload has come
-  signal is_first    : std_logic;                      -- this is the first one
-  signal taken_r     : std_logic;                      -- its bytes are taken
-  signal closed_r    : std_logic;                      -- its sample, or the count of fragments, is full
-  signal between_r   : std_logic;                      -- the bytes so far are whole fragments
+  signal inside_r    : std_logic;                     -- a byte of the payload has come
+  signal is_first    : std_logic;                     -- this is the first one
+  signal taken_r     : std_logic;                     -- its bytes are taken
+  signal closed_r    : std_logic;                     -- its sample, or the count of fragments, is full
+  signal between_r   : std_logic;                     -- the bytes so far are whole fragments
   signal byte_r      : std_logic_vector(7 downto 0) := (others => '0');
   signal valid_r     : std_logic;
-  signal continued   : std_logic;                      -- a byte of a sample that has begun
+  signal continued   : std_logic;                     -- a byte of a sample that has begun
   signal writes      : std_logic;
-  signal begins_r    : std_logic;                      -- this is the first byte of a fragment, and of its sample
-  signal first_r     : std_logic;                      -- this is the first byte of DATA, and there may be room
-  signal succeeds_r  : std_logic;                      -- if its sample takes the place of an older one
-  signal takes       : std_logic;                      -- its bytes are taken from this one on
-  signal taken       : std_logic;                      -- the bytes so far are taken
-  signal came_r      : place_t := (others => '0');     -- bytes of the payload
-  signal over_r      : std_logic;                      -- these are too many
-  signal is_placed   : std_logic;                      -- a DATA that ends is the sample, if there is a place for it
-  signal ends_part   : std_logic;                      -- this is the last byte of a fragment
-  signal is_end      : std_logic;                      -- all of the sample has come
+  signal begins_r    : std_logic;                     -- this is the first byte of a fragment, and of its sample
+  signal first_r     : std_logic;                     -- this is the first byte of DATA, and there may be room
+  signal succeeds_r  : std_logic;                     -- if its sample takes the place of an older one
+  signal takes       : std_logic;                     -- its bytes are taken from this one on
+  signal taken       : std_logic;                     -- the bytes so far are taken
+  signal came_r      : place_t := (others => '0');    -- bytes of the payload
+  signal over_r      : std_logic;                     -- these are too many
+  signal is_placed   : std_logic;                     -- a DATA that ends is the sample, if there is a place for it
+  signal ends_part   : std_logic;                     -- this is the last byte of a fragment
+  signal is_end      : std_logic;                     -- all of the sample has come
   -- To come: bytes of the fragment, fragments, and bytes of the sample; and whether that is one, or none.
   signal part_r      : half_t := (others => '0');
   signal parts_r     : half_t := (others => '0');
@@ -156,7 +156,7 @@ architecture rtl of firm_rtps_assembly is
   signal one_count_r : std_logic;
   signal one_rest_r  : std_logic;
 
-  -- The end of a submessage or a packet, and one cycle later.
+  -- The end of a submessage or a packet; all that follows from it happens one cycle later.
   signal keeps       : std_logic;                     -- its bytes count
   signal completes   : std_logic;                     -- the sample has come, and has a place
   signal keeps_r     : std_logic;
@@ -291,7 +291,7 @@ begin
   is_end    <= kind_r and ((continued and one_left_r) or (taken_r and none_left_r and between_r));
   is_placed <= data_r and taken and not has_room and not over_r;
 
-  -- More cycles are between these numbers and the first byte.
+  -- These numbers are complete at least four cycles before the first byte.
   look_ahead : process (clk)
   begin
     if rising_edge(clk) then
