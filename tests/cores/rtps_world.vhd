@@ -16,6 +16,7 @@ entity rtps_world is
     SLOTS        : integer := 16;
     RELIABLE     : integer := 0; -- a bit for each endpoint
     TRANSIENT    : integer := 0;
+    BYTES        : integer := 4096;
     ASSEMBLED    : integer := 0;
     PROGRAM_BITS : integer := 13 -- of an address in the memory of packets
   );
@@ -130,7 +131,7 @@ begin
       SAMPLE    => SAMPLE,
       SLOTS     => SLOTS,
       DEPTH     => 4096,
-      BYTES     => 4096,
+      BYTES     => BYTES,
       SAMPLES   => 16,
       ASSEMBLED => ASSEMBLED
     )
