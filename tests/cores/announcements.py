@@ -107,6 +107,7 @@ class Results:
     sent: list[Sent] = field(default_factory=list)
     refused: int = 0
     lossy: int = 0  # packets with a sample without room
+    skipped: int = 0  # packets with a sample that is too long
 
 
 def expected(events: Sequence[Event], assembled: int = 0, sample: int = SAMPLE, waiting: int = WAITING) -> Results:
@@ -137,6 +138,7 @@ def expected(events: Sequence[Event], assembled: int = 0, sample: int = SAMPLE, 
         participant.outbox.clear()
     print(participant.counts)
     results.lossy = participant.counts["packets with samples without room"]
+    results.skipped = participant.counts["packets with samples that are too long"]
     return results
 
 

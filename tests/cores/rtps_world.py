@@ -102,5 +102,6 @@ class World:
             some = self.do(event)
             found.frames += some.frames
             found.sent += some.sent
-        found.refused, found.lossy = self.pulses["refused"], self.pulses["lost"]
+        found.refused = self.pulses["refused"]
+        found.lossy, found.skipped = self.pulses["lost"], self.pulses["parted"]
         return found

@@ -57,7 +57,8 @@ entity rtps_world is
     is_sample_lost      : out std_logic;
     is_peer_refused     : out std_logic;
     is_endpoint_refused : out std_logic;
-    is_frame_refused    : out std_logic
+    is_frame_refused    : out std_logic;
+    is_sample_parted    : out std_logic
   );
 end entity rtps_world;
 
@@ -181,7 +182,7 @@ begin
       is_peer_refused     => is_peer_refused,
       is_endpoint_refused => is_endpoint_refused,
       is_frame_refused    => is_frame_refused,
-      is_sample_parted    => open,
+      is_sample_parted    => is_sample_parted,
       is_packet_broken    => open,
       is_endpoint_other   => open
     );

@@ -280,10 +280,11 @@ class Participant:
         self.sources: list[Source] = []
         self.sinks: list[Sink] = []
         self.assembly: Assembly | None = None
-        # Of this packet: the sample that was put together, the bytes for payloads, and whether a sample found none.
+        # Of this packet: the sample that was put together, the bytes for payloads, whether a sample found none, and
+        # whether one is too long.
         self._assembled: tuple[Source, int] | None = None
         self._room = 0
-        self._has_lost = False
+        self._has_lost = self._has_skipped = False
         self.histories = {item.entity: History(item) for item in node.writers}
         self._announced = {
             PUBLICATIONS_WRITER: [node.endpoint_data(item) for item in node.writers],
@@ -442,7 +443,8 @@ class Participant:
             self.counts["packets of others"] += 1
             return
         self.counts["faulty packets"] += not message.is_whole
-        self._assembled, self._room, self._has_lost = None, self._limits.waiting, False
+        self._assembled, self._room = None, self._limits.waiting
+        self._has_lost = self._has_skipped = False
         for source in self.sources:
             source.before = source.expected
         if peer := self.peers.get(message.prefix):
@@ -454,6 +456,7 @@ class Participant:
             elif is_mine:
                 self._submessage(message.prefix, item)
         self.counts["packets with samples without room"] += self._has_lost
+        self.counts["packets with samples that are too long"] += self._has_skipped
 
     def _submessage(self, prefix: bytes, item: Submessage) -> None:
         if isinstance(item, Data) and item.writer == rtps.PARTICIPANT_WRITER:
@@ -655,7 +658,7 @@ class Participant:
                     self._lose()
                 return
             elif len(payload) > self._limits.assembled:
-                self.counts["payloads that are too long"] += 1
+                self._skip()
                 payload = None
             else:
                 self._assembled = source, item.number
@@ -675,6 +678,10 @@ class Participant:
         has_room = part is None and self._assembled is None and self._limits.assembled > 0
         return has_room and number >= source.before
 
+    def _skip(self) -> None:
+        self.counts["payloads that are too long"] += 1
+        self._has_skipped = True
+
     def _lose(self) -> None:
         self.counts["samples without room"] += 1
         self._has_lost = True
@@ -689,7 +696,7 @@ class Participant:
         if item.is_key:
             return
         if item.size > self._limits.assembled:
-            self.counts["payloads that are too long"] += 1
+            self._skip()
             if self._is_next(source, item.number):
                 source.advance(item.number + 1)
             return

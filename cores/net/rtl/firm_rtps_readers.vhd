@@ -438,6 +438,9 @@ begin
         misses  := misses_r or (is_sample and not pushes)
                    or (is_wanted and (data_r or fragment_r) and is_unplaced);
         skips   := skips_r or (is_sample and fragment_r and is_long);
+        if ASSEMBLED /= 0 and is_sample = '1' and data_r = '1' and is_long = '1' then
+          skips := '1';
+        end if;
       end if;
       if ends_r = '1' then
         -- The packet may end with the submessage.
