@@ -5,7 +5,8 @@
 -- further packets, in the order in which these were complete.
 --
 -- The user has room for the content of one long packet. So the next long one waits until the user rests, but not for
--- ever; other packets pass it.
+-- ever. Other packets pass it, and frames wait as well, as long as there is room: they would tell the user of what it
+-- has not got yet.
 --
 -- Fragments of several packets may be interleaved, but those of each packet come in order, as hosts send them and an
 -- Ethernet keeps them. So the state of a packet is its size so far, whatever the number of fragments. A packet that
@@ -192,6 +193,7 @@ architecture rtl of firm_ipv4_reassembly is
   signal stored_valid : std_logic;
   signal stored_last  : std_logic;
   signal stored_ready : std_logic;
+  signal loses        : std_logic;
 
   -- The lowest one of several; 0 if there is none.
   function lowest(slots : slots_t) return slot_t is
@@ -489,7 +491,7 @@ begin
         held_r  <= '1';
         rest_r  <= REST-1;
         since_r <= 0;
-      elsif rest_r = 0 then
+      elsif rest_r = 0 or loses = '1' then
         held_r <= '0';
       elsif tick = '1' then
         since_r <= since_r + 1;
@@ -528,9 +530,10 @@ begin
       m_axis_tvalid => stored_valid,
       m_axis_tlast  => stored_last,
       m_axis_tready => stored_ready,
-      is_lost       => is_lost
+      is_lost       => loses
     );
 
+  is_lost      <= loses;
   stored_ready <= '1' when state_r = DRAINING else '0';
 
   choose : process (clk)
@@ -550,6 +553,8 @@ begin
         elsif ready /= NO_SLOT then
           state_r    <= SENDING;
           out_slot_r <= lowest(next_one);
+        elsif whole_r /= NO_SLOT then
+          state_r <= RESTING;
         end if;
       elsif state_r = SENDING then
         out_last_r  <= sizes_r(to_integer(out_slot_r)) + (DATA_PLACE-1);
@@ -571,12 +576,12 @@ begin
         out_place_r <= (others => '0');
         if gap_r /= 0 then
           gap_r <= gap_r - 1;
-        elsif stored_valid = '1' and (turn_r = '1' or ready = NO_SLOT) then
+        elsif stored_valid = '1' and (turn_r = '1' or whole_r = NO_SLOT) then
           state_r <= DRAINING;
         elsif ready /= NO_SLOT then
           state_r    <= SENDING;
           out_slot_r <= lowest(next_one);
-        elsif (place_r = 0 or waits_r = '0') and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
+        elsif whole_r = NO_SLOT and (place_r = 0 or waits_r = '0') and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
           state_r <= PASSING;
         end if;
       elsif stored_valid = '1' and stored_last = '1' then
