@@ -175,7 +175,7 @@ def test_a_frame_without_room_is_lost(library: Library, tmp_path: Path) -> None:
 def test_a_long_packet_waits_until_the_one_before_is_out(
     library: Library, tmp_path: Path, hold: int, busy: int
 ) -> None:
-    """But not for ever; other packets and frames pass it. The bench has the time at which each begins."""
+    """But not for ever; other packets pass it. The bench has the time at which each begins."""
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     long = [chance.randbytes(2000) for _ in range(4)]

@@ -5,7 +5,7 @@
 -- further packets, in the order in which these were complete.
 --
 -- The user has room for the content of one long packet. So the next long one waits until the user rests, but not for
--- ever. Other packets pass it, and frames wait as well, as long as there is room: they would tell the user of what it
+-- ever. Other packets pass it; frames wait as well, as long as there is room, since they would tell the user of what it
 -- has not got yet.
 --
 -- Fragments of several packets may be interleaved, but those of each packet come in order, as hosts send them and an
@@ -581,7 +581,8 @@ begin
         elsif ready /= NO_SLOT then
           state_r    <= SENDING;
           out_slot_r <= lowest(next_one);
-        elsif whole_r = NO_SLOT and (place_r = 0 or waits_r = '0') and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
+        elsif whole_r = NO_SLOT and (place_r = 0 or waits_r = '0')
+              and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
           state_r <= PASSING;
         end if;
       elsif stored_valid = '1' and stored_last = '1' then
