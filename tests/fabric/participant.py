@@ -48,6 +48,8 @@ AFTER_FAREWELL = 200
 DISCOVERY_REQUEST, DISCOVERY_HEARTBEAT = 200, 500
 # A writer that has written nothing may not answer.
 USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
+# A request that is repeated waits for twice as long as the one before, up to this.
+LONGEST_REQUEST = 320
 ASSEMBLY = 1000
 WINDOW = 2
 MOST_REQUESTED = 8
@@ -191,6 +193,7 @@ class Source:
     requested: int = 0
     asked: int = 0  # the fragment after those that were asked for, or 0
     next_request: int = 0
+    patience: int = 0  # ms to the next request for the same number
     before: int = 1  # `expected` when the packet began
 
     @property
@@ -412,12 +415,15 @@ class Participant:
 
     def _request(self, source: Source) -> None:
         """Ask for what is missing, or for a heartbeat if the writer has not told what it has."""
-        most = 1 if source.requested == source.expected else MOST_REQUESTED
+        part = self._part_of(source) if source.is_heard else None
+        repeats = source.requested == source.expected and not (part and self._has_come(source, part))
+        most = 1 if repeats else MOST_REQUESTED
+        source.patience = min(2 * source.patience, LONGEST_REQUEST) if repeats else USER_REQUEST
         source.requested = source.expected
-        source.next_request = self._now + (USER_REQUEST if source.is_heard else UNHEARD_REQUEST)
+        source.next_request = self._now + (source.patience if source.is_heard else UNHEARD_REQUEST)
         ends = source.endpoint.entity, source.entity
-        if source.is_heard and (part := self._part_of(source)):
-            missing = part.missing(MOST_REQUESTED if self._has_come(source, part) else most)
+        if part:
+            missing = part.missing(most)
             source.asked = part.fragment + missing.size
             self._send_to(
                 source.peer,
