@@ -97,6 +97,7 @@ _TIMES = {
     "DISCOVERY_REQUEST": 200,
     "DISCOVERY_HEARTBEAT": 500,
     "USER_REQUEST": 20,
+    "LONGEST_REQUEST": 320,
     "UNHEARD_REQUEST": 500,
     "USER_HEARTBEAT": 100,
     # Seconds, and one more: the first one may be short.

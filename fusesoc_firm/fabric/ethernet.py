@@ -14,11 +14,11 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.system.derived.ethernet import (
     LEAST_REASSEMBLED,
+    WAITING_BYTES,
     assembled_bytes,
     discovery_bytes,
     reassembled_bytes,
     slot_bytes,
-    waiting_bytes,
 )
 from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entity
@@ -77,7 +77,7 @@ def fragment_bytes(system: DerivedSystem, node: Node) -> int:
     """Return the bytes of the memories for messages in several packets, which are in use until they have left."""
     longest = reassembled_bytes(system)
     places = 1 << (_PLACES * node.network.reassemblies - 1).bit_length()
-    waiting = waiting_bytes(system) + discovery_bytes(system) * _DISCOVERY_BITS // 8
+    waiting = WAITING_BYTES + discovery_bytes(system) * _DISCOVERY_BITS // 8
     return longest * places + assembled_bytes(system) + waiting if longest else 0
 
 
@@ -126,7 +126,7 @@ def _configuration(system: DerivedSystem, node: Node, entities: Context) -> Cont
         # Without DHCP they have no effect.
         **{f"{name}_packet": numbers.get(name, 0) for name in dhcp.PACKETS},
         "discovery": discovery_bytes(system),
-        "waiting": waiting_bytes(system),
+        "waiting": WAITING_BYTES,
         "assembled": assembled_bytes(system),
         "reassemblies": node.network.reassemblies if reassembled_bytes(system) else 0,
         # Without a reassembly it has no effect.

@@ -154,8 +154,8 @@ def measured_tables(
     wanted = [row for found in table_rows.values() for row in found if re.search(pattern, row.name)]
 
     def measured(row: Row) -> tuple[str, ...]:
-        found = _placed(row, nextpnr, seeds)
-        tell(f"{row.name}: {found if isinstance(found, str) else _summary(found)}")
+        found = placed(row, nextpnr, seeds)
+        tell(f"{row.name}: {found if isinstance(found, str) else summary(found)}")
         return _cells(row, found)
 
     nextpnr.prepare()
@@ -169,7 +169,7 @@ def measured_tables(
     return tables
 
 
-def _placed(row: Row, nextpnr: Nextpnr, seeds: Sequence[int]) -> Placement | str:
+def placed(row: Row, nextpnr: Nextpnr, seeds: Sequence[int]) -> Placement | str:
     """Return the placement, or the error."""
     with tempfile.TemporaryDirectory() as name:
         try:
@@ -179,11 +179,13 @@ def _placed(row: Row, nextpnr: Nextpnr, seeds: Sequence[int]) -> Placement | str
             return f"{FAILED}: {error}"
 
 
-def _summary(found: Placement) -> str:
-    return f"{found.median:.1f} MHz ({_of_seeds(found)}), {found.cells}; slowest: {' > '.join(found.path)}"
+def summary(found: Placement) -> str:
+    """What is told of a placement."""
+    return f"{found.median:.1f} MHz ({of_seeds(found)}), {found.cells}; slowest: {' > '.join(found.path)}"
 
 
-def _of_seeds(found: Placement) -> str:
+def of_seeds(found: Placement) -> str:
+    """The frequencies of the seeds."""
     return " ".join(f"{fmax:.0f}" for fmax in found.fmax.values())
 
 
@@ -193,7 +195,7 @@ def _cells(row: Row, found: Placement | str) -> tuple[str, ...]:
         return (*row.key, "", "", "", "", bar, FAILED, stretch)
     verdict = "" if row.bar is None else MET if found.median >= row.bar else MISSED
     cells = (str(found.cells.lut), str(found.cells.ff))
-    return (*row.key, f"{found.median:.1f}", _of_seeds(found), *cells, bar, verdict, stretch)
+    return (*row.key, f"{found.median:.1f}", of_seeds(found), *cells, bar, verdict, stretch)
 
 
 def _not_measured(row: Row) -> tuple[str, ...]:

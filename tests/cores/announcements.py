@@ -50,6 +50,7 @@ ROOM = Sizes(sources=8, sinks=8)  # in the tables; less than for eight peers
 SAMPLE = 64  # bytes of the longest payload that the node sends
 LONG = 65536  # the same, if it sends samples in fragments
 ASSEMBLED = 4096  # bytes of the longest one that it puts together, if it does
+WAITING = 4096  # bytes of payloads that wait
 IDLE = -1  # an event that waits until the node has nothing to do
 _GAP = 12  # cycles between two packets, at least
 _ETHERNET, _UDP = 14, 42  # bytes before the header of IPv4, and before the payload of UDP
@@ -105,16 +106,19 @@ class Results:
     frames: list[bytes] = field(default_factory=list)
     sent: list[Sent] = field(default_factory=list)
     refused: int = 0
+    lossy: int = 0  # packets with a sample without room
+    skipped: int = 0  # packets with a sample that is too long
 
 
-def expected(events: Sequence[Event], assembled: int = 0, sample: int = SAMPLE) -> Results:
+def expected(events: Sequence[Event], assembled: int = 0, sample: int = SAMPLE, waiting: int = WAITING) -> Results:
     """What the reference does; samples in fragments have up to so many bytes, and those that it sends."""
     node, results, now = a_node(), Results(), 0
 
     def take(endpoint: Endpoint, payload: bytes) -> None:
         results.frames.append(struct.pack("<BI", node.readers.index(endpoint), len(payload)) + payload)
 
-    limits = Limits(sources=ROOM.sources, sinks=ROOM.sinks, longest=max(1344, assembled), assembled=assembled)
+    longest = max(1344, assembled)
+    limits = Limits(sources=ROOM.sources, sinks=ROOM.sinks, longest=longest, assembled=assembled, waiting=waiting)
     participant = Participant(node, take, limits)
     participant.start(now)
     for event in events:
@@ -133,6 +137,8 @@ def expected(events: Sequence[Event], assembled: int = 0, sample: int = SAMPLE) 
         results.sent += participant.outbox
         participant.outbox.clear()
     print(participant.counts)
+    results.lossy = participant.counts["packets with samples without room"]
+    results.skipped = participant.counts["packets with samples that are too long"]
     return results
 
 
@@ -205,8 +211,8 @@ class Peers:
 
     If they exaggerate, so do their lists of encodings. Unless `is_sure`, no writer matches the reliable reader. `burst`
     is the largest number of packets for best effort that are sent one after the other. If it `is_long`, they also send
-    samples in fragments. `sample` is the size of the longest payload that the node sends; if it may need fragments, the
-    peers ask for some.
+    samples in fragments; if `waiting` is not 0, also samples of one submessage that find no room in so many bytes.
+    `sample` is the size of the longest payload that the node sends; if it may need fragments, the peers ask for some.
     """
 
     def __init__(
@@ -218,10 +224,11 @@ class Peers:
         is_sure: bool = True,
         burst: int = 5,
         is_long: bool = False,
+        waiting: int = 0,
         sample: int = SAMPLE,
     ) -> None:
         self._sample_bytes = sample
-        self._is_sure, self._burst, self._is_long = is_sure, burst, is_long
+        self._is_sure, self._burst, self._is_long, self._waiting = is_sure, burst, is_long, waiting
         self._exaggerates = exaggerate
         self._chance, self._node = random.Random(seed), a_node()
         self._peers = [self._peer(number) for number in range(count)]
@@ -260,6 +267,8 @@ class Peers:
         }
         if self._is_long:
             ways[self._long_sample] = 40
+        if self._waiting:
+            ways[self._whole_samples] = 40
         if self._sample_bytes > FRAGMENT_BYTES:
             ways |= {self._ask_for_fragments: 30, self._publish: 30, self._ask: 30}
         for _ in range(count):
@@ -288,7 +297,21 @@ class Peers:
         peer.told[PUBLICATIONS_WRITER] = 11
         return self.events
 
-    def _sure_writer(self, peer: _Peer, entity: bytes) -> bytes:
+    def flood(self, count: int) -> dict[int, Event]:
+        """A peer announces so many writers in one packet, and says so; the events in which it does so one by one."""
+        (peer,), told = self._peers, (DISCOVERY[PUBLICATIONS_WRITER], PUBLICATIONS_WRITER)
+        filler = Parameter.USER_DATA, self._octets(peer, bytes(600))
+        items = [
+            Data(*told, number, self._sure_writer(peer, bytes([0, 0, number, rtps.USER_WRITER]), filler))
+            for number in range(1, count + 1)
+        ]
+        self._come(peer)
+        self._send(peer, self._destination(), *items)
+        self._send(peer, self._destination(), Heartbeat(*told, 1, count, 7, True))
+        writer = Writer(is_little=peer.is_little)
+        return {item.number: Event(Kind.PACKET, writer.message(peer.prefix, item)) for item in items}
+
+    def _sure_writer(self, peer: _Peer, entity: bytes, *others: tuple[int, bytes]) -> bytes:
         """The announcement of a writer that matches the reliable reader."""
         topic, type_, _ = READ[SURE]
         return self._parameters(
@@ -297,6 +320,7 @@ class Peers:
             (Parameter.TOPIC_NAME, self._octets(peer, topic.encode() + b"\0")),
             (Parameter.TYPE_NAME, self._octets(peer, type_.encode() + b"\0")),
             (Parameter.RELIABILITY, self._word(peer, Reliability.RELIABLE) + bytes(8)),
+            *others,
         )
 
     # --- packets -----------------------------------------------------------------------------------------------------
@@ -578,6 +602,46 @@ class Peers:
                 self.events[-1] = replace(event, data=event.data[: chance.randrange(20, len(event.data))])
         for item in others:
             self._send(other, self._destination(), item)
+
+    def _whole_samples(self, peer: _Peer) -> None:
+        """Packets of samples of all sizes in one submessage each, and fragments; some are cut, aborted or repeated.
+
+        Unless a reader is reliable, there are no fragments, and the packets come one after the other.
+        """
+        chance, is_sure = self._chance, self._is_sure
+        for _ in range(chance.randrange(1, 4)):
+            other = [item for item in peer.writers if not item.is_sure] or [_Writer(b"none")]
+            writer = self._sure(peer) if is_sure and chance.random() < 0.6 else chance.choice(other)
+            parts = self._parts(peer) if is_sure and chance.random() < 0.3 else []
+            number = max(1, writer.number + chance.choice([1, 1, 1, 1, 1, 0, -1, 2]))
+            items: list[Data | DataFrag] = []
+            for _ in range(chance.choice([1, 1, 1, 2, 2, 3])):
+                if parts and chance.random() < 0.5:
+                    items.append(parts.pop(0))
+                items.append(self._whole(writer, number))
+                writer.number = max(writer.number, number)
+                number += chance.choice([1, 1, 1, 0])
+            # The reference asks for a sample at once, and not after the packet, which may have it.
+            items.sort(key=lambda item: item.number)
+            for _ in range(chance.choice([1, 1, 1, 2])):
+                self._send(peer, self._destination(), *items, is_slow=is_sure)
+            # A cut sample takes the place of an older one of its writer, which the reference does not see.
+            if len(items) == 1 and chance.random() < 0.2:
+                event = self.events[-1]
+                self.events[-1] = replace(event, data=event.data[: chance.randrange(20, len(event.data))])
+            for part in parts:
+                self._send(peer, self._destination(), part)
+            if is_sure and chance.random() < 0.3:
+                told = Heartbeat(rtps.NO_ENTITY, writer.entity, 1, writer.number, 4, chance.random() < 0.5)
+                self._send(peer, self._destination(), told)
+
+    def _whole(self, writer: _Writer, number: int) -> Data:
+        chance = self._chance
+        sizes = [self._waiting + place for place in (-1, 0, 1)] + [ASSEMBLED + place for place in (-1, 0, 1, 900)]
+        size = chance.choice([*sizes, *range(1, 9), self._waiting // 2, self._waiting // 2 + 1, 2 * self._waiting])
+        inline = ((Parameter.STATUS_INFO, bytes(4)),) if chance.random() < 0.2 else ()
+        reader = chance.choice([rtps.NO_ENTITY] * 9 + [self._node.readers[0].entity])
+        return Data(reader, writer.entity, number, chance.randbytes(size), inline)
 
     def _parts(self, peer: _Peer) -> list[DataFrag]:
         """The fragments of a sample, some of them twice, as if they had been asked for."""

@@ -101,6 +101,7 @@ class World {
     if (top_.sent_tvalid) collect("sent", sent_, top_.sent_tdata, top_.sent_tlast);
     if (top_.is_frame_refused) std::puts("refused");
     if (top_.is_sample_lost || top_.is_discovery_lost) std::puts("lost");
+    if (top_.is_sample_parted) std::puts("parted");
     if (top_.is_peer_refused) std::puts("peer");
     if (top_.is_endpoint_refused) std::puts("endpoint");
   }

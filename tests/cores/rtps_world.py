@@ -15,7 +15,7 @@ from fusesoc_firm.fabric.control import Sizes, main_of
 from fusesoc_firm.fabric.node import Node
 from fusesoc_firm.fabric.packets import programs_of
 from tests.bench.model import compiled
-from tests.cores.announcements import ROOM, SAMPLE, Event, Kind, Results, a_node, sent
+from tests.cores.announcements import ROOM, SAMPLE, WAITING, Event, Kind, Results, a_node, sent
 from tests.fabric.memories import generics, memories
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
@@ -25,18 +25,18 @@ HERE = Path(__file__).parent
 HARDWARE = ("axis/package", "axis/axis", "net/mac", "net/builder", "net/rtps")
 
 
-def program(node: Node, sizes: Sizes, assembled: int, sample: int) -> Path:
+def program(node: Node, sizes: Sizes, assembled: int, sample: int, waiting: int) -> Path:
     """The program, which is compiled once; without Verilator, the test is skipped."""
     if not shutil.which("verilator"):
         pytest.skip("verilator is not installed")
-    name = f"rtps_world_{len(node.endpoints)}_{sizes.sources}_{sizes.sinks}_{assembled}_{sample}"
-    return made_once(name, partial(_build, node, sizes, assembled, sample)) / "model" / "Vrtps_world"
+    name = f"rtps_world_{len(node.endpoints)}_{sizes.sources}_{sizes.sinks}_{assembled}_{sample}_{waiting}"
+    return made_once(name, partial(_build, node, sizes, assembled, sample, waiting)) / "model" / "Vrtps_world"
 
 
-def _build(node: Node, sizes: Sizes, assembled: int, sample: int, folder: Path) -> Path:
+def _build(node: Node, sizes: Sizes, assembled: int, sample: int, waiting: int, folder: Path) -> Path:
     """GHDL's netlist of the hardware, translated by Verilator."""
     files = [*memories(node, "rtps_world", folder, sizes), HERE / "rtps_world.vhd"]
-    given = {**generics(node, sizes), "ASSEMBLED": assembled, "SAMPLE": sample}
+    given = {**generics(node, sizes), "ASSEMBLED": assembled, "SAMPLE": sample, "BYTES": waiting}
     given["PROGRAM_BITS"] = programs_of(node).address_bits
     verilog = netlist("rtps_world", folder, files, core_files(*HARDWARE), (), **given)
     bench = (HERE / "rtps_world.cpp").read_text(encoding="ascii")
@@ -53,9 +53,10 @@ class World:
         sizes: Sizes = ROOM,
         assembled: int = 0,
         sample: int = SAMPLE,
+        waiting: int = WAITING,
     ) -> None:
         own = node or a_node()
-        words = [str(program(own, sizes, assembled, sample)), str(main_of(own)), str(stall)]
+        words = [str(program(own, sizes, assembled, sample, waiting)), str(main_of(own)), str(stall)]
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match
@@ -102,4 +103,5 @@ class World:
             found.frames += some.frames
             found.sent += some.sent
         found.refused = self.pulses["refused"]
+        found.lossy, found.skipped = self.pulses["lost"], self.pulses["parted"]
         return found

@@ -16,6 +16,7 @@ entity rtps_world is
     SLOTS        : integer := 16;
     RELIABLE     : integer := 0; -- a bit for each endpoint
     TRANSIENT    : integer := 0;
+    BYTES        : integer := 4096;
     ASSEMBLED    : integer := 0;
     PROGRAM_BITS : integer := 13 -- of an address in the memory of packets
   );
@@ -56,7 +57,8 @@ entity rtps_world is
     is_sample_lost      : out std_logic;
     is_peer_refused     : out std_logic;
     is_endpoint_refused : out std_logic;
-    is_frame_refused    : out std_logic
+    is_frame_refused    : out std_logic;
+    is_sample_parted    : out std_logic
   );
 end entity rtps_world;
 
@@ -130,7 +132,7 @@ begin
       SAMPLE    => SAMPLE,
       SLOTS     => SLOTS,
       DEPTH     => 4096,
-      BYTES     => 4096,
+      BYTES     => BYTES,
       SAMPLES   => 16,
       ASSEMBLED => ASSEMBLED
     )
@@ -180,7 +182,7 @@ begin
       is_peer_refused     => is_peer_refused,
       is_endpoint_refused => is_endpoint_refused,
       is_frame_refused    => is_frame_refused,
-      is_sample_parted    => open,
+      is_sample_parted    => is_sample_parted,
       is_packet_broken    => open,
       is_endpoint_other   => open
     );

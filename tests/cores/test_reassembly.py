@@ -171,6 +171,38 @@ def test_a_frame_without_room_is_lost(library: Library, tmp_path: Path) -> None:
     assert len(events) > 3
 
 
+@pytest.mark.parametrize(("hold", "busy"), [(300, 20_000), (4, 1_000_000)])
+def test_a_long_packet_waits_until_the_one_before_is_out(
+    library: Library, tmp_path: Path, hold: int, busy: int
+) -> None:
+    """But not for ever; other packets pass it. The bench has the time at which each begins."""
+    print(f"seed {SEED}")
+    chance = random.Random(SEED)
+    long = [chance.randbytes(2000) for _ in range(4)]
+    short = [chance.randbytes(700) for _ in range(4)]
+    sent: list[tuple[int, bytes]] = []
+    for number in range(4):
+        parts = [
+            *fragments(HOSTS[0], number, long[number], 1000),
+            *fragments(HOSTS[1], number, short[number], 400),
+            echo_request(bytes([number]) * 30),
+        ]
+        sent += [(0, part) for part in parts]
+        # Two of them wait together.
+        sent[-1] = (6000 if number == 1 else 0, parts[-1])
+    rows = [(before, False, frame) for before, frame in sent]
+    generics = {"PACKETS": 4, "LONG": 1024, "BUSY_CYCLES": busy, "HOLD_TICKS": hold, "LAST_CYCLES": 100000}
+    frames, events = _run(library, tmp_path, rows, **generics)
+    assert events == []
+    passed, made = _parts(frames, [frame for _, frame in sent])
+    assert passed == _passing([frame for _, frame in sent])
+    data = [frame[34:] for frame in made]
+    assert [item for item in data if len(item) == 2000] == long
+    assert [item for item in data if len(item) == 700] == short
+    # The second long one comes before the second short one, and leaves after it.
+    assert data.index(short[1]) < data.index(long[1])
+
+
 def test_frames_of_others_are_never_reassembled(library: Library, tmp_path: Path) -> None:
     data = bytes(2000)
     sent = [frame.replace(MAC, b"\x02\0\0\0\0\3", 1) for frame in fragments(HOSTS[0], 1, data)]
@@ -202,7 +234,17 @@ def test_it_has_no_combinational_loop(tmp_path: Path) -> None:
     assert loops("firm_ipv4_reassembly", tmp_path, core_files(CORES[-1]), core_files(*CORES[:2], "net/mac")) == []
 
 
-@pytest.mark.parametrize(("generic", "value"), [("PACKETS", 0), ("PACKETS", 9), ("BYTES", 1024), ("TICKS", 0)])
+@pytest.mark.parametrize(
+    ("generic", "value"),
+    [
+        ("PACKETS", 0),
+        ("PACKETS", 9),
+        ("BYTES", 1024),
+        ("TICKS", 0),
+        ("LONG", 1000),
+        ("HOLD_TICKS", 0),
+    ],
+)
 def test_illegal_generics_are_refused(library: Library, tmp_path: Path, generic: str, value: int) -> None:
     result = library.run("firm_ipv4_reassembly", {generic: value}, directory=tmp_path)
     assert result.exit_code != 0

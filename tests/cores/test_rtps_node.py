@@ -10,9 +10,11 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.fabric.control import main_of
+from fusesoc_firm.fabric.rtps import PUBLICATIONS_WRITER
 from tests.cores.announcements import (
     ASSEMBLED,
     LONG,
+    ROOM,
     SAMPLE,
     SURE,
     WRITTEN,
@@ -31,6 +33,7 @@ from tests.cores.rtps_world import HARDWARE, World
 from tests.fabric.dissection import read_alike
 from tests.fabric.memories import bits
 from tests.fabric.messages import AckNack, Data, DataFrag, Gap, Heartbeat, InfoDestination, NackFrag, parse
+from tests.fabric.participant import DISCOVERY_REQUEST
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
 
@@ -40,6 +43,8 @@ NODE = a_node()
 # Peers, stall and seed of a case in which all happens, and the events of such a case.
 FULL = (9, 30, SEED + 2)
 EVENTS = 2000
+# Bytes of payloads that wait, of which there are fewer than in the longest samples.
+SHORT = 1024
 # The same of cases in which samples are sent in fragments, also of the longest ones.
 LONG_CASES = [(2, 0, SEED + 3), (5, 30, SEED + 1), (1, 10, SEED + 6)]
 
@@ -197,6 +202,22 @@ def test_samples_in_fragments_are_put_together(peers: int, stall: int, seed: int
 
 
 @pytest.mark.check
+@pytest.mark.parametrize(("peers", "stall", "seed"), [(2, 0, SEED), (4, 30, SEED + 1), (1, 10, SEED + 2)])
+def test_samples_that_find_no_room_are_put_together(peers: int, stall: int, seed: int) -> None:
+    """Samples of all sizes in one submessage each, between fragments; what finds no room at all is counted."""
+    print(f"seed {seed}")
+    events = Peers(peers, seed, is_long=True, waiting=SHORT).run(3000)
+    wanted = expected(events, ASSEMBLED, waiting=SHORT)
+    sizes = Counter(len(frame) - 5 for frame in wanted.frames)
+    print(sizes, wanted.lossy)
+    assert min(sizes[SHORT], sizes[SHORT + 1], sizes[ASSEMBLED]) >= 5 and sizes[1] >= 2 and wanted.lossy >= 20
+    with World(stall, assembled=ASSEMBLED, waiting=SHORT) as world:
+        found = world.all(events)
+    _check(found, wanted)
+    assert (found.lossy, found.skipped) == (wanted.lossy, wanted.skipped)
+
+
+@pytest.mark.check
 @pytest.mark.parametrize(("peers", "stall", "seed"), LONG_CASES)
 def test_long_samples_are_sent_in_fragments(peers: int, stall: int, seed: int) -> None:
     """All sizes from 4 to 65,536 bytes, and longer ones are refused; peers ask for samples and fragments again."""
@@ -225,6 +246,41 @@ def test_a_host_that_takes_nothing_loses_samples_but_no_discovery() -> None:
 
 
 @pytest.mark.check
+def test_a_host_that_takes_little_loses_whole_long_samples() -> None:
+    """They come while another one leaves: those that are taken are unchanged, and the loss is counted."""
+    print(f"seed {SEED}")
+    events = Peers(3, SEED, is_sure=False, waiting=SHORT).run(1500)
+    wanted = expected(events, ASSEMBLED, waiting=1 << 17)
+    with World(90, assembled=ASSEMBLED, waiting=SHORT) as world:
+        found = world.all(events)
+    sizes = [len(frame) - 5 for frame in found.frames]
+    print(len(wanted.frames), Counter(sizes), found.lossy)
+    assert found.lossy > 20 and sum(size > SHORT for size in sizes) > 20
+    assert len(found.frames) < len(wanted.frames)
+    sent = b"".join(event.data for event in events)
+    assert all(frame[5:] in sent for frame in found.frames)
+    assert without_counts(found.sent) == without_counts(wanted.sent)
+
+
+@pytest.mark.check
+def test_announcements_that_find_no_room_are_counted_and_asked_for() -> None:
+    """A packet has more of them than the memory; the node asks for two at a time."""
+    peers = Peers(1, SEED)
+    announced = peers.flood(ROOM.sources)
+    with World() as world:
+        world.all(peers.events)
+        assert (world.pulses["lost"], world.entries[1]) == (1, 0)
+        for _ in range(ROOM.sources):
+            sent = world.do(Event(Kind.TICKS, count=DISCOVERY_REQUEST)).sent
+            items = [item for _, packet in sent if (message := parse(packet)) for item in message.submessages]
+            asked = [item for item in items if isinstance(item, AckNack) and item.writer == PUBLICATIONS_WRITER]
+            assert all(item.missing.size <= 2 for item in asked)
+            for number in sorted({number for item in asked for number in item.missing}):
+                world.do(announced[number])
+        assert world.entries[1] == ROOM.sources
+
+
+@pytest.mark.check
 def test_a_list_of_very_many_encodings_counts() -> None:
     """Its number is a multiple of 65536, of which the lower half is that of a list that is not told."""
     seed = SEED + 3
@@ -234,16 +290,22 @@ def test_a_list_of_very_many_encodings_counts() -> None:
         _check(world.all(events), expected(events))
 
 
+def _assembled(sample: int) -> int:
+    """A node that sends long messages takes them, too."""
+    return ASSEMBLED if sample > SAMPLE else 0
+
+
 @pytest.mark.parametrize("sample", [SAMPLE, 2048])
 def test_the_node_has_no_latch(library: Library, sample: int) -> None:
-    assert library.latches("firm_rtps_node", {**SIZES, "SAMPLE": sample}) == []
+    assert library.latches("firm_rtps_node", {**SIZES, "SAMPLE": sample, "ASSEMBLED": _assembled(sample)}) == []
 
 
 @pytest.mark.check
 @pytest.mark.parametrize("sample", [SAMPLE, 2048])
 def test_the_node_has_no_combinational_loop(tmp_path: Path, sample: int) -> None:
     *others, node = core_files(*HARDWARE)
-    assert loops("firm_rtps_node", tmp_path, [node], others, {"SAMPLE": sample}) == []
+    generics = {"SAMPLE": sample, "ASSEMBLED": _assembled(sample)}
+    assert loops("firm_rtps_node", tmp_path, [node], others, generics) == []
 
 
 @pytest.mark.check

@@ -48,6 +48,8 @@ AFTER_FAREWELL = 200
 DISCOVERY_REQUEST, DISCOVERY_HEARTBEAT = 200, 500
 # A writer that has written nothing may not answer.
 USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
+# A request that is repeated waits for twice as long as the one before, up to this.
+LONGEST_REQUEST = 320
 ASSEMBLY = 1000
 WINDOW = 2
 MOST_REQUESTED = 8
@@ -63,7 +65,8 @@ DISCOVERY = {PUBLICATIONS_WRITER: PUBLICATIONS_READER, SUBSCRIPTIONS_WRITER: SUB
 class Limits:
     """The sizes of a node's tables: peers, their writers and readers that match, and bytes of a sample.
 
-    `assembled` are those of a sample in fragments; longer ones are skipped.
+    `assembled` are those of a sample in fragments; longer ones are skipped. `waiting` are those of the payloads of a
+    packet; a sample that finds no room there is treated as one in fragments.
     """
 
     peers: int = 8
@@ -71,6 +74,7 @@ class Limits:
     sinks: int = 32
     longest: int = 65536
     assembled: int = 65536
+    waiting: int = 131072
 
 
 @dataclass
@@ -189,11 +193,17 @@ class Source:
     requested: int = 0
     asked: int = 0  # the fragment after those that were asked for, or 0
     next_request: int = 0
+    patience: int = 0  # ms to the next request for the same number
+    before: int = 1  # `expected` when the packet began
 
     @property
     def is_reliable(self) -> bool:
         """Whether the reader asks for what it lacks."""
         return self.endpoint.quality.is_reliable
+
+    def is_next(self, number: int) -> bool:
+        """Whether it is known before the end of the packet that the reader takes a sample."""
+        return number == self.before if self.is_reliable else number >= self.before
 
     def advance(self, expected: int) -> None:
         """Expect a higher number."""
@@ -273,7 +283,11 @@ class Participant:
         self.sources: list[Source] = []
         self.sinks: list[Sink] = []
         self.assembly: Assembly | None = None
-        self._has_assembled = False  # in this packet
+        # Of this packet: the sample that was put together, the bytes for payloads, whether a sample found none, and
+        # whether one is too long.
+        self._assembled: tuple[Source, int] | None = None
+        self._room = 0
+        self._has_lost = self._has_skipped = False
         self.histories = {item.entity: History(item) for item in node.writers}
         self._announced = {
             PUBLICATIONS_WRITER: [node.endpoint_data(item) for item in node.writers],
@@ -401,12 +415,15 @@ class Participant:
 
     def _request(self, source: Source) -> None:
         """Ask for what is missing, or for a heartbeat if the writer has not told what it has."""
-        most = 1 if source.requested == source.expected else MOST_REQUESTED
+        part = self._part_of(source) if source.is_heard else None
+        repeats = source.requested == source.expected and not (part and self._has_come(source, part))
+        most = 1 if repeats else MOST_REQUESTED
+        source.patience = min(2 * source.patience, LONGEST_REQUEST) if repeats else USER_REQUEST
         source.requested = source.expected
-        source.next_request = self._now + (USER_REQUEST if source.is_heard else UNHEARD_REQUEST)
+        source.next_request = self._now + (source.patience if source.is_heard else UNHEARD_REQUEST)
         ends = source.endpoint.entity, source.entity
-        if source.is_heard and (part := self._part_of(source)):
-            missing = part.missing(MOST_REQUESTED if self._has_come(source, part) else most)
+        if part:
+            missing = part.missing(most)
             source.asked = part.fragment + missing.size
             self._send_to(
                 source.peer,
@@ -432,7 +449,10 @@ class Participant:
             self.counts["packets of others"] += 1
             return
         self.counts["faulty packets"] += not message.is_whole
-        self._has_assembled = False
+        self._assembled, self._room = None, self._limits.waiting
+        self._has_lost = self._has_skipped = False
+        for source in self.sources:
+            source.before = source.expected
         if peer := self.peers.get(message.prefix):
             peer.left = peer.lease
         is_mine = True
@@ -441,6 +461,8 @@ class Participant:
                 is_mine = item.prefix in (self.node.prefix, bytes(12))
             elif is_mine:
                 self._submessage(message.prefix, item)
+        self.counts["packets with samples without room"] += self._has_lost
+        self.counts["packets with samples that are too long"] += self._has_skipped
 
     def _submessage(self, prefix: bytes, item: Submessage) -> None:
         if isinstance(item, Data) and item.writer == rtps.PARTICIPANT_WRITER:
@@ -632,10 +654,43 @@ class Participant:
         return part if part and part.is_of(source, source.expected) else None
 
     def _sample(self, source: Source, item: Data) -> None:
+        payload = None if item.is_key else item.payload
+        if payload:
+            is_free = self._may_assemble(source, item.number)
+            if len(payload) <= self._room:
+                self._room -= len(payload)
+            elif not is_free:
+                if item.number >= source.before:
+                    self._lose()
+                return
+            elif len(payload) > self._limits.assembled:
+                self._skip()
+                payload = None
+            else:
+                self._assembled = source, item.number
         if self._is_next(source, item.number):
             source.advance(item.number + 1)
-            if item.payload is not None and not item.is_key:
-                self._give(source, item.payload)
+            if payload is not None:
+                self._give(source, payload)
+
+    def _may_assemble(self, source: Source, number: int) -> bool:
+        """Whether there is room for a long sample, which takes that of an older one of its writer.
+
+        It is not known yet whether the sample needs it.
+        """
+        part = self.assembly
+        if part and part.source is source and part.number != number and source.is_next(number):
+            part = self.assembly = None
+        has_room = part is None and self._assembled is None and self._limits.assembled > 0
+        return has_room and number >= source.before
+
+    def _skip(self) -> None:
+        self.counts["payloads that are too long"] += 1
+        self._has_skipped = True
+
+    def _lose(self) -> None:
+        self.counts["samples without room"] += 1
+        self._has_lost = True
 
     def _give(self, source: Source, payload: bytes) -> None:
         if len(payload) > self._limits.longest:
@@ -647,24 +702,25 @@ class Participant:
         if item.is_key:
             return
         if item.size > self._limits.assembled:
-            self.counts["payloads that are too long"] += 1
+            self._skip()
             if self._is_next(source, item.number):
                 source.advance(item.number + 1)
             return
         is_taken = item.number == source.expected if source.is_reliable else item.number >= source.expected
         part = self.assembly
         if part is None or not part.is_of(source, item.number):
-            if not is_taken:
+            is_again = self._assembled and self._assembled[0] is source and self._assembled[1] == item.number
+            if is_again or not source.is_next(item.number):
                 return
             is_sound = item.first == 1 and item.count and item.fragment_bytes and item.size and item.payload
-            if self._has_assembled or (part and part.source is not source) or not is_sound:
-                self.counts["samples without room"] += 1
+            if self._assembled or (part and part.source is not source) or not is_sound:
+                self._lose()
                 return
             part = Assembly(source, item.number, item.size, item.fragment_bytes, self._now)
         part.take(item, self._now)
         self.assembly = part if part.data else None
         if part.is_whole:
-            self.assembly, self._has_assembled = None, True
+            self.assembly, self._assembled = None, (source, item.number)
             if is_taken:
                 source.advance(item.number + 1)
                 self._give(source, bytes(part.data))

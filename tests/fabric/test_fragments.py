@@ -17,6 +17,7 @@ from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.rtps import Parameter, Reliability, octets, parameter, parameter_list, string
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
+from tests.bench.network import LONGEST as LONGEST_GENERICS
 from tests.cores.fragments import HOSTS, Host, fragments
 from tests.cores.test_net_link import NODE
 from tests.fabric.messages import Data, InfoDestination, Submessage, Writer
@@ -32,6 +33,7 @@ GAP_CYCLES = 12
 # Cycles in which the node acts on an announcement.
 SLOW_CYCLES = 8000
 LONGEST = 8000
+LAST_CYCLES = 20000
 NODE_PREFIX = rtps.VENDOR + bytes.fromhex("020000000002") + bytes(4)
 SPECIFICATION = """\
 project:
@@ -48,7 +50,14 @@ blocks:
 
 def _library(folder: Path, reassemblies: int, longest: int = LONGEST) -> Library:
     """The node with the clock of a simulated board."""
-    text = SPECIFICATION.format(reassemblies=reassemblies, longest=longest)
+    library = Library("firm", folder)
+    paths = _generated(folder, SPECIFICATION.format(reassemblies=reassemblies, longest=longest))
+    library.analyse([*core_files(*NODE), *paths, HERE / "playing_node.vhd"])
+    return library
+
+
+def _generated(folder: Path, text: str) -> list[Path]:
+    """The files of the node of a specification."""
     (folder / "turtle.yaml").write_text(text, encoding="utf-8")
     others = dict.fromkeys(("board", "paths", "distro"))
     parameters = {"spec": "turtle.yaml", "product": "system", "clock": "250 kHz", **others}
@@ -56,19 +65,26 @@ def _library(folder: Path, reassemblies: int, longest: int = LONGEST) -> Library
     paths = [folder / f"turtle_system_{part}.vhd" for part in PARTS]
     for path in paths:
         path.write_text(str(files[path.name].content), encoding="utf-8")
-    library = Library("firm", folder)
-    library.analyse([*core_files(*NODE), *paths, HERE / "playing_node.vhd"])
-    return library
+    return paths
 
 
-def _taken(library: Library, folder: Path, bursts: Iterable[tuple[int, bytes]]) -> list[bytes]:
-    """The frames to the system."""
+def _generics(folder: Path) -> dict[str, str]:
+    """The numbers that the node in a folder gives to firm_net_link."""
+    node = (folder / "turtle_system_node.vhd").read_text(encoding="utf-8")
+    own = dict(re.findall(r"^  constant ([A-Z]+) +: integer := (\d+);", node, re.MULTILINE))
+    return own | dict(re.findall(r"^ +([A-Z]+) +=> (\d+),$", node, re.MULTILINE))
+
+
+def _taken(
+    library: Library, folder: Path, bursts: Iterable[tuple[int, bytes]], last_cycles: int = LAST_CYCLES
+) -> list[bytes]:
+    """The frames to the system, until some cycles after the last burst."""
     rows = []
     for before, frame in bursts:
         sent = PREAMBLE + frame + zlib.crc32(frame).to_bytes(FCS_BYTES, "little")
         rows.append(" ".join(map(str, (before, len(sent), *sent))))
     (folder / "line.txt").write_text("\n".join(rows) + "\n", encoding="ascii")
-    result = library.run("playing_node", {}, directory=folder)
+    result = library.run("playing_node", {"LAST_CYCLES": last_cycles}, directory=folder)
     assert result.exit_code == 0, result.output
     lines = (folder / "taken.txt").read_text(encoding="ascii").splitlines()
     return [bytes(map(int, line.split()[1:])) for line in lines]
@@ -136,11 +152,12 @@ def _bursts(hosts: Sequence[Host], frames: Iterable[bytes]) -> list[tuple[int, b
 
 
 def test_messages_of_all_sizes_arrive_whole(tmp_path: Path) -> None:
+    """Of the last three, each waits until the one before is out, in twice the time in which it comes."""
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     payloads = [_payload(chance, size) for size in (8, 1344, 1400, 1480, 2900, 5001, LONGEST - 1, LONGEST)]
     frames = [frame for number, item in enumerate(payloads, 1) for frame in _sample(HOSTS[0], number, item)]
-    taken = _taken(_library(tmp_path, 1), tmp_path, _bursts(HOSTS[:1], frames))
+    taken = _taken(_library(tmp_path, 1), tmp_path, _bursts(HOSTS[:1], frames), 3 * LAST_CYCLES)
     assert taken == [_as_frame(payload) for payload in payloads]
 
 
@@ -194,15 +211,23 @@ def test_announcements_may_come_in_fragments(tmp_path: Path) -> None:
 
 
 def test_its_memory_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Packets of 8,192 bytes, four of them, and twice as many for messages and for words of discovery that wait."""
+    """Four packets and a message of 8,192 bytes, payloads of 4,096, and words of discovery for one packet."""
     path = tmp_path / "turtle.yaml"
     path.write_text(SPECIFICATION.format(reassemblies=2, longest=7936), encoding="utf-8")
     assert main(["system", "check", str(path)]) == 0
-    assert "the node needs 92160 bytes of memory for messages in several packets\n" in capsys.readouterr().out
+    assert "the node needs 62464 bytes of memory for messages in several packets\n" in capsys.readouterr().out
+
+
+def test_the_memories_for_the_longest_messages_fit_an_ecp5_85(tmp_path: Path) -> None:
+    """tests/bench/network.py places them."""
+    text = SPECIFICATION.replace("qos: {{profile: sensor_data}}}}", "maxLength: {longest}, qos: {{depth: 1}}}}")
+    _generated(tmp_path, text.format(reassemblies=1, longest=65280))
+    generics, wanted = _generics(tmp_path), {name: str(value) for name, value in LONGEST_GENERICS.items()}
+    assert {name: generics[name] for name in wanted} == wanted
+    assert generics["PAYLOADS"] == "4096"
 
 
 def test_a_node_for_short_messages_has_no_reassembly(tmp_path: Path) -> None:
     _library(tmp_path, 4, 1344)
-    node = (tmp_path / "turtle_system_node.vhd").read_text(encoding="utf-8")
-    generics = dict(re.findall(r"^ +([A-Z]+) +=> (\w+),$", node, re.MULTILINE))
+    generics = _generics(tmp_path)
     assert (generics["REASSEMBLIES"], generics["PAYLOADS"]) == ("0", "4096")

@@ -27,24 +27,24 @@ SIZES = (1, 1335, 1336, 1337, 4000, 5376, LONGEST - BESIDES)
 SETTLING = 60
 # Without MaxMessageSize, Cyclone DDS puts samples of up to 14,720 bytes into one packet.
 CYCLONE = "<CycloneDDS><Domain><General><MaxMessageSize>{size}</MaxMessageSize></General></Domain></CycloneDDS>"
-SPECIFICATION = f"""\
+SPECIFICATION = """\
 project:
   name: board
   clock: 125 MHz
   interconnect: ethernet
-  network: {{mac: "02:00:00:00:00:09", address: 192.0.2.9, phy: rgmii, reassembly: 65507}}
+  network: {mac: "02:00:00:00:00:09", address: 192.0.2.9, phy: rgmii, reassembly: 65507}
 accelerators:
   - name: digest
     type: VHDL
     sources: digest.vhd
     interface:
-      input: [{{middleware: ROS2, message: std_msgs/String}}]
-      output: [{{middleware: ROS2, message: std_msgs/UInt32}}]
+      input: [{middleware: ROS2, message: std_msgs/String}]
+      output: [{middleware: ROS2, message: std_msgs/UInt32}]
 blocks:
-  - {{name: text, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /text_in, maxLength: {LONGEST},
-     outgoing: [{{name: digest}}]}}
-  - {{name: digest, type: digest, outgoing: [{{name: sum}}]}}
-  - {{name: sum, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /sum_out}}
+  - {name: text, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /text_in, maxLength: 65280,
+     outgoing: [{name: digest}]}
+  - {name: digest, type: digest, outgoing: [{name: sum}]}
+  - {name: sum, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /sum_out}
 """
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
@@ -109,6 +109,18 @@ def test_cyclone_sends_long_messages_in_fragments_of_rtps(
         _answered(peer, [_text(chance, SIZES[-1]) for _ in range(6)])
     kinds = {type(item) for _, message in read_alike(capture) for item in message.submessages}
     assert DataFrag in kinds
+
+
+@pytest.mark.parametrize("kind", ["rclpy", "cyclone"])
+def test_bursts_of_messages_of_65000_bytes_are_answered(lab: Lab, kind: str) -> None:
+    """Between short ones, as one packet of IPv4 each (Fast DDS), or in fragments of RTPS."""
+    print(f"seed {SEED}")
+    chance = random.Random(SEED)
+    lab.board()
+    peer: Peer = getattr(lab, kind)({"sum": "UInt32"}, {"text": "String"})
+    _settle(peer)
+    for length in (65000, 30_000, 65280):
+        _answered(peer, [_text(chance, size - BESIDES) for size in (length, length, 100, length, 2000, length)])
 
 
 def test_what_fast_dds_sent_while_the_cable_was_out_is_asked_for(lab: Lab) -> None:

@@ -2,7 +2,11 @@
 -- Reassembles the fragments of UDP datagrams (RFC 791). Frames pass through as they come; those with a fragment for
 -- this host are aborted, since only here it is known whether one is missing. When a packet is complete, it is sent as
 -- one frame without fragments. Frames that come meanwhile wait in a store, except fragments, and leave by turns with
--- further packets.
+-- further packets, in the order in which these were complete.
+--
+-- The user has room for the content of one long packet. So the next long one waits until the user rests, but not for
+-- ever. Other packets pass it; frames wait as well, as long as there is room, since they would tell the user of what it
+-- has not got yet.
 --
 -- Fragments of several packets may be interleaved, but those of each packet come in order, as hosts send them and an
 -- Ethernet keeps them. So the state of a packet is its size so far, whatever the number of fragments. A packet that
@@ -18,7 +22,11 @@ entity firm_ipv4_reassembly is
     PACKETS : integer := 2;     -- that are reassembled at the same time, 1 to 8
     BYTES   : integer := 16384; -- of the longest one, without its header; a power of two, 2048 to 65536
     DEPTH   : integer := 4096;  -- bytes of frames that wait for the end of a packet, a power of two, 4 and more
-    TICKS   : integer := 1000   -- without a fragment, after which a packet is given up, 1 to 65535
+    TICKS   : integer := 1000;  -- without a fragment, after which a packet is given up, 1 to 65535
+    LONG    : integer := 4096;  -- bytes from which on a packet is long, a power of two, 2 and more
+    -- After a long packet, after which the next one leaves anyway, 1 to 65535. The board of a simulation, whose
+    -- millisecond has 250 cycles, needs 262 for the longest message.
+    HOLD_TICKS : integer := 300
   );
   port (
     clk   : in std_logic;
@@ -40,6 +48,8 @@ entity firm_ipv4_reassembly is
     m_axis_tuser  : out std_logic_vector(0 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
+
+    rests : in std_logic;  -- the user is not busy with the content of packets
 
     -- Pulses.
     is_dropped : out std_logic;  -- a packet that is given up, or a fragment that belongs to none
@@ -69,6 +79,8 @@ architecture rtl of firm_ipv4_reassembly is
   constant MAC_BYTES      : natural := 6;
   constant GAP            : natural := 6;      -- cycles between frames
   constant LONGEST        : natural := 65535;  -- a packet with its header
+  -- Cycles in which the user rests, after which it is not busy: it may take a while until it begins.
+  constant REST           : positive := 256;
 
   subtype byte_t is std_logic_vector(7 downto 0);
   constant UDP     : byte_t := x"11";
@@ -84,6 +96,7 @@ architecture rtl of firm_ipv4_reassembly is
   type keys_t is array (natural range 0 to PACKETS-1) of key_t;
   type sizes_t is array (natural range 0 to PACKETS-1) of size_t;
   type sums_t is array (natural range 0 to PACKETS-1) of sum_t;
+  type orders_t is array (natural range 0 to PACKETS-1) of slots_t;
   type ages_t is array (natural range 0 to PACKETS-1) of natural range 0 to 65535;
   constant NO_SLOT : slots_t := (others => '0');
 
@@ -93,6 +106,8 @@ architecture rtl of firm_ipv4_reassembly is
   -- Of each packet.
   signal used_r  : slots_t;                                 -- it has fragments
   signal whole_r : slots_t;                                 -- it waits to be sent
+  signal long_r  : slots_t;                                 -- and is long
+  signal older_r : orders_t := (others => NO_SLOT);         -- those that were whole before
   signal keys_r  : keys_t;
   signal sizes_r : sizes_t := (others => (others => '0'));  -- bytes so far
   signal sums_r  : sums_t := (others => (others => '0'));   -- of the words of the header that stay
@@ -112,9 +127,14 @@ architecture rtl of firm_ipv4_reassembly is
   signal free_r     : slot_t := (others => '0');            -- the place that it gets if it is a first one
   signal has_free_r : std_logic;
 
-  signal found : slots_t;                                   -- the packet of the fragment
-  signal known : slot_t;
-  signal fed   : slots_t;                                   -- the packet whose fragment is under way
+  -- The packet of the fragment, which is known before the header ends.
+  signal found_r   : slots_t;
+  signal known     : slot_t;
+  signal size_r    : size_t := (others => '0');
+  signal repeats_r : std_logic;                             -- the fragment has come before
+  signal follows_r : std_logic;                             -- it is the next one
+  signal is_long_r : std_logic;                             -- the packet has no room
+  signal fed       : slots_t;                               -- it is not given up: its fragment is under way
 
   -- The beat one cycle later, and what is done with it.
   signal beat_r    : byte_t := (others => '0');
@@ -133,6 +153,12 @@ architecture rtl of firm_ipv4_reassembly is
   signal is_good   : std_logic;                             -- it has ended, and is not aborted
 
   -- ------------------------------------------------------------------ what leaves
+  signal ready    : slots_t;                                -- those that may be sent, and the first one of them
+  signal next_one : slots_t;
+  signal held_r   : std_logic;                              -- long ones are not sent
+  signal rest_r   : natural range 0 to REST-1;              -- cycles until then
+  signal since_r  : natural range 0 to 65535;               -- the last long one, milliseconds
+
   type state_t is (PASSING, SENDING, RESTING, DRAINING);
   signal state_r     : state_t;
   signal turn_r      : std_logic;                           -- it is the store's turn
@@ -150,7 +176,16 @@ architecture rtl of firm_ipv4_reassembly is
   signal shows_end_r : std_logic;
   signal data_r      : byte_t := (others => '0');
   signal head_r      : byte_t := (others => '0');
-  signal sent_byte   : byte_t;
+  -- One cycle later, since memories show their bytes late in a cycle.
+  signal sends_r      : std_logic;                          -- a byte of the packet
+  signal ends_sent_r  : std_logic;
+  signal sent_at_r    : size_t := (others => '0');
+  signal sent_data_r  : byte_t := (others => '0');
+  signal sent_head_r  : byte_t := (others => '0');
+  signal drains_r     : std_logic;                          -- a byte of the store
+  signal ends_store_r : std_logic;
+  signal store_data_r : byte_t := (others => '0');
+  signal sent_byte    : byte_t;
 
   signal user         : std_logic_vector(0 downto 0);        -- of the frame that comes; a fragment is aborted
   signal store_valid  : std_logic;
@@ -158,6 +193,7 @@ architecture rtl of firm_ipv4_reassembly is
   signal stored_valid : std_logic;
   signal stored_last  : std_logic;
   signal stored_ready : std_logic;
+  signal loses        : std_logic;
 
   -- The lowest one of several; 0 if there is none.
   function lowest(slots : slots_t) return slot_t is
@@ -188,6 +224,13 @@ begin
     severity failure;
   assert TICKS >= 1 and TICKS <= 65535
     report "firm_ipv4_reassembly: TICKS is " & integer'image(TICKS) & "; legal: 1 to 65535"
+    severity failure;
+
+  assert LONG >= 2 and 2**clog2(LONG) = LONG
+    report "firm_ipv4_reassembly: LONG is " & integer'image(LONG) & "; legal: powers of two, 2 and more"
+    severity failure;
+  assert HOLD_TICKS >= 1 and HOLD_TICKS <= 65535
+    report "firm_ipv4_reassembly: HOLD_TICKS is " & integer'image(HOLD_TICKS) & "; legal: 1 to 65535"
     severity failure;
 
   -- ------------------------------------------------------------------ the header
@@ -258,17 +301,33 @@ begin
     end if;
   end process read_header;
 
-  compare_keys : process (used_r, whole_r, keys_r, key_r)
+  -- The key is complete four beats before the first one after the header: there is time for these.
+  find_packet : process (clk)
   begin
-    for index in 0 to PACKETS-1 loop
-      found(index) <= '0';
-      if used_r(index) = '1' and whole_r(index) = '0' and keys_r(index) = key_r then
-        found(index) <= '1';
+    if rising_edge(clk) then
+      for index in 0 to PACKETS-1 loop
+        found_r(index) <= '0';
+        if used_r(index) = '1' and whole_r(index) = '0' and keys_r(index) = key_r then
+          found_r(index) <= '1';
+        end if;
+      end loop;
+      size_r    <= sizes_r(to_integer(known));
+      repeats_r <= '0';
+      if end_r <= size_r then
+        repeats_r <= '1';
       end if;
-    end loop;
-  end process compare_keys;
+      follows_r <= '0';
+      if offset_r = size_r then
+        follows_r <= '1';
+      end if;
+      is_long_r <= '0';
+      if end_r > BYTES or end_r > LONGEST-IPV4_BYTES then
+        is_long_r <= '1';
+      end if;
+    end if;
+  end process find_packet;
 
-  known <= lowest(found);
+  known <= lowest(found_r);
 
   -- ------------------------------------------------------------------ the fragment
 
@@ -298,22 +357,22 @@ begin
         left_r  <= bytes_r;
         write_r <= offset_r;
         slot_r  <= known;
-        if found /= NO_SLOT and end_r <= sizes_r(to_integer(known)) then
+        if found_r /= NO_SLOT and repeats_r = '1' then
           -- It has come before.
           null;
-        elsif end_r > BYTES or end_r > LONGEST-IPV4_BYTES then
+        elsif is_long_r = '1' then
           refused_r <= '1';
           broken_r  <= '1';
-        elsif found /= NO_SLOT and offset_r = sizes_r(to_integer(known)) then
+        elsif found_r /= NO_SLOT and follows_r = '1' then
           taken_r <= '1';
-        elsif found = NO_SLOT and offset_r = 0 and has_free_r = '1' then
+        elsif found_r = NO_SLOT and offset_r = 0 and has_free_r = '1' then
           taken_r <= '1';
           slot_r  <= free_r;
         else
           refused_r <= '1';
           broken_r  <= '1';
         end if;
-        if found = NO_SLOT then
+        if found_r = NO_SLOT then
           broken_r <= '0';
         end if;
       end if;
@@ -354,8 +413,10 @@ begin
   end process access_head;
 
   is_good <= ends_r and not aborted_r;
-  -- A packet is not given up while its fragment comes.
-  fed     <= found when mine_r = '1' and (place_r >= DATA_PLACE or ends_r = '1') else NO_SLOT;
+  -- A packet is not given up while its fragment comes, and none while that one's packet is found.
+  fed     <= (others => '1') when place_r >= SOURCE_PLACE+4 and place_r <= DATA_PLACE else
+             found_r when mine_r = '1' and (place_r > DATA_PLACE or ends_r = '1') else
+             NO_SLOT;
 
   keep_packets : process (clk)
   begin
@@ -374,6 +435,14 @@ begin
           if taken_r = '1' and is_whole = '1' then
             used_r(index)  <= '1';
             whole_r(index) <= not has_more_r;
+            long_r(index)  <= '0';
+            if end_r >= LONG then
+              long_r(index) <= '1';
+            end if;
+            older_r(index) <= whole_r;
+            for other in 0 to PACKETS-1 loop
+              older_r(other)(index) <= '0';
+            end loop;
             sizes_r(index) <= end_r;
             ages_r(index)  <= 0;
             if offset_r = 0 then
@@ -399,6 +468,46 @@ begin
 
   -- ------------------------------------------------------------------ what leaves
 
+  find_next : process (whole_r, long_r, held_r, older_r, ready)
+  begin
+    for index in 0 to PACKETS-1 loop
+      ready(index)    <= whole_r(index) and not (long_r(index) and held_r);
+      next_one(index) <= '0';
+      if (older_r(index) and ready) = NO_SLOT then
+        next_one(index) <= ready(index);
+      end if;
+    end loop;
+  end process find_next;
+
+  hold : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rests = '0' then
+        rest_r <= REST-1;
+      elsif rest_r /= 0 then
+        rest_r <= rest_r - 1;
+      end if;
+      if shows_end_r = '1' and long_r(to_integer(out_slot_r)) = '1' then
+        held_r  <= '1';
+        rest_r  <= REST-1;
+        since_r <= 0;
+      elsif rest_r = 0 or loses = '1' then
+        held_r <= '0';
+      elsif tick = '1' then
+        since_r <= since_r + 1;
+        if since_r = HOLD_TICKS-1 then
+          held_r  <= '0';
+          since_r <= 0;
+        end if;
+      end if;
+      if rst_n = '0' then
+        held_r  <= '0';
+        rest_r  <= 0;
+        since_r <= 0;
+      end if;
+    end if;
+  end process hold;
+
   waits <= waits_r when place_r /= 0 else
            '0' when state_r = PASSING else
            '1';
@@ -421,9 +530,10 @@ begin
       m_axis_tvalid => stored_valid,
       m_axis_tlast  => stored_last,
       m_axis_tready => stored_ready,
-      is_lost       => is_lost
+      is_lost       => loses
     );
 
+  is_lost      <= loses;
   stored_ready <= '1' when state_r = DRAINING else '0';
 
   choose : process (clk)
@@ -440,9 +550,11 @@ begin
           gap_r <= GAP-1;
         elsif gap_r /= 0 then
           gap_r <= gap_r - 1;
-        elsif whole_r /= NO_SLOT then
+        elsif ready /= NO_SLOT then
           state_r    <= SENDING;
-          out_slot_r <= lowest(whole_r);
+          out_slot_r <= lowest(next_one);
+        elsif whole_r /= NO_SLOT then
+          state_r <= RESTING;
         end if;
       elsif state_r = SENDING then
         out_last_r  <= sizes_r(to_integer(out_slot_r)) + (DATA_PLACE-1);
@@ -466,10 +578,11 @@ begin
           gap_r <= gap_r - 1;
         elsif stored_valid = '1' and (turn_r = '1' or whole_r = NO_SLOT) then
           state_r <= DRAINING;
-        elsif whole_r /= NO_SLOT then
+        elsif ready /= NO_SLOT then
           state_r    <= SENDING;
-          out_slot_r <= lowest(whole_r);
-        elsif (place_r = 0 or waits_r = '0') and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
+          out_slot_r <= lowest(next_one);
+        elsif whole_r = NO_SLOT and (place_r = 0 or waits_r = '0')
+              and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
           state_r <= PASSING;
         end if;
       elsif stored_valid = '1' and stored_last = '1' then
@@ -488,34 +601,45 @@ begin
   end process choose;
 
   -- Length, fragment and checksum are those of the whole packet.
-  sent_byte <= data_r when shown_at_r >= DATA_PLACE else
-               std_logic_vector(out_total_r(15 downto 8)) when shown_at_r = LENGTH_PLACE else
-               std_logic_vector(out_total_r(7 downto 0)) when shown_at_r = LENGTH_PLACE+1 else
-               x"00" when shown_at_r = FRAGMENT_PLACE or shown_at_r = FRAGMENT_PLACE+1 else
-               std_logic_vector(checksum_r(15 downto 8)) when shown_at_r = CHECKSUM_PLACE else
-               std_logic_vector(checksum_r(7 downto 0)) when shown_at_r = CHECKSUM_PLACE+1 else
-               mac(47 downto 40) when shown_at_r = 0 else
-               head_r;
+  sent_byte <= sent_data_r when sent_at_r >= DATA_PLACE else
+               std_logic_vector(out_total_r(15 downto 8)) when sent_at_r = LENGTH_PLACE else
+               std_logic_vector(out_total_r(7 downto 0)) when sent_at_r = LENGTH_PLACE+1 else
+               x"00" when sent_at_r = FRAGMENT_PLACE or sent_at_r = FRAGMENT_PLACE+1 else
+               std_logic_vector(checksum_r(15 downto 8)) when sent_at_r = CHECKSUM_PLACE else
+               std_logic_vector(checksum_r(7 downto 0)) when sent_at_r = CHECKSUM_PLACE+1 else
+               mac(47 downto 40) when sent_at_r = 0 else
+               sent_head_r;
 
   show : process (clk)
   begin
     if rising_edge(clk) then
+      sends_r      <= shown_r;
+      ends_sent_r  <= shows_end_r;
+      sent_at_r    <= shown_at_r;
+      sent_data_r  <= data_r;
+      sent_head_r  <= head_r;
+      drains_r     <= stored_valid and stored_ready;
+      ends_store_r <= stored_last;
+      store_data_r <= stored_data;
+
       m_axis_tdata  <= s_axis_tdata;
       m_axis_tuser  <= user;
       m_axis_tvalid <= s_axis_tvalid and not waits;
       m_axis_tlast  <= s_axis_tlast;
-      if state_r = SENDING then
+      if sends_r = '1' then
         m_axis_tdata  <= sent_byte;
         m_axis_tuser  <= "0";
-        m_axis_tvalid <= shown_r;
-        m_axis_tlast  <= shows_end_r;
-      elsif state_r = DRAINING then
-        m_axis_tdata  <= stored_data;
+        m_axis_tvalid <= '1';
+        m_axis_tlast  <= ends_sent_r;
+      elsif drains_r = '1' then
+        m_axis_tdata  <= store_data_r;
         m_axis_tuser  <= "0";
-        m_axis_tvalid <= stored_valid;
-        m_axis_tlast  <= stored_last;
+        m_axis_tvalid <= '1';
+        m_axis_tlast  <= ends_store_r;
       end if;
       if rst_n = '0' then
+        sends_r       <= '0';
+        drains_r      <= '0';
         m_axis_tvalid <= '0';
       end if;
     end if;

@@ -27,7 +27,7 @@ entity firm_net_link is
     HAS_STATUS    : boolean := false; -- the system has a status, which is read by UDP
     DISCOVERY     : integer := 4096;  -- bytes of discovery and of payloads that wait, see firm_rtps_node
     PAYLOADS      : integer := 4096;
-    ASSEMBLED     : integer := 0;     -- bytes of the longest message in fragments of RTPS, see firm_rtps_node
+    ASSEMBLED     : integer := 0;     -- bytes of the longest message that is put together, see firm_rtps_node
     -- Packets whose fragments may be interleaved, 0 to 4, and the bytes of the longest one; without them, fragments
     -- are dropped.
     REASSEMBLIES : integer := 0;
@@ -472,11 +472,19 @@ begin
   -- Of another number, the part would complain first.
   with_fragments : if REASSEMBLIES >= 1 and REASSEMBLIES <= MOST_REASSEMBLIES generate
 
+    signal rests : std_logic;
+
+  begin
+
+    rests <= not sample_tvalid;
+
     u_reassembly : entity firm.firm_ipv4_reassembly
       generic map (
         -- As many may leave at the same time.
         PACKETS => 2*REASSEMBLIES,
-        BYTES   => REASSEMBLED
+        BYTES   => REASSEMBLED,
+        -- The payload of a shorter one has room among those that wait.
+        LONG    => PAYLOADS
       )
       port map (
         clk           => clk,
@@ -492,6 +500,7 @@ begin
         m_axis_tuser  => whole_tuser,
         m_axis_tvalid => whole_tvalid,
         m_axis_tlast  => whole_tlast,
+        rests         => rests,
         is_dropped    => is_packet_dropped,
         is_lost       => is_frame_lost
       );

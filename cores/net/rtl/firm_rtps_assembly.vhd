@@ -8,6 +8,10 @@
 --
 -- A fragment counts when its submessage has ended without a part of one, and its packet is known to be good. Until
 -- then, its bytes are behind those that count, where the fragment can be written again.
+--
+-- A DATA whose payload finds no room among those that wait is a sample, too: it is known to need the assembly when it
+-- ends, so each DATA takes the assembly if it is free, and returns it if there was room. It takes that of an older
+-- sample of its writer, of which no more will come.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -37,7 +41,9 @@ entity firm_rtps_assembly is
 
     -- Of the submessage that arrives, from the first byte of its payload on.
     is_wanted : in std_logic;  -- it is a sample for a reader of the node
+    -- At least from one cycle later on; of a fragment, from its first byte on.
     is_next   : in std_logic;  -- the reader takes a sample with this number
+    is_new    : in std_logic;  -- it has not taken this sample or a later one
     source    : in unsigned(SOURCE_BITS-1 downto 0);
     number    : in std_logic_vector(47 downto 0);
 
@@ -46,6 +52,7 @@ entity firm_rtps_assembly is
     ends        : in  std_logic;
     spoils      : in  std_logic;
     has_place   : in  std_logic;                      -- for a sample among those that wait
+    has_room    : in  std_logic;                      -- so has the payload, and waits there
     is_complete : out std_logic;                      -- with `submessage`: it ends the sample
     is_long     : out std_logic;                      -- with `submessage`: it belongs to a sample that is too long
     is_dropped  : out std_logic;                      -- with `submessage`: it belongs to a sample without room
@@ -95,33 +102,68 @@ architecture rtl of firm_rtps_assembly is
   signal memory : memory_t;
 
   -- ------------------------------------------------------------------ the fragment that arrives
-  signal kind_r     : std_logic;                      -- it is one, and not of a key
-  signal other_r    : std_logic;                      -- the sample's number differs from that of the assembly
-  signal differs_r  : std_logic;                      -- so do a size, or the number of the next fragment
-  signal later_r    : std_logic;                      -- it is not the first one of its sample
-  signal size_r     : half_t := (others => '0');
-  signal high_r     : std_logic;                      -- the size has more than 16 bits
-  signal each_r     : half_t := (others => '0');
-  signal count_r    : half_t := (others => '0');
-  signal fits       : std_logic;
-  signal has_bytes  : std_logic;                      -- neither a size nor the number of fragments is zero
-  signal is_holder  : std_logic;                      -- its writer is that of the assembly
-  signal is_same    : std_logic;                      -- and so is its sample
-  signal is_free    : std_logic;                      -- the assembly is not whole
-  signal continues  : std_logic;
-  signal begins     : std_logic;
-  signal inside_r   : std_logic;                      -- a byte of the payload has come
-  signal taken_r    : std_logic;                      -- its bytes are taken
-  signal closed_r   : std_logic;                      -- its sample, or the count of fragments, is full
-  signal between_r  : std_logic;                      -- the bytes so far are whole fragments
-  signal byte_r     : std_logic_vector(7 downto 0) := (others => '0');
-  signal valid_r    : std_logic;
-  signal writes     : std_logic;
-  signal ends_part  : std_logic;                      -- this is the last byte of a fragment
-  signal ends_all   : std_logic;                      -- and of the sample
-  signal is_end     : std_logic;                      -- all of the sample has come
-  signal part_r     : half_t := (others => '0');      -- bytes of the fragment to come
-  signal parts_r    : half_t := (others => '0');      -- fragments to come
+  signal kind_r      : std_logic;                     -- it is one, and not of a key
+  signal data_r      : std_logic;                     -- it is a payload of DATA
+  signal other_r     : std_logic;                     -- the sample's number differs from that of the assembly
+  signal compares_r  : std_logic;                     -- the last byte of a field is one of a size or of that number
+  signal field_r     : std_logic_vector(7 downto 0) := (others => '0');
+  signal wanted_r    : std_logic_vector(7 downto 0) := (others => '0');  -- what it has to be
+  signal differs     : std_logic;                     -- a size differs, or the number of the next fragment
+  signal differs_r   : std_logic;
+  signal later_r     : std_logic;                     -- it is not the first one of its sample
+  signal size_r      : half_t := (others => '0');
+  signal high_r      : std_logic;                     -- the size has more than 16 bits
+  signal each_r      : half_t := (others => '0');
+  signal count_r     : half_t := (others => '0');
+  signal fits        : std_logic;
+  signal has_bytes   : std_logic;                     -- neither a size nor the number of fragments is zero
+  signal has_parts_r : std_logic;                     -- except for that of the sample
+  signal is_holder   : std_logic;                     -- its writer is that of the assembly
+  signal is_same     : std_logic;                     -- and so is its sample
+  signal is_free     : std_logic;                     -- the assembly is not whole
+  signal continues   : std_logic;
+  signal begins      : std_logic;
+  signal inside_r    : std_logic;                     -- a byte of the payload has come
+  signal is_first    : std_logic;                     -- this is the first one
+  signal taken_r     : std_logic;                     -- its bytes are taken
+  signal closed_r    : std_logic;                     -- its sample, or the count of fragments, is full
+  signal between_r   : std_logic;                     -- the bytes so far are whole fragments
+  signal byte_r      : std_logic_vector(7 downto 0) := (others => '0');
+  signal valid_r     : std_logic;
+  signal continued   : std_logic;                     -- a byte of a sample that has begun
+  signal writes      : std_logic;
+  signal begins_r    : std_logic;                     -- this is the first byte of a fragment, and of its sample
+  signal first_r     : std_logic;                     -- this is the first byte of DATA, and there may be room
+  signal succeeds_r  : std_logic;                     -- if its sample takes the place of an older one
+  signal takes       : std_logic;                     -- its bytes are taken from this one on
+  signal taken       : std_logic;                     -- the bytes so far are taken
+  signal came_r      : place_t := (others => '0');    -- bytes of the payload
+  signal over_r      : std_logic;                     -- these are too many
+  signal is_placed   : std_logic;                     -- a DATA that ends is the sample, if there is a place for it
+  signal ends_part   : std_logic;                     -- this is the last byte of a fragment
+  signal is_end      : std_logic;                     -- all of the sample has come
+  -- To come: bytes of the fragment, fragments, and bytes of the sample; and whether that is one, or none.
+  signal part_r      : half_t := (others => '0');
+  signal parts_r     : half_t := (others => '0');
+  signal left_r      : half_t := (others => '0');
+  signal one_part_r  : std_logic;
+  signal one_parts_r : std_logic;
+  signal one_left_r  : std_logic;
+  signal none_left_r : std_logic;
+  -- The same before the first byte.
+  signal rest_r      : half_t := (others => '0');
+  signal one_each_r  : std_logic;
+  signal one_count_r : std_logic;
+  signal one_rest_r  : std_logic;
+
+  -- The end of a submessage or a packet; all that follows from it happens one cycle later.
+  signal keeps       : std_logic;                     -- its bytes count
+  signal completes   : std_logic;                     -- the sample has come, and has a place
+  signal keeps_r     : std_logic;
+  signal completes_r : std_logic;
+  signal fails_r     : std_logic;                     -- the sample is given up
+  signal ends_r      : std_logic;
+  signal spoils_r    : std_logic;
 
   -- ------------------------------------------------------------------ the sample
   signal used_r   : std_logic;
@@ -141,6 +183,14 @@ architecture rtl of firm_rtps_assembly is
   signal read_r : unsigned(PLACE_BITS-1 downto 0) := (others => '0');
   signal read   : unsigned(PLACE_BITS-1 downto 0);
 
+  function is_number(value : half_t; number : natural) return std_logic is
+  begin
+    if value = number then
+      return '1';
+    end if;
+    return '0';
+  end function is_number;
+
   -- A byte of a number, the lowest at place 0.
   function byte_of(value : unsigned; place : natural) return std_logic_vector is
   begin
@@ -159,12 +209,18 @@ begin
   -- ------------------------------------------------------------------ the fields
 
   read_fields : process (clk)
-    variable compared : std_logic_vector(7 downto 0);
   begin
     if rising_edge(clk) then
-      kind_r <= '0';
+      field_r    <= field_data;
+      compares_r <= '0';
+      differs_r  <= differs;
+      kind_r     <= '0';
       if kind = RTPS_DATA_FRAG then
         kind_r <= not flags(RTPS_FRAGMENT_KEY);
+      end if;
+      data_r <= '0';
+      if kind = RTPS_DATA then
+        data_r <= flags(RTPS_PAYLOAD);
       end if;
       if field_valid = '1' then
         if unsigned(field_address) = RECORD_KIND then
@@ -196,38 +252,121 @@ begin
               and field_data /= x"00" then
           later_r <= '1';
         end if;
-        compared := x"00";
+        wanted_r <= x"00";
         for place in 0 to 1 loop
           if unsigned(field_address) = FIRST_PLACE+place then
-            compared := byte_of(counts_r.fragment, place);
+            wanted_r <= byte_of(counts_r.fragment, place);
           elsif unsigned(field_address) = EACH_PLACE+place then
-            compared := byte_of(length_r, place);
+            wanted_r <= byte_of(length_r, place);
           elsif unsigned(field_address) = SIZE_PLACE+place then
-            compared := byte_of(bytes_r, place);
+            wanted_r <= byte_of(bytes_r, place);
           end if;
         end loop;
         if is_in(field_address, RECORD_FRAGMENTS, 12) = '1' and unsigned(field_address) /= COUNT_PLACE
-           and unsigned(field_address) /= COUNT_PLACE+1 and field_data /= compared then
-          differs_r <= '1';
+           and unsigned(field_address) /= COUNT_PLACE+1 then
+          compares_r <= '1';
         end if;
       end if;
     end if;
   end process read_fields;
 
+  differs   <= '1' when compares_r = '1' and field_r /= wanted_r else differs_r;
   fits      <= '1' when high_r = '0' and size_r <= BYTES else '0';
-  has_bytes <= '1' when size_r /= 0 and each_r /= 0 and count_r /= 0 else '0';
+  has_bytes <= has_parts_r when size_r /= 0 else '0';
   is_holder <= '1' when source = source_r else '0';
   is_free   <= not (whole_r or ended_r);
   is_same   <= used_r and is_holder and not other_r;
-  continues <= is_free and is_same and has_bytes and not differs_r;
+  continues <= is_free and is_same and has_bytes and not differs;
   begins    <= is_free and is_next and fits and has_bytes and not later_r and (not used_r or (is_holder and other_r));
 
   -- ------------------------------------------------------------------ the bytes
 
-  writes    <= valid_r and taken_r and not closed_r;
-  ends_all  <= '1' when writes = '1' and spot_r.place + 1 = bytes_r else '0';
-  ends_part <= '1' when writes = '1' and (part_r = 1 or ends_all = '1') else '0';
-  is_end    <= '1' when taken_r = '1' and (ends_all = '1' or spot_r.place = bytes_r) else '0';
+  -- The number of DATA may be compared one cycle after its payload begins.
+  takes     <= first_r and (is_next or (is_new and not succeeds_r));
+  taken     <= taken_r or takes;
+  is_first  <= payload_valid and not inside_r;
+  continued <= valid_r and taken_r and not closed_r;
+  writes    <= continued or takes;
+  ends_part <= kind_r and continued and (one_part_r or one_left_r);
+  is_end    <= kind_r and ((continued and one_left_r) or (taken_r and none_left_r and between_r));
+  is_placed <= data_r and taken and not has_room and not over_r;
+
+  -- These numbers are complete at least four cycles before the first byte.
+  look_ahead : process (clk)
+  begin
+    if rising_edge(clk) then
+      rest_r      <= bytes_r - counts_r.place(15 downto 0);
+      one_each_r  <= is_number(each_r, 1);
+      one_count_r <= is_number(count_r, 1);
+      one_rest_r  <= is_number(rest_r, 1);
+      has_parts_r <= not (is_number(each_r, 0) or is_number(count_r, 0));
+    end if;
+  end process look_ahead;
+
+  count_bytes : process (clk)
+  begin
+    if rising_edge(clk) then
+      came_r <= came_r + 1;
+      if payload_valid = '0' then
+        came_r <= came_r;
+      elsif came_r(PLACE_BITS) = '1' then
+        over_r <= '1';
+      end if;
+      if writes = '1' then
+        between_r   <= ends_part;
+        closed_r    <= kind_r and (one_left_r or (one_part_r and one_parts_r));
+        none_left_r <= one_left_r;
+        one_left_r  <= is_number(left_r, 2);
+        one_part_r  <= is_number(part_r, 2);
+        left_r      <= left_r - 1;
+        part_r      <= part_r - 1;
+        if ends_part = '1' then
+          one_part_r  <= one_each_r;
+          one_parts_r <= is_number(parts_r, 2);
+          part_r      <= each_r;
+          parts_r     <= parts_r - 1;
+        end if;
+      elsif inside_r = '0' then
+        between_r   <= '1';
+        closed_r    <= '0';
+        none_left_r <= '0';
+        one_left_r  <= one_rest_r;
+        one_part_r  <= one_each_r;
+        one_parts_r <= one_count_r;
+        left_r      <= rest_r;
+        part_r      <= each_r;
+        parts_r     <= count_r;
+        -- If the bytes are taken, they begin a sample.
+        if is_same = '0' then
+          one_left_r <= is_number(size_r, 1);
+          left_r     <= size_r;
+        end if;
+      end if;
+      if is_first = '1' then
+        came_r <= to_unsigned(1, 17);
+        over_r <= '0';
+      end if;
+    end if;
+  end process count_bytes;
+
+  keeps     <= submessage and taken and (data_r or ends_part or (between_r and not writes));
+  completes <= submessage and has_place and (is_placed or is_end);
+
+  note_ends : process (clk)
+  begin
+    if rising_edge(clk) then
+      keeps_r     <= keeps;
+      completes_r <= completes;
+      fails_r     <= keeps and not completes and (data_r or is_end);
+      ends_r      <= ends;
+      spoils_r    <= spoils;
+      if rst_n = '0' then
+        keeps_r <= '0';
+        fails_r <= '0';
+        ends_r  <= '0';
+      end if;
+    end if;
+  end process note_ends;
 
   write_byte : process (clk)
   begin
@@ -244,91 +383,57 @@ begin
           read_r;
 
   take_fragment : process (clk)
-    variable spot    : spot_t;
-    variable counts  : spot_t;
-    variable gives   : std_logic;  -- the sample is given up
-    variable used    : std_logic;
-    variable began   : std_logic;
-    variable fed     : std_logic;
-    variable ended   : std_logic;
-    variable between : std_logic;
+    variable counts : spot_t;
+    variable gives  : std_logic;  -- the sample is given up
+    variable used   : std_logic;
+    variable began  : std_logic;
+    variable fed    : std_logic;
+    variable ended  : std_logic;
   begin
     if rising_edge(clk) then
       read_r  <= read;
       byte_r  <= payload_data;
       valid_r <= payload_valid;
-      spot    := spot_r;
       counts  := counts_r;
       used    := used_r;
       began   := began_r;
       fed     := fed_r;
       ended   := ended_r;
-      between := between_r;
       gives   := '0';
+      taken_r <= taken;
 
       -- A byte.
       if writes = '1' then
-        spot.place := spot_r.place + 1;
-        part_r     <= part_r - 1;
-        between    := ends_part;
+        spot_r.place <= spot_r.place + 1;
         if ends_part = '1' then
-          spot.fragment := spot_r.fragment + 1;
-          part_r        <= length_r;
-          parts_r       <= parts_r - 1;
-        end if;
-        if ends_all = '1' or (ends_part = '1' and parts_r = 1) then
-          closed_r <= '1';
+          spot_r.fragment <= spot_r.fragment + 1;
         end if;
       end if;
 
       -- The end of a submessage.
-      if submessage = '1' then
-        if taken_r = '1' and between = '1' then
-          counts := spot;
-          fed    := '1';
-          ended  := is_end and has_place;
-          gives  := is_end and not has_place;
-        end if;
+      if submessage = '1' or ends = '1' then
         taken_r  <= '0';
         inside_r <= '0';
       end if;
-
-      -- The first byte of a payload.
-      if payload_valid = '1' and inside_r = '0' then
-        inside_r  <= '1';
-        taken_r   <= kind_r and is_wanted and (continues or begins);
-        closed_r  <= '0';
-        between   := '1';
-        part_r    <= each_r;
-        parts_r   <= count_r;
-        spot      := counts_r;
-        if kind_r = '1' and is_wanted = '1' and begins = '1' then
-          used     := '1';
-          began    := '1';
-          age_r    <= 0;
-          source_r <= source;
-          number_r <= number;
-          bytes_r  <= size_r;
-          length_r <= each_r;
-          spot     := BEGINNING;
-          counts   := BEGINNING;
-        end if;
+      if keeps_r = '1' then
+        counts := spot_r;
+        fed    := '1';
+        ended  := completes_r;
+        gives  := fails_r;
       end if;
 
       -- A sample that is whole is known to be one of the writer before.
       if renews = '1' and renewed = source_r and whole_r = '0' then
-        began := began or ended;
-        gives := gives or not ended;
+        began := began or ended or completes;
+        gives := gives or not (ended or completes);
       end if;
 
       -- The end of a packet.
-      if ends = '1' then
-        taken_r  <= '0';
-        inside_r <= '0';
-        if spoils = '1' then
+      if ends_r = '1' then
+        if spoils_r = '1' then
           counts := kept_r;
           gives  := gives or began;
-        elsif began = '1' and counts.place = 0 then
+        elsif began = '1' and fed = '0' then
           -- The first fragment was cut.
           gives := '1';
         else
@@ -344,7 +449,7 @@ begin
       elsif tick = '1' and used_r = '1' and is_free = '1' then
         if age_r /= TICKS-1 then
           age_r <= age_r + 1;
-        elsif taken_r = '0' and began = '0' and fed = '0' then
+        elsif (taken or began_r or fed_r or keeps_r or is_first) = '0' then
           gives := '1';
         end if;
       end if;
@@ -352,22 +457,50 @@ begin
         whole_r <= '0';
         gives   := '1';
       end if;
+
+      -- The first byte of a payload.
+      begins_r <= '0';
+      first_r  <= '0';
+      if is_first = '1' then
+        inside_r   <= '1';
+        taken_r    <= kind_r and is_wanted and (continues or begins);
+        begins_r   <= kind_r and is_wanted and begins;
+        first_r    <= data_r and is_wanted and is_free and (not used_r or (is_holder and other_r));
+        succeeds_r <= used_r;
+        spot_r     <= counts_r;
+        if data_r = '1' or is_same = '0' then
+          spot_r <= BEGINNING;
+        end if;
+      end if;
+      if begins_r = '1' or takes = '1' then
+        used     := '1';
+        began    := '1';
+        fed      := '0';
+        source_r <= source;
+        number_r <= number;
+        bytes_r  <= size_r;
+        length_r <= each_r;
+        counts   := BEGINNING;
+      end if;
+
       if gives = '1' then
         used    := '0';
         began   := '0';
         taken_r <= '0';
-        age_r   <= 0;
       end if;
-      spot_r    <= spot;
-      counts_r  <= counts;
-      used_r    <= used;
-      began_r   <= began;
-      fed_r     <= fed;
-      ended_r   <= ended;
-      between_r <= between;
+      if used_r = '0' then
+        age_r <= 0;
+      end if;
+      counts_r <= counts;
+      used_r   <= used;
+      began_r  <= began;
+      fed_r    <= fed;
+      ended_r  <= ended;
       if rst_n = '0' then
         valid_r  <= '0';
         inside_r <= '0';
+        begins_r <= '0';
+        first_r  <= '0';
         taken_r  <= '0';
         used_r   <= '0';
         began_r  <= '0';
@@ -379,10 +512,11 @@ begin
     end if;
   end process take_fragment;
 
-  is_complete <= submessage and is_end and (between_r or ends_part);
-  is_long     <= submessage and kind_r and not fits;
-  is_dropped  <= submessage and kind_r and is_next and fits and not (taken_r or is_same);
-  size        <= std_logic_vector(bytes_r);
+  is_complete <= submessage and (is_placed or is_end);
+  is_long     <= submessage and ((kind_r and not fits) or (data_r and taken and over_r and not has_room));
+  is_dropped  <= submessage and ((kind_r and is_next and fits and not (taken_r or is_same))
+                                 or (data_r and is_new and not (taken or has_room)));
+  size        <= std_logic_vector(came_r(15 downto 0)) when data_r = '1' else std_logic_vector(size_r);
   is_whole    <= whole_r;
 
   is_open        <= used_r and is_free and not began_r;

@@ -52,7 +52,8 @@ entity firm_rtps_history is
     is_last_part : out std_logic;
     is_beyond    : out std_logic;
 
-    -- Shows the payload of a slot, or of the last sample that has come, and its size, from two cycles after `shows` on.
+    -- Shows the payload of a slot, or of the last sample that has come: its size from two cycles after `shows` on, its
+    -- first byte from three cycles on.
     shows         : in  std_logic;
     shows_new     : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
@@ -75,36 +76,38 @@ architecture rtl of firm_rtps_history is
   constant SLOT_BITS     : positive := clog2(SLOTS);
   constant HAS_FRAGMENTS : boolean  := SAMPLE > RTPS_FRAGMENT_BYTES;
 
+  subtype place_t is unsigned(SLOT_BITS+BYTE_BITS-1 downto 0);
   subtype slot_t is unsigned(SLOT_BITS-1 downto 0);
-  type bytes_t is array (natural range 0 to SLOTS*SAMPLE-1) of std_logic_vector(7 downto 0);
+  type bytes_t is array (natural range <>) of std_logic_vector(7 downto 0);
   type sizes_t is array (natural range 0 to SLOTS-1) of unsigned(BYTE_BITS downto 0);
   type slots_t is array (natural range 0 to MOST_WRITERS-1) of slot_t;
 
-  signal bytes : bytes_t;
   signal sizes : sizes_t := (others => (others => '0'));
   signal nexts : slots_t := (others => (others => '0'));
 
   -- The frame that comes.
-  signal head_r    : unsigned(2 downto 0);
-  signal writer_r  : unsigned(2 downto 0) := (others => '0');
-  signal size_r    : unsigned(BYTE_BITS downto 0) := (others => '0');
-  signal wrong_r   : std_logic;  -- it is refused
-  signal has_r     : std_logic;
-  signal moves     : std_logic;
-  signal is_head   : std_logic;
-  signal is_full   : std_logic;
-  signal writes    : std_logic;
-  signal new_size  : unsigned(BYTE_BITS downto 0);
-  signal next_slot : slot_t;
-  signal is_good   : std_logic;
-  signal ends      : std_logic;
+  signal head_r      : unsigned(2 downto 0);
+  signal writer_r    : unsigned(2 downto 0) := (others => '0');
+  signal size_r      : unsigned(BYTE_BITS downto 0) := (others => '0');
+  signal wrong_r     : std_logic;  -- it is refused
+  signal has_r       : std_logic;
+  signal moves       : std_logic;
+  signal is_head     : std_logic;
+  signal is_full     : std_logic;
+  signal writes      : std_logic;
+  signal new_size    : unsigned(BYTE_BITS downto 0);
+  signal next_slot   : slot_t;
+  signal write_place : place_t;
+  signal is_good     : std_logic;
+  signal ends        : std_logic;
 
   -- The payload that leaves.
-  signal slot_r  : slot_t := (others => '0');
-  signal shown_r : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
-  signal place_r : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
-  signal shows_r : std_logic := '0';
-  signal byte_r  : std_logic_vector(7 downto 0) := (others => '0');
+  signal slot_r     : slot_t := (others => '0');
+  signal shown_r    : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
+  signal place_r    : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
+  signal read_place : place_t;
+  signal shows_r    : std_logic := '0';
+  signal steps      : std_logic;                                          -- to the next byte
 
   -- The fragment that the program chose.
   signal size       : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- of the sample in the slot
@@ -142,15 +145,16 @@ begin
   is_good       <= not (is_head or wrong_r or is_full or s_axis_tuser(0));
   ends          <= moves and s_axis_tlast;
 
-  write_payload : process (clk)
+  write_size : process (clk)
   begin
     if rising_edge(clk) then
       if writes = '1' then
-        bytes(to_integer(next_slot & size_r(BYTE_BITS-1 downto 0))) <= s_axis_tdata;
-        sizes(to_integer(next_slot))                                <= new_size;
+        sizes(to_integer(next_slot)) <= new_size;
       end if;
     end if;
-  end process write_payload;
+  end process write_size;
+
+  write_place <= next_slot & size_r(BYTE_BITS-1 downto 0);
 
   write_slot : process (clk)
   begin
@@ -203,13 +207,12 @@ begin
 
   -- ------------------------------------------------------------------ payloads
 
-  read_payload : process (clk)
+  show_payload : process (clk)
   begin
     if rising_edge(clk) then
       shows_r <= shows;
       shown_r <= sizes(to_integer(slot_r));
-      if shows_r = '1' or m_axis_tready = '1' then
-        byte_r  <= bytes(to_integer(slot_r & place_r));
+      if steps = '1' then
         place_r <= place_r + 1;
       end if;
       if shows = '1' then
@@ -225,11 +228,68 @@ begin
         slot_r <= unsigned(choice(SLOT_BITS-1 downto 0));
       end if;
     end if;
-  end process read_payload;
+  end process show_payload;
 
-  m_axis_tdata <= byte_r;
+  read_place <= slot_r & place_r;
 
   with_fragments : if HAS_FRAGMENTS generate
+
+    -- A memory of many blocks shows its bytes late in a cycle. So each bank has a register, and one of them is shown.
+    constant BANKS     : positive := max(1, SLOTS*SAMPLE/16384);
+    constant BANK      : positive := SLOTS*SAMPLE/BANKS;  -- bytes
+    constant BANK_BITS : positive := clog2(BANK);
+
+    subtype bank_t is natural range 0 to BANKS-1;
+    signal writes_to : bank_t;
+    signal bank_r    : bank_t;
+    signal bank_2r   : bank_t;
+    signal shows_2r  : std_logic := '0';
+    signal shown     : bytes_t(0 to BANKS-1) := (others => (others => '0'));
+
+    function bank_of(place : place_t) return bank_t is
+    begin
+      return to_integer(shift_right(place, BANK_BITS));
+    end function bank_of;
+
+  begin
+
+    writes_to <= bank_of(write_place);
+
+    all_banks : for number in 0 to BANKS-1 generate
+
+      signal bytes  : bytes_t(0 to BANK-1);
+      signal byte_r : std_logic_vector(7 downto 0) := (others => '0');
+
+    begin
+
+      access_bank : process (clk)
+      begin
+        if rising_edge(clk) then
+          if writes = '1' and writes_to = number then
+            bytes(to_integer(resize(write_place, BANK_BITS))) <= s_axis_tdata;
+          end if;
+          if steps = '1' then
+            byte_r        <= bytes(to_integer(resize(read_place, BANK_BITS)));
+            shown(number) <= byte_r;
+          end if;
+        end if;
+      end process access_bank;
+
+    end generate all_banks;
+
+    follow_bank : process (clk)
+    begin
+      if rising_edge(clk) then
+        shows_2r <= shows_r;
+        if steps = '1' then
+          bank_r  <= bank_of(read_place);
+          bank_2r <= bank_r;
+        end if;
+      end if;
+    end process follow_bank;
+
+    steps        <= shows_r or shows_2r or m_axis_tready;
+    m_axis_tdata <= shown(bank_2r);
 
     u_fragment : entity firm.firm_rtps_fragment
       port map (
@@ -255,6 +315,25 @@ begin
 
   without_fragments : if not HAS_FRAGMENTS generate
 
+    signal bytes  : bytes_t(0 to SLOTS*SAMPLE-1);
+    signal byte_r : std_logic_vector(7 downto 0) := (others => '0');
+
+  begin
+
+    access_bytes : process (clk)
+    begin
+      if rising_edge(clk) then
+        if writes = '1' then
+          bytes(to_integer(write_place)) <= s_axis_tdata;
+        end if;
+        if steps = '1' then
+          byte_r <= bytes(to_integer(read_place));
+        end if;
+      end if;
+    end process access_bytes;
+
+    steps         <= shows_r or m_axis_tready;
+    m_axis_tdata  <= byte_r;
     size          <= (others => '0');
     start         <= (others => '0');
     part_bytes    <= (others => '0');

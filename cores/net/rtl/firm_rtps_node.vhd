@@ -19,7 +19,8 @@ entity firm_rtps_node is
     DEPTH   : integer := 2048; -- bytes of waiting discovery, a power of two, 4 to 65536
     BYTES   : integer := 2048; -- of waiting payloads, a power of two, 4 to 131072
     SAMPLES : integer := 16;   -- that wait for the host, a power of two, 2 or more
-    -- Bytes of the longest sample in fragments of RTPS, a power of two, 1024 to 65536; 0 if all of them are skipped.
+    -- Bytes of the longest sample in fragments of RTPS, or without room in BYTES: a power of two, 1024 to 65536. 0 if
+    -- they are skipped, or dropped.
     ASSEMBLED : integer := 0
   );
   port (
@@ -87,7 +88,7 @@ entity firm_rtps_node is
     is_endpoint_refused : out std_logic;  -- one that matches
     is_frame_refused    : out std_logic;  -- a frame to send: without a payload, too long, or of another id
     -- Pulses: something was wrong, or another than it should be.
-    is_sample_parted    : out std_logic;  -- a packet with a sample in fragments that is skipped
+    is_sample_parted    : out std_logic;  -- a packet with a sample that is skipped: in fragments, or too long
     is_packet_broken    : out std_logic;  -- a packet, or the list of parameters in it
     is_endpoint_other   : out std_logic   -- the announcement of a topic of the node's that differs from it
   );

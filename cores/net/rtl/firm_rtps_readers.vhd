@@ -6,7 +6,8 @@
 -- The writer of a sample is looked up while the packet arrives. When the packet is known to be good, the sample's
 -- number is compared with the next one of its writer: a reliable reader takes that one only, and another one takes
 -- any later one as well. A sample that is taken waits for the host. One that comes in fragments is put together
--- elsewhere (firm_rtps_assembly), and takes its turn among the others when it is whole.
+-- elsewhere (firm_rtps_assembly), and takes its turn among the others when it is whole. So does one whose payload finds
+-- no room among those that wait.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -21,7 +22,8 @@ entity firm_rtps_readers is
     SOURCES : integer := 8;    -- matched writers, 1 to 64
     BYTES   : integer := 2048; -- of payloads that wait, a power of two, 4 to 131072
     SAMPLES : integer := 16;   -- that wait, a power of two, 2 or more
-    -- Bytes of the longest sample in fragments, see firm_rtps_assembly; 0 if all of them are skipped.
+    -- Bytes of the longest sample in fragments, or without room among those; see firm_rtps_assembly. 0 if all of them
+    -- are skipped, or dropped.
     ASSEMBLED : integer := 0
   );
   port (
@@ -77,7 +79,7 @@ entity firm_rtps_readers is
 
     -- A pulse for each good packet with a sample:
     is_lost   : out std_logic; -- without room
-    is_parted : out std_logic  -- in fragments that are skipped
+    is_parted : out std_logic  -- that is skipped: in fragments, or too long
   );
 end entity firm_rtps_readers;
 
@@ -149,7 +151,7 @@ architecture rtl of firm_rtps_readers is
   signal filled_r     : std_logic;  -- with a payload that is whole
   signal fragment_r   : std_logic;  -- with a part of one
   -- Of the assembly.
-  signal is_complete  : std_logic;  -- the part completes a sample
+  signal is_complete  : std_logic;  -- the part completes a sample, or is one without room elsewhere
   signal is_long      : std_logic;  -- the part is skipped with its sample
   signal is_unplaced  : std_logic;  -- the part is dropped
   signal whole_size   : std_logic_vector(SIZE_BITS-1 downto 0);
@@ -171,6 +173,7 @@ architecture rtl of firm_rtps_readers is
   signal misses_r  : std_logic;  -- a sample of the packet found no room
   signal skips_r   : std_logic;  -- a sample of the packet is a fragment that is skipped
   signal pushes    : std_logic;
+  signal fills     : std_logic;  -- with a payload that waits
   signal size      : size_t;
   signal spare_r   : std_logic;
   signal first_r   : count_t := (others => '0');  -- of the packet's samples
@@ -351,6 +354,9 @@ begin
       if kind = RTPS_DATA then
         filled_r <= flags(RTPS_PAYLOAD);
       end if;
+      if ASSEMBLED /= 0 and (full_r = '1' or (payload_valid = '1' and has_room = '0')) then
+        filled_r <= '0';
+      end if;
       ends_r   <= is_whole or is_faulty or is_foreign or is_aborted;
       spoils_r <= is_foreign or is_aborted;
       if rst_n = '0' then
@@ -365,12 +371,20 @@ begin
                         and write_r(PLACE_BITS-1 downto 0) = read_r(PLACE_BITS-1 downto 0) else
                '1';
   is_wanted <= known_r and for_it_r and not large_r;
-  is_sample <= is_wanted and (data_r or (fragment_r and (is_complete or is_long)));
+
+  all_samples : if ASSEMBLED = 0 generate
+    is_sample <= is_wanted and (data_r or (fragment_r and (is_complete or is_long)));
+  end generate all_samples;
+
   -- The payload's last byte came before: the next submessage has a head first.
-  size      <= unsigned(whole_size) when is_complete = '1' else
-               resize(write_r - sample_r, SIZE_BITS) when filled_r = '1' else
-               (others => '0');
-  pushes    <= is_sample and spare_r and not (full_r and filled_r);
+  size <= unsigned(whole_size) when is_complete = '1' else
+          resize(write_r - sample_r, SIZE_BITS) when filled_r = '1' else
+          (others => '0');
+
+  all_pushes : if ASSEMBLED = 0 generate
+    pushes <= is_sample and spare_r and not (full_r and filled_r);
+    fills  <= pushes and filled_r;
+  end generate all_pushes;
 
   write_payload : process (clk)
   begin
@@ -414,15 +428,19 @@ begin
       end if;
       if pushes = '1' then
         last := last_r + 1;
-        if filled_r = '1' then
-          place := write_r;
-        end if;
+      end if;
+      if fills = '1' then
+        place := write_r;
       end if;
       if submessage_r = '1' then
         write_r <= place;
         full_r  <= '0';
-        misses  := misses_r or (is_sample and not pushes) or (is_wanted and fragment_r and is_unplaced);
+        misses  := misses_r or (is_sample and not pushes)
+                   or (is_wanted and (data_r or fragment_r) and is_unplaced);
         skips   := skips_r or (is_sample and fragment_r and is_long);
+        if ASSEMBLED /= 0 and is_sample = '1' and data_r = '1' and is_long = '1' then
+          skips := '1';
+        end if;
       end if;
       if ends_r = '1' then
         -- The packet may end with the submessage.
@@ -473,6 +491,8 @@ begin
   with_assembly : if ASSEMBLED /= 0 generate
 
     signal is_mine_too    : std_logic;
+    signal has_payload_r  : std_logic;  -- it is DATA, and not of a key
+    signal is_new_r       : std_logic;
     signal wanted_r       : number_t := (others => '0');
     signal is_strict_r    : std_logic;
     signal is_next_r      : std_logic;
@@ -494,15 +514,30 @@ begin
 
   begin
 
-    -- Bytes of the fragment follow its number by twelve or more others.
+    -- A sample whose payload has no room is none if it is old: that is no loss.
+    is_sample <= is_wanted and ((data_r and (filled_r or not has_payload_r))
+                                or ((data_r or fragment_r) and (is_complete or is_long)));
+    pushes    <= is_sample and spare_r;
+    fills     <= is_wanted and data_r and filled_r and spare_r;
+
+    -- Bytes of a fragment follow its number by twelve or more others, and those of DATA may follow at once.
     compare_number : process (clk)
     begin
       if rising_edge(clk) then
+        has_payload_r <= '0';
+        if kind = RTPS_DATA then
+          has_payload_r <= flags(RTPS_PAYLOAD);
+        end if;
         wanted_r    <= wanted;
         is_strict_r <= reliable_r(to_integer(sender_r));
         is_next_r   <= '0';
-        if unsigned(number_r) = wanted_r or (is_strict_r = '0' and unsigned(number_r) > wanted_r) then
+        is_new_r    <= '0';
+        if unsigned(number_r) = wanted_r then
           is_next_r <= '1';
+          is_new_r  <= '1';
+        elsif unsigned(number_r) > wanted_r then
+          is_next_r <= not is_strict_r;
+          is_new_r  <= '1';
         end if;
       end if;
     end process compare_number;
@@ -528,12 +563,14 @@ begin
         flags          => flags,
         is_wanted      => is_mine_too,
         is_next        => is_next_r,
+        is_new         => is_new_r,
         source         => sender_r,
         number         => number_r,
         submessage     => submessage_r,
         ends           => ends_r,
         spoils         => spoils_r,
         has_place      => spare_r,
+        has_room       => filled_r,
         is_complete    => is_complete,
         is_long        => is_long,
         is_dropped     => is_unplaced,

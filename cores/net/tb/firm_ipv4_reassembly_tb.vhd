@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends frames to the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether
 -- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a frame that leaves, in the
--- same form without the cycles; or `dropped`, or `lost`.
+-- same form without the cycles; or `dropped`, or `lost`. After a long packet has left, the user is busy for some
+-- cycles; the next one begins later, or when its time is over.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -13,6 +14,9 @@ entity firm_ipv4_reassembly_tb is
     BYTES         : integer := 2048;
     DEPTH         : integer := 4096;
     TICKS         : integer := 1000;
+    LONG          : integer := 4096;
+    HOLD_TICKS    : integer := 300;
+    BUSY_CYCLES   : integer := 0;     -- after a long packet
     FRAME_FILE    : string  := "frames.txt";
     RESULT_FILE   : string  := "packets.txt";
     EXPECTED_FILE : string  := "";
@@ -25,7 +29,9 @@ end entity firm_ipv4_reassembly_tb;
 
 architecture simulation of firm_ipv4_reassembly_tb is
 
-  constant GAP : positive := 6;  -- cycles between frames, at least
+  constant GAP  : positive := 6;   -- cycles between frames, at least
+  constant HEAD : positive := 34;  -- bytes of a packet before those that make it long
+  constant REST : positive := 20;  -- cycles until the user begins
 
   signal clk   : std_logic := '0';
   signal rst_n : std_logic;
@@ -41,6 +47,7 @@ architecture simulation of firm_ipv4_reassembly_tb is
   signal m_tuser    : std_logic_vector(0 downto 0);
   signal m_tvalid   : std_logic;
   signal m_tlast    : std_logic;
+  signal rests      : std_logic := '1';
   signal is_dropped : std_logic;
   signal is_lost    : std_logic;
 
@@ -50,10 +57,12 @@ begin
 
   u_reassembly : entity firm.firm_ipv4_reassembly
     generic map (
-      PACKETS => PACKETS,
-      BYTES   => BYTES,
-      DEPTH   => DEPTH,
-      TICKS   => TICKS
+      PACKETS    => PACKETS,
+      BYTES      => BYTES,
+      DEPTH      => DEPTH,
+      TICKS      => TICKS,
+      LONG       => LONG,
+      HOLD_TICKS => HOLD_TICKS
     )
     port map (
       clk           => clk,
@@ -69,6 +78,7 @@ begin
       m_axis_tuser  => m_tuser,
       m_axis_tvalid => m_tvalid,
       m_axis_tlast  => m_tlast,
+      rests         => rests,
       is_dropped    => is_dropped,
       is_lost       => is_lost
     );
@@ -125,5 +135,37 @@ begin
       end if;
     end if;
   end process check_gaps;
+
+  be_busy : process (clk)
+    variable count   : natural := 0;
+    variable left    : natural := 0;  -- cycles until the user has taken all of a long packet
+    variable since   : natural := 0;  -- milliseconds, when it came
+    variable is_late : boolean := false;
+  begin
+    if rising_edge(clk) and rst_n = '1' then
+      if left /= 0 then
+        left := left - 1;
+      end if;
+      if m_tvalid = '1' then
+        if count = 0 then
+          is_late := left = 0 or ms - since >= HOLD_TICKS-1;
+        end if;
+        count := count + 1;
+        if m_tlast = '1' then
+          if count >= HEAD+LONG and m_tuser = "0" then
+            assert is_late
+              report "a long packet begins while the user is busy" severity failure;
+            left  := REST+BUSY_CYCLES;
+            since := ms;
+          end if;
+          count := 0;
+        end if;
+      end if;
+      rests <= '1';
+      if left /= 0 and left <= BUSY_CYCLES then
+        rests <= '0';
+      end if;
+    end if;
+  end process be_busy;
 
 end architecture simulation;

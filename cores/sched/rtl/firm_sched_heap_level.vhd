@@ -59,9 +59,6 @@ architecture rtl of firm_sched_heap_level is
   constant SIDE         : natural  := LOW_BITS;  -- the bit of the index that tells left from right
   -- A node: valid, key, the low bits of its item's index.
   constant NODE_BITS    : positive := 1 + KEY_BITS + LOW_BITS;
-  -- In memories of many words, the enable of a write is decoded and drives many cells. INSERT then always writes to its
-  -- place, so that its comparison arrives at the data.
-  constant REWRITES     : boolean  := LEVEL > 6;
   subtype node_t is std_logic_vector(NODE_BITS-1 downto 0);
   -- The compared bits of items on one path: key and low bits of the index.
   subtype rank_t is std_logic_vector(NODE_BITS-2 downto 0);
@@ -84,10 +81,6 @@ architecture rtl of firm_sched_heap_level is
   signal right_key_first : std_logic;
   signal takes_right     : std_logic;  -- FILL: the right one of the pair goes first
   signal node_first      : std_logic;  -- INSERT: the node goes before the item, if there is one
-
-  signal stores : std_logic;  -- the item is written before it is compared
-  signal expels : std_logic;  -- it takes the place of one that it precedes
-  signal stored : node_t;     -- INSERT, CLEAR: what the node holds afterwards, if it is written
 
 begin
 
@@ -218,21 +211,11 @@ begin
   end process hand_down;
 
   -- The comparison is the last to arrive. An item is stored in an empty node, or in the place of one that it precedes.
-  in_place : if REWRITES generate
-    stores <= insert_r;
-    expels <= '0';
-    stored <= node when (insert_r and node_first and node(NODE_BITS-1)) = '1' else item;
-  end generate in_place;
-  where_it_goes : if not REWRITES generate
-    stores <= insert_r and not node(NODE_BITS-1);
-    expels <= insert_r and not node_first;
-    stored <= item;
-  end generate where_it_goes;
-
-  choose_write : process (stored, stores, expels, clear_r, id_r, hole, hole_right,
+  choose_write : process (item, node, insert_r, clear_r, id_r, node_first, hole, hole_right,
                           filler_valid, filler_id, filler_key)
+    variable stores : std_logic;  -- the node is empty
   begin
-    write_node <= stored;
+    write_node <= item;
     if hole = '1' then
       write_node(NODE_BITS-1)                 <= filler_valid;
       write_node(NODE_BITS-2 downto LOW_BITS) <= filler_key;
@@ -240,10 +223,11 @@ begin
         write_node(place) <= filler_id(place);
       end loop;
     end if;
+    stores      := insert_r and not node(NODE_BITS-1);
     write_left  <= ((stores and not id_r(SIDE)) or clear_r or (hole and not hole_right)) or
-                   (expels and not id_r(SIDE));
+                   ((insert_r and not id_r(SIDE)) and not node_first);
     write_right <= ((stores and id_r(SIDE)) or clear_r or (hole and hole_right)) or
-                   (expels and id_r(SIDE));
+                   ((insert_r and id_r(SIDE)) and not node_first);
   end process choose_write;
 
 end architecture rtl;

@@ -15,7 +15,9 @@ MOST_SUBSCRIBERS = MOST_PUBLISHERS = 8
 LONGEST_IN_FRAME, LONGEST, LONGEST_SENT_BY_DEFAULT = 1344, 65280, 1024
 # Bytes of the headers beside a payload in a packet of IPv4, with further submessages before it.
 _HEADERS_BYTES = 256
-_LEAST_WAITING, _MOST_DISCOVERY = 4096, 32768
+# Bytes of payloads that wait; a longer payload is in the memory of a sample in several packets.
+WAITING_BYTES = 4096
+_LEAST_DISCOVERY, _MOST_DISCOVERY = 4096, 16384
 # What the generics of the hardware may be at least.
 LEAST_REASSEMBLED, _LEAST_ASSEMBLED = 2048, 1024
 # Samples of a writer that others may ask for, and slots for the samples of all writers together.
@@ -71,23 +73,18 @@ def reassembled_bytes(system: DerivedSystem) -> int:
 
 
 def assembled_bytes(system: DerivedSystem) -> int:
-    """Return the bytes of the longest sample in fragments of RTPS, a power of two; 0 if none is taken."""
+    """Return the bytes of the longest sample that is put together, a power of two; 0 if none is taken."""
     longest = _longest_of_several(system)
     return max(_LEAST_ASSEMBLED, _power(longest)) if longest else 0
-
-
-def waiting_bytes(system: DerivedSystem) -> int:
-    """Return the bytes of payloads that wait, a power of two: the longest one comes while one leaves."""
-    longest = _longest_of_several(system)
-    return max(_LEAST_WAITING, 2 * _power(longest + _HEADERS_BYTES))
 
 
 def discovery_bytes(system: DerivedSystem) -> int:
     """Return the bytes of discovery that wait, a power of two.
 
-    Peers announce all their endpoints in one packet, with whose payloads the fields of its submessages wait.
+    Peers announce all their endpoints in one packet, with whose payloads the fields of its submessages wait. One that
+    finds no room is counted, and the node asks for these endpoints again, two at a time.
     """
-    return min(_MOST_DISCOVERY, max(_LEAST_WAITING, 2 * reassembled_bytes(system)))
+    return min(_MOST_DISCOVERY, max(_LEAST_DISCOVERY, reassembled_bytes(system)))
 
 
 def slot_count(used: int) -> int:
