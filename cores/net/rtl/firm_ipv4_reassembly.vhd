@@ -187,13 +187,17 @@ architecture rtl of firm_ipv4_reassembly is
   signal store_data_r : byte_t := (others => '0');
   signal sent_byte    : byte_t;
 
-  signal user         : std_logic_vector(0 downto 0);        -- of the frame that comes; a fragment is aborted
-  signal store_valid  : std_logic;
-  signal stored_data  : byte_t;
-  signal stored_valid : std_logic;
-  signal stored_last  : std_logic;
-  signal stored_ready : std_logic;
-  signal loses        : std_logic;
+  signal user           : std_logic_vector(0 downto 0);      -- of the frame that comes; a fragment is aborted
+  signal store_valid    : std_logic;
+  signal stored_data    : byte_t;
+  signal stored_valid   : std_logic;
+  signal stored_last    : std_logic;
+  signal stored_ready   : std_logic;
+  signal waiting_r      : std_logic;                         -- the next byte of the store, whose memory is late, too
+  signal waiting_data_r : byte_t := (others => '0');
+  signal waiting_last_r : std_logic;
+  signal drains         : std_logic;
+  signal loses          : std_logic;
 
   -- The lowest one of several; 0 if there is none.
   function lowest(slots : slots_t) return slot_t is
@@ -534,7 +538,22 @@ begin
     );
 
   is_lost      <= loses;
-  stored_ready <= '1' when state_r = DRAINING else '0';
+  drains       <= waiting_r when state_r = DRAINING else '0';
+  stored_ready <= drains or not waiting_r;
+
+  wait_for_turn : process (clk)
+  begin
+    if rising_edge(clk) then
+      if stored_ready = '1' then
+        waiting_r      <= stored_valid;
+        waiting_data_r <= stored_data;
+        waiting_last_r <= stored_last;
+      end if;
+      if rst_n = '0' then
+        waiting_r <= '0';
+      end if;
+    end if;
+  end process wait_for_turn;
 
   choose : process (clk)
   begin
@@ -576,16 +595,16 @@ begin
         out_place_r <= (others => '0');
         if gap_r /= 0 then
           gap_r <= gap_r - 1;
-        elsif stored_valid = '1' and (turn_r = '1' or whole_r = NO_SLOT) then
+        elsif waiting_r = '1' and (turn_r = '1' or whole_r = NO_SLOT) then
           state_r <= DRAINING;
         elsif ready /= NO_SLOT then
           state_r    <= SENDING;
           out_slot_r <= lowest(next_one);
-        elsif whole_r = NO_SLOT and (place_r = 0 or waits_r = '0')
+        elsif whole_r = NO_SLOT and stored_valid = '0' and (place_r = 0 or waits_r = '0')
               and s_axis_tvalid = '0' and moves_r = '0' and ends_r = '0' then
           state_r <= PASSING;
         end if;
-      elsif stored_valid = '1' and stored_last = '1' then
+      elsif waiting_r = '1' and waiting_last_r = '1' then
         state_r <= RESTING;
         turn_r  <= '0';
         gap_r   <= GAP;
@@ -618,9 +637,9 @@ begin
       sent_at_r    <= shown_at_r;
       sent_data_r  <= data_r;
       sent_head_r  <= head_r;
-      drains_r     <= stored_valid and stored_ready;
-      ends_store_r <= stored_last;
-      store_data_r <= stored_data;
+      drains_r     <= drains;
+      ends_store_r <= waiting_last_r;
+      store_data_r <= waiting_data_r;
 
       m_axis_tdata  <= s_axis_tdata;
       m_axis_tuser  <= user;
