@@ -183,13 +183,13 @@ architecture rtl of firm_rtps_assembly is
   signal read_r : unsigned(PLACE_BITS-1 downto 0) := (others => '0');
   signal read   : unsigned(PLACE_BITS-1 downto 0);
 
-  function is_number(value : half_t; number : natural) return std_logic is
+  function equals(value : half_t; other : natural) return std_logic is
   begin
-    if value = number then
+    if value = other then
       return '1';
     end if;
     return '0';
-  end function is_number;
+  end function equals;
 
   -- A byte of a number, the lowest at place 0.
   function byte_of(value : unsigned; place : natural) return std_logic_vector is
@@ -296,10 +296,10 @@ begin
   begin
     if rising_edge(clk) then
       rest_r      <= bytes_r - counts_r.place(15 downto 0);
-      one_each_r  <= is_number(each_r, 1);
-      one_count_r <= is_number(count_r, 1);
-      one_rest_r  <= is_number(rest_r, 1);
-      has_parts_r <= not (is_number(each_r, 0) or is_number(count_r, 0));
+      one_each_r  <= equals(each_r, 1);
+      one_count_r <= equals(count_r, 1);
+      one_rest_r  <= equals(rest_r, 1);
+      has_parts_r <= not (equals(each_r, 0) or equals(count_r, 0));
     end if;
   end process look_ahead;
 
@@ -316,13 +316,13 @@ begin
         between_r   <= ends_part;
         closed_r    <= kind_r and (one_left_r or (one_part_r and one_parts_r));
         none_left_r <= one_left_r;
-        one_left_r  <= is_number(left_r, 2);
-        one_part_r  <= is_number(part_r, 2);
+        one_left_r  <= equals(left_r, 2);
+        one_part_r  <= equals(part_r, 2);
         left_r      <= left_r - 1;
         part_r      <= part_r - 1;
         if ends_part = '1' then
           one_part_r  <= one_each_r;
-          one_parts_r <= is_number(parts_r, 2);
+          one_parts_r <= equals(parts_r, 2);
           part_r      <= each_r;
           parts_r     <= parts_r - 1;
         end if;
@@ -338,7 +338,7 @@ begin
         parts_r     <= count_r;
         -- If the bytes are taken, they begin a sample.
         if is_same = '0' then
-          one_left_r <= is_number(size_r, 1);
+          one_left_r <= equals(size_r, 1);
           left_r     <= size_r;
         end if;
       end if;
