@@ -286,6 +286,8 @@ def test_eight_subscribers_take_turns_at_four_sockets(running: Clocked) -> None:
 def test_another_node_with_its_name_takes_its_place(running: Clocked) -> None:
     ros = running.ros
     words = ["rostopic", "pub", "/turn", "geometry_msgs/Quaternion", "{w: 1}", "__name:=fabric"]
+    # One that still registers its topics when the other one begins to would take its place back.
+    running.board.wait_until(lambda: {"/place", "/turn"} <= {*_tool(ros, "rostopic", "list").stdout.split()})
     with _started(ros, *words) as other:
         # The hardware stops for good.
         running.board.wait_until(lambda: running.board.listening() == 0)
