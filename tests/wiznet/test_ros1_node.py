@@ -286,12 +286,15 @@ def test_eight_subscribers_take_turns_at_four_sockets(running: Clocked) -> None:
 def test_another_node_with_its_name_takes_its_place(running: Clocked) -> None:
     ros = running.ros
     words = ["rostopic", "pub", "/turn", "geometry_msgs/Quaternion", "{w: 1}", "__name:=fabric"]
-    # One that still registers its topics when the other one begins to would take its place back.
+    # One that registers for the first time after the other one takes its place instead.
     running.board.wait_until(lambda: {"/place", "/turn"} <= {*_tool(ros, "rostopic", "list").stdout.split()})
-    with _started(ros, *words) as other:
+    with _started(ros, *words):
         # The hardware stops for good.
         running.board.wait_until(lambda: running.board.listening() == 0)
         running.board.wait_until(lambda: "/place" not in _tool(ros, "rostopic", "list").stdout)
+    # The first one may have ended as well: if the hardware was registering again when it came, each took the other's
+    # place.
+    with _started(ros, *words) as other:
         turn = " * /turn [geometry_msgs/Quaternion] 1 publisher"
         running.board.wait_until(lambda: turn in _tool(ros, "rostopic", "list", "-v").stdout)
         assert f"Pid: {other.pid}" in _tool(ros, "rosnode", "info", "/fabric").stdout
