@@ -606,7 +606,7 @@ class Peers:
     def _whole_samples(self, peer: _Peer) -> None:
         """Packets of samples of all sizes in one submessage each, and fragments; some are cut, aborted or repeated.
 
-        Unless a reader is reliable, there are no fragments, and the packets come one after the other.
+        For readers that are not reliable, there are no fragments, and packets keep their order.
         """
         chance, is_sure = self._chance, self._is_sure
         for _ in range(chance.randrange(1, 4)):

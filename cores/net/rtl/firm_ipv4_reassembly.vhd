@@ -133,7 +133,7 @@ architecture rtl of firm_ipv4_reassembly is
   signal size_r    : size_t := (others => '0');
   signal repeats_r : std_logic;                             -- the fragment has come before
   signal follows_r : std_logic;                             -- it is the next one
-  signal is_long_r : std_logic;                             -- the packet has no room
+  signal exceeds_r : std_logic;                             -- the packet has no room
   signal fed       : slots_t;                               -- it is not given up: its fragment is under way
 
   -- The beat one cycle later, and what is done with it.
@@ -324,9 +324,9 @@ begin
       if offset_r = size_r then
         follows_r <= '1';
       end if;
-      is_long_r <= '0';
+      exceeds_r <= '0';
       if end_r > BYTES or end_r > LONGEST-IPV4_BYTES then
-        is_long_r <= '1';
+        exceeds_r <= '1';
       end if;
     end if;
   end process find_packet;
@@ -364,7 +364,7 @@ begin
         if found_r /= NO_SLOT and repeats_r = '1' then
           -- It has come before.
           null;
-        elsif is_long_r = '1' then
+        elsif exceeds_r = '1' then
           refused_r <= '1';
           broken_r  <= '1';
         elsif found_r /= NO_SLOT and follows_r = '1' then

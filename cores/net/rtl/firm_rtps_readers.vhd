@@ -514,7 +514,7 @@ begin
 
   begin
 
-    -- A sample whose payload has no room is none if it is old: that is no loss.
+    -- An old sample without room for its payload is not counted: the reader has it already.
     is_sample <= is_wanted and ((data_r and (filled_r or not has_payload_r))
                                 or ((data_r or fragment_r) and (is_complete or is_long)));
     pushes    <= is_sample and spare_r;
