@@ -2,6 +2,9 @@
 -- Forwards one of SOURCES streams: `source` selects it while `enable` is '1'. The multiplexer is purely combinational
 -- and ignores frames: the driver of `source` keeps them whole (a scheduler), or a firm_axis_burst after it marks
 -- bursts.
+-- The lowest bits of an index select in the first multiplexers of a tree, which are the most, so their wires are the
+-- longest. Of more than 32 sources, `tvalid` and `tlast`, which return to the scheduler, have places whose numbers are
+-- the indices with their halves exchanged: the wires of `tdata` then do not slow them down.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -35,6 +38,26 @@ end entity firm_axis_mux;
 
 architecture rtl of firm_axis_mux is
 
+  constant ID_BITS  : positive := index_bits(SOURCES);
+  constant LOW_BITS : natural  := (ID_BITS / 2) * boolean'pos(SOURCES > 32);  -- exchanged with the others
+  constant HIGH_END : positive := 2**(ID_BITS-LOW_BITS);
+  -- One for each source; if halves are exchanged, one for each index.
+  constant PLACES : integer := SOURCES + (2**ID_BITS - SOURCES) * boolean'pos(LOW_BITS > 0);
+  subtype id_t is std_logic_vector(ID_BITS-1 downto 0);
+  subtype places_t is std_logic_vector(PLACES-1 downto 0);
+
+  function placed(bits : std_logic_vector(SOURCES-1 downto 0)) return std_logic_vector is
+    variable found : places_t := (others => '0');
+  begin
+    for number in bits'range loop
+      found(number / 2**LOW_BITS + number mod 2**LOW_BITS * HIGH_END) := bits(number);
+    end loop;
+    return found;
+  end function placed;
+
+  signal place         : id_t;
+  signal placed_tvalid : places_t;
+  signal placed_tlast  : places_t;
   signal chosen_tvalid : std_logic_vector(0 downto 0);
   signal chosen_tlast  : std_logic_vector(0 downto 0);
   signal take          : std_logic;
@@ -79,15 +102,19 @@ begin
       );
   end generate wider;
 
+  place         <= source(LOW_BITS-1 downto 0) & source(ID_BITS-1 downto LOW_BITS);
+  placed_tvalid <= placed(s_axis_tvalid);
+  placed_tlast  <= placed(s_axis_tlast);
+
   u_select_tlast : entity firm.firm_axis_select
     generic map (
-      WORDS   => SOURCES,
+      WORDS   => PLACES,
       WIDTH   => 1,
       DECODED => true
     )
     port map (
-      words_in => s_axis_tlast,
-      index    => source,
+      words_in => placed_tlast,
+      index    => place,
       word     => chosen_tlast
     );
 
@@ -105,13 +132,13 @@ begin
 
   u_select_tvalid : entity firm.firm_axis_select
     generic map (
-      WORDS   => SOURCES,
+      WORDS   => PLACES,
       WIDTH   => 1,
       DECODED => true
     )
     port map (
-      words_in => s_axis_tvalid,
-      index    => source,
+      words_in => placed_tvalid,
+      index    => place,
       word     => chosen_tvalid
     );
 
