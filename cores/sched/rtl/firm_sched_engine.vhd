@@ -215,16 +215,7 @@ begin
         word     => of_row
       );
 
-    select_offset : process (of_row, a_column)
-      variable found : key_t;
-    begin
-      found := (others => '0');
-      for place in a_column'range loop
-        found := found or gated(of_row((place+1)*KEY_BITS-1 downto place*KEY_BITS), a_column(place));
-      end loop;
-      offset <= found;
-    end process select_offset;
-
+    offset    <= word_at(a_column, of_row);
     a_key     <= std_logic_vector(unsigned(time_r) + unsigned(offset));
     key_ready <= '1';
 
@@ -259,6 +250,8 @@ begin
         completed_id => grant_select_r,
         read         => a_valid,
         read_id      => a_id,
+        read_row     => a_row,
+        read_column  => a_column,
         read_ready   => key_ready,
         stamp        => a_key
       );

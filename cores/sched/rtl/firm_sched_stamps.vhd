@@ -6,8 +6,8 @@
 -- long have no order among each other, but go before all others. The memory is used once per cycle: a completion has
 -- priority, then a sweep that is due, then a read. A step of the sweep reads a stamp in one cycle and writes it, if
 -- necessary, in a later one, which keeps the path through the memory short. A completion arrives late, and is recorded
--- in the next cycle; no task of its requester can be read before. Writes have an address of their own, so that a read's
--- depends on few signals.
+-- in the next cycle; no task of its requester can be read before. The column of a read arrives late: each column has a
+-- memory, and the read's column only selects among their words, while that of the sweep selects for itself.
 -- A requester without a stamp since reset uses its index: lower ones count as less recently used. Marks record which
 -- requesters have stamps, in rows like those of firm_sched_arrivals. After reset they are cleared, one row per cycle,
 -- while no task arrives.
@@ -16,6 +16,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
 use firm.firm_sched_queue_pkg.all;
 
 entity firm_sched_stamps is
@@ -30,10 +31,13 @@ entity firm_sched_stamps is
     completed    : in std_logic;
     completed_id : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
 
-    read       : in  std_logic;
-    read_id    : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-    read_ready : out std_logic;  -- `stamp` is that of `read_id`
-    stamp      : out std_logic_vector(STAMP_BITS-1 downto 0)
+    read        : in  std_logic;
+    read_id     : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+    -- The place of the same in firm_sched_arrivals: its row, and its column as the only '1'.
+    read_row    : in  std_logic_vector(row_bits_of(REQUESTERS)-1 downto 0);
+    read_column : in  std_logic_vector(2**column_bits_of(REQUESTERS)-1 downto 0);
+    read_ready  : out std_logic;  -- `stamp` is that of `read_id`
+    stamp       : out std_logic_vector(STAMP_BITS-1 downto 0)
   );
 end entity firm_sched_stamps;
 
@@ -61,21 +65,22 @@ architecture rtl of firm_sched_stamps is
   signal clearing      : std_logic;
   signal reads         : std_logic;
   signal sweeps        : std_logic;
-  signal read_address  : id_t;
   signal write_address : id_t;
-  signal read_row      : std_logic_vector(ROW_BITS-1 downto 0);
-  signal read_column   : std_logic_vector(COLUMN_BITS-1 downto 0);
   signal write_row     : std_logic_vector(ROW_BITS-1 downto 0);
   signal write_column  : std_logic_vector(COLUMN_BITS-1 downto 0);
+  signal stamp_row     : std_logic_vector(ROW_BITS-1 downto 0);
+  signal words         : std_logic_vector(COLUMNS*STAMP_BITS-1 downto 0);  -- of the row of the read, or of the sweep
   signal read_word     : std_logic_vector(STAMP_BITS-1 downto 0);
+  signal sweep_word    : std_logic_vector(STAMP_BITS-1 downto 0);
   signal write_word    : std_logic_vector(STAMP_BITS-1 downto 0);
   signal write_enable  : std_logic;
-  signal marks         : columns_t;  -- of the row that is read
-  signal old_marks     : columns_t;  -- of the row that is written
+  signal write_columns : columns_t;
+  signal marks         : columns_t;  -- of the read's row
+  signal old_marks     : columns_t;  -- of the row of a completion, or of the sweep
   signal new_marks     : columns_t;
   signal write_marks   : std_logic;
-  signal is_marked     : std_logic_vector(0 downto 0);
-  signal found_stamp   : std_logic_vector(STAMP_BITS-1 downto 0);
+  signal is_marked     : std_logic;
+  signal sweep_marked  : std_logic_vector(0 downto 0);
   signal age           : unsigned(STAMP_BITS-1 downto 0);  -- of the sweep's stamp
   signal is_old        : std_logic;
   signal moves         : std_logic;  -- the sweep moves to the next requester
@@ -97,27 +102,40 @@ begin
 
   write_address <= std_logic_vector(resize(unsigned(completed_id_r), ID_BITS)) when completed_r = '1' else
                    std_logic_vector(sweep_r(ID_BITS-1 downto 0));
-  -- A word that is read together with a completion is not used.
-  read_address  <= std_logic_vector(resize(unsigned(read_id), ID_BITS)) when read = '1' and due = '0' else
-                   std_logic_vector(sweep_r(ID_BITS-1 downto 0));
   write_row     <= write_address(ID_BITS-1 downto COLUMN_BITS);
   write_column  <= write_address(COLUMN_BITS-1 downto 0);
-  read_row      <= read_address(ID_BITS-1 downto COLUMN_BITS);
-  read_column   <= read_address(COLUMN_BITS-1 downto 0);
+  -- A word that is read together with a completion is not used.
+  stamp_row     <= read_row when read = '1' and due = '0' else
+                   std_logic_vector(sweep_r(ID_BITS-1 downto COLUMN_BITS));
 
-  u_stamps : entity firm.firm_sched_ram_2
+  write_columns <= decode(write_column, write_enable, COLUMNS);
+
+  stamps : for column in columns_t'range generate
+    u_stamps : entity firm.firm_sched_ram_2
+      generic map (
+        ADDRESS_BITS => ROW_BITS,
+        WORD_BITS    => STAMP_BITS
+      )
+      port map (
+        clk          => clk,
+        address      => write_row,
+        read_word    => open,
+        write_enable => write_columns(column),
+        write_word   => write_word,
+        address_2    => stamp_row,
+        read_word_2  => words((column+1)*STAMP_BITS-1 downto column*STAMP_BITS)
+      );
+  end generate stamps;
+
+  u_sweep_word : entity firm.firm_axis_select
     generic map (
-      ADDRESS_BITS => ID_BITS,
-      WORD_BITS    => STAMP_BITS
+      WORDS => COLUMNS,
+      WIDTH => STAMP_BITS
     )
     port map (
-      clk          => clk,
-      address      => write_address,
-      read_word    => open,
-      write_enable => write_enable,
-      write_word   => write_word,
-      address_2    => read_address,
-      read_word_2  => read_word
+      words_in => words,
+      index    => write_column,
+      word     => sweep_word
     );
 
   new_marks   <= old_marks or decode(write_column, '1', COLUMNS) when clearing = '0' else (others => '0');
@@ -138,18 +156,19 @@ begin
       read_word_2  => marks
     );
 
-  u_is_marked : entity firm.firm_axis_select
+  is_marked <= any_of(marks and read_column);
+  read_word <= word_at(read_column, words);
+
+  u_sweep_marked : entity firm.firm_axis_select
     generic map (
       WORDS => COLUMNS,
       WIDTH => 1
     )
     port map (
-      words_in => marks,
-      index    => read_column,
-      word     => is_marked
+      words_in => old_marks,
+      index    => write_column,
+      word     => sweep_marked
     );
-
-  found_stamp <= read_word when is_marked(0) = '1' else std_logic_vector(resize(unsigned(read_address), STAMP_BITS));
 
   age    <= count_r - unsigned(swept_r);
   is_old <= age(STAMP_BITS-1) or age(STAMP_BITS-2);
@@ -188,7 +207,10 @@ begin
         sweep_r(ID_BITS) <= '1';
       end if;
       if known_r = '0' then
-        swept_r <= found_stamp;
+        swept_r <= sweep_word;
+        if sweep_marked(0) = '0' then
+          swept_r <= std_logic_vector(resize(sweep_r(ID_BITS-1 downto 0), STAMP_BITS));
+        end if;
       end if;
       -- A stamp that was read is outdated if its requester completes a task.
       known_r <= not clearing and (sweeps or known_r) and not moves;
@@ -203,6 +225,6 @@ begin
   end process sweep;
 
   read_ready <= reads;
-  stamp      <= found_stamp;
+  stamp      <= read_word when is_marked = '1' else std_logic_vector(resize(unsigned(read_id), STAMP_BITS));
 
 end architecture rtl;
