@@ -28,7 +28,8 @@ from tests.fabric.messages import (
     Submessage,
     Writer,
 )
-from tests.fabric.participant import DISCOVERY, FRAGMENT_BYTES, Limits, Participant
+from tests.fabric.participant import FRAGMENT_BYTES, Participant
+from tests.fabric.participant_tables import DISCOVERY, Limits
 
 HASH = "RIHS01_" + "5af0" * 16
 _DURABLE = Quality(is_reliable=False, is_transient_local=True)

@@ -13,7 +13,8 @@ from fusesoc_firm.system.derived.model import Network, Quality
 from tests.cores.announcements import HASH, Event, Kind, Results, a_node
 from tests.cores.rtps_world import World
 from tests.fabric.messages import Address
-from tests.fabric.participant import Limits, Participant
+from tests.fabric.participant import Participant
+from tests.fabric.participant_tables import Limits
 
 TYPE = "std_msgs::msg::dds_::UInt32_"
 DEPTH = 15  # of the node's topics

@@ -25,7 +25,8 @@ from fusesoc_firm.message.library import libraries
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics
-from tests.fabric.participant import DISCOVERY, Participant
+from tests.fabric.participant import Participant
+from tests.fabric.participant_tables import DISCOVERY
 
 _PERIOD = 0.01
 _BUFFER = 1 << 22

@@ -10,16 +10,14 @@ come is asked for alone.
 
 from __future__ import annotations
 
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from operator import attrgetter
 
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.rtps import (
-    PUBLICATIONS_READER,
     PUBLICATIONS_WRITER,
-    SUBSCRIPTIONS_READER,
     SUBSCRIPTIONS_WRITER,
     Durability,
     Parameter,
@@ -41,6 +39,17 @@ from tests.fabric.messages import (
     Writer,
     parse,
 )
+from tests.fabric.participant_tables import (
+    DISCOVERY,
+    LARGEST,
+    Assembly,
+    History,
+    Limits,
+    Peer,
+    Sink,
+    Source,
+    free_slot,
+)
 
 FIRST_ANNOUNCEMENTS, SOON, LATER = 5, 100, 3000
 # A farewell, in case peers know an earlier life of the node, and the announcements that follow it.
@@ -51,222 +60,11 @@ USER_REQUEST, UNHEARD_REQUEST, USER_HEARTBEAT = 20, 500, 100
 # A request that is repeated waits for twice as long as the one before, up to this.
 LONGEST_REQUEST = 320
 ASSEMBLY = 1000
-WINDOW = 2
 MOST_REQUESTED = 8
 FRAGMENT_BYTES = 1344
 # A sample with a larger number is not taken.
 NUMBER_BITS = 48
 XCDR1 = 0
-# The reader of each of the two writers of discovery.
-DISCOVERY = {PUBLICATIONS_WRITER: PUBLICATIONS_READER, SUBSCRIPTIONS_WRITER: SUBSCRIPTIONS_READER}
-
-
-@dataclass(frozen=True)
-class Limits:
-    """The sizes of a node's tables: peers, their writers and readers that match, and bytes of a sample.
-
-    `assembled` are those of a sample in fragments; longer ones are skipped. `waiting` are those of the payloads of a
-    packet; a sample that finds no room there is treated as one in fragments.
-    """
-
-    peers: int = 8
-    sources: int = 32
-    sinks: int = 32
-    longest: int = 65536
-    assembled: int = 65536
-    waiting: int = 131072
-
-
-@dataclass
-class Window:
-    """The numbers that have come from a writer of discovery: all below `expected`. Later ones are not kept.
-
-    `asked` is the number after those that were asked for, of which the hardware has the lowest byte.
-    """
-
-    expected: int = 1
-    last: int = 0
-    is_heard: bool = False
-    asked: int = 0
-
-    def take(self, number: int) -> bool:
-        """Note a number; whether it is the next one."""
-        self.last = max(self.last, number)
-        is_next = number == self.expected
-        self.expected += is_next
-        return is_next
-
-    def begin(self, first: int) -> None:
-        """All numbers below `first` are gone."""
-        self.expected = max(self.expected, first)
-
-    @property
-    def is_behind(self) -> bool:
-        """Whether numbers are missing."""
-        return self.last >= self.expected
-
-    @property
-    def has_answer(self) -> bool:
-        """Whether all that was asked for has come."""
-        return self.asked == self.expected % 256
-
-    @property
-    def is_under_way(self) -> bool:
-        """Whether something that was asked for has not come."""
-        return 1 <= (self.asked - self.expected) % 256 <= WINDOW
-
-    def ask(self) -> Numbers:
-        """The numbers to ask for."""
-        most = 1 if self.is_under_way else WINDOW
-        end = max(self.expected, min(self.last + 1, self.expected + most))
-        self.asked = end % 256
-        return Numbers.of(range(self.expected, end), self.expected)
-
-
-@dataclass
-class Peer:
-    """Another participant: where it listens, the seconds of its lease, and the state of discovery between the two."""
-
-    slot: int
-    prefix: bytes
-    metatraffic: Address
-    user: Address
-    lease: int
-    left: int
-    windows: dict[bytes, Window] = field(default_factory=lambda: {writer: Window() for writer in DISCOVERY})
-    acknowledged: set[bytes] = field(default_factory=set)
-    next_request: int = 0
-    next_heartbeat: int = 0
-
-
-@dataclass
-class Assembly:
-    """A sample whose fragments come in order: the next one is `fragment`."""
-
-    source: Source
-    number: int
-    size: int
-    fragment_bytes: int
-    touched: int
-    data: bytearray = field(default_factory=bytearray)
-    fragment: int = 1
-
-    def is_of(self, source: Source, number: int) -> bool:
-        """Whether it is the sample of this writer with this number."""
-        return self.source is source and self.number == number
-
-    def take(self, item: DataFrag, now: int) -> None:
-        """Take fragments that are the next ones, and end with a whole one."""
-        if (item.first, item.fragment_bytes, item.size) != (self.fragment, self.fragment_bytes, self.size):
-            return
-        left = self.size - len(self.data)
-        part = item.payload[: min(item.count * item.fragment_bytes, left)]
-        count, more = divmod(len(part), self.fragment_bytes)
-        if part and (not more or len(part) == left):
-            self.data += part
-            self.fragment += count + bool(more)
-            self.touched = now
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether all has come."""
-        return len(self.data) == self.size
-
-    def missing(self, most: int) -> Numbers:
-        """The next fragments."""
-        left = -(-(self.size - len(self.data)) // self.fragment_bytes)
-        return Numbers.of(range(self.fragment, self.fragment + min(left, most)), self.fragment)
-
-
-@dataclass
-class Source:
-    """A peer's writer that a reader of the node matches; `expected` is the next number to take."""
-
-    slot: int
-    peer: Peer
-    entity: bytes
-    endpoint: Endpoint
-    address: Address
-    expected: int = 1
-    last: int = 0
-    is_heard: bool = False
-    requested: int = 0
-    asked: int = 0  # the fragment after those that were asked for, or 0
-    next_request: int = 0
-    patience: int = 0  # ms to the next request for the same number
-    before: int = 1  # `expected` when the packet began
-
-    @property
-    def is_reliable(self) -> bool:
-        """Whether the reader asks for what it lacks."""
-        return self.endpoint.quality.is_reliable
-
-    def is_next(self, number: int) -> bool:
-        """Whether it is known before the end of the packet that the reader takes a sample."""
-        return number == self.before if self.is_reliable else number >= self.before
-
-    def advance(self, expected: int) -> None:
-        """Expect a higher number."""
-        self.expected = max(self.expected, expected)
-
-
-@dataclass
-class History:
-    """A writer of the node with its last samples."""
-
-    endpoint: Endpoint
-    number: int = 0
-    samples: OrderedDict[int, bytes] = field(default_factory=OrderedDict)
-
-    def add(self, payload: bytes) -> None:
-        """Keep a sample, and no more than the topic's depth."""
-        self.number += 1
-        self.samples[self.number] = payload
-        while len(self.samples) > self.endpoint.quality.depth:
-            self.samples.popitem(last=False)
-
-
-@dataclass
-class Sink:
-    """A peer's reader that matches a writer of the node: it gets samples from `start` on, and has those below.
-
-    Until a reader has heard a heartbeat, it may drop all samples, and then skip those that its first heartbeat tells
-    of. Cyclone DDS does so. Thus heartbeats tell of no sample until the reader has answered one.
-    """
-
-    slot: int
-    peer: Peer
-    entity: bytes
-    history: History
-    address: Address
-    is_reliable: bool
-    start: int
-    is_heard: bool = False
-    acknowledged: int = 0
-    next_heartbeat: int = 0
-    next_count: int = 0  # the least one of its next request for fragments
-
-    @property
-    def first(self) -> int:
-        """The first number that it can get."""
-        return max(self.start, next(iter(self.history.samples), self.history.number + 1))
-
-    @property
-    def told(self) -> tuple[int, int]:
-        """The first and the last number in a heartbeat."""
-        return (self.first, self.history.number) if self.is_heard else (self.start, self.start - 1)
-
-    @property
-    def is_behind(self) -> bool:
-        """Whether it has not acknowledged all samples."""
-        return not self.is_heard or self.acknowledged <= self.history.number
-
-    def answer(self, item: AckNack) -> None:
-        """Note what it has. A request for a heartbeat alone, which comes before the first one, acknowledges nothing."""
-        is_request = not item.is_final and not item.missing.size and item.missing.base <= max(1, self.start - 1)
-        self.is_heard = self.is_heard or not is_request
-        if self.is_heard:
-            self.acknowledged = item.missing.base
 
 
 class Participant:
@@ -275,7 +73,7 @@ class Participant:
     What it sends is in `outbox`, as addresses and packets. `counts` tells what was refused, and why.
     """
 
-    def __init__(self, node: Node, take: Callable[[Endpoint, bytes], None], limits: Limits = Limits()) -> None:
+    def __init__(self, node: Node, take: Callable[[Endpoint, bytes], None], limits: Limits = LARGEST) -> None:
         self.node, self._take, self._limits = node, take, limits
         self.outbox: list[tuple[Address, bytes]] = []
         self.counts: Counter[str] = Counter()
@@ -337,7 +135,7 @@ class Participant:
             self._announce(self._group)
         passed = (now - self._started) // 1000 - self._seconds
         self._seconds += passed
-        for peer in sorted(self.peers.values(), key=_slot):
+        for peer in sorted(self.peers.values(), key=attrgetter("slot")):
             peer.left -= passed
             if peer.left <= 0:
                 self.counts["leases that ended"] += 1
@@ -498,7 +296,7 @@ class Participant:
         user = facts.address(Parameter.DEFAULT_UNICAST_LOCATOR) or metatraffic
         # The first second may be short.
         lease = min(max(1, seconds), 65534) + 1
-        slot = _free(self.peers.values())
+        slot = free_slot(self.peers.values())
         peer = self.peers[prefix] = Peer(slot, prefix, metatraffic, user, lease, lease)
         self._tick_peer(peer)
 
@@ -554,8 +352,8 @@ class Participant:
         if guid[:12] != peer.prefix or len(guid) != 16:
             return
         if item.status & (rtps.DISPOSED | rtps.UNREGISTERED):
-            self.sources = [other for other in self.sources if not _is(other, peer, guid[12:])]
-            self.sinks = [other for other in self.sinks if not _is(other, peer, guid[12:])]
+            self.sources = [other for other in self.sources if not other.is_of(peer, guid[12:])]
+            self.sinks = [other for other in self.sinks if not other.is_of(peer, guid[12:])]
             self._give_up()
             return
         is_writer = item.writer == PUBLICATIONS_WRITER
@@ -584,18 +382,18 @@ class Participant:
     def _match(self, peer: Peer, endpoint: Endpoint, entity: bytes, facts: ParameterList) -> None:
         known: list[Source | Sink] = [*self.sources, *self.sinks]
         # A known endpoint keeps the topic with which it was announced first.
-        same = [_ours(item) for item in known if _is(item, peer, entity)]
+        same = [item.endpoint for item in known if item.is_of(peer, entity)]
         if any(ours is endpoint or ours.topic != endpoint.topic for ours in same):
             return
         used, most = (self.sinks, self._limits.sinks) if endpoint.is_writer else (self.sources, self._limits.sources)
         if len(used) == most:
             self.counts["endpoints without room"] += 1
             return
-        slot = _free(used)
+        slot = free_slot(used)
         address = facts.address(Parameter.UNICAST_LOCATOR) or peer.user
         if not endpoint.is_writer:
             source = Source(slot, peer, entity, endpoint, address)
-            self.sources = sorted([*self.sources, source], key=_slot)
+            self.sources = sorted([*self.sources, source], key=attrgetter("slot"))
             if endpoint.quality.is_reliable:
                 self._request(source)
             return
@@ -603,7 +401,7 @@ class Participant:
         is_reliable, wants_history = _quality(facts, is_writer=False)
         start = 1 if endpoint.quality.is_transient_local and wants_history else history.number + 1
         sink = Sink(slot, peer, entity, history, address, is_reliable, start)
-        self.sinks = sorted([*self.sinks, sink], key=_slot)
+        self.sinks = sorted([*self.sinks, sink], key=attrgetter("slot"))
         if is_reliable:
             self._send_heartbeat(sink)
         else:
@@ -615,7 +413,7 @@ class Participant:
 
     def _from_writer(self, peer: Peer, item: Data | DataFrag | Heartbeat | HeartbeatFrag | Gap) -> None:
         for source in self.sources:
-            if _is(source, peer, item.writer) and item.reader in (rtps.NO_ENTITY, source.endpoint.entity):
+            if source.is_of(peer, item.writer) and item.reader in (rtps.NO_ENTITY, source.endpoint.entity):
                 match item:
                     case Data() | DataFrag() if item.number >= 1 << NUMBER_BITS:
                         pass
@@ -756,7 +554,7 @@ class Participant:
 
     def _from_reader(self, peer: Peer, item: AckNack | NackFrag) -> None:
         for sink in self.sinks:
-            if _is(sink, peer, item.reader) and sink.history.endpoint.entity == item.writer and sink.is_reliable:
+            if sink.is_of(peer, item.reader) and sink.history.endpoint.entity == item.writer and sink.is_reliable:
                 if isinstance(item, AckNack):
                     self._asked(sink, item)
                 elif item.number <= sink.history.number and item.count >= sink.next_count:
@@ -797,26 +595,8 @@ class Participant:
             self._send_heartbeat(sink)
 
 
-def _slot(item: Peer | Source | Sink) -> int:
-    return item.slot
-
-
-def _free(items: Iterable[Peer | Source | Sink]) -> int:
-    """The lowest number of an entry that is not used."""
-    used = {item.slot for item in items}
-    return next(number for number in range(len(used) + 1) if number not in used)
-
-
 def _guid(prefix: bytes) -> bytes:
     return prefix + rtps.PARTICIPANT
-
-
-def _is(item: Source | Sink, peer: Peer, entity: bytes) -> bool:
-    return item.peer is peer and item.entity == entity
-
-
-def _ours(item: Source | Sink) -> Endpoint:
-    return item.endpoint if isinstance(item, Source) else item.history.endpoint
 
 
 def _fragment(ends: tuple[bytes, bytes, int], payload: bytes, place: int) -> DataFrag:

@@ -21,7 +21,7 @@ from tests.bench.network import LONGEST as LONGEST_GENERICS
 from tests.cores.fragments import HOSTS, Host, fragments
 from tests.cores.test_net_link import NODE
 from tests.fabric.messages import Data, InfoDestination, Submessage, Writer
-from tests.fabric.participant import DISCOVERY
+from tests.fabric.participant_tables import DISCOVERY
 from tests.hdl.ghdl import Library, core_files
 
 SEED = 20261127

@@ -25,7 +25,7 @@ from tests.cores.ethernet import padded
 from tests.cores.fragments import HOSTS, fragments
 from tests.cores.requests import echo_request
 from tests.fabric.messages import Data, DataFrag, Submessage, Writer
-from tests.fabric.participant import DISCOVERY
+from tests.fabric.participant_tables import DISCOVERY
 
 STATUS_PORT = 7399
 METATRAFFIC_PORT, USER_PORT = rtps.metatraffic_port(0), rtps.user_port(0)

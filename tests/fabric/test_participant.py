@@ -14,7 +14,8 @@ from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import LEASE_SECONDS, Endpoint, Node
 from fusesoc_firm.system.derived.model import Network, Quality
 from tests.fabric.messages import AckNack, Address, Data, Heartbeat, Message, parse
-from tests.fabric.participant import FRAGMENT_BYTES, Limits, Participant, Source
+from tests.fabric.participant import FRAGMENT_BYTES, Participant
+from tests.fabric.participant_tables import Limits, Source
 from tests.fabric.test_messages import random_packets
 
 SEED = 20261126
