@@ -215,7 +215,7 @@ begin
         word     => of_row
       );
 
-    offset    <= word_at(a_column, of_row);
+    offset    <= word_of(a_column, of_row);
     a_key     <= std_logic_vector(unsigned(time_r) + unsigned(offset));
     key_ready <= '1';
 

@@ -29,7 +29,7 @@ package firm_sched_pkg is
   function index_of(one_hot : std_logic_vector) return std_logic_vector;
 
   -- The word at the place of the only '1', of as many words; word 0 is the lowest. If there is none, zeros.
-  function word_at(one_hot, words : std_logic_vector) return std_logic_vector;
+  function word_of(one_hot, words : std_logic_vector) return std_logic_vector;
 
   -- Bit k is '1' if k is more than `index`.
   function above(index : std_logic_vector; outputs : natural) return std_logic_vector;
@@ -138,7 +138,7 @@ package body firm_sched_pkg is
     return index;
   end function index_of;
 
-  function word_at(one_hot, words : std_logic_vector) return std_logic_vector is
+  function word_of(one_hot, words : std_logic_vector) return std_logic_vector is
     constant WIDTH : positive := words'length / one_hot'length;
     alias places   : std_logic_vector(one_hot'length-1 downto 0) is one_hot;
     alias numbered : std_logic_vector(words'length-1 downto 0) is words;
@@ -148,7 +148,7 @@ package body firm_sched_pkg is
       found := found or gated(numbered((place+1)*WIDTH-1 downto place*WIDTH), places(place));
     end loop;
     return found;
-  end function word_at;
+  end function word_of;
 
   function above(index : std_logic_vector; outputs : natural) return std_logic_vector is
     variable more : std_logic_vector(outputs-1 downto 0);

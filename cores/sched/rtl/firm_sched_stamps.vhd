@@ -157,7 +157,7 @@ begin
     );
 
   is_marked <= any_of(marks and read_column);
-  read_word <= word_at(read_column, words);
+  read_word <= word_of(read_column, words);
 
   u_sweep_marked : entity firm.firm_axis_select
     generic map (
