@@ -22,7 +22,7 @@ end entity firm_sched_first_of_row;
 architecture rtl of firm_sched_first_of_row is
 
   constant COLUMN_BITS : positive := index_bits(COLUMNS);
-  constant SHORT       : positive := 4;
+  constant SHORT       : positive := 8;
 
 begin
 
