@@ -2,11 +2,11 @@
 -- A priority queue of few cycles: a shift register that is kept sorted, with the ports of firm_sched_heap.
 --
 -- An insert and a pop take one cycle each, even at the same time, and the next root is valid in the next cycle. `pop`
--- arrives late, so that it only decides on the root, and the other cells move a cycle later. Meanwhile, the first of
--- them still holds the item that has become the root. Many cells are divided into segments that get an item one after
--- another, a cycle later each, so that no item has to reach all of them in a cycle (a systolic array of shift
--- registers; S.-W. Moon, J. Rexford, K. G. Shin, "Scalable hardware priority queue architectures for high-speed packet
--- switches", IEEE Transactions on Computers 49 (11), 2000).
+-- arrives late: the root is prepared for both cases, and selected a cycle later, when the other cells move. Until then,
+-- the first of them still holds the item that has become the root.
+-- Many cells are divided into segments. An item reaches them one after another, a cycle later each, so that it need not
+-- cross the whole queue in a cycle (a systolic array of shift registers; S.-W. Moon, J. Rexford, K. G. Shin, "Scalable
+-- hardware priority queue architectures for high-speed packet switches", IEEE Transactions on Computers 49 (11), 2000).
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -73,10 +73,12 @@ architecture rtl of firm_sched_sorted_queue is
 
   type items_t is array (natural range <>) of std_logic_vector(ITEM_BITS-1 downto 0);
 
-  -- The root.
-  signal valid_r  : std_logic;
-  signal item_r   : std_logic_vector(ITEM_BITS-1 downto 0);
-  signal popped_r : std_logic;  -- there was a pop in the last cycle: cell 1 holds what is the root
+  -- The root after a pop, and without one.
+  signal popped_r          : std_logic;  -- there was a pop in the last cycle: cell 1 holds what is the root
+  signal valid_if_popped_r : std_logic;
+  signal valid_if_kept_r   : std_logic;
+  signal item_if_popped_r  : std_logic_vector(ITEM_BITS-1 downto 0);
+  signal item_if_kept_r    : std_logic_vector(ITEM_BITS-1 downto 0);
 
   -- The inputs of each segment: the root is before the first one. The last index is that of a segment never needed.
   signal before_valid : std_logic_vector(0 to SEGMENTS-1);
@@ -93,9 +95,9 @@ architecture rtl of firm_sched_sorted_queue is
 
 begin
 
-  before_valid(0) <= valid_r;
-  before_item(0)  <= item_r;
-  before_first(0) <= not valid_r or is_before(new_item(0), item_r);
+  before_valid(0) <= valid_if_popped_r when popped_r = '1' else valid_if_kept_r;
+  before_item(0)  <= item_if_popped_r when popped_r = '1' else item_if_kept_r;
+  before_first(0) <= not before_valid(0) or is_before(new_item(0), before_item(0));
   removed(0)      <= popped_r;
   new_valid(0)    <= insert_valid;
   new_item(0)     <= insert_key & insert_id;
@@ -103,18 +105,17 @@ begin
   hold_root : process (clk)
   begin
     if rising_edge(clk) then
-      popped_r <= pop and rst_n;
-      if rst_n = '0' then
-        valid_r <= '0';
-      elsif pop = '1' then
-        valid_r <= head_valid(0);
-      elsif insert = '1' then
-        valid_r <= '1';
+      popped_r          <= pop;
+      valid_if_popped_r <= head_valid(0);
+      valid_if_kept_r   <= before_valid(0) or insert;
+      item_if_popped_r  <= head_item(0);
+      item_if_kept_r    <= before_item(0);
+      if insert_valid = '1' and before_first(0) = '1' then
+        item_if_kept_r <= new_item(0);
       end if;
-      if pop = '1' then
-        item_r <= head_item(0);
-      elsif insert_valid = '1' and before_first(0) = '1' then
-        item_r <= new_item(0);
+      if rst_n = '0' then
+        popped_r        <= '0';
+        valid_if_kept_r <= '0';
       end if;
     end if;
   end process hold_root;
@@ -159,12 +160,12 @@ begin
   new_head(SEGMENTS)   <= '1';
 
   insert_ready <= '1';
-  root_valid   <= valid_r;
-  root_id      <= item_r(ID_BITS-1 downto 0);
-  root_key     <= item_r(ITEM_BITS-1 downto ID_BITS);
-  first_valid  <= valid_r;
-  first_id     <= item_r(ID_BITS-1 downto 0);
-  first_key    <= item_r(ITEM_BITS-1 downto ID_BITS);
-  empty        <= not valid_r;
+  root_valid   <= before_valid(0);
+  root_id      <= before_item(0)(ID_BITS-1 downto 0);
+  root_key     <= before_item(0)(ITEM_BITS-1 downto ID_BITS);
+  first_valid  <= before_valid(0);
+  first_id     <= before_item(0)(ID_BITS-1 downto 0);
+  first_key    <= before_item(0)(ITEM_BITS-1 downto ID_BITS);
+  empty        <= not before_valid(0);
 
 end architecture rtl;
