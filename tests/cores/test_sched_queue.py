@@ -21,7 +21,7 @@ ENTITIES = {False: "firm_sched_heap", True: "firm_sched_sorted_queue"}
 FILLING = (90, 5)
 RATES = [(30, 20), FILLING, (20, 90), (100, 100)]
 # Items, those of a segment of the sorted queue, and cycles with the same rates.
-SEGMENTS = [(5, 2, 10), (8, 2, 14), (13, 3, 17), (100, 32, 150), (256, 32, 270)]
+SEGMENTED = [(5, 2, 10), (8, 2, 14), (13, 3, 17), (100, 32, 150), (256, 32, 270)]
 
 
 @dataclass(frozen=True)
@@ -157,15 +157,27 @@ def test_it_is_a_priority_queue(
         assert fullest == items or rates != FILLING
 
 
-# With small segments, two items often meet where one segment ends. The queue's reset finds items on their way in two of
-# the cases.
-@pytest.mark.parametrize(("items", "segment", "burst"), SEGMENTS)
-def test_segments_keep_their_order(library: Library, tmp_path: Path, items: int, segment: int, burst: int) -> None:
+# With small segments, two items often meet where one segment ends. The reset finds items on their way in two of the
+# cases.
+@pytest.mark.parametrize(("items", "segment", "burst"), SEGMENTED)
+def test_segments_keep_the_order(library: Library, tmp_path: Path, items: int, segment: int, burst: int) -> None:
+    _judge_segmented(library, tmp_path / "trace.txt", items, segment, burst)
+
+
+def _judge_segmented(library: Library, trace: Path, items: int, segment: int, burst: int) -> None:
     generics: dict[str, Generic] = {"SEGMENT": segment, "BURST": burst, "CYCLES": 8000}
-    for cycles in _cycles(library, tmp_path / "trace.txt", True, items, RATES[0], **generics):
+    for cycles in _cycles(library, trace, True, items, RATES[0], **generics):
         popped, fullest = _judge(cycles, True)
         assert popped > 500
         assert fullest == items
+
+
+def test_the_netlist_of_segments_does_the_same(tmp_path: Path) -> None:
+    library = _library(tmp_path)
+    items, segment, burst = SEGMENTED[1]
+    library.replace_by_netlist(ENTITIES[True], {"ITEMS": items, "KEY_BITS": KEY_BITS, "SEGMENT": segment})
+    library.analyse(core_files("sched/queue", fileset="tb"))
+    _judge_segmented(library, tmp_path / "trace.txt", items, segment, burst)
 
 
 @pytest.mark.one_in(4)
