@@ -48,27 +48,30 @@ architecture rtl of firm_sched_sorted_queue is
   constant ID_BITS   : positive := index_bits(ITEMS);
   constant ITEM_BITS : positive := KEY_BITS + ID_BITS;
 
+  -- The first segment, which the scheduler reads, is short, so that the others need not be near the scheduler.
+  constant FIRST : positive := max(SEGMENT / 4, 2);
+
   function segments_of return positive is
   begin
     if ITEMS <= 2 * SEGMENT then
       return 1;
     end if;
-    return (ITEMS + SEGMENT - 1) / SEGMENT;
+    return 1 + (ITEMS - FIRST + SEGMENT - 1) / SEGMENT;
   end function segments_of;
 
   constant SEGMENTS : positive := segments_of;
 
   -- The root is an item of the first segment; the last segment has the rest.
   function cells_of(segment_index : natural) return natural is
-    variable cells : integer := SEGMENT;
   begin
-    if segment_index = SEGMENTS-1 then
-      cells := ITEMS - segment_index * SEGMENT;
+    if SEGMENTS = 1 then
+      return ITEMS - 1;
+    elsif segment_index = 0 then
+      return FIRST - 1;
+    elsif segment_index = SEGMENTS-1 then
+      return ITEMS - FIRST - (SEGMENTS-2) * SEGMENT;
     end if;
-    if segment_index = 0 then
-      cells := cells - 1;
-    end if;
-    return cells;
+    return SEGMENT;
   end function cells_of;
 
   type items_t is array (natural range <>) of std_logic_vector(ITEM_BITS-1 downto 0);
