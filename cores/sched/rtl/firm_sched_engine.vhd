@@ -51,6 +51,8 @@ architecture rtl of firm_sched_engine is
   constant STAMP_BITS : positive := ID_BITS + 5;
   constant HAS_STAMPS : boolean  := POLICY = LRU;
   constant IS_SORTED  : boolean  := POLICY = EDF_LATENCY;
+  -- Without segments, the sorted queue compares B with all items: a selection before that would be repeated in each.
+  constant B_IS_SELECTED_LATER : boolean := not IS_SORTED or REQUESTERS > 64;
 
   function bits_of_key return positive is
   begin
@@ -437,6 +439,11 @@ begin
         after_beat_r  <= beat;
         arrived_id_r  <= a_id;
         arrived_key_r <= a_key;
+        -- With EDF, a beat does not change the key.
+        if not B_IS_SELECTED_LATER and preempt = '1' then
+          arrived_id_r  <= grant_select_r;
+          arrived_key_r <= key;
+        end if;
       end if;
       if b_has_room = '1' then
         left_id_r    <= grant_select_r;
@@ -446,8 +453,8 @@ begin
     end if;
   end process hold_both;
 
-  b_id  <= left_id_r when preempted_r = '1' else arrived_id_r;
-  b_key <= arrived_key_r when preempted_r = '0' else
+  b_id  <= left_id_r when B_IS_SELECTED_LATER and preempted_r = '1' else arrived_id_r;
+  b_key <= arrived_key_r when not B_IS_SELECTED_LATER or preempted_r = '0' else
            left_later_r when after_beat_r = '1' else
            left_key_r;
 
