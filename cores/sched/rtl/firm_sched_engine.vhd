@@ -51,6 +51,8 @@ architecture rtl of firm_sched_engine is
   constant STAMP_BITS : positive := ID_BITS + 5;
   constant HAS_STAMPS : boolean  := POLICY = LRU;
   constant IS_SORTED  : boolean  := POLICY = EDF_LATENCY;
+  -- Without segments, the sorted queue compares B with all items: a selection before that would be repeated in each.
+  constant B_IS_SELECTED_LATER : boolean := not IS_SORTED or REQUESTERS > 64;
 
   function bits_of_key return positive is
   begin
@@ -86,10 +88,19 @@ architecture rtl of firm_sched_engine is
   signal key_ready  : std_logic;
 
   -- B is the arrived task or the preempted one.
-  signal b_valid_r : std_logic;
-  signal b_id      : id_t;
-  signal b_key     : key_t;
-  signal b_is_free : std_logic;  -- is empty or leaves
+  signal b_valid_r  : std_logic;
+  signal b_id       : id_t;
+  signal b_key      : key_t;
+  signal b_is_free  : std_logic;  -- is empty or leaves
+  signal b_has_room : std_logic;  -- for a preempted task
+
+  signal preempted_r   : std_logic;
+  signal after_beat_r  : std_logic;  -- the preempted task sent a beat in its last cycle
+  signal arrived_id_r  : id_t;
+  signal arrived_key_r : key_t;
+  signal left_id_r     : id_t;
+  signal left_key_r    : key_t;      -- without a beat in the last cycle
+  signal left_later_r  : key_t;      -- with a beat in it
 
   signal insert       : std_logic;
   signal insert_ready : std_logic;
@@ -313,6 +324,8 @@ begin
 
   -- The next grant.
 
+  b_has_room <= '1' when IS_SORTED else not b_valid_r;
+
   choose          <= of_case(beat, last, not running_r, '0', '1');
   moves_if_paused <= may_preempt or not running_r;
   pop             <= of_case(beat, last, moves_if_paused and first_valid, may_preempt and first_valid, first_valid);
@@ -336,10 +349,8 @@ begin
 
   preemptive : if not HAS_STAMPS generate
     signal root_is_before : std_logic;
-    signal b_has_room     : std_logic;
   begin
     root_is_before <= root_valid and is_before(root_key, key);
-    b_has_room     <= '1' when IS_SORTED else not b_valid_r;
     -- A possibly wrong task is better than none, since the right one preempts it after a beat.
     gives_way      <= not first_valid when SHORTEST_RUN <= 1 else empty;
     may_preempt    <= running_r and keyed_r and root_is_before and b_has_room and may_leave;
@@ -420,62 +431,32 @@ begin
   end process hold_b;
 
   -- Without a task in B, its content does not matter. Which task it is, is known late in the cycle in which it enters.
-  selected_later : if not IS_SORTED generate
-    signal preempted_r   : std_logic;
-    signal after_beat_r  : std_logic;  -- the preempted task sent a beat in its last cycle
-    signal arrived_id_r  : id_t;
-    signal arrived_key_r : key_t;
-    signal left_id_r     : id_t;
-    signal left_key_r    : key_t;      -- without a beat in the last cycle
-    signal left_later_r  : key_t;      -- with a beat in it
+  hold_both : process (clk)
   begin
-
-    hold_both : process (clk)
-    begin
-      if rising_edge(clk) then
-        if b_is_free = '1' then
-          preempted_r   <= preempt;
-          after_beat_r  <= beat;
-          arrived_id_r  <= a_id;
-          arrived_key_r <= a_key;
-        end if;
-        if b_valid_r = '0' then
-          left_id_r    <= grant_select_r;
-          left_key_r   <= key;
-          left_later_r <= key_after_beat;
+    if rising_edge(clk) then
+      if b_is_free = '1' then
+        preempted_r   <= preempt;
+        after_beat_r  <= beat;
+        arrived_id_r  <= a_id;
+        arrived_key_r <= a_key;
+        -- With EDF, a beat does not change the key.
+        if not B_IS_SELECTED_LATER and preempt = '1' then
+          arrived_id_r  <= grant_select_r;
+          arrived_key_r <= key;
         end if;
       end if;
-    end process hold_both;
-
-    b_id  <= left_id_r when preempted_r = '1' else arrived_id_r;
-    b_key <= arrived_key_r when preempted_r = '0' else
-             left_later_r when after_beat_r = '1' else
-             left_key_r;
-
-  end generate selected_later;
-  -- The sorted queue compares B with each of its items: a selection before that would be repeated in all of them. With
-  -- EDF, a beat does not change the key.
-  selected_at_once : if IS_SORTED generate
-    signal id_r  : id_t;
-    signal key_r : key_t;
-  begin
-
-    hold_one : process (clk)
-    begin
-      if rising_edge(clk) then
-        id_r  <= a_id;
-        key_r <= a_key;
-        if preempt = '1' then
-          id_r  <= grant_select_r;
-          key_r <= key;
-        end if;
+      if b_has_room = '1' then
+        left_id_r    <= grant_select_r;
+        left_key_r   <= key;
+        left_later_r <= key_after_beat;
       end if;
-    end process hold_one;
+    end if;
+  end process hold_both;
 
-    b_id  <= id_r;
-    b_key <= key_r;
-
-  end generate selected_at_once;
+  b_id  <= left_id_r when B_IS_SELECTED_LATER and preempted_r = '1' else arrived_id_r;
+  b_key <= arrived_key_r when not B_IS_SELECTED_LATER or preempted_r = '0' else
+           left_later_r when after_beat_r = '1' else
+           left_key_r;
 
   sends_own_time : if POLICY = LST generate
     signal step : unsigned(0 downto 0);

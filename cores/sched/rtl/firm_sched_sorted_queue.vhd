@@ -1,11 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A priority queue of few cycles: a shift register that is kept sorted, with the ports of firm_sched_heap.
 --
--- Each cell compares the new item with its own. Since the cells are sorted, those after the new item's place detect
--- this by their own comparison, and the place itself by that of the cell before: only the new item crosses the whole
--- queue. An insert and a pop take one cycle each, even at the same time, and the next root is valid in the next cycle.
--- `pop` arrives late, so that it only decides on the root, and the other cells move a cycle later. Meanwhile, the first
--- of them still holds the item that has become the root.
+-- An insert and a pop take one cycle each, even at the same time, and the next root is valid in the next cycle. `pop`
+-- arrives late: the root is prepared for both cases, and selected a cycle later, when the other cells move. Until then,
+-- the first of them still holds the item that has become the root.
+-- Many cells are divided into segments. An item reaches them one after another, a cycle later each, so that it need not
+-- cross the whole queue in a cycle (a systolic array of shift registers; S.-W. Moon, J. Rexford, K. G. Shin, "Scalable
+-- hardware priority queue architectures for high-speed packet switches", IEEE Transactions on Computers 49 (11), 2000).
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -15,7 +16,8 @@ use firm.firm_sched_queue_pkg.all;
 entity firm_sched_sorted_queue is
   generic (
     ITEMS    : positive;
-    KEY_BITS : positive
+    KEY_BITS : positive;
+    SEGMENT  : positive := 32  -- items of a segment, 2 or more; as many as two need no segments
   );
   port (
     clk   : in std_logic;
@@ -43,115 +45,130 @@ end entity firm_sched_sorted_queue;
 
 architecture rtl of firm_sched_sorted_queue is
 
-  constant ID_BITS : positive := index_bits(ITEMS);
-  subtype item_t is std_logic_vector(KEY_BITS+ID_BITS-1 downto 0);
-  -- Cell 0 is the root. After the last one, there are two more cells, never full, as neighbours.
-  type items_t is array (0 to ITEMS+1) of item_t;
+  constant ID_BITS   : positive := index_bits(ITEMS);
+  constant ITEM_BITS : positive := KEY_BITS + ID_BITS;
 
-  signal valid_r  : std_logic_vector(0 to ITEMS+1);
-  signal item_r   : items_t;
-  signal popped_r : std_logic;  -- there was a pop in the last cycle: cell 1 holds what is the root
+  -- The first segment, which the scheduler reads, is short, so that the others need not be near the scheduler.
+  constant FIRST : positive := max(SEGMENT / 4, 2);
 
-  signal new_item  : item_t;
-  signal new_first : std_logic_vector(0 to ITEMS+1);  -- the new item comes before the cell's own
+  function segments_of return positive is
+  begin
+    if ITEMS <= 2 * SEGMENT then
+      return 1;
+    end if;
+    return 1 + (ITEMS - FIRST + SEGMENT - 1) / SEGMENT;
+  end function segments_of;
 
-  -- The item behind the root, and the root after a pop.
-  signal second_valid : std_logic;
-  signal second       : item_t;
-  signal new_second   : std_logic;
-  signal next_root    : item_t;
+  constant SEGMENTS : positive := segments_of;
+
+  -- The root is an item of the first segment; the last segment has the rest.
+  function cells_of(segment_index : natural) return natural is
+  begin
+    if SEGMENTS = 1 then
+      return ITEMS - 1;
+    elsif segment_index = 0 then
+      return FIRST - 1;
+    elsif segment_index = SEGMENTS-1 then
+      return ITEMS - FIRST - (SEGMENTS-2) * SEGMENT;
+    end if;
+    return SEGMENT;
+  end function cells_of;
+
+  type items_t is array (natural range <>) of std_logic_vector(ITEM_BITS-1 downto 0);
+
+  -- The root after a pop, and without one.
+  signal popped_r          : std_logic;  -- there was a pop in the last cycle: cell 1 holds what is the root
+  signal valid_if_popped_r : std_logic;
+  signal valid_if_kept_r   : std_logic;
+  signal item_if_popped_r  : std_logic_vector(ITEM_BITS-1 downto 0);
+  signal item_if_kept_r    : std_logic_vector(ITEM_BITS-1 downto 0);
+
+  -- The inputs of each segment: the root is before the first one. The last index is that of a segment never needed.
+  signal before_valid : std_logic_vector(0 to SEGMENTS-1);
+  signal before_item  : items_t(0 to SEGMENTS-1);
+  signal before_first : std_logic_vector(0 to SEGMENTS-1);
+  signal removed      : std_logic_vector(0 to SEGMENTS);
+  signal new_valid    : std_logic_vector(0 to SEGMENTS);
+  signal new_item     : items_t(0 to SEGMENTS);
+
+  -- Its first item in the next cycle; whether the new item of the segment before comes before that.
+  signal head_valid : std_logic_vector(0 to SEGMENTS);
+  signal head_item  : items_t(0 to SEGMENTS);
+  signal new_head   : std_logic_vector(0 to SEGMENTS);
 
 begin
 
-  new_item <= insert_key & insert_id;
-
-  new_first(0) <= not valid_r(0) or is_before(new_item, item_r(0));
-
-  neighbours : for cell in ITEMS to ITEMS+1 generate
-    valid_r(cell)   <= '0';
-    item_r(cell)    <= (others => '0');
-    new_first(cell) <= '1';
-  end generate neighbours;
-
-  second_valid <= valid_r(2) when popped_r = '1' else valid_r(1);
-  second       <= item_r(2) when popped_r = '1' else item_r(1);
-  new_second   <= new_first(2) when popped_r = '1' else new_first(1);
-  next_root    <= new_item when insert_valid = '1' and new_second = '1' else second;
+  before_valid(0) <= valid_if_popped_r when popped_r = '1' else valid_if_kept_r;
+  before_item(0)  <= item_if_popped_r when popped_r = '1' else item_if_kept_r;
+  before_first(0) <= not before_valid(0) or is_before(new_item(0), before_item(0));
+  removed(0)      <= popped_r;
+  new_valid(0)    <= insert_valid;
+  new_item(0)     <= insert_key & insert_id;
 
   hold_root : process (clk)
   begin
     if rising_edge(clk) then
-      popped_r <= pop and rst_n;
-      if rst_n = '0' then
-        valid_r(0) <= '0';
-      elsif pop = '1' then
-        valid_r(0) <= second_valid or insert;
-      elsif insert = '1' then
-        valid_r(0) <= '1';
+      popped_r          <= pop;
+      valid_if_popped_r <= head_valid(0);
+      valid_if_kept_r   <= before_valid(0) or insert;
+      item_if_popped_r  <= head_item(0);
+      item_if_kept_r    <= before_item(0);
+      if insert_valid = '1' and before_first(0) = '1' then
+        item_if_kept_r <= new_item(0);
       end if;
-      if pop = '1' then
-        item_r(0) <= next_root;
-      elsif insert_valid = '1' and new_first(0) = '1' then
-        item_r(0) <= new_item;
+      if rst_n = '0' then
+        popped_r        <= '0';
+        valid_if_kept_r <= '0';
       end if;
     end if;
   end process hold_root;
 
-  -- If the new item comes before the root, the old root follows it, even if it is popped at the same time: as after
-  -- every pop, cell 1 then holds what is to be removed.
-  cells : for cell in 1 to ITEMS-1 generate
-    signal shift_back  : std_logic;  -- away from the root: takes the item of the cell before
-    signal shift_front : std_logic;  -- takes that of the next cell
-    signal take_new    : std_logic;
-    signal from_before : std_logic;
-  begin
-    new_first(cell) <= not valid_r(cell) or is_before(new_item, item_r(cell));
-    from_before     <= insert_valid and new_first(cell-1);
+  -- An item leaves a segment only if none of its items comes after it, so that it has no neighbour before the next one.
+  each_segment : for segment_index in 0 to SEGMENTS-1 generate
+    not_first : if segment_index > 0 generate
+      before_valid(segment_index) <= '0';
+      before_item(segment_index)  <= (others => '0');
+      before_first(segment_index) <= '0';
+    end generate not_first;
 
-    -- A pop moves all items to the front; a new item moves those after its place back again, so they stay in place.
-    first : if cell = 1 generate
-      shift_back  <= from_before;
-      shift_front <= popped_r;
-      take_new    <= insert_valid and new_first(2) and not new_first(0) when popped_r = '1' else
-                     insert_valid and new_first(1) and not new_first(0);
-    end generate first;
-    others_behind : if cell > 1 generate
-      shift_back  <= from_before and not popped_r;
-      shift_front <= popped_r and not (insert_valid and new_first(cell));
-      take_new    <= insert_valid and new_first(cell+1) and not new_first(cell) when popped_r = '1' else
-                     insert_valid and new_first(cell) and not new_first(cell-1);
-    end generate others_behind;
+    u_cells : entity firm.firm_sched_sorted_cells
+      generic map (
+        CELLS     => cells_of(segment_index),
+        ITEM_BITS => ITEM_BITS
+      )
+      port map (
+        clk             => clk,
+        rst_n           => rst_n,
+        removed         => removed(segment_index),
+        new_valid       => new_valid(segment_index),
+        new_item        => new_item(segment_index),
+        before_valid    => before_valid(segment_index),
+        before_item     => before_item(segment_index),
+        before_first    => before_first(segment_index),
+        head_valid      => head_valid(segment_index),
+        head_item       => head_item(segment_index),
+        other_item      => new_item(max(segment_index-1, 0)),
+        other_head      => new_head(segment_index),
+        after_removed   => removed(segment_index+1),
+        after_new_valid => new_valid(segment_index+1),
+        after_new_item  => new_item(segment_index+1),
+        after_valid     => head_valid(segment_index+1),
+        after_item      => head_item(segment_index+1),
+        after_first     => new_head(segment_index+1)
+      );
+  end generate each_segment;
 
-    hold_item : process (clk)
-    begin
-      if rising_edge(clk) then
-        if rst_n = '0' then
-          valid_r(cell) <= '0';
-        elsif take_new = '1' then
-          valid_r(cell) <= '1';
-        elsif shift_back = '1' then
-          valid_r(cell) <= valid_r(cell-1);
-        elsif shift_front = '1' then
-          valid_r(cell) <= valid_r(cell+1);
-        end if;
-        if take_new = '1' then
-          item_r(cell) <= new_item;
-        elsif shift_back = '1' then
-          item_r(cell) <= item_r(cell-1);
-        elsif shift_front = '1' then
-          item_r(cell) <= item_r(cell+1);
-        end if;
-      end if;
-    end process hold_item;
-  end generate cells;
+  head_valid(SEGMENTS) <= '0';
+  head_item(SEGMENTS)  <= (others => '0');
+  new_head(SEGMENTS)   <= '1';
 
   insert_ready <= '1';
-  root_valid   <= valid_r(0);
-  root_id      <= item_r(0)(ID_BITS-1 downto 0);
-  root_key     <= item_r(0)(item_t'high downto ID_BITS);
-  first_valid  <= valid_r(0);
-  first_id     <= item_r(0)(ID_BITS-1 downto 0);
-  first_key    <= item_r(0)(item_t'high downto ID_BITS);
-  empty        <= not valid_r(0);
+  root_valid   <= before_valid(0);
+  root_id      <= before_item(0)(ID_BITS-1 downto 0);
+  root_key     <= before_item(0)(ITEM_BITS-1 downto ID_BITS);
+  first_valid  <= before_valid(0);
+  first_id     <= before_item(0)(ID_BITS-1 downto 0);
+  first_key    <= before_item(0)(ITEM_BITS-1 downto ID_BITS);
+  empty        <= not before_valid(0);
 
 end architecture rtl;

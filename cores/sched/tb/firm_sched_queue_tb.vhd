@@ -14,12 +14,14 @@ use firm.firm_axis_pkg.all;
 entity firm_sched_queue_tb is
   generic (
     SORTED         : boolean := false;  -- the sorted queue instead of the heap
+    SEGMENT        : integer := 32;     -- items of its segments
     ITEMS          : integer := 8;
     KEY_BITS       : integer := 8;
     SEED           : integer := 1;
     CYCLES         : integer := 1000;
     INSERT_PERCENT : integer := 50;
     POP_PERCENT    : integer := 50;
+    BURST          : natural := 0;      -- cycles after which the percents change at random; 0: never
     TRACE          : string  := "queue.txt";
     EXPECTED       : string  := ""
   );
@@ -81,7 +83,8 @@ begin
     u_queue : entity firm.firm_sched_sorted_queue
       generic map (
         ITEMS    => ITEMS,
-        KEY_BITS => KEY_BITS
+        KEY_BITS => KEY_BITS,
+        SEGMENT  => SEGMENT
       )
       port map (
         clk          => clk,
@@ -120,6 +123,9 @@ begin
     variable base   : natural := 0;
     variable item   : natural;
     variable number : natural;
+
+    variable inserts : natural := INSERT_PERCENT;
+    variable pops    : natural := POP_PERCENT;
 
     procedure draw(below : in positive; value : out natural) is
       variable random : real;
@@ -165,7 +171,7 @@ begin
     begin
       insert_valid <= '0' after 1 ns;
       draw(100, number);
-      if number >= INSERT_PERCENT then
+      if number >= inserts then
         return;
       end if;
       draw(ITEMS, item);
@@ -183,6 +189,12 @@ begin
 
   begin
     for cycle in 0 to CYCLES-1 loop
+      if BURST > 0 and cycle mod max(BURST, 1) = 0 then
+        draw(3, inserts);
+        draw(3, pops);
+        inserts := 50 * inserts;
+        pops    := 50 * pops;
+      end if;
       clk <= '1';
       write_cycle;
       if insert_valid = '1' and insert_ready = '1' then
@@ -212,7 +224,7 @@ begin
       end if;
       draw(100, number);
       pop_wanted <= '0' after 1 ns;
-      if number < POP_PERCENT and rst_n = '1' then
+      if number < pops and rst_n = '1' then
         pop_wanted <= '1' after 1 ns;
       end if;
       wait for 5 ns;
