@@ -51,8 +51,9 @@ architecture rtl of firm_sched_engine is
   constant STAMP_BITS : positive := ID_BITS + 5;
   constant HAS_STAMPS : boolean  := POLICY = LRU;
   constant IS_SORTED  : boolean  := POLICY = EDF_LATENCY;
-  -- Without segments, the sorted queue compares B with all items: a selection before that would be repeated in each.
-  constant B_IS_SELECTED_LATER : boolean := not IS_SORTED or REQUESTERS > 64;
+  -- Where paths are long, the task in B is selected in the next cycle, which needs a register for each candidate. But
+  -- without segments, the sorted queue compares B with all items, and the selection would be repeated in each.
+  constant B_IS_SELECTED_LATER : boolean := REQUESTERS > 64 or (REQUESTERS > 32 and not IS_SORTED);
 
   function bits_of_key return positive is
   begin
@@ -439,10 +440,12 @@ begin
         after_beat_r  <= beat;
         arrived_id_r  <= a_id;
         arrived_key_r <= a_key;
-        -- With EDF, a beat does not change the key.
         if not B_IS_SELECTED_LATER and preempt = '1' then
           arrived_id_r  <= grant_select_r;
           arrived_key_r <= key;
+          if beat = '1' then
+            arrived_key_r <= key_after_beat;
+          end if;
         end if;
       end if;
       if b_has_room = '1' then
