@@ -607,7 +607,7 @@ class Peers:
     def _whole_samples(self, peer: _Peer) -> None:
         """Packets of samples of all sizes in one submessage each, and fragments; some are cut, aborted or repeated.
 
-        For readers that are not reliable, there are no fragments, and packets keep their order.
+        Best-effort readers get no fragments, and their packets keep their order.
         """
         chance, is_sure = self._chance, self._is_sure
         for _ in range(chance.randrange(1, 4)):

@@ -194,7 +194,7 @@ class Participant:
 
     def _heartbeat(self, sink: Sink) -> Heartbeat:
         sink.next_heartbeat = self._now + USER_HEARTBEAT
-        writer = sink.history.endpoint.entity
+        writer = sink.endpoint.entity
         return Heartbeat(sink.entity, writer, *sink.told, self._next_count())
 
     def _send_heartbeat(self, sink: Sink) -> None:
@@ -202,7 +202,7 @@ class Participant:
 
     def _send_sample(self, sink: Sink, number: int, *, is_last: bool = True) -> None:
         payload = sink.history.samples[number]
-        ends = sink.entity, sink.history.endpoint.entity, number
+        ends = sink.entity, sink.endpoint.entity, number
         parts: list[Submessage] = [Data(*ends, payload)]
         if len(payload) > FRAGMENT_BYTES:
             count = -(-len(payload) // FRAGMENT_BYTES)
@@ -554,7 +554,7 @@ class Participant:
 
     def _from_reader(self, peer: Peer, item: AckNack | NackFrag) -> None:
         for sink in self.sinks:
-            if sink.is_of(peer, item.reader) and sink.history.endpoint.entity == item.writer and sink.is_reliable:
+            if sink.is_of(peer, item.reader) and sink.endpoint.entity == item.writer and sink.is_reliable:
                 if isinstance(item, AckNack):
                     self._asked(sink, item)
                 elif item.number <= sink.history.number and item.count >= sink.next_count:
@@ -569,7 +569,7 @@ class Participant:
             self._send_to(
                 sink.peer,
                 sink.address,
-                Gap(sink.entity, sink.history.endpoint.entity, gone[0], Numbers(sink.first)),
+                Gap(sink.entity, sink.endpoint.entity, gone[0], Numbers(sink.first)),
             )
         kept = [number for number in wanted if number >= sink.first]
         # Several samples in fragments might be too many for a reader, which asks for the next one after the heartbeat.
@@ -586,7 +586,7 @@ class Participant:
             self._send_heartbeat(sink)
             return
         payload = sink.history.samples[item.number]
-        ends = sink.entity, sink.history.endpoint.entity, item.number
+        ends = sink.entity, sink.endpoint.entity, item.number
         count = -(-len(payload) // FRAGMENT_BYTES)
         wanted = [place for place in item.missing if 1 <= place <= count] if count > 1 else []
         for place in wanted:

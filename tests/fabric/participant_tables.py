@@ -145,12 +145,22 @@ class Assembly:
 
 
 @dataclass
-class Source:
-    """A peer's writer that a reader of the node matches; `expected` is the next number to take."""
+class Match:
+    """An endpoint of a peer that one of the node matches."""
 
     slot: int
     peer: Peer
     entity: bytes
+
+    def is_of(self, peer: Peer, entity: bytes) -> bool:
+        """Whether it is this endpoint of a peer."""
+        return self.peer is peer and self.entity == entity
+
+
+@dataclass
+class Source(Match):
+    """A peer's writer that a reader of the node matches; `expected` is the next number to take."""
+
     endpoint: Endpoint
     address: Address
     expected: int = 1
@@ -166,10 +176,6 @@ class Source:
     def is_reliable(self) -> bool:
         """Whether the reader asks for what it lacks."""
         return self.endpoint.quality.is_reliable
-
-    def is_of(self, peer: Peer, entity: bytes) -> bool:
-        """Whether it is this endpoint of a peer."""
-        return self.peer is peer and self.entity == entity
 
     def is_next(self, number: int) -> bool:
         """Whether it is known before the end of the packet that the reader takes a sample."""
@@ -197,16 +203,13 @@ class History:
 
 
 @dataclass
-class Sink:
+class Sink(Match):
     """A peer's reader that matches a writer of the node: it gets samples from `start` on, and has those below.
 
     Until a reader has heard a heartbeat, it may drop all samples, and then skip those that its first heartbeat tells
     of. Cyclone DDS does so. Thus heartbeats tell of no sample until the reader has answered one.
     """
 
-    slot: int
-    peer: Peer
-    entity: bytes
     history: History
     address: Address
     is_reliable: bool
@@ -220,10 +223,6 @@ class Sink:
     def endpoint(self) -> Endpoint:
         """The writer that it matches."""
         return self.history.endpoint
-
-    def is_of(self, peer: Peer, entity: bytes) -> bool:
-        """Whether it is this endpoint of a peer."""
-        return self.peer is peer and self.entity == entity
 
     @property
     def first(self) -> int:
@@ -248,7 +247,7 @@ class Sink:
             self.acknowledged = item.missing.base
 
 
-def free_slot(items: Iterable[Peer | Source | Sink]) -> int:
+def free_slot(items: Iterable[Peer | Match]) -> int:
     """The lowest number of an entry that is not used."""
     used = {item.slot for item in items}
     return next(number for number in range(len(used) + 1) if number not in used)

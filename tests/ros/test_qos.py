@@ -254,7 +254,7 @@ def test_counts_are_published_as_diagnostics(place: Place, kind: str, capsys: py
             assert watcher.stdout
             statuses = (json.loads(line) for line in watcher.stdout)
             peer.wait_until_connected()
-            # Whoever begins to listen between the two may hear of the hardware first.
+            # They come one after the other: a subscriber that starts between them receives that of the hardware first.
             first = next(status for status in statuses if status["name"] == f"{NAME}: node")
             assert first["level"] == 0
             hardware = next(

@@ -259,7 +259,7 @@ def _camera(_number: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
     yield 0, encode(response, answer)
 
 
-def _clients(ros: Ros, calls: int) -> list[list[str]]:
+def _commands(ros: Ros, calls: int) -> list[list[str]]:
     """The commands of two clients of roscpp, two of rospy."""
     rospy = [ros.python, str(ROS / "service_peer.py"), "1", CAMERA, str(calls)]
     roscpp = [str(roscpp_peer("service_client")), CAMERA, str(calls)]
@@ -290,7 +290,7 @@ def test_clients_of_rospy_and_roscpp_at_once(tmp_path: Path, kind: str) -> None:
                 # The node leaves two sockets free for calls of the master and others, and each client probes first. So
                 # that none is refused on a slow machine, the next one starts when the probe has gone. Of those that are
                 # ready, only roscpp's are connected.
-                for number, command in enumerate(_clients(ros, 20)):
+                for number, command in enumerate(_commands(ros, 20)):
                     clients.append(Client(ros, command))
                     assert clients[-1].line() == "ready\n"
                     board.wait_until(partial(_is_connected, board, min(number + 1, 2)))
@@ -304,5 +304,5 @@ def test_clients_of_rospy_and_roscpp_at_once(tmp_path: Path, kind: str) -> None:
 
 def _is_connected(board: Board, connections: int) -> bool:
     """So many peers are connected, and what else there was has ended."""
-    states = [item.status for item in board.chip.sockets[1:]]
-    return states.count(Status.ESTABLISHED) == connections and states.count(Status.LISTEN) == 7 - connections
+    established = sum(item.status == Status.ESTABLISHED for item in board.chip.sockets[1:])
+    return established == connections and board.listening() == 7 - connections

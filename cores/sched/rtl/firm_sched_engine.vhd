@@ -53,7 +53,7 @@ architecture rtl of firm_sched_engine is
   constant IS_SORTED  : boolean  := POLICY = EDF_LATENCY;
   -- Where paths are long, the task in B is selected in the next cycle, which needs a register for each candidate. But
   -- without segments, the sorted queue compares B with all items, and the selection would be repeated in each.
-  constant B_IS_SELECTED_LATER : boolean := REQUESTERS > 64 or (REQUESTERS > 32 and not IS_SORTED);
+  constant B_IS_SELECTED_LATER : boolean := REQUESTERS > 2 * SEGMENT_ITEMS or (REQUESTERS > 32 and not IS_SORTED);
 
   function bits_of_key return positive is
   begin

@@ -21,6 +21,9 @@ package firm_sched_queue_pkg is
   -- stops, and no new key is an eighth or more before or after it, keys are never half the range apart.
   function is_overdue(key, now : std_logic_vector) return std_logic;
 
+  -- The items of a segment of firm_sched_sorted_queue, which has none for up to two segments' items.
+  constant SEGMENT_ITEMS : positive := 32;
+
 end package firm_sched_queue_pkg;
 
 package body firm_sched_queue_pkg is

@@ -47,7 +47,7 @@ end entity firm_sched_sorted_cells;
 
 architecture rtl of firm_sched_sorted_cells is
 
-  -- The segment's cells with one neighbour before and two after them. The second one counts only if there are no cells.
+  -- The cells with one neighbour before them and two after them, of which the last one matters only without cells.
   type items_t is array (0 to CELLS+2) of std_logic_vector(ITEM_BITS-1 downto 0);
 
   signal valid    : std_logic_vector(0 to CELLS+2);

@@ -17,7 +17,7 @@ entity firm_sched_sorted_queue is
   generic (
     ITEMS    : positive;
     KEY_BITS : positive;
-    SEGMENT  : positive := 32  -- items of a segment, 2 or more; as many as two need no segments
+    SEGMENT  : positive := SEGMENT_ITEMS  -- items of a segment, 2 or more; as many as two need no segments
   );
   port (
     clk   : in std_logic;
