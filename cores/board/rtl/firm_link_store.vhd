@@ -30,7 +30,7 @@ entity firm_link_store is
     m_valid : out std_logic;
     m_ready : in  std_logic;
 
-    room : out natural range 0 to 2**clog2(LONGEST+SPARE+6)-1;  -- bytes that can still be stored
+    room : out natural;  -- bytes that can still be stored
 
     -- Pulses at the end of each frame.
     is_good    : out std_logic;

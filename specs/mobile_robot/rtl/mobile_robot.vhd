@@ -73,6 +73,7 @@ architecture rtl of mobile_robot is
   constant COMMAND_CYCLES : positive := 12;
 
   signal position_r     : natural range 0 to PWM_CYCLES-1;
+  signal position       : std_logic_vector(14 downto 0);
   -- The last cycle of a period of the PWM, and of one of control.
   signal pwm_last_r     : std_logic;
   signal tick_r         : std_logic;
@@ -100,6 +101,7 @@ architecture rtl of mobile_robot is
 
 begin
 
+  position          <= std_logic_vector(to_unsigned(position_r, position'length));
   start             <= '1' when wait_r = COMMAND_CYCLES else '0';
   taking            <= tick_r and in_msg_valid and not out_valid_r;
   in_msg_ready      <= taken_r(1);
@@ -251,7 +253,7 @@ begin
       port map (
         clk      => clk,
         rst_n    => rst_n,
-        position => position_r,
+        position => position,
         is_last  => pwm_last_r,
         duty     => duty,
         pwm      => pwm(k),

@@ -14,7 +14,7 @@ entity pwm_driver is
     rst_n    : in  std_logic;
 
     -- The cycle's number in its period, and whether it is the last one; all wheels share the counter.
-    position : in  natural range 0 to 32767;
+    position : in  std_logic_vector(14 downto 0);
     is_last  : in  std_logic;
     -- Two's complement, at most a period.
     duty     : in  std_logic_vector(15 downto 0);
@@ -41,7 +41,7 @@ begin
   begin
     if rising_edge(clk) then
       pwm_r <= '0';
-      if position < on_r then
+      if unsigned(position) < on_r then
         pwm_r <= '1';
       end if;
       dir_r <= forward_r;
