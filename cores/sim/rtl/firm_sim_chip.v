@@ -30,7 +30,7 @@ module firm_sim_chip (
       $fflush(reports);
       answer = $fgetc(answers);
       if (answer < 0)
-        $finish;
+        $finish(0);
     end
   endtask
 

@@ -910,7 +910,7 @@ module firm_sim_host #(
         $fclose(received_file);
       if (faults != 0)
         $fatal(1, "FAIL %0d/%0d", frames_right, expectations);
-      $finish;
+      $finish(0);
     end
   endtask
 

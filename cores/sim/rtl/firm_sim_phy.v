@@ -47,7 +47,7 @@ module firm_sim_phy #(
         line[place] = high;
       end
       if (high < 0) begin
-        $finish;
+        $finish(0);
         size = 0;
       end
       place = 0;

@@ -634,7 +634,7 @@ module firm_sim_pipe #(
       end
       request = request == "Q" ? -1 : $fgetc(requests);
     end
-    $finish;
+    $finish(0);
   end
 
 endmodule

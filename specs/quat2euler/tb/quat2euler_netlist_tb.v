@@ -45,7 +45,7 @@ module quat2euler_netlist_tb;
   initial begin
     if (!$value$plusargs("vectors=%s", file)) begin
       $display("quat2euler_netlist_tb: +vectors=FILE is missing");
-      $finish;
+      $finish(0);
     end
     $readmemh(file, vectors);
   end
@@ -65,7 +65,7 @@ module quat2euler_netlist_tb;
       received <= received + 1;
     end
     if (received == MESSAGES || cycle == PATIENCE)
-      $finish;
+      $finish(0);
   end
 
 endmodule
