@@ -16,14 +16,14 @@ typedef struct {
     uint32_t next, next_high, buffer, buffer_high, reserved[2], control, status, unused[8];
 } firm_descriptor_t;
 
-/* Memory shared by processor and engine; it must begin at a multiple of FIRM_DMA_ALIGNMENT, where the engine reaches
- * it. */
+/* Memory shared by processor and engine, where the engine reaches it. Variables of this type are aligned; memory from
+ * elsewhere must begin at a multiple of FIRM_DMA_ALIGNMENT. */
 typedef struct {
     volatile firm_descriptor_t to_system[FIRM_DMA_BUFFERS];
     volatile firm_descriptor_t from_system[FIRM_DMA_BUFFERS];
     uint8_t to_buffers[FIRM_DMA_BUFFERS][FIRM_DMA_BUFFER_BYTES];
     uint8_t from_buffers[FIRM_DMA_BUFFERS][FIRM_DMA_BUFFER_BYTES];
-} firm_dma_memory_t;
+} __attribute__((aligned(FIRM_DMA_ALIGNMENT))) firm_dma_memory_t;
 
 typedef enum {
     FIRM_DMA_OK,
