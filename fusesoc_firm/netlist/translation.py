@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 
 from fusesoc_firm.netlist import dump, lost_constants, probe_functions, verilog
 from fusesoc_firm.netlist.corrections import correct, doubts
+from fusesoc_firm.netlist.ghdl_faults import Fault, faults_at_hand
 from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.netlist.model import GrownTableError, LostMemoryError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.padding import Padding
@@ -52,10 +53,10 @@ _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
 
 _CRASH = "GHDL Bug occurred"
-# The places in GHDL 2.0 where it crashes, with the input that causes each crash.
+# The places where GHDL crashes, with the input that causes each crash; the line of a file is that of GHDL 2.0.
 _OF_TABLES = ("netlists.adb:774", "STORAGE_ERROR")
 _CRASHES = {
-    "netlists-builders.adb:929": "\nA possible cause is an integer whose range contains only one number, such as "
+    "netlists-builders.adb": "\nA possible cause is an integer whose range contains only one number, such as "
     "`range 0 to N - 1` with N = 1: GHDL does not support integers without bits.",
     **dict.fromkeys(
         _OF_TABLES,
@@ -65,8 +66,8 @@ _CRASHES = {
 }
 _OF_MEMORIES = "netlists-memories.adb"
 
-# GHDL 2.0 accesses a table's old memory after the table has grown, so an assignment to some bits of a signal may be
-# lost. If the C library overwrites freed memory, GHDL crashes instead of writing a wrong netlist.
+# `Fault.GROWN_TABLES`: GHDL accesses a table's old memory after the table has grown, so an assignment to some bits of a
+# signal may be lost. If the C library overwrites freed memory, GHDL crashes instead of writing a wrong netlist.
 _MEMORY = {"MALLOC_PERTURB_": "165"}
 
 # The numbers of additional assignments with which a translation is repeated after such a crash.
@@ -194,16 +195,19 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     if lost:
         raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not match the VHDL"]))
     modules = dump.read(text)
-    if ghdl.translation.refuses_loops and (found := loops(modules)):
-        raise NetlistError("\n".join(found))
+    if ghdl.translation.refuses_loops and (rings := loops(modules)):
+        raise NetlistError("\n".join(rings))
     components = _components(modules, ghdl.translation.verilog)
     # The second netlist supplies the generics, which the dump lacks.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
-    doubt = ghdl.check_constants(modules)
+    faults = faults_at_hand()
+    found = [_other_warnings(warnings)]
+    if Fault.LOST_CONSTANTS in faults:
+        found.append(ghdl.check_constants(modules))
     correct(modules)
-    return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(
-        filter(None, [_other_warnings(warnings), doubt, *doubts(modules)])
-    )
+    if Fault.MIXED_CONSTANTS in faults:
+        found += doubts(modules)
+    return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(filter(None, found))
 
 
 @dataclass(frozen=True)
@@ -223,7 +227,7 @@ class _Ghdl:
                 ["ghdl", command, *options, *arguments],
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                env={**os.environ, **_MEMORY},
+                env={**os.environ, **(_MEMORY if Fault.GROWN_TABLES in faults_at_hand() else {})},
             ) as process,
         ):
             assert process.stdout
