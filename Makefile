@@ -33,6 +33,9 @@ VERIFY_OPTIONS ?=
 BENCH ?=
 # Options and pages for make docs, such as DOCS=--update or DOCS=README.md; without pages, all are processed.
 DOCS ?=
+# The suite and the commands, separated by semicolons, of make debian, such as COMMANDS='make sim; .ci/run'
+SUITE ?= trixie
+COMMANDS ?= make sim; make test
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # Programs other than Python that tests run.
@@ -62,7 +65,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); see the message above." >&2; exit 1; }
 
-.PHONY: help sim test check docs studio ros bitstream bench matrix proofs policies corpus fuzz-netlist lint licences setup tools clean distclean
+.PHONY: help sim test check docs studio ros bitstream bench matrix proofs policies corpus fuzz-netlist debian lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -133,6 +136,9 @@ policies: $(VENV)/.installed ## Write the lists of schedulers in cores/sched fro
 fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
 	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
+
+debian: ## Run the README's commands in a minimal system of a suite, as root; SUITE=trixie or bookworm, COMMANDS='make sim; .ci/run'
+	@python=$$(./.ci/install-tools debootstrap unshare:util-linux git) && "$$python" .ci/debian.py "$(SUITE)" "$(COMMANDS)"
 
 lint: setup $(VENV)/.extra-lint ## Check style and types of Python and VHDL, including a sample of generated VHDL
 	@$(BIN)/ruff check .
