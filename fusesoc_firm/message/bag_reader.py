@@ -40,11 +40,14 @@ BAGS = "a bag is a ROS 1 .bag file, or a ROS 2 folder, .mcap file or .db3 file"
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _METADATA = "metadata.yaml"
 _ROS1_MAGIC = b"#ROSBAG"
+_SQLITE_MAGIC = b"SQLite format 3\0"
+_SQLITE_HEADER_BYTES = 100
 # The errors that rosbags reports for a damaged bag, and the remedy for each.
 _REMEDIES = {
     "not indexed": "the bag was not closed; run: rosbag reindex {path}",
     "index looks damaged": "the bag is cut off; run: rosbag reindex {path}",
     "are still in the journal": "the bag was not closed; run: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
+    "the file is cut off": "copy the bag again, or recover the rest; run: sqlite3 FILE .recover",
     "end magic is invalid": "the bag was not closed or is cut off; run: mcap recover {path}",
 }
 
@@ -169,7 +172,7 @@ def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
     """Open a bag for reading within the context. Raise `InputError`, with `hint` if the path is not a bag."""
     with ExitStack() as stack:
         with _readable(path, hint):
-            _check_journals(path)
+            _check_databases(path)
             readers = _readers(path)
             for reader in readers:
                 stack.enter_context(reader)
@@ -191,12 +194,31 @@ def _readers(path: Path) -> list[Reader]:
     return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
 
 
-def _check_journals(path: Path) -> None:
-    """Raise `ValueError` if SQLite has not yet written all messages to the file, since rosbags would miss the rest."""
+def _check_databases(path: Path) -> None:
+    """Raise `ValueError` if messages are not in a file of SQLite: not yet written to it, or cut off.
+
+    rosbags would miss the former, and read zeros in place of the end of the latter.
+    """
     for file in path.glob("*.db3") if path.is_dir() else [path]:
         journal = file.with_name(f"{file.name}-wal")
         if journal.exists() and journal.stat().st_size:
             raise ValueError(f"messages of {file.name} are still in the journal {journal.name}")
+        size, expected = file.stat().st_size, _database_size(file)
+        if size < expected:
+            raise ValueError(f"the file is cut off: {file.name} has {size} of {expected} bytes")
+
+
+def _database_size(file: Path) -> int:
+    """Return the size, in bytes, that a file has according to its header (SQLite's file format, 1.3), or 0."""
+    with file.open("rb") as opened:
+        header = opened.read(_SQLITE_HEADER_BYTES)
+    is_known = len(header) == _SQLITE_HEADER_BYTES and header.startswith(_SQLITE_MAGIC)
+    # An old writer does not update the number of pages, which the second number tells.
+    if not is_known or header[24:28] != header[92:96]:
+        return 0
+    # 65,536 does not fit, and is written as 1.
+    page_bytes = int.from_bytes(header[16:18], "big")
+    return int.from_bytes(header[28:32], "big") * (65536 if page_bytes == 1 else page_bytes)
 
 
 def _is_ros1(path: Path) -> bool:

@@ -127,6 +127,24 @@ def test_a_damaged_bag(tmp_path: Path, kind: str, share: float) -> None:
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", version(kind))])
 
 
+@pytest.mark.parametrize("page_bytes", [4096, 65536])
+@pytest.mark.parametrize("missing", [1, 100])
+def test_a_database_whose_last_page_is_incomplete(tmp_path: Path, page_bytes: int, missing: int) -> None:
+    """SQLite reads zeros there."""
+    path = write(tmp_path, "sqlite3", many("sqlite3", 100))
+    file = path / "recorded.db3"
+    with contextlib.closing(sqlite3.connect(file)) as database:
+        database.execute(f"pragma page_size={page_bytes}")
+        database.execute("vacuum")
+    assert read_x(path, "sqlite3") == list(range(100))
+    size = file.stat().st_size
+    cut(path, 1 - missing / size)
+    left = file.stat().st_size
+    for bag in (path, file):
+        with pytest.raises(InputError, match=rf"cut off: recorded\.db3 has {left} of {size} bytes\n.*sqlite3 FILE"):
+            read_x(bag, "sqlite3")
+
+
 @pytest.mark.parametrize(("kind", "ros"), [("ros1", ROS2), ("mcap", ROS1)])
 def test_a_bag_of_the_other_version(tmp_path: Path, kind: str, ros: Middleware) -> None:
     path = write(tmp_path, kind, [("/p", POINT, 1.0, 0), ("/q", POINT, 1.0, 0)])
