@@ -36,7 +36,7 @@ class Machine:
 
     def add_apt(self, *brings: str) -> None:
         """Add an apt-get that records its calls, and whose `install` adds programs."""
-        copies = [f'[ "$1" = update ] || /bin/cp "$0" {self.programs}/{name}' for name in brings]
+        copies = [f'[ "$1" = update ] || /bin/cp {self.programs}/id {self.programs}/{name}' for name in brings]
         self.add("apt-get", "\n".join([f'echo "$DEBIAN_FRONTEND $*" >> {self.log}', 'echo "apt talks"', *copies]))
 
     def install(self) -> subprocess.CompletedProcess[str]:
@@ -102,6 +102,34 @@ def test_what_apt_did_not_bring_is_said(machine: Machine) -> None:
     assert "Missing: ghdl\napt-get ran" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("printed", "reason"),
+    [
+        ("E: Unable to locate package ghdl", "This system's release has no package of this name."),
+        ("E: Package 'ghdl' has no installation candidate", "This system's release has no package of this name."),
+        ("W: Failed to fetch ARCHIVE  Temporary failure resolving 'ARCHIVE'", "The package archive cannot be reached."),
+        ("E: Could not get lock /var/lib/dpkg/lock-frontend.", "Another program is installing packages."),
+    ],
+)
+def test_why_apt_could_not_install_is_said(machine: Machine, printed: str, reason: str) -> None:
+    machine.add("id", "echo 0")
+    machine.add("g++")
+    machine.add("apt-get", f'echo "{printed}" >&2; exit 100')
+    done = machine.install()
+    assert done.returncode == 1
+    assert f"Missing: ghdl\n{reason}" in done.stderr
+    assert done.stderr.splitlines()[0] == printed
+
+
+@pytest.mark.parametrize(("version", "status"), [("1.0.0", 1), ("0.37", 1), ("2.0.0", 0), ("10.1", 0)])
+def test_an_old_ghdl_is_refused(machine: Machine, version: str, status: int) -> None:
+    machine.add("ghdl", f'echo "GHDL {version} (Ubuntu) [Dunoon edition]"')
+    machine.add("g++")
+    done = machine.install()
+    assert done.returncode == status
+    assert (f"GHDL {version} is too old: 2.0 or later is needed." in done.stderr) == bool(status)
+
+
 def test_make_without_a_target_lists_them() -> None:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     done = subprocess.run(["make"], cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
@@ -120,6 +148,7 @@ def test_make_without_a_target_lists_them() -> None:
         "proofs",
         "policies",
         "fuzz-netlist",
+        "debian",
         "lint",
         "licences",
         "setup",
