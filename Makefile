@@ -63,7 +63,9 @@ FUZZ_OPTIONS ?=
 
 # Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip would hide error messages.
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
-  { cat $(1)/pip.log >&2; echo "pip could not install $(2); see the message above." >&2; exit 1; }
+  { cat $(1)/pip.log >&2; echo "pip could not install $(2); see the message above." >&2; \
+    ! grep -q "Retrying (" $(1)/pip.log || echo "The package index cannot be reached. Run make again with a network, and with a proxy if one is needed." >&2; \
+    exit 1; }
 
 .PHONY: help sim test check docs studio ros bitstream bench matrix proofs policies corpus fuzz-netlist debian lint licences setup tools clean distclean
 
@@ -171,15 +173,10 @@ $(VENV)/.extra-%: $(VENV)/.installed
 	@$(call pip_install,$(VENV),--editable '.[$*]')
 	@touch $@
 
-# ROS 2 as wheels, and the libpython that some of their libraries expect in the process. The wheels have a venv of
-# their own, since they fill it with libraries and headers.
+# ROS 2 as wheels; they have a venv of their own, since they fill it with libraries and headers.
 $(VENV)/.ros2: tests/ros/ros2.txt $(VENV)/.installed
 	@echo "Installing ROS 2 into $(VENV)/ros2"
-	@python=$$(./.ci/install-tools) && "$$python" -m venv --clear $(VENV)/ros2 && \
-	  ./.ci/install-tools $$("$$python" -c 'from sys import version_info as v; from ctypes.util import find_library as f; \
-	    name = f"python{v[0]}.{v[1]}"; print("" if f(name) else f"lib{name}")') >/dev/null && \
-	  $(VENV)/ros2/bin/pip install --quiet --disable-pip-version-check --requirement $< && touch $@ || \
-	  echo "ROS 2 is missing: tests that need it are skipped" >&2
+	@./.ci/install-ros2 $(VENV)/ros2 $< && touch $@ || echo "ROS 2 is missing: tests that need it are skipped" >&2
 
 clean: ## Remove everything that was built, except .venv
 	@find build -mindepth 1 -maxdepth 1 ! -name FUSESOC_IGNORE -exec rm -rf {} +

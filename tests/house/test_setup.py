@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -258,6 +259,78 @@ def test_why_pip_failed_is_shown(checkout: Checkout) -> None:
     assert done.returncode
     assert "The conflict is this\n" in done.stderr
     assert checkout.calls("fusesoc") == []
+
+
+def test_a_missing_network_is_said(checkout: Checkout) -> None:
+    checkout.add("venv/bin/pip", 'echo "WARNING: Retrying (Retry(total=4)) after connection broken"; exit 1')
+    done = checkout.make("bitstream", "BOARD=icebreaker")
+    assert done.returncode
+    assert "The package index cannot be reached. Run make again with a network," in done.stderr
+
+
+class Pythons:
+    """Interpreters on the PATH of install-ros2, whose environments have wheels or not."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.environment = folder / "ros2"
+
+    def add(self, name: str, pip: str) -> None:
+        """Add an interpreter, or uv, and the script that is the pip of its environments."""
+        program = self.folder / name
+        program.write_text(
+            f"#!/bin/bash\necho {name} >> {self.folder}/log\nmkdir -p {self.environment}/bin\n"
+            f"printf '#!/bin/bash\\n%s\\n' {shlex.quote(pip)} > {self.environment}/bin/pip\n"
+            f"printf '#!/bin/bash\\n' > {self.environment}/bin/python\nchmod +x {self.environment}/bin/*\n"
+        )
+        program.chmod(0o755)
+
+    def install(self) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [ROOT / ".ci" / "install-ros2", self.environment, "requirements.txt"],
+            env={"PATH": f"{self.folder}:/usr/bin:/bin", "PYTHON": "own"},
+            text=True,
+            capture_output=True,
+            check=False,
+        )
+
+    @property
+    def tried(self) -> list[str]:
+        return (self.folder / "log").read_text().split()
+
+
+NO_WHEELS = "echo 'ERROR: No matching distribution found for ros-rclpy==7.1.6'; exit 1"
+
+
+def test_ros2_is_installed_for_the_first_python_with_wheels(tmp_path: Path) -> None:
+    pythons = Pythons(tmp_path)
+    for name, pip in (("own", NO_WHEELS), ("python3.12", NO_WHEELS), ("python3.11", "exit 0"), ("uv", "exit 0")):
+        pythons.add(name, pip)
+    assert pythons.install().returncode == 0
+    assert pythons.tried == ["own", "python3.12", "python3.11"]
+
+
+def test_ros2_is_installed_with_uv_if_no_python_has_wheels(tmp_path: Path) -> None:
+    pythons = Pythons(tmp_path)
+    for name in ("own", *(f"python3.{minor}" for minor in range(11, 15))):
+        pythons.add(name, NO_WHEELS)
+    pythons.add("uv", "exit 0")
+    assert pythons.install().returncode == 0
+    assert pythons.tried[-1] == "uv"
+
+
+@pytest.mark.parametrize(
+    ("pip", "tried"), [(NO_WHEELS, 6), (f"echo 'WARNING: Retrying (Retry(total=4))'; {NO_WHEELS}", 1), ("exit 1", 1)]
+)
+def test_why_ros2_is_missing_is_one_line(tmp_path: Path, pip: str, tried: int) -> None:
+    pythons = Pythons(tmp_path)
+    for name in ("own", *(f"python3.{minor}" for minor in range(11, 15)), "uv"):
+        pythons.add(name, pip)
+    done = pythons.install()
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("The wheels of ROS 2 could not be installed: ")
+    assert len(pythons.tried) == tried
 
 
 @pytest.mark.one_in(2)
