@@ -21,9 +21,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fusesoc_firm.netlist import dump, lost_constants, probe_functions, verilog
+from fusesoc_firm.netlist import dump, ghdl2, lost_constants, probe_functions, verilog
 from fusesoc_firm.netlist.corrections import correct, doubts
-from fusesoc_firm.netlist.ghdl_faults import Fault, faults_at_hand
 from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.netlist.model import GrownTableError, LostMemoryError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.padding import Padding
@@ -66,7 +65,7 @@ _CRASHES = {
 }
 _OF_MEMORIES = "netlists-memories.adb"
 
-# `Fault.GROWN_TABLES`: GHDL accesses a table's old memory after the table has grown, so an assignment to some bits of a
+# GHDL 2.0 accesses a table's old memory after the table has grown, so an assignment to some bits of a
 # signal may be lost. If the C library overwrites freed memory, GHDL crashes instead of writing a wrong netlist.
 _MEMORY = {"MALLOC_PERTURB_": "165"}
 
@@ -200,13 +199,10 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     components = _components(modules, ghdl.translation.verilog)
     # The second netlist supplies the generics, which the dump lacks.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
-    faults = faults_at_hand()
     found = [_other_warnings(warnings)]
-    if Fault.LOST_CONSTANTS in faults:
-        found.append(ghdl.check_constants(modules))
+    if ghdl2.is_at_hand():
+        found += [ghdl.check_constants(modules), *doubts(modules)]
     correct(modules)
-    if Fault.MIXED_CONSTANTS in faults:
-        found += doubts(modules)
     return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(filter(None, found))
 
 
@@ -227,7 +223,7 @@ class _Ghdl:
                 ["ghdl", command, *options, *arguments],
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                env={**os.environ, **(_MEMORY if Fault.GROWN_TABLES in faults_at_hand() else {})},
+                env={**os.environ, **(_MEMORY if ghdl2.is_at_hand() else {})},
             ) as process,
         ):
             assert process.stdout

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.netlist import ghdl2
 from fusesoc_firm.netlist.model import NetlistError
 from tests.hdl.ghdl import Library
 from tests.hdl.verilog import compile_verilog, netlist
@@ -107,7 +108,9 @@ def test_the_netlist_computes_what_the_vhdl_says(tmp_path: Path) -> None:
 
 
 def test_ghdl_alone_does_not(tmp_path: Path) -> None:
-    """Where this fails, GHDL has become better, and the repair can go."""
+    """What GHDL 3 and later write as Verilog is not used either, and has other faults."""
+    if not ghdl2.is_at_hand():
+        pytest.skip("the faults are those of GHDL 2")
     work = Library("work", tmp_path)
     work.analyse([ARITHMETIC])
     text = work.netlist_of_ghdl("arithmetic", {"OFFSET": OFFSET}, "verilog")

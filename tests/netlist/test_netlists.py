@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.netlist import translation
-from fusesoc_firm.netlist.ghdl_faults import Fault, faults_at_hand
+from fusesoc_firm.netlist import ghdl2, translation
 from fusesoc_firm.netlist.model import NetlistError
 from fusesoc_firm.netlist.translation import Translation, translate
 from tests.netlist import comparison, simulators
@@ -61,7 +60,7 @@ def test_a_table_that_ghdl_outgrows_is_an_error_and_no_wrong_netlist(monkeypatch
     """Whether it is one depends on the number of assignments before, and on GHDL."""
     monkeypatch.setattr(translation, "_PADDINGS", (0,))
     found = [item for more in (2, 3) for item in differences([growing(more)], ["icarus"])]
-    assert bool(found) == (Fault.GROWN_TABLES in faults_at_hand())
+    assert bool(found) == ghdl2.is_at_hand()
     for item in found:
         assert item.kind == comparison.CRASH
         assert "GHDL 2.0 crashes if one of its tables grows" in item.message
@@ -101,7 +100,7 @@ def test_an_error_has_its_place_in_the_source(tmp_path: Path) -> None:
 @pytest.mark.parametrize("designs", [LOST, COMPUTED], ids=["literal", "computed"])
 def test_a_constant_that_ghdl_loses_is_refused(designs: list[Design]) -> None:
     """Each of them alone, with its place, as one that is found would hide others; a GHDL that loses none is right."""
-    if Fault.LOST_CONSTANTS not in faults_at_hand():
+    if not ghdl2.is_at_hand():
         assert not differences(designs, ["icarus"])
         return
     for design in designs:
@@ -123,8 +122,8 @@ def test_a_constant_beside_parts_of_its_signal_is_warned_of(tmp_path: Path) -> N
     source.write_text(MIXED.text)
     warnings = translate(Translation(MIXED.name, str(output), {"work": [str(source)]}, {}), tmp_path / "ghdl")
     warning = r"\S+mixed\.vhd:\d+:\d+: warning: if one branch assigns a constant .*"
-    assert re.fullmatch(warning if Fault.MIXED_CONSTANTS in faults_at_hand() else "", warnings)
-    assert Fault.MIXED_CONSTANTS in faults_at_hand() or not differences([MIXED], ["icarus"])
+    assert re.fullmatch(warning if ghdl2.is_at_hand() else "", warnings)
+    assert ghdl2.is_at_hand() or not differences([MIXED], ["icarus"])
 
 
 @pytest.mark.parametrize("judge", ["icarus", "yosys"])

@@ -1,5 +1,4 @@
-"""Each correction of GHDL's synthesis is needed with the versions for which it is made, and GHDL is right without it
-with the others."""
+"""Each correction of GHDL's synthesis is needed with the versions for which it is made, and with no others."""
 
 from __future__ import annotations
 
@@ -7,17 +6,16 @@ from collections.abc import Sequence
 
 import pytest
 
-from fusesoc_firm.netlist import translation
-from fusesoc_firm.netlist.ghdl_faults import Fault, faults_at_hand, faults_of
+from fusesoc_firm.netlist import ghdl2, translation
 from fusesoc_firm.netlist.model import Modules
 from tests.netlist.comparison import differences
 from tests.netlist.designs import Design
 from tests.netlist.faults import COMPUTED, FAULTS, LOST, MIXED, RESTORED, growing
 
-OF_VERSIONS = {
-    Fault.LOST_CONSTANTS: [*LOST, *COMPUTED, *RESTORED],
-    Fault.MIXED_CONSTANTS: [MIXED],
-    Fault.GROWN_TABLES: [growing(2), growing(3)],
+OF_GHDL2 = {
+    "lost constants": [*LOST, *COMPUTED, *RESTORED],
+    "mixed constants": [MIXED],
+    "grown tables": [growing(2), growing(3)],
 }
 OF_ALL = {
     "numeric_std": [item for item in FAULTS if item.name.startswith(("subtracted", "narrowed", "product", "compared"))],
@@ -26,18 +24,18 @@ OF_ALL = {
 
 
 @pytest.mark.parametrize(
-    ("version", "faults"),
+    ("version", "has_faults"),
     [
-        ("GHDL 2.0.0 (Debian 2.0.0+dfsg-6.2+b2) [Dunoon edition]", set(Fault)),
-        ("GHDL 3.0.0 (v3.0.0) [Dunoon edition]", {Fault.MIXED_CONSTANTS}),
-        ("GHDL 5.0.1 (Debian 5.0.1+dfsg-1+b1) [Dunoon edition]", set()),
-        ("GHDL 10.2 [Dunoon edition]", set()),
-        ("ghdl", set(Fault)),
-        ("", set(Fault)),
+        ("GHDL 2.0.0 (Debian 2.0.0+dfsg-6.2+b2) [Dunoon edition]", True),
+        ("GHDL 3.0.0 (tarball) [Dunoon edition]", False),
+        ("GHDL 5.0.1 (Debian 5.0.1+dfsg-1+b1) [Dunoon edition]", False),
+        ("GHDL 10.2 [Dunoon edition]", False),
+        ("ghdl", True),
+        ("", True),
     ],
 )
-def test_a_version_has_the_faults_that_were_not_mended_before(version: str, faults: set[Fault]) -> None:
-    assert faults_of(version) == faults
+def test_versions_from_3_on_do_not_have_the_faults(version: str, has_faults: bool) -> None:
+    assert ghdl2.has_faults(version) == has_faults
 
 
 def wrong_ones(designs: Sequence[Design]) -> list[str]:
@@ -48,17 +46,15 @@ def no_longer_needed(what: str) -> None:
     pytest.skip(f"the installed GHDL needs no correction of {what}")
 
 
-@pytest.mark.parametrize("fault", Fault)
-def test_without_corrections_ghdl_is_right_unless_its_version_has_the_fault(
-    fault: Fault, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    has_fault = fault in faults_at_hand()
-    monkeypatch.setattr(translation, "faults_at_hand", frozenset)
+@pytest.mark.parametrize("fault", OF_GHDL2)
+def test_without_corrections_only_ghdl_2_is_wrong(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    has_faults = ghdl2.is_at_hand()
+    monkeypatch.setattr(ghdl2, "is_at_hand", lambda: False)
     monkeypatch.setattr(translation, "_PADDINGS", (0,))
-    wrong = wrong_ones(OF_VERSIONS[fault])
-    assert has_fault or not wrong
-    if has_fault and not wrong:
-        no_longer_needed(fault.name)
+    wrong = wrong_ones(OF_GHDL2[fault])
+    assert has_faults or not wrong
+    if has_faults and not wrong:
+        no_longer_needed(fault)
 
 
 @pytest.mark.parametrize("correction", OF_ALL)
