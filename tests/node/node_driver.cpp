@@ -96,6 +96,7 @@ int main(int, char** arguments) {
   std::ostringstream published;
   const auto publish = [&](unsigned publisher, const std::uint8_t* payload, std::size_t size) {
     published << "published " << publisher << " " << to_hex(payload, size) << "\n";
+    if (std::string(payload, payload + size) == "slow") std::this_thread::sleep_for(std::chrono::milliseconds(300));
   };
   const std::string address = arguments[1];
   firm::Node node(

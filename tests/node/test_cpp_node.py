@@ -181,6 +181,14 @@ def test_a_simulator_that_fails_ends_the_node(node_driver: Driver, fault: str, e
     assert 0 < len(published) <= 8 and published == [payload for _, payload in messages][: len(published)]
 
 
+def test_what_came_before_a_failure_is_published_though_the_sender_meets_it_first(node_driver: Driver) -> None:
+    messages = [(0, b"slow"), *((0, bytes([number])) for number in range(40))]
+    outcome = run(node_driver, puts(messages), f"pipe:{SIMULATOR} --fault exit --at 20")
+    assert outcome.said["error"] == "the simulator ended with status 3"
+    published = outcome.published[0]
+    assert 1 < len(published) <= 20 and published == [payload for _, payload in messages][: len(published)]
+
+
 def test_a_simulator_that_ends_while_nothing_moves_is_noticed(node_driver: Driver) -> None:
     """Nothing is sent after its last answer."""
     outcome = run(node_driver, [*puts([(0, b"abc")]), "await 2"], f"pipe:{SIMULATOR} --fault later --at 0")

@@ -55,7 +55,8 @@ class PipeTransport : public Transport {
     changed_.notify_all();
   }
 
-  // Bursts that arrived before an error are returned before the error is thrown.
+  // Bursts that arrived before an error are returned before the error is thrown, even if the sender has met it first and
+  // closed the transport.
   std::optional<Burst> receive(Timeout timeout = std::nullopt) override {
     std::unique_lock<std::mutex> lock(mutex_);
     const auto is_ready = [this] { return is_over_ || !bursts_.empty(); };
@@ -64,9 +65,9 @@ class PipeTransport : public Transport {
     } else {
       changed_.wait(lock, is_ready);
     }
-    if (is_closing_) return std::nullopt;
+    if (is_closing_ && !has_failed_) return std::nullopt;
     if (bursts_.empty()) {
-      if (is_over_) throw_if_over();
+      if (is_over_ && !is_closing_) throw_if_over();
       return std::nullopt;
     }
     std::optional<Burst> burst(std::move(bursts_.front()));
@@ -129,6 +130,7 @@ class PipeTransport : public Transport {
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     error_ = error;
+    has_failed_ = !error.empty() && !is_closing_;
     is_over_ = true;
     has_ended_ = true;
     changed_.notify_all();
@@ -332,6 +334,7 @@ class PipeTransport : public Transport {
   bool is_at_rest_ = false;
   bool is_closing_ = false;
   bool is_over_ = false;
+  bool has_failed_ = false;  // before it was closed
   bool has_ended_ = false;
   std::string error_;
 
