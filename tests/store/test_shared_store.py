@@ -8,6 +8,7 @@ import os
 import shutil
 import socket
 import stat
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -143,6 +144,10 @@ def test_clean_of_folders_without_end(root: Path) -> None:
         os.close(handle)
         handle = inner
     os.close(handle)
+    if sys.version_info >= (3, 13):
+        Store(root, 0).clean()
+        assert not folder.exists()
+        return
     with pytest.raises(OSError, match=r"Too many open files|too many"):
         Store(root, 0).clean()
     # The test's files are removed by an independent tool.
