@@ -56,6 +56,12 @@ class Library:
     name: str
     directory: Path
     standard: str = "93"
+    program: str = "ghdl"
+
+    @property
+    def version(self) -> str:
+        """What GHDL prints of its version."""
+        return subprocess.run([self.program, "--version"], capture_output=True, text=True, check=True).stdout
 
     def analyse(self, files: Iterable[Path], *options: str) -> None:
         """Analyse files in this order, strictly as the standard says; raise `GhdlError` on a fault."""
@@ -78,7 +84,15 @@ class Library:
 
         Its files are relative to `directory` (default: the library's).
         """
-        command = [*limited(seconds), "ghdl", "-r", *self._options(), entity, *_generic_options(generics), *options]
+        command = [
+            *limited(seconds),
+            self.program,
+            "-r",
+            *self._options(),
+            entity,
+            *_generic_options(generics),
+            *options,
+        ]
         process = subprocess.run(
             command,
             cwd=directory or self.directory,
@@ -134,7 +148,7 @@ class Library:
 
     def _ghdl(self, command: str, *arguments: str) -> str:
         process = subprocess.run(
-            ["ghdl", command, *self._options(), *arguments],
+            [self.program, command, *self._options(), *arguments],
             capture_output=True,
             text=True,
             errors="replace",

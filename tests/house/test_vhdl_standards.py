@@ -1,4 +1,5 @@
-"""All VHDL is analysed as VHDL-93 and as VHDL-2008 without an error or a warning: ours, and what is generated."""
+"""All VHDL is analysed and elaborated as VHDL-93 and as VHDL-2008 without an error or a warning, by each GHDL at hand:
+ours, and what is generated."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -23,6 +25,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.netlist import ghdl2
 from fusesoc_firm.text.diagnostics import InputError
 from tests import corpus
 from tests.hdl.ghdl import CORES, REPOSITORY, GhdlError, Library
@@ -37,6 +40,15 @@ MESSAGES = ("geometry_msgs/Pose", "sensor_msgs/Image", "sensor_msgs/JointState",
 SAMPLE = 25
 STRICT = ("--warn-error",)
 
+# Debian's ghdl starts one of the others. The variable FIRM_GHDLS adds programs.
+GHDLS = list(filter(shutil.which, ("ghdl-mcode", "ghdl-llvm", "ghdl-gcc"))) or ["ghdl"]
+GHDLS += filter(None, os.environ.get("FIRM_GHDLS", "").split(os.pathsep))
+
+ENTITY = re.compile(r"^entity (\w+) is$(.*?)^end", re.MULTILINE | re.IGNORECASE | re.DOTALL)
+GENERICS = re.compile(r"^  generic \((.*?)^  \);", re.MULTILINE | re.IGNORECASE | re.DOTALL)
+COMMENT = re.compile("--.*")
+# A bench needs its stimuli, a kernel its library in C++, and the ports of a top have bounds.
+NO_TOP = ("cannot open file", "cannot load VHPIDIRECT shared library", "cannot be at the top")
 UNIT = re.compile(r"^(?:entity|package) (\w+) is$", re.MULTILINE | re.IGNORECASE)
 USED = re.compile(r"^\s*(?:use|\w+ : entity) (?:firm|work)\.(\w+)", re.MULTILINE | re.IGNORECASE)
 # Instead of the synchroniser of robot:cdc:firm_cdc_sync.
@@ -51,15 +63,34 @@ def in_order(files: Iterable[Path]) -> list[Path]:
     return list(TopologicalSorter({file: others - {file} for file, others in used.items()}).static_order())
 
 
+def elaborate_all(library: Library, files: Iterable[Path]) -> None:
+    """Elaborate each entity that can be a top: each of its generics has a default."""
+    for file in files:
+        for name, head in ENTITY.findall(file.read_text(encoding="utf-8")):
+            generics = GENERICS.search(COMMENT.sub("", head))
+            if generics and not all(":=" in generic for generic in generics[1].split(";")):
+                continue
+            try:
+                library.elaborate(name)
+            except GhdlError as error:
+                if not any(text in str(error) for text in NO_TOP):
+                    raise
+
+
+@pytest.fixture(scope="module", params=GHDLS)
+def ghdl(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
 @pytest.fixture(scope="module", params=STANDARDS)
 def standard(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
 @pytest.fixture(scope="module")
-def firm(standard: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
+def firm(ghdl: str, standard: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
     """All cores and their benches, analysed as the standard says; GHDL keeps a library for one standard only."""
-    library = Library("firm", tmp_path_factory.mktemp(f"firm_{standard}"), standard)
+    library = Library("firm", tmp_path_factory.mktemp(f"firm_{standard}"), standard, ghdl)
     library.analyse(in_order(set(CORES.rglob("*.vhd")) - {SIMULATED_SYNC}), *STRICT)
     return library
 
@@ -68,22 +99,41 @@ def user_of(firm: Library, folder: Path) -> Library:
     """A library `work` in `folder`, which finds `firm`."""
     for file in firm.directory.glob("firm-obj*.cf"):
         shutil.copy(file, folder)
-    return Library("work", folder, firm.standard)
+    return replace(firm, name="work", directory=folder)
 
 
-@pytest.mark.usefixtures("firm")
-def test_cores(standard: str, tmp_path: Path) -> None:
-    Library("firm", tmp_path, standard).analyse([SIMULATED_SYNC], *STRICT)
+def test_cores(firm: Library, tmp_path: Path) -> None:
+    elaborate_all(firm, CORES.rglob("*.vhd"))
+    replace(firm, directory=tmp_path).analyse([SIMULATED_SYNC], *STRICT)
 
 
-def test_a_warning_is_a_fault(standard: str, tmp_path: Path) -> None:
+def test_a_port_with_bounds_other_than_its_actual_is_found(firm: Library, tmp_path: Path) -> None:
+    """By GHDL 3 and later, and for constant bounds only in the elaboration."""
+    path = tmp_path / "bounds.vhd"
+    path.write_text(
+        "entity part is generic (N : positive := 7); port (p : out natural range 0 to N); end entity;\n"
+        "architecture rtl of part is begin p <= N; end architecture;\n"
+        "entity whole is\nend entity;\n"
+        "architecture rtl of whole is signal r : natural; begin\n"
+        "  u : entity work.part port map (p => r);\nend architecture;\n"
+    )
+    library = user_of(firm, tmp_path)
+    library.analyse([path], *STRICT)
+    if ghdl2.has_faults(library.version):
+        elaborate_all(library, [path])
+        return
+    with pytest.raises(GhdlError, match="range"):
+        elaborate_all(library, [path])
+
+
+def test_a_warning_is_a_fault(ghdl: str, standard: str, tmp_path: Path) -> None:
     path = tmp_path / "e.vhd"
     path.write_text(
         "entity e is generic (N : natural := 1); end e;\narchitecture a of e is\n"
         "  function f(n : natural) return natural is begin return n; end f;\nbegin\nend a;\n"
     )
     with pytest.raises(GhdlError, match=r'(?i)hides generic "n"'):
-        Library("work", tmp_path, standard).analyse([path], *STRICT)
+        Library("work", tmp_path, standard, ghdl).analyse([path], *STRICT)
 
 
 @pytest.mark.parametrize("core", sorted(SPECS.glob("*/*.core")), ids=lambda path: path.stem)
@@ -100,7 +150,9 @@ def test_systems(firm: Library, core: Path, tmp_path: Path) -> None:
     made = write(call(spec, stimuli, model, **given), tmp_path) if is_vhdl else generate_system(spec, tmp_path)
     names = {path.name for path in made}
     others = [path for path in spec.parent.rglob("*.vhd") if path.name not in names]
-    user_of(firm, tmp_path).analyse([*made, *in_order(others)], *STRICT)
+    work = user_of(firm, tmp_path)
+    work.analyse([*made, *in_order(others)], *STRICT)
+    elaborate_all(work, [*made, *others])
 
 
 def analyse_converters(work: Library, library: MessageLibrary, names: list[MessageName], count: int) -> None:
@@ -118,7 +170,9 @@ def analyse_converters(work: Library, library: MessageLibrary, names: list[Messa
             for made in (*subscribers, publisher_files([frame], width)):
                 for file, content in made.items():
                     (work.directory / file).write_text(str(content.content), encoding="ascii")
-                work.analyse([work.directory / file for file in made], *STRICT)
+                files = [work.directory / file for file in made]
+                work.analyse(files, *STRICT)
+                elaborate_all(work, files)
         count -= 1
 
 
