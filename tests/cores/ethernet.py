@@ -115,6 +115,11 @@ def write_capture(path: Path, frames: Iterable[bytes]) -> None:
     path.write_bytes(header + b"".join(packets))
 
 
+def is_set(flag: str) -> bool:
+    """A flag as tshark shows it: 0 or 1, or in other formats and from version 4.2 on a word."""
+    return {"0": False, "False": False, "1": True, "True": True}[flag]
+
+
 def checksum(data: bytes) -> int:
     """The checksum of IPv4, ICMP and UDP (RFC 1071) of an even number of bytes."""
     total: int = sum(struct.unpack(f">{len(data) // 2}H", data))

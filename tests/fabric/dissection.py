@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.rtps import Parameter
+from tests.cores.ethernet import is_set
 from tests.fabric.messages import (
     AckNack,
     Data,
@@ -41,9 +42,9 @@ _FORMS: dict[str, Callable[[str], Any]] = {
     "rtps.sm.rdEntityId": lambda text: bytes.fromhex(text.removeprefix("0x")),
     "rtps.sm.wrEntityId": lambda text: bytes.fromhex(text.removeprefix("0x")),
     "rtps.sm.seqNumber": int,
-    "rtps.flag.final": int,
-    "rtps.flag.data_present": int,
-    "rtps.flag.data.serialized_key": int,
+    "rtps.flag.final": is_set,
+    "rtps.flag.data_present": is_set,
+    "rtps.flag.data.serialized_key": is_set,
     "rtps.data_frag.number": _unsigned,
     "rtps.data_frag.num_fragments": int,
     "rtps.data_frag.size": int,
@@ -77,7 +78,7 @@ def _fields(part: ET.Element) -> Iterator[tuple[str, object]]:
     for field in part.iter("field"):
         name, text = field.get("name", ""), field.get("show", "").replace(":", "")
         if name == "rtps.flag.endianness":
-            is_little = text == "1"
+            is_little = is_set(text)
         elif name == "rtps.bitmap":
             words = bytes.fromhex(text)
             bits = b"".join(words[at : at + 4][:: -1 if is_little else 1] for at in range(0, len(words), 4))
