@@ -130,7 +130,7 @@ class _Bits:
             return [inputs[0][min(bit, len(inputs[0]) - 1) :][:1] for bit in range(width)]
         if gate.kind == "$extract":
             return [inputs[0][gate.numbers[0] + bit :][:1] for bit in range(width)]
-        if gate.kind.startswith("$dyn_"):
+        if gate.kind.startswith("$dyn_") or gate.kind == "$bmux":
             return self._of_element(gate, inputs, width)
         is_memory = gate.kind == "$mem_rd" and output == 0  # for its next port
         return [(bit,) for bit in inputs[0]] if is_memory else [[*chain(*inputs)]] * width
@@ -144,6 +144,8 @@ class _Bits:
 
     def _of_element(self, gate: Instance, inputs: Sequence[Sequence[int]], width: int) -> list[Sequence[int]]:
         """Read or write an element of a vector: bits keep their places within the elements."""
+        if gate.kind == "$bmux":
+            return [[*inputs[0][bit::width], *inputs[1]] for bit in range(width)]
         is_read = gate.kind == "$dyn_extract"
         source, (data, index) = inputs[0], ([], inputs[1]) if is_read else inputs[1:3]
         step = self._step(gate.inputs[1 if is_read else 2]) or 1
@@ -265,20 +267,26 @@ def _of_instances(loop: Iterable[_Step]) -> Iterator[_Step]:
     return (step for step in loop if not step.gate.is_gate)
 
 
+def _entity(name: str) -> str:
+    """Return a module's name without the architecture, the library and the generics, which GHDL 6 appends."""
+    return name.partition("_B")[0]
+
+
 def _sentence(bits: _Bits, loop: Sequence[_Step]) -> str:
     """Name the ports between which instances close a loop; first those of a `ready` on which another output depends."""
+    entity = _entity(bits.module.name)
     steps = sorted(_of_instances(loop), key=lambda step: not _is_against_the_rule(*bits.ports(step)))
     if not steps:
         signals = dict.fromkeys(step.gate.name for step in loop if step.gate.kind in {"$signal", "$isignal"})
         names = ", ".join(f"'{name}'" for name in signals) or "unnamed signals"
-        return f"{loop[0].gate.location}: error: combinational loop in '{bits.module.name}': {names}"
+        return f"{loop[0].gate.location}: error: combinational loop in '{entity}': {names}"
     first, *others = steps
     source, result = bits.ports(first)
     ways = ", ".join(
         f"'{step.gate.name}' (from '{start}' to '{end}')" for step in others for start, end in [bits.ports(step)]
     )
     return (
-        f"{first.gate.location}: error: combinational loop in '{bits.module.name}': '{result}' of '{first.gate.name}' "
+        f"{first.gate.location}: error: combinational loop in '{entity}': '{result}' of '{first.gate.name}' "
         f"depends on its '{source}', which {f'depends on it through {ways}' if ways else 'is connected to it'}"
     )
 

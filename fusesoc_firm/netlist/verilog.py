@@ -378,6 +378,13 @@ class _Writer:
         yield from self._assign(gate, " + ".join(self.extended(gate.input(index), width) for index in (0, 1)))
 
     def _dynamic_extraction(self, gate: Instance) -> Iterator[str]:
+        yield from self._part(gate, self._place(gate, gate.input(1)))
+
+    def _element(self, gate: Instance) -> Iterator[str]:
+        yield from self._part(gate, f"{self.value(gate.input(1))} * {gate.outputs[0].width}")
+
+    def _part(self, gate: Instance, place: str) -> Iterator[str]:
+        """Assign the bits of the first input from `place` on."""
         source, width = gate.input(0), gate.outputs[0].width
         if source.width == width:
             yield from self._assign(gate, self.value(source))
@@ -386,7 +393,7 @@ class _Writer:
         if source.number in self.constants:
             name = self._distinct(f"{gate.name}_source")
             yield f"  wire {declaration(source.width)}{name} = {self.value(source)};"
-        yield from self._assign(gate, f"{name}[{self._place(gate, gate.input(1))} +: {width}]")
+        yield from self._assign(gate, f"{name}[{place} +: {width}]")
 
     def _dynamic_insertion(self, gate: Instance) -> Iterator[str]:
         source, data, index = (gate.input(number) for number in range(3))
@@ -451,6 +458,7 @@ class _Writer:
         "$memidx": _scaled_index,
         "$addidx": _sum_of_indices,
         "$dyn_extract": _dynamic_extraction,
+        "$bmux": _element,
         **dict.fromkeys(("$dyn_insert", "$dyn_insert_en"), _dynamic_insertion),
         "$pmux": _selection,
         **dict.fromkeys(("$inout", "$iinout"), _bidirectional),
