@@ -23,7 +23,7 @@ _OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-nostartfiles", "-DFIRM_UART
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor that is emulated: its compiler, and its emulator with the options that choose the machine.
+    """A processor that is emulated: its compiler, and its emulator with the machine and the machine's options.
 
     `files` are those of its folder in `node/c/boards` beside the start-up code. `package` has the library that the
     compiler needs.
@@ -34,7 +34,8 @@ class Processor:
     options: tuple[str, ...]
     files: tuple[str, ...]
     emulator: str
-    machine: tuple[str, ...]
+    machine: str
+    options_of_machine: tuple[str, ...]
     package: str
 
     @property
@@ -54,7 +55,8 @@ _ZYNQ = Processor(
     ("-mcpu=cortex-a9", "-mfpu=vfpv3", "-mfloat-abi=hard", "-marm"),
     (),
     "qemu-system-arm",
-    ("-machine", "xilinx-zynq-a9", "-m", "512"),
+    "xilinx-zynq-a9",
+    ("-m", "512"),
     "libnewlib-arm-none-eabi",
 )
 _ZYNQMP = Processor(
@@ -67,8 +69,9 @@ _ZYNQMP = Processor(
     ),
     ("firm_memory.c",),
     "qemu-system-aarch64",
-    # The program starts at level 3, as after AMD's FSBL. The display controller would look for a sound card.
-    ("-machine", "xlnx-zcu102,secure=on", "-m", "1024", "-audiodev", "none,id=none"),
+    # The program starts at level 3, as after AMD's FSBL.
+    "xlnx-zcu102,secure=on",
+    ("-m", "1024"),
     "libc6-dev-arm64-cross",
 )
 PROCESSORS = {item.name: item for item in (_ZYNQ, _ZYNQMP)}

@@ -89,7 +89,8 @@ class Emulation:
             with Line(self.start(), folder / "line") as line:
                 command = [
                     self.processor.emulator,
-                    *self.processor.machine,
+                    *_machine(self.processor),
+                    *self.processor.options_of_machine,
                     *_OPTIONS,
                     "-kernel",
                     str(self.program),
@@ -140,6 +141,21 @@ class Emulation:
             wanted = [item.payload for item in self.traffic.responses if item.publisher.block == publisher.block]
             found += _differences(publisher, received[publisher.id], wanted)
         return found
+
+
+def _machine(processor: Processor) -> tuple[str, ...]:
+    """Return the options that choose the machine, without a sound card for its display controller.
+
+    From QEMU 8.2 on, the machine itself has a property for that; before, the default device is the only one. Raises
+    `InputError`.
+    """
+    command = [processor.emulator, "-machine", f"{processor.machine.partition(',')[0]},help"]
+    try:
+        properties = subprocess.run(command, capture_output=True, text=True, check=False).stdout
+    except OSError as error:
+        fail(f"{command[0]} cannot be started: {error.strerror}")
+    device = ",audiodev=none" if "audiodev=" in properties else ""
+    return "-machine", f"{processor.machine}{device}", "-audiodev", "none,id=none"
 
 
 class Console:
