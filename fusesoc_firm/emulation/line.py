@@ -9,6 +9,7 @@ from __future__ import annotations
 import select
 import socket
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 from fusesoc_firm.node.transport.simulator import Simulator, Taken
@@ -16,6 +17,9 @@ from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError
 
 # The system takes this many bytes at once from the emulator, whose UART waits meanwhile.
 _MOST_BYTES = 64
+# With so many bytes for the emulator, which takes none, the simulation waits. The program sends meanwhile: if the line
+# waited with it, neither side would ever take what the other one sends.
+_MOST_PENDING = 1 << 20
 _STEP_CYCLES = 5_000
 # Without a beat for this time, nothing is under way in the hardware, and the simulator rests.
 _REST_CYCLES = 100_000
@@ -39,6 +43,7 @@ class Line(Closing):
         self._listener.listen(1)
         self._is_closed = False
         self._waiting = 0  # requests that the system has not taken
+        self._pending = bytearray()  # bytes that the emulator has not taken
         self.is_at_rest = True
         self._thread = threading.Thread(target=self._serve, name="line", daemon=True)
         self._thread.start()
@@ -63,8 +68,10 @@ class Line(Closing):
 
     def _carry(self, peer: socket.socket) -> None:
         self._simulator.run(1)
+        peer.setblocking(False)
         while not self._is_closed:
-            self.is_at_rest = not self._waiting and self._simulator.quiet >= _REST_CYCLES
+            is_quiet = self._simulator.quiet >= _REST_CYCLES
+            self.is_at_rest = is_quiet and not self._waiting and not self._pending
             if not self._waiting and _is_readable(peer, _REST_SECONDS if self.is_at_rest else 0):
                 data = peer.recv(_MOST_BYTES)
                 if not data:
@@ -73,12 +80,24 @@ class Line(Closing):
                 self._simulator.request(data)
                 self._waiting += 1
                 self.moved += len(data)
+            if len(self._pending) >= _MOST_PENDING:
+                select.select([], [peer], [], _REST_SECONDS)
+                self._send(peer)
+                continue
             for event in self._simulator.run(_STEP_CYCLES):
                 if isinstance(event, Taken):
                     self._waiting -= 1
                 elif isinstance(event, Burst):
-                    peer.sendall(event.data)
-                    self.moved += len(event.data)
+                    self._pending += event.data
+            self._send(peer)
+
+    def _send(self, peer: socket.socket) -> None:
+        """Send as many bytes as the emulator takes now."""
+        with suppress(BlockingIOError):
+            while self._pending:
+                sent = peer.send(self._pending)
+                del self._pending[:sent]
+                self.moved += sent
 
 
 def _is_readable(item: socket.socket, seconds: float) -> bool:
