@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from itertools import count
 from operator import eq, ge, gt, le, lt, ne
 
 from fusesoc_firm.netlist.model import Instance, Modules, Net
@@ -35,12 +36,13 @@ def correct(modules: Modules) -> None:
     """Correct a netlist in place."""
     for module in modules.values():
         drivers = {net.number: gate for gate in module.instances for net in gate.outputs}
+        numbers = count(module.first_unused())
         made: list[Instance] = []
         for gate in module.instances:
             if gate.kind == "$or":
                 _correct_rotation(gate, drivers)
             elif gate.kind in _COMPARISONS:
-                made += filter(None, [_correct_comparison(gate, drivers)])
+                made += filter(None, [_correct_comparison(gate, drivers, numbers)])
         module.instances += made
 
 
@@ -94,8 +96,11 @@ def _correct_rotation(gate: Instance, drivers: Mapping[int, Instance]) -> None:
             gate.kind, gate.inputs = kind, list(one.inputs)
 
 
-def _correct_comparison(gate: Instance, drivers: dict[int, Instance]) -> Instance | None:
-    """Compare the vector before its extension with a new constant, which is returned, or make the result constant."""
+def _correct_comparison(gate: Instance, drivers: Mapping[int, Instance], numbers: Iterator[int]) -> Instance | None:
+    """Compare the vector before its extension with a new constant, which is returned, or make the result constant.
+
+    `numbers` are those of new nets.
+    """
     for index in (0, 1):
         number, lengthened = _driver(gate, index, drivers), _driver(gate, 1 - index, drivers)
         bits = constant(number) if number else None
@@ -108,11 +113,10 @@ def _correct_comparison(gate: Instance, drivers: dict[int, Instance]) -> Instanc
             )
             if low <= value <= high:
                 name = f"{gate.name}_number"
-                net = Net(max(drivers) + 1, vector.width, f"{name}_o")
-                parameter = str(value % (1 << vector.width))
-                drivers[net.number] = Instance(name, "$const_UB32", gate.location, [parameter], outputs=[net])
+                net = Net(next(numbers), vector.width, f"{name}_o")
                 gate.inputs = [net, vector] if index == 0 else [vector, net]
-                return drivers[net.number]
+                parameter = str(value % (1 << vector.width))
+                return Instance(name, "$const_UB32", gate.location, [parameter], outputs=[net])
             # The number is greater than, or less than, all values of the vector.
             compared = (value, 0) if index == 0 else (0, value)
             gate.parameters = [str(int(_COMPARISONS[gate.kind][0](*compared)))]

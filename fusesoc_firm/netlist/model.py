@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 
 class NetlistError(Exception):
@@ -86,6 +87,11 @@ class Module:
     is_defined: bool = False
     results: Sequence[Net | None] = ()
     arguments: Sequence[Net] = ()
+
+    def first_unused(self) -> int:
+        """Return the first of the numbers that no net has."""
+        driven = (net.number for instance in self.instances for net in instance.outputs)
+        return 1 + max(chain(driven, (net.number for net in self.arguments)), default=0)
 
 
 Modules = Mapping[str, Module]

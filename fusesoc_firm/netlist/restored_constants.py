@@ -63,8 +63,7 @@ def _inputs(module: Module, modules: Modules, sources: Mapping[str, Source]) -> 
 
 def _constant(module: Module, zero: Instance, highest: int, width: int) -> Net:
     """Return the net of a new constant with these highest bits."""
-    numbers = [net.number for gate in module.instances for net in gate.outputs]
-    net = Net(max([*numbers, *(net.number for net in module.arguments)]) + 1, width, f"{zero.name}_restored_o")
+    net = Net(module.first_unused(), width, f"{zero.name}_restored_o")
     words = ["0"] * (width // WORD - 1) + [str(highest)]
     module.instances.append(
         replace(zero, name=f"{zero.name}_restored", kind="$const_bit", parameters=words, outputs=[net])
