@@ -90,12 +90,14 @@ class Places:
     def _may_be_written(self, path: str) -> bool:
         is_byte_code = _BYTE_CODE in path and self._is_known(path)
         is_legal = path in _Below((self.folder, self.temporary, *self.caches, *_WRITABLE))
-        return is_legal or is_byte_code or path.startswith(self.histories)
+        is_above = any(history.startswith(path + os.sep) for history in self.histories)
+        return is_legal or is_byte_code or is_above or path.startswith(self.histories)
 
 
 def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], declared: Iterable[str] = ()) -> Places:
     """Return the places of a step with this environment; `declared` are input files outside its folder."""
     home = environment.get("HOME", os.path.expanduser("~"))
+    states = environment.get("XDG_STATE_HOME") or os.path.join(home, ".local", "state")
     caches = environment.get("XDG_CACHE_HOME") or os.path.join(home, ".cache")
     return Places(
         os.path.abspath(folder),
@@ -108,8 +110,9 @@ def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], dec
         ),
         frozenset(map(os.path.realpath, declared)),
         home,
-        # Yosys keeps a history even if nobody types commands; it writes a temporary file and renames it.
-        (os.path.join(home, ".yosys_history"),),
+        # Yosys keeps a history even if nobody types commands; it writes a temporary file and renames it. The second one
+        # is that of Yosys 0.52 (Debian 13), which makes its folder, too.
+        (os.path.join(home, ".yosys_history"), os.path.join(states, "yosys", "history")),
     )
 
 

@@ -87,6 +87,10 @@ def places() -> Places:
         Trace(written={"/work/build/out", "/work/build.tmp/x", "/ccache/1", "/dev/null", "/proc/self/comm"}),
         Trace(written={f"{sys.prefix}/lib/__pycache__/x.pyc"}, asked={"/home/me/secret"}, listed={"/work"}),
         Trace(read={"/home/me/.yosys_history"}, written={"/home/me/.yosys_history-71.tmp"}),
+        Trace(
+            read={"/home/me/.local/state/yosys/history"},
+            written={"/home/me/.local", "/home/me/.local/state/yosys", "/home/me/.local/state/yosys/history"},
+        ),
     ],
 )
 def test_what_a_step_may_do(places: Places, trace: Trace) -> None:
@@ -99,6 +103,7 @@ def test_what_a_step_may_do(places: Places, trace: Trace) -> None:
         (Trace(read={"/work/other.vhd"}), "it reads /work/other.vhd, which is not an input of its core"),
         (Trace(read={"/work/buildings"}), "it reads /work/buildings, which is not an input of its core"),
         (Trace(programs={"/home/me/x"}), "it reads /home/me/x, which is not an input of its core"),
+        (Trace(written={"/home/me/.local/x"}), "it writes /home/me/.local/x, outside its folder"),
         (Trace(written={"/home/me/x", "/work/build/y"}), "it writes /home/me/x, outside its folder"),
         (Trace(written={"/dev/ttyUSB0"}), "it writes /dev/ttyUSB0, outside its folder"),
         (Trace(written={"/usr/share/x"}), "it writes /usr/share/x, outside its folder"),
