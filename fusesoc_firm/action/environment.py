@@ -15,7 +15,7 @@ _OF_SESSION = tuple(
     "SSH_ SUDO_ TERM_ TMUX VSCODE_ VTE_ WAYLAND_ WINDOWID XDG_RUNTIME XDG_SESSION".split()
 )
 # Variables that name places. Their effect is observed: the programs that run, and the files that are read.
-_UNKEYED = frozenset("CCACHE_DIR HOME LOGNAME PATH TMPDIR USER XDG_CACHE_HOME".split())
+_UNKEYED = frozenset("CCACHE_DIR HOME LOGNAME PATH TMPDIR USER XDG_CACHE_HOME XDG_STATE_HOME".split())
 
 
 def of_step(environment: Mapping[str, str]) -> dict[str, str]:
