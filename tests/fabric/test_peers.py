@@ -51,7 +51,7 @@ def _why_not() -> str:
     try:
         import cyclonedds  # noqa: F401
     except ImportError:
-        return "cyclonedds is not installed"
+        return "cyclonedds is not installed; its wheels are for Python 3.13 and earlier"
     return missing() or missing_ros(2)
 
 
