@@ -139,7 +139,7 @@ fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
 	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
-debian: ## Run the README's commands in a minimal system of a suite, as root; SUITE=trixie or bookworm, COMMANDS='make sim; .ci/run'
+debian: ## Run the README's commands in a minimal system of a suite, as root; SUITE=trixie, bookworm, forky; COMMANDS='make sim; .ci/run'
 	@python=$$(./.ci/install-tools debootstrap unshare:util-linux git) && "$$python" .ci/debian.py "$(SUITE)" "$(COMMANDS)"
 
 lint: setup $(VENV)/.extra-lint ## Check style and types of Python and VHDL, including a sample of generated VHDL

@@ -21,7 +21,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-SUITES = ("bookworm", "trixie")
+SUITES = ("bookworm", "trixie", "forky")
+# An older debootstrap has no script for a later suite; all of them link to this one.
+SCRIPTS = Path("/usr/share/debootstrap/scripts")
+LATEST = "sid"
 CHECKOUT = Path("/root/fusesoc_firm")
 # Programs and files of `make` itself; all others must come from the commands.
 PACKAGES = ("ca-certificates", "git", "make")
@@ -125,9 +128,12 @@ def new_machine(suite: str) -> Path:
     if not base.exists():
         print(f"Building a minimal {suite} in {base}", flush=True)
         remove(part)
-        packages = f"--include={','.join(PACKAGES)}"
+        options = ["--variant=minbase", f"--include={','.join(PACKAGES)}"]
+        source = mirror()
+        if source and not (SCRIPTS / suite).exists():
+            source.append(str(SCRIPTS / LATEST))
         subprocess.run(
-            ["debootstrap", "--variant=minbase", packages, suite, part, *mirror()],
+            ["debootstrap", *options, suite, part, *source],
             stdout=subprocess.DEVNULL,
             check=True,
         )

@@ -307,13 +307,17 @@ def _numbered(ros: int, topics: Sequence[NodeTopic], blocks: int, options: RosOp
     ]
 
 
-def _groups(ros: int, description: NodeDescription) -> Iterator[list[int]]:
-    """Yield the numbers of the topics to each client of an action; the first one, of states, tells of a server."""
-    number = len(description.subscribers)
+def _groups(ros: int, description: NodeDescription) -> Iterator[dict[str, list[int]]]:
+    """Yield the numbers of each action client's topics; the first subscriber, of states, tells of a server."""
+    number, given = len(description.subscribers), len(description.publishers)
     for action in description.actions:
         if action.ros == ros and not action.is_server:
-            yield [*range(number, number + len(action.subscribers))]
+            yield {
+                "subscribers": [*range(number, number + len(action.subscribers))],
+                "publishers": [*range(given, given + len(action.publishers))],
+            }
         number += len(action.subscribers)
+        given += len(action.publishers)
 
 
 def _services(ros: int, services: Sequence[NodeService]) -> list[dict[str, object]]:

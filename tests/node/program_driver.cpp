@@ -37,6 +37,7 @@ class Alone {
   void unsubscribe() {}
   void flush() {}
   bool has_publisher(const firm::Topic&) const { return true; }
+  bool has_subscriber(const firm::Topic&) const { return true; }
 };
 
 }  // namespace

@@ -84,6 +84,7 @@ class Middleware {
   void unsubscribe() {}
   void flush() {}
   bool has_publisher(const firm::Topic&) const { return true; }
+  bool has_subscriber(const firm::Topic&) const { return true; }
 
  private:
   static constexpr unsigned kMostSpins = 1200;  // of 50 ms

@@ -49,7 +49,8 @@ class Ros1(Ros):
         self._callers = {number: Caller(self, rospy, item) for number, item in self._clients.items()}
         self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"] if topic["is_numbered"]}
         # The topics that must be connected before messages of another one are handed over.
-        self._others = {first: others for first, *others in config["groups"]}
+        self._others = {first: others for first, *others in (group["subscribers"] for group in config["groups"])}
+        self._given = {group["subscribers"][0]: group["publishers"] for group in config["groups"]}
         self._subscribers: dict[int, Any] = {}
         for topic in config["subscribers"]:
             self._subscribers[topic["number"]] = rospy.Subscriber(
@@ -59,8 +60,12 @@ class Ros1(Ros):
     def _has_publisher(self, topic: int) -> bool:
         return topic in self._subscribers and self._subscribers[topic].get_num_connections() > 0
 
+    def _has_subscriber(self, topic: int) -> bool:
+        return bool(self._publishers[topic].get_num_connections() > 0)
+
     def _taken(self, message: Any, topic: int) -> None:
-        if not all(map(self._has_publisher, self._others.get(topic, ()))):
+        is_connected = all(map(self._has_publisher, self._others.get(topic, ())))
+        if not is_connected or not all(map(self._has_subscriber, self._given.get(topic, ()))):
             return
         payload = message._buff  # noqa: SLF001 - rospy has no public name for it
         missing = 0

@@ -183,10 +183,13 @@ class NodeActions {
       subscribe(ros, topics.at(Action::kResult), [&client](const Bytes& result) { client.take_result(result); });
     }
     subscribe(ros, topics.at(Action::kStates), [&ros, &client, &topics](const Bytes& states) {
-      // States let goals be sent. What their server publishes before the other topics are connected would be lost.
+      // States let goals be sent. What is published before the other topics are connected would be lost.
       if constexpr (Ros::kVersion == 1) {
         for (const std::size_t other : {Action::kFeedback, Action::kResult}) {
           if (!ros.has_publisher(topics.at(other))) return;
+        }
+        for (const Topic& given : client.action().publishers) {
+          if (!ros.has_subscriber(given)) return;
         }
       }
       client.take_states(states);

@@ -153,13 +153,22 @@ class Ros1 {
     });
   }
 
+  // Return whether a topic that the node advertises is connected to a subscriber.
+  bool has_subscriber(const Topic& topic) const {
+    const std::string name = node_->resolveName(topic.name);
+    return std::any_of(publishers_.begin(), publishers_.end(), [&name](const ros::Publisher& publisher) {
+      return publisher.getTopic() == name && publisher.getNumSubscribers() > 0;
+    });
+  }
+
   // Return a function that publishes messages of a topic.
   MessageHandler advertise(const Topic& topic, const Quality& quality) {
     ros::AdvertiseOptions options(topic.name, static_cast<std::uint32_t>(quality.depth), topic.signature, topic.type,
                                   topic.definition);
     options.latch = quality.is_transient_local;
     types_[node_->resolveName(topic.name)] = topic.type;
-    return [publisher = node_->advertise(options)](const std::uint8_t* data, std::size_t size) {
+    publishers_.push_back(node_->advertise(options));
+    return [publisher = publishers_.back()](const std::uint8_t* data, std::size_t size) {
       publisher.publish(RawMessage{data, size});
     };
   }
@@ -235,6 +244,7 @@ class Ros1 {
   ros::CallbackQueue callbacks_;
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Subscriber> subscribers_;
+  std::vector<ros::Publisher> publishers_;
   std::vector<std::unique_ptr<RawServer>> servers_;
   std::vector<std::unique_ptr<RawClient>> clients_;
 };
