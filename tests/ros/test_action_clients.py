@@ -8,7 +8,8 @@ import re
 import shutil
 import time
 import xmlrpc.client
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
@@ -76,8 +77,11 @@ class Planner(Place):
             server.end()
 
     @contextmanager
-    def recording(self, bag: Path) -> Iterator[None]:
-        """Record the action, the orders and what the hardware tells with ROS 1's own recorder."""
+    def recording(self, bag: Path, counts: Mapping[str, int]) -> Iterator[None]:
+        """Record the action, the orders and what the hardware tells with ROS 1's own recorder.
+
+        It ends when it has received so many messages of these topics: what is still on its way would be lost.
+        """
         topics = ["/order", "/told", *(f"{ACTION}/{end}" for end in ("goal", "cancel", "feedback", "result"))]
         command = ["rosbag", "record", "--tcpnodelay", "-O", str(bag), *topics, "__name:=recorder"]
         with NodeProcess(self.folder / "recorder.log", command, self.ros.environment) as recorder:
@@ -85,8 +89,10 @@ class Planner(Place):
                 assert recorder.process.poll() is None, recorder.said()
                 time.sleep(0.02)
             yield
-            # Its script does not take a signal that it has inherited as ignored.
             (node,) = self._nodes("/recorder")
+            while any(_received(node)[topic] < count for topic, count in counts.items()):
+                time.sleep(0.02)
+            # Its script does not take a signal that it has inherited as ignored.
             node.shutdown("/test", "the test has ended")
             assert recorder.wait() == 0, recorder.said()
 
@@ -103,6 +109,12 @@ class Planner(Place):
 
     def _nodes(self, *names: str) -> list[Any]:
         return [xmlrpc.client.ServerProxy(self._master.lookupNode("/test", name)[2]) for name in names]
+
+
+def _received(node: Any) -> Counter[str]:
+    """The numbers of messages that a node of roscpp has received; it answers without the usual status and text."""
+    _, subscriptions = node.getBusStats("/test")
+    return Counter({topic: sum(link[2] for link in links) for topic, links in subscriptions})
 
 
 def _links_of(node: Any) -> list[Any] | None:
@@ -293,7 +305,8 @@ def test_recorded_goals_are_replayed(place: Planner, tmp_path: Path, capsys: pyt
     orders = [*(source.randrange(1 << 20) & ~0x10 for _ in range(8)), HELD, Kind.REJECTED << 20, HELD + 1]
     bag, target = tmp_path / "in.bag", tmp_path / "out.bag"
     with place.server(), place.node("python") as (node, hardware):
-        with place.recording(bag):
+        ends = {f"{ACTION}/{end}": len(orders) for end in ("goal", "result")}
+        with place.recording(bag, {"/order": len(orders), "/told": len(orders), f"{ACTION}/cancel": 2, **ends}):
             hardware.send(*orders)
             results = [hardware.until_result()[1] for _ in orders]
         assert node.stop() == 0, node.said()
