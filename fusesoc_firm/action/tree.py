@@ -27,7 +27,7 @@ _STAMPS: dict[str, re.Pattern[bytes]] = {
     ".cf": re.compile(rb'"\d{14}\.\d{3}"'),
     # The origins of cores, which no flow uses.
     ".eda.yml": re.compile(rb"^(?:cores|dependencies):\n(?:[ -].*\n)*", re.MULTILINE),
-    "yosys.log": re.compile(rb"^(?:End of script\.|Time spent:|ABC: Total runtime).*$", re.MULTILINE),
+    "yosys.log": re.compile(rb"^(?:End of script\.|Time spent:|ABC: Total runtime|ABC: elapse:).*$", re.MULTILINE),
     "next.log": re.compile(rb"\b\d+\.\d\d(?:s\b| +\d+\.\d\d\|)"),
     "__verFiles.dat": re.compile(rb"(?<=[CST] ) *\d+ +\d+ +\d+ +\d+ +\d+ +\d+"),
 }

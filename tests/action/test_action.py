@@ -311,3 +311,24 @@ def test_what_steps_receive_of_the_environment() -> None:
     given = {"LC_ALL": "C", "PATH": "/bin", "HOME": "/home/me"}
     assert of_step({**session, **given}) == given
     assert key_of({**session, **given}) == {"LC_ALL": "C"}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        # Yosys 0.23 and 0.52.
+        "End of script. Logfile hash: {0}, CPU: user {1}s system 0.05s, MEM: 60.50 MB peak",
+        "Time spent: 2{0}% 38x opt_clean (1 sec), 13% 44x opt_expr (0 sec), ...",
+        "ABC: Total runtime =     {1} sec",
+        "ABC: elapse: {1} seconds, total: {1} seconds",
+    ],
+)
+def test_times_in_the_log_of_yosys_do_not_count(tmp_path: Path, line: str) -> None:
+    log = tmp_path / "yosys.log"
+    identities = []
+    for digit, seconds in ((1, 0.73), (2, 0.87)):
+        log.write_text(f"Checking module m...\n{line.format(digit, seconds)}\nEnd.\n")
+        identities.append(tree_of(tmp_path, Contents())["yosys.log"].identity)
+    assert identities[0] == identities[1]
+    log.write_text(f"Checking module n...\n{line.format(1, 0.73)}\nEnd.\n")
+    assert tree_of(tmp_path, Contents())["yosys.log"].identity != identities[0]
