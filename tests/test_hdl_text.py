@@ -49,7 +49,7 @@ REASONS = {
                 "_choice",
                 "text",
                 "_declarations",
-                "_dynamic_extraction",
+                "_part",
                 "_bidirectional",
                 "_assertion",
                 "_register",
