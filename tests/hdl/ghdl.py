@@ -68,8 +68,11 @@ class Library:
         self._ghdl("-a", *options, *(str(file) for file in files))
 
     def elaborate(self, entity: str) -> None:
-        """Bind and elaborate `entity` and all below it, without a simulation; raise `GhdlError` on a fault."""
-        self._ghdl("--elab-run", entity, "--no-run")
+        """Bind and elaborate `entity` and all below it, without a simulation; raise `GhdlError` on a fault.
+
+        Files that it opens are in the library's directory.
+        """
+        self._ghdl("--elab-run", entity, "--no-run", directory=self.directory)
 
     def run(
         self,
@@ -146,9 +149,10 @@ class Library:
     def _options(self) -> list[str]:
         return [f"--std={self.standard}", f"--work={self.name}", f"--workdir={self.directory}", f"-P{self.directory}"]
 
-    def _ghdl(self, command: str, *arguments: str) -> str:
+    def _ghdl(self, command: str, *arguments: str, directory: Path | None = None) -> str:
         process = subprocess.run(
             [self.program, command, *self._options(), *arguments],
+            cwd=directory,
             capture_output=True,
             text=True,
             errors="replace",
