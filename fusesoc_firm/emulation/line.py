@@ -82,14 +82,16 @@ class Line(Closing):
                 self.moved += len(data)
             if len(self._pending) >= _MOST_PENDING:
                 select.select([], [peer], [], _REST_SECONDS)
-                self._send(peer)
-                continue
-            for event in self._simulator.run(_STEP_CYCLES):
-                if isinstance(event, Taken):
-                    self._waiting -= 1
-                elif isinstance(event, Burst):
-                    self._pending += event.data
+            else:
+                self._run()
             self._send(peer)
+
+    def _run(self) -> None:
+        for event in self._simulator.run(_STEP_CYCLES):
+            if isinstance(event, Taken):
+                self._waiting -= 1
+            elif isinstance(event, Burst):
+                self._pending += event.data
 
     def _send(self, peer: socket.socket) -> None:
         """Send as many bytes as the emulator takes now."""

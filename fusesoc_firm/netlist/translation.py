@@ -65,8 +65,8 @@ _CRASHES = {
 }
 _OF_MEMORIES = "netlists-memories.adb"
 
-# GHDL 2.0 accesses a table's old memory after the table has grown, so an assignment to some bits of a
-# signal may be lost. If the C library overwrites freed memory, GHDL crashes instead of writing a wrong netlist.
+# GHDL 2.0 accesses a table's old memory after the table has grown, so an assignment to some bits of a signal may be
+# lost. If the C library overwrites freed memory, GHDL crashes instead of writing a wrong netlist.
 _MEMORY = {"MALLOC_PERTURB_": "165"}
 
 # The numbers of additional assignments with which a translation is repeated after such a crash.
@@ -194,8 +194,8 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     if lost:
         raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not match the VHDL"]))
     modules = dump.read(text)
-    if ghdl.translation.refuses_loops and (rings := loops(modules)):
-        raise NetlistError("\n".join(rings))
+    if ghdl.translation.refuses_loops and (sentences := loops(modules)):
+        raise NetlistError("\n".join(sentences))
     components = _components(modules, ghdl.translation.verilog)
     # The second netlist supplies the generics, which the dump lacks.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
