@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from tests.hdl.ghdl import REPOSITORY
-from tests.pages.console import blocks, check
-from tests.pages.page import DOCS, Page, pages
-from tests.pages.stage import stage
+from tools.pages.console import TESTED_PICTURES, blocks, check
+from tools.pages.page import DOCS, Page, pages
+from tools.pages.stage import stage
 
 LINES, COLUMNS = 250, 100
 # Written by commands; their lines of prose are as long as those of all pages.
@@ -27,8 +27,6 @@ FOLLOWED = [
     # It builds a bitstream, which takes minutes.
     pytest.param("how-to/onto-an-icebreaker.md", marks=pytest.mark.thorough),
 ]
-# Drawn and held to the code by a test of its own.
-TESTED_PICTURES = {"house.svg", "terminal.svg", "waves.svg"}
 
 
 def with_readmes() -> list[Page]:
@@ -86,7 +84,7 @@ def test_every_page_says_whom_it_serves_in_its_first_two_lines() -> None:
 
 
 def test_every_page_is_in_the_navigation_and_in_the_index() -> None:
-    settings = tomllib.loads((REPOSITORY / "zensical.toml").read_text(encoding="utf-8"))
+    settings = tomllib.loads((DOCS / "zensical.toml").read_text(encoding="utf-8"))
     listed = [
         name for item in settings["project"]["nav"] for name in ([item] if isinstance(item, str) else _names(item))
     ]
@@ -176,7 +174,7 @@ $ sleep infinity
 @pytest.fixture
 def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A page whose output is right."""
-    monkeypatch.setattr("tests.pages.page.REPOSITORY", tmp_path)
+    monkeypatch.setattr("tools.pages.page.REPOSITORY", tmp_path)
     path = tmp_path / "page.md"
     path.write_text(PAGE, encoding="utf-8")
     return path

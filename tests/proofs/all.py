@@ -1,7 +1,0 @@
-"""All that is proved."""
-
-from __future__ import annotations
-
-from tests.proofs import manager, parts, schedulers
-
-PROOFS = (*manager.PROOFS, *parts.PROOFS, *schedulers.PROOFS)
