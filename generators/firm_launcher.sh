@@ -1,15 +1,15 @@
 # Start a program of a build, in the build's work folder: sh firm_launcher.sh PROGRAM ARGUMENT...
 #
-# The package's launcher finds programs of PyPI, names the package of a missing one, and notes in manifest.json which
-# one has run. It is in Python, whose start takes longer than many a step of a build, so it runs as rarely as possible:
+# The package's launcher finds programs of PyPI, names the package of a missing one, and records each program in
+# manifest.json. It is in Python, whose start takes longer than many steps of a build, so it runs rarely:
 #
-# * In a build's folder, it leaves the path of a program that it has noted in .firm_noted. Until FuseSoC sets the build
-#   up again, that file changes or the manifest is removed, the program is started from here.
-# * In the user's cache, it leaves a note of each program: what goes into the manifest, and the files that decide that.
-#   While these are unchanged, other builds take the note.
+# * In a build's folder, it writes the path of each recorded program to .firm_noted. Until FuseSoC sets the build up
+#   again, that file changes or the manifest is removed, the program is started from here.
+# * In the user's cache, it writes a note of each program: the entries of the manifest, and the files that they depend
+#   on. While these are unchanged, other builds use the note.
 #
-# What was built here, such as ./Vtop, and mkdir, which is no tool of a build, are started from here, and so is
-# everything if no Python has the package.
+# Programs that were built here, such as ./Vtop, and mkdir, which is not a tool of a build, are started from here, and
+# so are all programs if no Python has the package.
 program=$1
 case $program in
   mkdir | */*) exec "$@" ;;
@@ -22,8 +22,8 @@ if [ -s manifest.json ] && [ "$noted" -nt Makefile ] && read -r path <"$noted" &
   exec "$@"
 fi
 
-# Set `environment` to what decides in which Python the package is found: variables, and how FuseSoC, above make, was
-# started.
+# Set `environment` to the variables and the command line of FuseSoC, above make, which determine the Python with the
+# package.
 read_environment() {
   process=$PPID
   while read -r _ name _ above _ <"/proc/$process/stat"; do
@@ -58,8 +58,8 @@ add_to_manifest() {
   if [ -s manifest.json ] && cmp -s manifest.part manifest.json; then rm manifest.part; else mv manifest.part manifest.json; fi
 }
 
-# Take the user's note of the program. Fail unless it holds here. Its lines: the environment, the package's folder,
-# the files that decide the facts, the program first, an empty line, and the entries.
+# Use the user's note of the program. Fail unless it is valid here. Its lines: the environment, the package's folder,
+# the files that the entries depend on, the program first, an empty line, and the entries.
 take_note() {
   [ -f "$note" ] || return
   set --
@@ -72,7 +72,7 @@ take_note() {
   [ -z "$newer" ] && { [ -d .firm_noted ] || mkdir .firm_noted; } && (flock 9 && add_to_manifest) 9<. && echo "$1" >"$noted"
 }
 
-# Outputs that must be removed after a failure, see the package's launcher.
+# Outputs to remove after a failure, see the package's launcher.
 note=
 environment=
 case " $* " in

@@ -43,7 +43,7 @@ def run(command: str) -> NoReturn:
         from importlib.util import find_spec
 
         if all(map(find_spec, _NEEDED)):
-            from fusesoc_firm.plugin.answer import main
+            from fusesoc_firm.builds.call.answer import main
 
             sys.exit(main(command, sys.argv[1:]))
         if not tried:
@@ -81,7 +81,7 @@ def _warn_of_another_version(command: str) -> None:
 def _is_recalled(command: str) -> bool:
     """Whether the call is a hit."""
     try:
-        from fusesoc_firm.plugin.recall import answer
+        from fusesoc_firm.builds.call.recall import answer
     except ImportError:
         return False
     return answer(command, sys.argv[1:])

@@ -1,4 +1,4 @@
-# A build's GNUmakefile, which GNU make reads in place of Edalize's Makefile: programs of the build are started by
+# A build's GNUmakefile, which GNU make reads instead of Edalize's Makefile: programs of the build are started by
 # firm_launcher.sh unless EDALIZE_LAUNCHER says otherwise.
 ifeq ($(origin EDALIZE_LAUNCHER),undefined)
 EDALIZE_LAUNCHER := sh firm_launcher.sh

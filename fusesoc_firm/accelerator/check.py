@@ -26,8 +26,8 @@ _PROGRAMS = {"VHDL": "ghdl", "Verilog": "yosys"}
 def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries]) -> tuple[Diagnostic, ...]:
     """Read the accelerators of a system and compare them with their interfaces; return the warnings.
 
-    `libraries` returns the files that accelerators in VHDL may use. If a program is missing, a warning says which
-    accelerators were not read. Raise `InputError` with all faults.
+    `libraries` returns the files that accelerators in VHDL may use. If a program is missing, a warning names the
+    accelerators that were not read. Raise `InputError` with all faults.
     """
     faults = Diagnostics()
     with tempfile.TemporaryDirectory(prefix="firm_") as name:

@@ -73,7 +73,7 @@ class InterfacePragma:
 
 @dataclass(frozen=True)
 class CppFunction:
-    """A function with a body. `words` are all words that the body may contain; None if it includes a file."""
+    """A function with a body. `words` are all words that the body may contain, or None if it includes a file."""
 
     name: str
     place: SourceRef
@@ -89,7 +89,7 @@ class _Token(NamedTuple):
 
 
 def read_function(path: Path, name: str) -> CppFunction | None:
-    """Return the function `name` of a file, or None if it is not defined exactly once in a form that is known."""
+    """Return the function `name` of a file, or None unless it is defined exactly once in a known form."""
     return _File(path).function(name)
 
 
@@ -195,7 +195,7 @@ def _split(tokens: Sequence[_Token]) -> list[list[_Token]]:
 
 
 def _type_of(texts: Sequence[str]) -> tuple[str, bool]:
-    """Return the type of a value or of a stream's elements, and whether it is a stream's; an unknown type is empty."""
+    """Return the type of a value or of a stream's elements, and whether it is a stream; an unknown type is empty."""
     words = [text for text in texts if text not in (*_QUALIFIERS, "*", "&")]
     is_stream = words[:1] in (["hls::stream"], ["stream"])
     if is_stream:

@@ -11,7 +11,7 @@ from fusesoc_firm.system.derived.cpp_function import Parameter, parameters
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.text.diagnostics import Diagnostics, closest, nearest
 
-# Types of which one is never another name of another one.
+# Distinct types, none of which is an alias of another.
 _TYPES = ("bool", "float", "double", *(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)))
 
 
@@ -33,7 +33,7 @@ def compare_function(type_: AcceleratorType, function: CppFunction, faults: Diag
 
 
 def _compare_order(wanted: list[Parameter], function: CppFunction, faults: Diagnostics) -> None:
-    """Add the first parameter at another place than in the interface."""
+    """Add the first parameter at a different position than in the interface."""
     for number, (found, right) in enumerate(zip(function.parameters, wanted, strict=True), 1):
         if found.name != right.name:
             message = f"parameter {number} is '{found.name}', and the interface needs '{right.name}' here"
@@ -48,7 +48,7 @@ def _compare_names(wanted: dict[str, Parameter], function: CppFunction, faults: 
     for found, expected in zip(function.parameters, places, strict=True):
         if found.name in wanted:
             continue
-        # The name at the same place is the likeliest one.
+        # The name at the same position is the most likely one.
         near = expected if expected in missing else closest(found.name, missing)
         hint = f"needed here: {missing.pop(near).declaration}" if near else "remove it"
         faults.error(f"parameter '{found.name}' is not in the interface", found.place, hint)
@@ -72,10 +72,10 @@ def _compare_type(found: CppParameter, wanted: Parameter, faults: Diagnostics) -
 
 
 def _check_streams(wanted: dict[str, Parameter], function: CppFunction, faults: Diagnostics) -> None:
-    """Add every stream at which the hardware would stop, since the function never uses it.
+    """Add every stream at which the hardware would stall, since the function never uses it.
 
-    An output needs its value, except that of a string or an array, which may be empty. The input after a string or an
-    array arrives only when that has been read; all that remains unread when the function returns is dropped.
+    An output needs a value, except a string or an array, which may be empty. The input after a string or an array
+    arrives only after the function has read them; unread data are dropped when the function returns.
     """
     words = function.words
     if words is None:

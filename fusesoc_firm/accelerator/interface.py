@@ -15,11 +15,11 @@ from fusesoc_firm.text.naming import identifier
 
 # A port's comment begins with the path of its field: `pose.position.x: float64`.
 _FIELD = re.compile(r"([\w.\[\]]+): ")
-# Names of fields that a message has in only one version of ROS; a source file may serve both versions.
+# Names of fields that exist in only one version of ROS; a source file may serve both versions.
 _OF_ONE_ROS = ("nsec", "nanosec", "seq")
 _WORDS = {"in": "input", "out": "output"}
 _KINDS = {"in": "an input", "out": "an output"}
-# The number of superfluous ports that are reported one by one.
+# The maximum number of superfluous ports that are reported separately.
 _MOST_PORTS = 4
 
 
@@ -116,7 +116,7 @@ def _lacks_driver(port: UnitPort, missing: dict[str, WantedPort], faults: Diagno
 
 
 def _report_inputs(ports: Sequence[UnitPort], faults: Diagnostics) -> None:
-    """Report inputs that nothing drives; many of them are one fault, as after an edit of the specification."""
+    """Report inputs that nothing drives; many of them count as one fault, as after an edit of the specification."""
     if len(ports) > _MOST_PORTS:
         names = ", ".join(f"'{port.name}'" for port in ports[:_MOST_PORTS])
         message = f"ports {names} and {len(ports) - _MOST_PORTS} more are not in the interface"

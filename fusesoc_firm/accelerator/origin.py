@@ -18,7 +18,7 @@ _INSTANCE = re.compile(r"  (u_\w+) : ")
 def origin(loaded: LoadedSystem, unit: str, lines: Sequence[str], line: int) -> SourceRef | None:
     """Return the place of the block whose converter or instance has `line` in a generated unit with these `lines`.
 
-    A line of the top level outside instances belongs to the project's name. None stands for an unknown unit.
+    A line of the top level outside instances belongs to the project's name. For an unknown unit, return None.
     """
     specification, system = loaded.specification, loaded.system
     block = _converters(system).get(unit)

@@ -1,6 +1,6 @@
 """The sources of a module's signals, from Yosys' text of a design (RTLIL) after `proc`.
 
-Yosys merges the sources of a signal when it writes other formats, so that several ones, or one of an input, are lost.
+In other formats, Yosys merges the sources of a signal, so that multiple sources, or a source of an input, are lost.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _OUTPUTS = ("\\Y", "\\Q")
 
 @dataclass(frozen=True)
 class Wire:
-    """A net of a module; `place` is its declaration as Yosys notes it, `file:line.column-...`, or empty."""
+    """A net of a module; `place` is its declaration in Yosys' notation, `file:line.column-...`, or empty."""
 
     name: str
     width: int
@@ -102,7 +102,7 @@ def sources(modules: dict[str, Module], top: str) -> tuple[Counter[Bit], set[Bit
 
 
 def _direction(type_: str, port: str, modules: dict[str, Module]) -> str:
-    """Return the direction of a cell's port, or an empty string for a module that is not known."""
+    """Return the direction of a cell's port, or an empty string for an unknown module."""
     if type_ in modules:
         wire = modules[type_].wires.get(port)
         return wire.direction if wire else "input"
@@ -133,7 +133,7 @@ def _sliced(bits: list[Bit], following: str) -> list[Bit]:
 def source_faults(modules: dict[str, Module], top: str) -> Iterator[tuple[Wire, str, str]]:
     """Yield the signals of a module with wrong sources, each with a message and a hint.
 
-    The hint is empty for outputs without a source, of which the simulation may need none.
+    The hint is empty for outputs without a source, which the simulation may not need.
     """
     module = modules.get(top)
     if module is None:

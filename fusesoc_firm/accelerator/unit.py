@@ -27,7 +27,7 @@ class UnitPort:
 
 @dataclass(frozen=True)
 class Unit:
-    """An entity or a module; `unset` are the places of generics without a value."""
+    """An entity or a module; `unset` contains the places of generics without a value."""
 
     name: str
     place: SourceRef

@@ -70,7 +70,7 @@ class VerilogReader:
                 faults.warn(f"'{match['name']}' does not have the bits {bits}", _line(match), hint)
 
     def _report_sources(self, read: str, paths: Sequence[Path], top: str, faults: Diagnostics) -> None:
-        """Add the assignments of a wrong kind, and signals with several sources, or with none."""
+        """Add assignments of the wrong kind, and signals with several sources or without a source."""
         result = self.folder / "module.il"
         done = self._run(f'{read} {_quoted(_compiled(paths))}; hierarchy -top {top}; proc; write_rtlil "{result}"')
         found = list(filter(None, map(_ASSIGNED.match, done.stderr.splitlines())))
@@ -91,7 +91,7 @@ class VerilogReader:
                 faults.warn(message, source, "assign it a value")
 
     def _report(self, output: str, paths: Sequence[Path], faults: Diagnostics) -> None:
-        """Report Yosys' error, except in SystemVerilog, of which simulators know more than Yosys."""
+        """Report Yosys' error, except in SystemVerilog, which simulators support better than Yosys."""
         match = next(filter(None, map(_ERROR.match, output.splitlines())), None)
         if match and Path(match["file"]).suffix.lower() not in _SYSTEM_VERILOG:
             faults.error(_readable(match["text"]), _line(match))
@@ -143,7 +143,7 @@ def _unit(name: str, module: Mapping[str, Any], path: Path) -> Unit:
 
 
 def _declared(attributes: Mapping[str, Any], path: Path, width: int) -> SourceRef:
-    """Return the place that Yosys notes at a module or a net; without one, the beginning of the file."""
+    """Return the place in the attributes of a module or a net, or the beginning of the file."""
     match = _SOURCE.match(str(attributes.get("src", "")))
     return place(Path(match["file"]), int(match["line"]), int(match["column"]), width) if match else place(path, 1, 1)
 
@@ -153,5 +153,5 @@ def _line(match: re.Match[str]) -> SourceRef:
 
 
 def _readable(text: str) -> str:
-    """Return a message of Yosys' parser without the names that tokens have inside the parser."""
+    """Return a message of Yosys' parser without the parser's internal names of tokens."""
     return re.sub(r"\bTOK_(\w+)", lambda match: f"'{match[1].lower()}'", text)

@@ -1,9 +1,9 @@
 """Entities in VHDL as GHDL reads them.
 
 GHDL analyses the files as a build does, and reports faults with their places. Ports are in GHDL's syntax tree of copies
-without architectures and without other libraries, so they are known even if an architecture has faults or uses units
-that are missing. (GHDL 2.0 cannot print the tree of a file that uses a library from a former analysis.) The ports of an
-entity that needs another library for its ports are unknown.
+without architectures and without other libraries, so they are known even if an architecture has faults or uses missing
+units. (GHDL 2.0 cannot print the tree of a file that uses a library from an earlier analysis.) The ports of an entity
+that needs another library for its ports are unknown.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _ARCHITECTURE = re.compile(
     r"(?=^[ \t]*(?:architecture\s+\w+\s+of|library\s|entity\s+\w+\s+is|package\s|configuration\s+\w+\s+of)|\Z)",
     re.IGNORECASE | re.MULTILINE | re.DOTALL,
 )
-# The context of units in other libraries than those of the language and the accelerator's own.
+# Context clauses for other libraries than those of the language and the accelerator's own.
 _OTHER_LIBRARY = re.compile(r"^[ \t]*(library|use)\s+(?!ieee\b|std\b|work\b)[^;]*;", re.IGNORECASE | re.MULTILINE)
 _OPERATORS: dict[str, Callable[[int, int], int]] = {
     "addition_operator": lambda left, right: left + right,
@@ -73,7 +73,7 @@ class VhdlReader:
             self._prepare()
             messages = self._analysed(paths)
         absent = [match[1] for text, _ in messages if (match := _MISSING_UNIT.match(text))]
-        # What is declared in a missing unit is unknown, too, so further messages say nothing.
+        # The declarations in a missing unit are unknown, so further messages are irrelevant.
         if not absent or (self._known.is_complete and not any(name in self._known.generated for name in absent)):
             for text, source in messages:
                 faults.error(text, source, _hint(text))
@@ -84,7 +84,7 @@ class VhdlReader:
 
     @cached_property
     def _is_faultless(self) -> bool:
-        """Whether GHDL has nothing to say about all sources together."""
+        """Whether GHDL reports no message about all sources together."""
         return not list(_messages(self._run("-a", self.sources).stderr))
 
     @cached_property
@@ -109,7 +109,7 @@ class VhdlReader:
     def _report_sources(
         self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics
     ) -> None:
-        """Add the signals with more than one source, and warn of outputs with none.
+        """Add the signals with more than one source, and warnings about outputs without a source.
 
         Other messages of GHDL's synthesis are ignored. A file with the value 'Z' may have such signals.
         """
@@ -270,7 +270,7 @@ class _Tree:
         return self._value(item.find("default_value"))
 
     def _follow(self, item: Element | None) -> Element | None:
-        """Return the element that another element refers to, or the element itself."""
+        """Return the element to which another element refers, or the element itself."""
         return self._elements.get(item.get("ref", "")) if item is not None and item.get("ref") else item
 
     def _place(self, item: Element, path: Path) -> SourceRef:
@@ -279,7 +279,7 @@ class _Tree:
 
 
 def _hint(text: str) -> str:
-    """Return a way to mend a fault, such as the library or the unit that GHDL misses, or an empty text."""
+    """Return a hint about a fault, such as the missing library or unit, or an empty text."""
     if text.startswith("infinite loop"):
         return "list the signals that start the process: 'process (clk)'"
     if text.startswith('no declaration for "firm"'):

@@ -88,7 +88,7 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     if rest and not hasattr(arguments, "remappings"):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     if rest:
-        from fusesoc_firm.node.options import remappings
+        from fusesoc_firm.node.interface.options import remappings
 
         arguments.remappings = remappings(rest, parser.error)
     return arguments

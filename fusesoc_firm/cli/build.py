@@ -15,7 +15,6 @@ from fusesoc_firm.cli.build_options import (
     add_reports,
     add_sandbox,
     add_selection,
-    is_sandboxed,
     limits_of,
     outputs_of,
     run_options_of,
@@ -25,9 +24,9 @@ from fusesoc_firm.cli.common import command, positive
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.plan import Plan
-    from fusesoc_firm.building.run_options import RunOptions
-    from fusesoc_firm.building.selection import Selection
+    from fusesoc_firm.builds.setup.plan import Plan
+    from fusesoc_firm.builds.setup.run_options import RunOptions
+    from fusesoc_firm.builds.setup.selection import Selection
 
 _NOT_CACHED = ("setup", "cluster")
 
@@ -73,25 +72,15 @@ def add_build(commands: Any) -> None:
 
 
 def _build_cached(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.building.steps import Steps
     from fusesoc_firm.cli.build_report import Report, Words
-    from fusesoc_firm.cli.cached import run_cached
-    from fusesoc_firm.plugin.build import How
+    from fusesoc_firm.cli.cached import how_to_run, run_cached
 
     if others := [name for name in _NOT_CACHED if getattr(arguments, name)]:
         cached = "--sandbox" if arguments.sandbox else "--cached"
         fail(f"{cached} cannot be combined with --{others[0]}")
     selection, options = selection_of(arguments), run_options_of(arguments)
     names = ("build",) if arguments.build_only else ("build", "run")
-    flags = tuple(options.use_flags().items())
-    steps = Steps(names, is_rerun=arguments.rerun, flags=flags, is_sandboxed=is_sandboxed(arguments))
-    how = How(
-        is_locked=arguments.locked,
-        jobs=arguments.jobs or 0,
-        is_failing_fast=arguments.fail_fast,
-        limits=limits_of(arguments),
-        steps=steps,
-    )
+    how = how_to_run(arguments, *names)
     chosen = ("build", *selection.words(), options.command_line(), names)
     make = partial(_plan, selection, options, arguments.build_root)
     report = Report(Words(is_cached=True), outputs_of(arguments))
@@ -99,7 +88,7 @@ def _build_cached(arguments: argparse.Namespace) -> None:
 
 
 def _plan(selection: Selection, options: RunOptions, build_root: Path | None) -> Plan:
-    from fusesoc_firm.building.plan import select_plan
+    from fusesoc_firm.builds.setup.plan import select_plan
 
     return select_plan(selection, options, build_root)
 
@@ -111,9 +100,9 @@ def _build(arguments: argparse.Namespace) -> None:
     if arguments.rerun:
         fail("--rerun needs --cached or --sandbox")
 
+    from fusesoc_firm.builds.parallel import How, Listener, build
     from fusesoc_firm.cli.build_report import Report, Words
     from fusesoc_firm.cli.cached import print_failures
-    from fusesoc_firm.plugin.build import How, Listener, build
 
     plan = _plan(selection_of(arguments), run_options_of(arguments), arguments.build_root)
     how = How(

@@ -10,12 +10,12 @@ from fusesoc_firm.cli.common import natural, positive
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.build import Limits
-    from fusesoc_firm.building.run_options import RunOptions
-    from fusesoc_firm.building.selection import Selection
+    from fusesoc_firm.builds.setup.outcome import Limits
+    from fusesoc_firm.builds.setup.run_options import RunOptions
+    from fusesoc_firm.builds.setup.selection import Selection
     from fusesoc_firm.cli.build_report import Outputs
 
-# Options of `fusesoc run` without attention of our own: with a value, and without.
+# Options that are passed to `fusesoc run` unchanged: with a value, and without.
 _VALUES = {"--filter": "apply a filter of FuseSoC; may be repeated", "--system-name": "another name for the system"}
 _SWITCHES = {
     "--no-export": "use the sources in their folders, and do not copy them",
@@ -25,7 +25,7 @@ _SWITCHES = {
 
 
 def add_selection(parser: argparse.ArgumentParser, default: str = "") -> None:
-    """Add the cores and targets, for `selection_of`; `default` names what is selected without them."""
+    """Add the cores and targets, for `selection_of`; `default` describes the default selection."""
     parser.add_argument(
         "cores",
         metavar="CORE",
@@ -55,7 +55,7 @@ def selection_of(arguments: argparse.Namespace, *, has_default: bool = False) ->
 
     May raise `InputError`.
     """
-    from fusesoc_firm.building.selection import Selection
+    from fusesoc_firm.builds.setup.selection import Selection
 
     revision: str | None = arguments.affected_since
     if not arguments.cores and revision is None and not has_default:
@@ -67,7 +67,7 @@ def selection_of(arguments: argparse.Namespace, *, has_default: bool = False) ->
         fail(f"no target of {missing[0]} is selected", hint=f"add --target NAME, or write {missing[0]}@NAME")
     affected = None
     if revision is not None:
-        from fusesoc_firm.plugin.project import affected_since
+        from fusesoc_firm.builds.project import affected_since
 
         affected = frozenset(affected_since(revision))
     is_where_present = arguments.where_present or not arguments.cores
@@ -89,7 +89,7 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
 
 def limits_of(arguments: argparse.Namespace) -> Limits:
     """Return the limits of each build."""
-    from fusesoc_firm.building.build import Limits
+    from fusesoc_firm.builds.setup.outcome import Limits
 
     return Limits(arguments.timeout or 0, arguments.retries)
 
@@ -104,12 +104,12 @@ def add_sandbox(parser: argparse.ArgumentParser) -> None:
 
 
 def is_sandboxed(arguments: argparse.Namespace) -> bool:
-    """Return whether steps are to run in a sandbox. Raise `InputError` if that is not possible."""
+    """Return whether steps run in a sandbox. Raise `InputError` if that is impossible."""
     if not arguments.sandbox:
         return False
     if arguments.no_export:
         fail("--sandbox cannot be combined with --no-export", hint="without export, a step's inputs are in no folder")
-    from fusesoc_firm.action.sandbox import check_sandbox
+    from fusesoc_firm.builds.step.sandbox import check_sandbox
 
     check_sandbox()
     return True
@@ -137,7 +137,7 @@ def add_fusesoc(parser: argparse.ArgumentParser) -> None:
 
 def run_options_of(arguments: argparse.Namespace) -> RunOptions:
     """Return the options of `fusesoc run` in the arguments."""
-    from fusesoc_firm.building.run_options import RunOptions
+    from fusesoc_firm.builds.setup.run_options import RunOptions
 
     given = vars(arguments)
     words = [f"{name}={value}" for name in _VALUES for value in given[_key(name)]]

@@ -16,8 +16,8 @@ from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.build import Build, Outcome
-    from fusesoc_firm.building.steps import Step
+    from fusesoc_firm.builds.setup.outcome import Build, Outcome
+    from fusesoc_firm.builds.setup.steps import Step
 
 _CACHED, _FAILED = "cached", "failed"
 
@@ -57,7 +57,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Outputs:
-    """The files of a report, and what is printed: `is_quiet` without progress and table, `is_verbose` with all logs."""
+    """The files of a report, and the printed parts: `is_quiet` omits progress and table, `is_verbose` adds all logs."""
 
     events: Path | None = None
     junit: Path | None = None
@@ -66,7 +66,7 @@ class Outputs:
 
 
 class Report:
-    """The reports of one run, which is from the constructor to `close`."""
+    """The reports of one run, from the constructor to `close`."""
 
     def __init__(self, words: Words, outputs: Outputs) -> None:
         """Begin the reports. Raise `InputError` if the file for the events cannot be written."""
@@ -76,11 +76,11 @@ class Report:
         self._rows: list[Row] = []
         self._running: list[Build] = []
         self._events = _opened(outputs.events) if outputs.events else None
-        # A progress bar, from the first build that is not recalled; its module loads longer than a recalled build.
+        # A progress bar, created at the first miss: loading its module takes longer than recalling a build.
         self._bar: Any = None
 
     def plan(self, builds: Sequence[Build]) -> None:
-        """Note all builds of the run, before the first one begins or ends."""
+        """Record all builds of the run, before the first one begins or ends."""
         self._builds = list(builds)
         if self._bar is not None:
             self._bar.total = len(builds)
@@ -91,19 +91,19 @@ class Report:
         self._print(text, sys.stderr)
 
     def progress(self, text: str) -> None:
-        """Show what happens before the first build."""
+        """Show the progress before the first build."""
         self._begin_bar()
         self._bar.set_postfix_str(text)
 
     def begin(self, build: Build, number: int) -> None:
-        """Note the start of a build's try, from 1."""
+        """Record the start of a try of a build; tries count from 1."""
         self._begin_bar()
         self._running.append(build)
         self._event("start", **_named(build), number=number)
         self._show()
 
     def end(self, outcome: Outcome) -> None:
-        """Note the end of a build, and print its log if the report is verbose."""
+        """Record the end of a build, and print its log if the report is verbose."""
         row = _row(outcome, self._words)
         if self._outputs.is_verbose and not outcome.is_skipped:
             self._print(f"{outcome.build}: {row.result}\n{_text_of(outcome.build.log)}".rstrip(), sys.stdout)
@@ -222,7 +222,7 @@ def junit(rows: Sequence[Row], seconds: float, words: Words) -> str:
 def _row(outcome: Outcome, words: Words) -> Row:
     steps: tuple[Step, ...] = ()
     if words.is_cached and not outcome.is_skipped:
-        from fusesoc_firm.building.steps import steps_of
+        from fusesoc_firm.builds.setup.steps import steps_of
 
         steps = steps_of(outcome.build)
     is_cached = outcome.result == "ok" and bool(steps) and all(step.state == _CACHED for step in steps)
@@ -231,7 +231,7 @@ def _row(outcome: Outcome, words: Words) -> Row:
 
 
 def _text_of(log: Path) -> str:
-    """Return a log, or nothing if there is none."""
+    """Return a log, or "" if it is missing."""
     try:
         return log.read_text(encoding="utf-8", errors="replace")
     except OSError:

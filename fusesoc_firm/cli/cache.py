@@ -12,8 +12,8 @@ from fusesoc_firm.cli.common import command, natural
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.action.results import Results
-    from fusesoc_firm.store.store import Store
+    from fusesoc_firm.builds.step.results import Results
+    from fusesoc_firm.builds.store.store import Store
 
 _UNIT = 1024
 _CORES, _RESULTS, _SERVED = "cores", "results", "served"
@@ -75,7 +75,7 @@ def add_cache(commands: Any) -> None:
 
 
 def _size(text: str) -> int:
-    from fusesoc_firm.store.store import parse_size
+    from fusesoc_firm.builds.store.store import parse_size
 
     if (size := parse_size(text)) is None:
         raise argparse.ArgumentTypeError(f"'{text}' is not a size; legal: a number of bytes, such as 4096, 500M or 2G")
@@ -83,9 +83,9 @@ def _size(text: str) -> int:
 
 
 def _show_cache(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.action.results import default_results
-    from fusesoc_firm.store.layout import read_entry
-    from fusesoc_firm.store.store import default_store, served_store
+    from fusesoc_firm.builds.step.results import default_results
+    from fusesoc_firm.builds.store.layout import read_entry
+    from fusesoc_firm.builds.store.store import default_store, served_store
 
     store = default_store()
     results, served = default_results(), served_store(0)
@@ -135,9 +135,9 @@ def _verify_cache(_: argparse.Namespace) -> None:
 
 
 def _serve_cache(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.store.remote import TOKEN
-    from fusesoc_firm.store.server import Server
-    from fusesoc_firm.store.store import served_store
+    from fusesoc_firm.builds.store.remote import TOKEN
+    from fusesoc_firm.builds.store.server import Server
+    from fusesoc_firm.builds.store.store import served_store
 
     token = os.environ.get(TOKEN, "")
     try:
@@ -151,8 +151,8 @@ def _serve_cache(arguments: argparse.Namespace) -> None:
 
 
 def _stores() -> Mapping[str, Store | Results]:
-    from fusesoc_firm.action.results import default_results
-    from fusesoc_firm.store.store import default_store, served_store
+    from fusesoc_firm.builds.step.results import default_results
+    from fusesoc_firm.builds.store.store import default_store, served_store
 
     return {_CORES: default_store(), _RESULTS: default_results(), _SERVED: served_store(0)}
 

@@ -102,7 +102,7 @@ def coloured(text: str, *, is_good: bool) -> str:
 
 
 def terminal_width() -> int:
-    """Return the number of columns of the terminal, or a usual one."""
+    """Return the number of columns of the terminal, or a default."""
     return shutil.get_terminal_size((100, 24)).columns
 
 
@@ -121,7 +121,7 @@ def check_sources(loaded: LoadedSystem, spec: Path) -> tuple[Diagnostic, ...]:
     """Compare a system's accelerators with their interfaces, and return the warnings. May raise `InputError`."""
     from fusesoc_firm.accelerator.check import check_accelerators
     from fusesoc_firm.accelerator.unit import Libraries
-    from fusesoc_firm.building.sources import vhdl_sources
+    from fusesoc_firm.builds.setup.sources import vhdl_sources
     from fusesoc_firm.system.message_sources import core_of
 
     def libraries() -> Libraries:
@@ -134,8 +134,8 @@ def check_sources(loaded: LoadedSystem, spec: Path) -> tuple[Diagnostic, ...]:
 
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     """Return the folders of message cores that FuseSoC finds from the current folder. May raise `InputError`."""
-    # FuseSoC is imported only when it is needed.
-    from fusesoc_firm.plugin.project import message_folders
+    # FuseSoC is imported only if needed.
+    from fusesoc_firm.builds.project import message_folders
 
     return message_folders(names) if names else ()
 

@@ -1,4 +1,4 @@
-"""`firm doctor`: find what a board with Linux lacks for a node."""
+"""`firm doctor`: find missing requirements of a node on a board with Linux."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from fusesoc_firm.cli.common import add_sources, command, core_folders, positive
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.emulation.run import Emulation, Report
+    from fusesoc_firm.runs.emulation.emulated_run import Emulation, Report
 
 _MOST_FAULTS = 30
 _PATIENCE_SECONDS = 60
@@ -57,11 +57,11 @@ def add_emulate(commands: Any) -> None:
 
 
 def _emulate(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.emulation.messages import emulated_traffic, load_emulated
-    from fusesoc_firm.emulation.program import PROCESSORS, Kernel, compile_player
-    from fusesoc_firm.emulation.run import Emulation
+    from fusesoc_firm.node.transport.built_simulator import CoreSources, build_simulator
     from fusesoc_firm.node.transport.simulator import Simulator
-    from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
+    from fusesoc_firm.runs.emulation.emulated_run import Emulation
+    from fusesoc_firm.runs.emulation.messages import emulated_traffic, load_emulated
+    from fusesoc_firm.runs.emulation.program import PROCESSORS, Kernel, compile_player
     from fusesoc_firm.system.message_sources import sources_of
     from fusesoc_firm.system.scaffold.core_file import EMULATING
     from fusesoc_firm.tools.programs import missing, ways
@@ -102,7 +102,7 @@ def _emulate(arguments: argparse.Namespace) -> None:
 
 @dataclass(frozen=True)
 class Detail:
-    """How much is printed of a run from which `expected` messages return: the progress only at a terminal."""
+    """The output about a run with `expected` responses; the progress is shown only at a terminal."""
 
     is_quiet: bool
     is_verbose: bool

@@ -14,10 +14,10 @@ from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.library import Libraries
-    from fusesoc_firm.simulation.excerpt import Recording
+    from fusesoc_firm.runs.simulation.excerpt import Recording
     from fusesoc_firm.system.scaffold.project import Project
 
-# The options that describe a new system, which an example has already.
+# The options that describe a new system, which an example already contains.
 _DESCRIBING = ("input", "output", "include", "ros", "language", "width", "from_bag", "limit")
 _OPTIONS = {"input": "--in", "output": "--out", "from_bag": "--from-bag"}
 
@@ -82,10 +82,19 @@ def add_init(commands: Any) -> None:
         metavar="DEMO",
         help="copy a demo system by its name or a word, such as quat2euler or pid (NAME is then only the folder)",
     )
+    init.add_argument(
+        "--extend",
+        type=Path,
+        metavar="SPEC",
+        help="ask for further accelerators and blocks of an existing specification, whose comments remain",
+    )
     add_sources(init)
 
 
 def _init(arguments: argparse.Namespace) -> None:
+    if arguments.extend:
+        _extend(arguments)
+        return
     if arguments.limit and not arguments.from_bag:
         fail("--limit needs --from-bag")
     if arguments.example is not None:
@@ -94,12 +103,27 @@ def _init(arguments: argparse.Namespace) -> None:
         _start(arguments)
 
 
+def _extend(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.cli.system import ask_for_system
+
+    if given := [name for name in ("name", "example", *_DESCRIBING) if getattr(arguments, name)]:
+        fail(f"--extend asks for all parts, so {_named(given[0])} has no meaning", hint="give only the specification")
+    if not arguments.extend.exists():
+        fail(f"{arguments.extend} does not exist", hint="'firm init NAME' starts a new project")
+    arguments.spec = arguments.extend
+    ask_for_system(arguments)
+
+
+def _named(option: str) -> str:
+    return "NAME" if option == "name" else _OPTIONS.get(option, f"--{option}")
+
+
 def _copy_example(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.scaffold.example import copy_example, example_named
     from fusesoc_firm.tools.library_path import demos_root, library_root
 
     if given := [name for name in _DESCRIBING if getattr(arguments, name)]:
-        fail(f"an example has no {_OPTIONS.get(given[0], f'--{given[0]}')}", hint="only NAME can be chosen")
+        fail(f"an example has no {_named(given[0])}", hint="only NAME can be chosen")
     example = example_named(arguments.example, demos_root())
     folder = Path(arguments.name or example)
     _print_files(folder, copy_example(example, folder, demos_root(), library_root()))
@@ -128,7 +152,7 @@ def _start(arguments: argparse.Namespace) -> None:
 def _recording(arguments: argparse.Namespace) -> Recording | None:
     if arguments.from_bag is None:
         return None
-    from fusesoc_firm.simulation.excerpt import Recording
+    from fusesoc_firm.runs.simulation.excerpt import Recording
 
     found = Recording.of(arguments.from_bag)
     if arguments.ros and int(arguments.ros) != found.ros.number:

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from fusesoc_firm.system.system_core import LoadedSystem
 
 
-# The options that a simulated board cannot serve, since it is the node.
+# The options that do not apply to a simulated board, since it is the node.
 _OF_NODES = ("trace", "watch", "status", "name", "qos", "queue", "restart", "lifecycle", "ros_python", "ros_args")
 
 
 def add_live(commands: Any) -> None:
     """Declare the commands."""
-    from fusesoc_firm.node.options import add_node_options
+    from fusesoc_firm.node.interface.options import add_node_options
 
     live = command(
         commands,
@@ -137,7 +137,7 @@ def _at_device(arguments: argparse.Namespace, loaded: LoadedSystem) -> tuple[Sim
 
 
 def _fail_for_network(arguments: argparse.Namespace, loaded: LoadedSystem) -> NoReturn:
-    """Raise `InputError` for a missing or useless device."""
+    """Raise `InputError` for a missing or unusable device."""
     from fusesoc_firm.system.written.specification import ETHERNET
 
     interconnect = loaded.specification.project.interconnect
@@ -160,9 +160,9 @@ def _refuse_options(arguments: argparse.Namespace, loaded: LoadedSystem) -> None
 
 
 def _run_node(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
-    from fusesoc_firm.node.description import describe
+    from fusesoc_firm.node.interface.description import describe
+    from fusesoc_firm.node.live_run import run_node, run_options
     from fusesoc_firm.node.reopening import at_address, of_simulator
-    from fusesoc_firm.node.run import run_node, run_options
     from fusesoc_firm.text.outputs import check_output
 
     description = describe(loaded)
@@ -180,8 +180,8 @@ def _run_node(arguments: argparse.Namespace, loaded: LoadedSystem) -> None:
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.node.cpp_trace import are_steps
-    from fusesoc_firm.node.trace_picture import draw_trace
+    from fusesoc_firm.node.engine.cpp_trace import are_steps
+    from fusesoc_firm.node.engine.trace_picture import draw_trace
 
     table: Path = arguments.table
     output: Path = arguments.output or table.with_suffix(".svg")
@@ -193,8 +193,8 @@ def _draw_trace(arguments: argparse.Namespace) -> None:
 
 def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
     """Convert a table of steps to an adjacent table of routes; return the path of the table of routes."""
-    from fusesoc_firm.node.cpp_trace import write_ways
-    from fusesoc_firm.node.description import describe
+    from fusesoc_firm.node.engine.cpp_trace import write_ways
+    from fusesoc_firm.node.interface.description import describe
 
     if not arguments.system:
         fail(

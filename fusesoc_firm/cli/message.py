@@ -91,8 +91,8 @@ def _show_message(arguments: argparse.Namespace) -> None:
 
 
 def _verify_messages(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.verify.campaign import Settings
-    from fusesoc_firm.verify.command import Places, verify_messages
+    from fusesoc_firm.runs.verify.campaign import Settings
+    from fusesoc_firm.runs.verify.command import Places, verify_messages
 
     command = ["firm", "message", "verify", "--ros", str(arguments.ros)]
     command += [word for path in arguments.path for word in ("--path", str(path))]

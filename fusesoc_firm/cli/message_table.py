@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from fusesoc_firm.building.simulation import Message
-from fusesoc_firm.simulation.answers import Answer, Payload
-from fusesoc_firm.simulation.host_files import is_zero, value_text
+from fusesoc_firm.builds.setup.simulation import Message
+from fusesoc_firm.runs.simulation.answers import Answer, Payload
+from fusesoc_firm.runs.simulation.host_files import is_zero, value_text
 
 
 def with_answers(messages: Iterable[Message], answers: Sequence[Answer]) -> Iterator[tuple[Message, Sequence[Answer]]]:
-    """Yield each message of a report with its responses, in the same order; with none if they are unknown."""
+    """Yield each message of a report with its responses, in the same order; without responses if they are unknown."""
     first = 0
     for message in messages:
         own = answers[first : first + len(message.received)]
@@ -37,8 +37,8 @@ def _title(label: str) -> str:
 def _texts(sent: Payload, answers: Sequence[Answer], width: int) -> list[str]:
     """Return the texts of a message and its responses.
 
-    If one is too long, each response has only fields that are not copied from the message, and the message only fields
-    that are not copied and, if it is still too long, not zero or empty.
+    If a text is too long, copied fields are omitted from the message and its responses. If the message is still too
+    long, its zero and empty fields are omitted, too.
     """
     texts = [_line(sent, sent.fields), *(_response(answer, answer.expected.fields) for answer in answers)]
     if max(map(len, texts)) <= width:

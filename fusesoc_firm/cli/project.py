@@ -42,7 +42,7 @@ def add_project(commands: Any) -> None:
 
 
 def _draw_cores(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.plugin.project import graph
+    from fusesoc_firm.builds.project import graph
     from fusesoc_firm.tools.pictures import check_picture, draw
 
     check_picture(arguments.output, arguments.format)
@@ -50,7 +50,7 @@ def _draw_cores(arguments: argparse.Namespace) -> None:
 
 
 def _list_affected(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.plugin.project import affected_since
+    from fusesoc_firm.builds.project import affected_since
 
     found = affected_since(arguments.since)
     width = max(map(len, found), default=0)
@@ -59,7 +59,7 @@ def _list_affected(arguments: argparse.Namespace) -> None:
 
 
 def _lock(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.plugin.project import check_locked, write_lock
+    from fusesoc_firm.builds.project import check_locked, write_lock
     from fusesoc_firm.text.outputs import shown
 
     if arguments.locked:

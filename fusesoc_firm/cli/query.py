@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fusesoc_firm.cli.common import command
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.query import Answer, Cores
+    from fusesoc_firm.builds.setup.query import Answer, Cores
 
 _CORE_HELP = "a core's name in FuseSoC, or a pattern such as 'acme:m:*'"
 
@@ -72,8 +72,8 @@ def _add_cores(parser: argparse.ArgumentParser) -> None:
 
 
 def _cores() -> Cores:
-    from fusesoc_firm.building.cores import project_cores
-    from fusesoc_firm.building.query import core_dependencies
+    from fusesoc_firm.builds.setup.cores import project_cores
+    from fusesoc_firm.builds.setup.query import core_dependencies
 
     return core_dependencies(project_cores())
 
@@ -91,18 +91,18 @@ def _allpaths(arguments: argparse.Namespace) -> Answer:
 
 
 def _generated(arguments: argparse.Namespace) -> Answer:
-    from fusesoc_firm.plugin.project import generated_files
+    from fusesoc_firm.builds.project import generated_files
 
     return generated_files(arguments.core, arguments.target)
 
 
 def _targets(arguments: argparse.Namespace) -> Answer:
-    from fusesoc_firm.building.query import targets
+    from fusesoc_firm.builds.setup.query import targets
 
     return targets(arguments.cores, arguments.kind)
 
 
 def _kinds(arguments: argparse.Namespace) -> Answer:
-    from fusesoc_firm.building.query import kinds
+    from fusesoc_firm.builds.setup.query import kinds
 
     return kinds(arguments.cores)

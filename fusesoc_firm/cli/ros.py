@@ -28,7 +28,7 @@ def add_ros(commands: Any) -> None:
 
 
 def _install(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.node.ros_wheels import install_wheels, ros_python
+    from fusesoc_firm.node.engine.ros_wheels import install_wheels, ros_python
 
     for wheel in install_wheels(arguments.packages):
         print(wheel)

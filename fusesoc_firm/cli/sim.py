@@ -23,8 +23,8 @@ from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.simulation import Report, Simulation
-    from fusesoc_firm.simulation.answers import Answer
+    from fusesoc_firm.builds.setup.simulation import Report, Simulation
+    from fusesoc_firm.runs.simulation.answers import Answer
     from fusesoc_firm.system.system_core import LoadedSystem
     from fusesoc_firm.text.diagnostics import SourceRef
 
@@ -73,7 +73,7 @@ def add_sim(commands: Any) -> None:
 
 
 def _sim(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.building.simulation import Wishes, simulation
+    from fusesoc_firm.builds.setup.simulation import Wishes, simulation
 
     core, folder = _core(arguments.system)
     wishes = Wishes(arguments.tool or "", arguments.seed, arguments.waves, arguments.options)
@@ -99,7 +99,7 @@ def _sim(arguments: argparse.Namespace) -> None:
 def _checked(chosen: Simulation) -> LoadedSystem | None:
     """Return the simulated system, of which the accelerators have been checked. Raise `InputError` with their faults.
 
-    Other faults in the specification are left to the simulation, and the result is None.
+    For other faults in the specification, which the simulation reports, the result is None.
     """
     from fusesoc_firm.system.message_sources import load_beside, spec_of
 
@@ -132,7 +132,7 @@ def _run(chosen: Simulation, *, is_verbose: bool, is_quiet: bool) -> Report:
 
 def _core(system: str | None) -> tuple[str, Path | None]:
     """Return the name of a system's core, and the folder of its file, if known. May raise `InputError`."""
-    from fusesoc_firm.building.simulation import core_name
+    from fusesoc_firm.builds.setup.simulation import core_name
     from fusesoc_firm.system.message_sources import core_of
 
     if system is None:
@@ -197,7 +197,7 @@ def _origin(copy: re.Match[str], work_root: Path, loaded: LoadedSystem) -> Sourc
 
 
 def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | None) -> None:
-    from fusesoc_firm.simulation.answers import read_answers
+    from fusesoc_firm.runs.simulation.answers import read_answers
     from fusesoc_firm.tools.simulators import SIMULATORS
 
     answers: Sequence[Answer] = []
@@ -216,8 +216,8 @@ def _with_fields(
     chosen: Simulation, faults: Sequence[str], answers: Sequence[Answer], loaded: LoadedSystem | None
 ) -> list[str]:
     """Return the faults with the fields of wrong bytes and, if they are known, with the values."""
-    from fusesoc_firm.simulation.answers import with_values
-    from fusesoc_firm.simulation.host_files import with_field
+    from fusesoc_firm.runs.simulation.answers import with_values
+    from fusesoc_firm.runs.simulation.host_files import with_field
 
     paths = [chosen.build.work_root / name for name in ("stimulus.txt", "expected.txt")]
     if loaded is None or not all(path.is_file() for path in paths):

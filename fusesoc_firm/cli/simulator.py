@@ -74,7 +74,7 @@ def built_board(arguments: argparse.Namespace) -> Any:
 
 
 def _built(arguments: argparse.Namespace, target: str) -> Any:
-    from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
+    from fusesoc_firm.node.transport.built_simulator import CoreSources, build_simulator
 
     sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)
     return build_simulator(
@@ -88,13 +88,13 @@ def _build_simulator(arguments: argparse.Namespace) -> None:
 
 
 def _seed(text: str) -> int:
-    from fusesoc_firm.simulation.simulator import MOST_SEED
+    from fusesoc_firm.node.transport.built_simulator import MOST_SEED
 
     return _within(1, MOST_SEED, text)
 
 
 def _percent(text: str) -> int:
-    from fusesoc_firm.simulation.simulator import MOST_STALL_PERCENT
+    from fusesoc_firm.node.transport.built_simulator import MOST_STALL_PERCENT
 
     return _within(0, MOST_STALL_PERCENT, text)
 

@@ -45,8 +45,8 @@ def add_status(commands: Any) -> None:
 
 
 def _print_status(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.node.status import check_digest, read_status, status_text
-    from fusesoc_firm.node.status_socket import open_status
+    from fusesoc_firm.node.status.status import check_digest, read_status, status_text
+    from fusesoc_firm.node.status.status_socket import open_status
     from fusesoc_firm.node.transport.transport import TransportError
     from fusesoc_firm.system.derived.ids import ONE_BYTE
     from fusesoc_firm.system.system_core import identity

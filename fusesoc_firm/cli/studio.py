@@ -17,8 +17,8 @@ from fusesoc_firm.text.diagnostics import fail
 if TYPE_CHECKING:
     import threading
 
-    from fusesoc_firm.node.watch import Control
-    from fusesoc_firm.studio.run import Run
+    from fusesoc_firm.node.engine.watch import Control
+    from fusesoc_firm.studio.page_run import Run
     from fusesoc_firm.studio.server import Studio
     from fusesoc_firm.system.system_core import LoadedSystem
 
@@ -60,7 +60,7 @@ def watched(
     *,
     stays: bool = False,
 ) -> Iterator[Run | None]:
-    """Serve the page of a run within the context if the arguments ask for it.
+    """Within the context, serve the page of a run if the arguments request it.
 
     `control` pauses the run. If the page `stays`, the context ends with Ctrl-C, after the run.
     """
@@ -70,7 +70,7 @@ def watched(
     _require_aiohttp()
     import threading
 
-    from fusesoc_firm.studio.run import Run
+    from fusesoc_firm.studio.page_run import Run
 
     run = Run(loaded, arguments.spec, title, control)
     studio = _studio(arguments, arguments.spec)
@@ -146,7 +146,7 @@ def _show(studio: Studio, arguments: argparse.Namespace, to: TextIO) -> None:
 
 def _studio(arguments: argparse.Namespace, place: Path) -> Studio:
     """Return the server of a place with the command's message sources."""
-    from fusesoc_firm.simulation.simulator import BuiltSimulator, CoreSources, build_simulator
+    from fusesoc_firm.node.transport.built_simulator import BuiltSimulator, CoreSources, build_simulator
     from fusesoc_firm.studio.server import Studio
     from fusesoc_firm.studio.workspace import Tools
     from fusesoc_firm.system.message_sources import known_names, load_beside, sources_of

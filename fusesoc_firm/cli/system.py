@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.bring_up import add_bring_up
 from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load, print_warnings
-from fusesoc_firm.node.languages import LANGUAGES, Place
+from fusesoc_firm.node.package.languages import LANGUAGES, Place
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
 
 if TYPE_CHECKING:
@@ -28,13 +28,48 @@ def add_system(commands: Any) -> None:
         "firm system check robot.yaml",
     )
     actions = system.add_subparsers(title="actions", metavar="ACTION", required=True)
-    new = command(
+    for add in (_add_new, _add_check, _add_show, _add_skeleton, _add_diagram, _add_report, _add_core, _add_node):
+        _add_specification(add(actions))
+    _add_specification(add_bring_up(actions))
+    _add_schema(actions)
+
+
+def _add_specification(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_sources(parser)
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print the result as JSON, for other programs")
+
+
+def _add_new(actions: Any) -> argparse.ArgumentParser:
+    return command(
         actions,
         "new",
         "write or extend a specification by answering questions",
         "firm system new robot.yaml",
-        _new_system,
+        ask_for_system,
     )
+
+
+def ask_for_system(arguments: argparse.Namespace) -> None:
+    """Ask for the keys of the specification `arguments.spec`, which is created or extended, and check it."""
+    from fusesoc_firm.system.message_sources import known_names, sources_of
+    from fusesoc_firm.system.scaffold.wizard import extend_specification
+    from fusesoc_firm.text.prompts import asker
+
+    def names(paths: Sequence[str]) -> list[str]:
+        sources = sources_of(arguments.spec, arguments.path, arguments.distro, core_folders)
+        return known_names(arguments.spec, paths, sources, core_folders)
+
+    if arguments.spec.exists():
+        _check_system(arguments)
+    extend_specification(arguments.spec, asker(), names)
+    _check_system(arguments)
+
+
+def _add_check(actions: Any) -> argparse.ArgumentParser:
     check = command(actions, "check", "report all faults in a specification", "firm system check robot.yaml", _check)
     check.add_argument(
         "--stimuli",
@@ -44,16 +79,111 @@ def add_system(commands: Any) -> None:
         default=[],
         help="check also that the system accepts all messages in a YAML file or bag; may be repeated",
     )
+    _add_json(check)
+    return check
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    if arguments.json:
+        _check_as_json(arguments)
+    else:
+        _check_system(arguments, arguments.stimuli)
+
+
+def _check_as_json(arguments: argparse.Namespace) -> None:
+    """Print whether a specification is valid, and all faults and warnings; exit with 1 if it is not valid."""
+    from fusesoc_firm.fabric.ethernet import ethernet_node
+    from fusesoc_firm.fabric.ros1 import memory_of
+
+    faults: Sequence[Diagnostic] = ()
+    warnings: Sequence[Diagnostic] = ()
+    try:
+        loaded = load(arguments)
+        warnings = loaded.warnings
+        warnings += check_sources(loaded, arguments.spec)
+        _check_stimuli(loaded, arguments.stimuli)
+        memory_of(loaded.system, loaded.libraries)
+        ethernet_node(loaded.system, loaded.libraries)
+    except InputError as error:
+        faults = error.diagnostics
+    _print_json({"valid": not faults, "diagnostics": [item.data() for item in (*faults, *warnings)]})
+    if faults:
+        sys.exit(1)
+
+
+def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
+    from fusesoc_firm.fabric.ethernet import ethernet_node, fragment_bytes, history_bytes
+    from fusesoc_firm.fabric.ros1 import memory_of
+    from fusesoc_firm.system.views.show import counts, default_lengths
+
+    loaded = load(arguments)
+    print_warnings(check_sources(loaded, arguments.spec))
+    system = loaded.system
+    _check_stimuli(loaded, stimuli)
+    memory = memory_of(system, loaded.libraries)
+    node = ethernet_node(system, loaded.libraries)
+    print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
+    for line in default_lengths(system):
+        print(line)
+    if memory:
+        print(f"the node needs {len(memory)} bytes of memory for its program and texts")
+    if node:
+        print(f"the node needs {history_bytes(system, node)} bytes of memory for the last messages of its publishers")
+    if node and (size := fragment_bytes(system, node)):
+        print(f"the node needs {size} bytes of memory for messages in several packets")
+
+
+def _check_stimuli(loaded: LoadedSystem, paths: Iterable[Path]) -> None:
+    """Raise `InputError` for the first file with a message that the system does not accept."""
+    from fusesoc_firm.runs.simulation.software_run import system_stimuli
+
+    for path in paths:
+        system_stimuli(path, loaded)
+
+
+def _add_show(actions: Any) -> argparse.ArgumentParser:
     show = command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
     )
-    skeletons = command(
+    _add_json(show)
+    return show
+
+
+def _show_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.views.show import derived_description
+    from fusesoc_firm.text.yaml_text import yaml_dump
+
+    description = derived_description(load(arguments).system)
+    if arguments.json:
+        _print_json(description)
+    else:
+        print(yaml_dump(description), end="")
+
+
+def _add_skeleton(actions: Any) -> argparse.ArgumentParser:
+    return command(
         actions,
         "skeleton",
         "write a first version of each accelerator that has no source",
         "firm system skeleton robot.yaml",
         _write_skeletons,
     )
+
+
+def _write_skeletons(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.scaffold.skeleton import missing_sources
+    from fusesoc_firm.text.outputs import write
+
+    loaded = load(arguments, needs_sources=False)
+    texts = missing_sources(loaded.system, loaded.folder)
+    for path, text in texts.items():
+        write(path, text)
+        print(path)
+    if not texts:
+        print("every accelerator has a source")
+
+
+def _add_diagram(actions: Any) -> argparse.ArgumentParser:
     draw = command(
         actions,
         "diagram",
@@ -67,6 +197,19 @@ def add_system(commands: Any) -> None:
         choices=("light", "dark"),
         help="the colours (default: light, and dark in an SVG whose reader prefers dark pages)",
     )
+    return draw
+
+
+def _draw_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.views.diagram import dark_style, diagram
+    from fusesoc_firm.tools.pictures import check_picture, draw
+
+    check_picture(arguments.output, arguments.format)
+    style = "" if arguments.theme else dark_style()
+    draw(diagram(load(arguments).system, arguments.theme), arguments.output, arguments.format, style)
+
+
+def _add_report(actions: Any) -> argparse.ArgumentParser:
     report = command(
         actions,
         "report",
@@ -86,8 +229,43 @@ def add_system(commands: Any) -> None:
         metavar="F",
         help="the stimuli of the page (default: stimuli.yaml beside the specification, if it exists)",
     )
-    for parser in (check, show, report):
-        parser.add_argument("--json", action="store_true", help="print the result as JSON, for other programs")
+    _add_json(report)
+    return report
+
+
+def _report_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.views.report import report
+
+    if arguments.html:
+        _write_page(arguments)
+        return
+    counted = report(arguments.spec, load(arguments))
+    if arguments.json:
+        _print_json({**asdict(counted), "generated": counted.generated, "ratio": counted.ratio})
+    else:
+        print(counted, end="")
+
+
+def _write_page(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.runs.simulation.software_run import system_stimuli
+    from fusesoc_firm.system.views.diagram import dark_style, diagram
+    from fusesoc_firm.system.views.page import page
+    from fusesoc_firm.text.outputs import check_output, write
+    from fusesoc_firm.tools.pictures import picture
+
+    check_output(arguments.html, (".html",))
+    loaded = load(arguments)
+    path = arguments.stimuli or loaded.folder / "stimuli.yaml"
+    is_known = arguments.stimuli is not None or path.exists()
+    stimuli = system_stimuli(path, loaded) if is_known else []
+    messages = [(item.subscriber.block, item.message) for item in stimuli]
+    drawn = picture(diagram(loaded.system), "svg", dark_style()).decode()
+    reports = sorted(loaded.folder.glob("build/*/*/report.json"))
+    write(arguments.html, page(loaded.system, drawn, reports, messages))
+    print(arguments.html)
+
+
+def _add_core(actions: Any) -> argparse.ArgumentParser:
     core = command(
         actions,
         "core",
@@ -95,29 +273,6 @@ def add_system(commands: Any) -> None:
         "firm system core robot.yaml --depend robot:acc:firm_cordic",
         _write_core,
     )
-    _add_core_options(core)
-    node = command(
-        actions,
-        "node",
-        "write a system's software node: a ROS package that connects topics to the hardware",
-        "firm system node robot.yaml -o src/robot_node",
-        _write_node,
-    )
-    _add_node_options(node)
-    bring_up = add_bring_up(actions)
-    for parser in (new, check, show, skeletons, draw, report, core, node, bring_up):
-        parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
-        add_sources(parser)
-    command(
-        actions,
-        "schema",
-        "print the JSON Schema of specifications, for editors",
-        "firm system schema > specification.schema.json",
-        _print_schema,
-    )
-
-
-def _add_core_options(core: argparse.ArgumentParser) -> None:
     core.add_argument(
         "-o", "--output", type=Path, metavar="F.core", help="the core file to write (default: beside the specification)"
     )
@@ -149,113 +304,7 @@ def _add_core_options(core: argparse.ArgumentParser) -> None:
         default=[],
         help="a VHDL file of the environment at the pins; may be repeated",
     )
-
-
-def _add_node_options(node: argparse.ArgumentParser) -> None:
-    node.add_argument("-o", "--output", type=Path, metavar="DIR", help="the package's folder (default: <system>_node)")
-    node.add_argument("--language", choices=sorted(LANGUAGES), default="cpp", help="the node's language (default: cpp)")
-    node.add_argument("--ros", type=int, choices=(1, 2), help="fail unless the system uses this version of ROS")
-
-
-def _check(arguments: argparse.Namespace) -> None:
-    if arguments.json:
-        _check_as_json(arguments)
-    else:
-        _check_system(arguments, arguments.stimuli)
-
-
-def _check_as_json(arguments: argparse.Namespace) -> None:
-    """Print whether a specification is valid, and all faults and warnings; exit with 1 if it is not valid."""
-    from fusesoc_firm.fabric.ethernet import ethernet_node
-    from fusesoc_firm.fabric.ros1 import memory_of
-
-    faults: Sequence[Diagnostic] = ()
-    warnings: Sequence[Diagnostic] = ()
-    try:
-        loaded = load(arguments)
-        warnings = loaded.warnings
-        warnings += check_sources(loaded, arguments.spec)
-        _check_stimuli(loaded, arguments.stimuli)
-        memory_of(loaded.system, loaded.libraries)
-        ethernet_node(loaded.system, loaded.libraries)
-    except InputError as error:
-        faults = error.diagnostics
-    _print_json({"valid": not faults, "diagnostics": [item.data() for item in (*faults, *warnings)]})
-    if faults:
-        sys.exit(1)
-
-
-def _print_json(data: object) -> None:
-    print(json.dumps(data, indent=2, ensure_ascii=False))
-
-
-def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
-    from fusesoc_firm.fabric.ethernet import ethernet_node, fragment_bytes, history_bytes
-    from fusesoc_firm.fabric.ros1 import memory_of
-    from fusesoc_firm.system.views.show import counts, default_lengths
-
-    loaded = load(arguments)
-    print_warnings(check_sources(loaded, arguments.spec))
-    system = loaded.system
-    _check_stimuli(loaded, stimuli)
-    memory = memory_of(system, loaded.libraries)
-    node = ethernet_node(system, loaded.libraries)
-    print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
-    for line in default_lengths(system):
-        print(line)
-    if memory:
-        print(f"the node needs {len(memory)} bytes of memory for its program and texts")
-    if node:
-        print(f"the node needs {history_bytes(system, node)} bytes of memory for the last messages of its publishers")
-    if node and (size := fragment_bytes(system, node)):
-        print(f"the node needs {size} bytes of memory for messages in several packets")
-
-
-def _check_stimuli(loaded: LoadedSystem, paths: Iterable[Path]) -> None:
-    """Raise `InputError` for the first file with a message that the system does not accept."""
-    from fusesoc_firm.simulation.software_run import system_stimuli
-
-    for path in paths:
-        system_stimuli(path, loaded)
-
-
-def _show_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.views.show import derived_description
-    from fusesoc_firm.text.yaml_text import yaml_dump
-
-    description = derived_description(load(arguments).system)
-    if arguments.json:
-        _print_json(description)
-    else:
-        print(yaml_dump(description), end="")
-
-
-def _new_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.message_sources import known_names, sources_of
-    from fusesoc_firm.system.scaffold.wizard import extend_specification
-    from fusesoc_firm.text.prompts import asker
-
-    def names(paths: Sequence[str]) -> list[str]:
-        sources = sources_of(arguments.spec, arguments.path, arguments.distro, core_folders)
-        return known_names(arguments.spec, paths, sources, core_folders)
-
-    if arguments.spec.exists():
-        _check_system(arguments)
-    extend_specification(arguments.spec, asker(), names)
-    _check_system(arguments)
-
-
-def _write_skeletons(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.scaffold.skeleton import missing_sources
-    from fusesoc_firm.text.outputs import write
-
-    loaded = load(arguments, needs_sources=False)
-    texts = missing_sources(loaded.system, loaded.folder)
-    for path, text in texts.items():
-        write(path, text)
-        print(path)
-    if not texts:
-        print("every accelerator has a source")
+    return core
 
 
 def _write_core(arguments: argparse.Namespace) -> None:
@@ -278,6 +327,20 @@ def _write_core(arguments: argparse.Namespace) -> None:
     print(path)
 
 
+def _add_node(actions: Any) -> argparse.ArgumentParser:
+    node = command(
+        actions,
+        "node",
+        "write a system's software node: a ROS package that connects topics to the hardware",
+        "firm system node robot.yaml -o src/robot_node",
+        _write_node,
+    )
+    node.add_argument("-o", "--output", type=Path, metavar="DIR", help="the package's folder (default: <system>_node)")
+    node.add_argument("--language", choices=sorted(LANGUAGES), default="cpp", help="the node's language (default: cpp)")
+    node.add_argument("--ros", type=int, choices=(1, 2), help="fail unless the system uses this version of ROS")
+    return node
+
+
 def _write_node(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.middleware import middleware_of
     from fusesoc_firm.text.outputs import write
@@ -293,45 +356,14 @@ def _write_node(arguments: argparse.Namespace) -> None:
     print(folder)
 
 
-def _draw_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.views.diagram import dark_style, diagram
-    from fusesoc_firm.tools.pictures import check_picture, draw
-
-    check_picture(arguments.output, arguments.format)
-    style = "" if arguments.theme else dark_style()
-    draw(diagram(load(arguments).system, arguments.theme), arguments.output, arguments.format, style)
-
-
-def _report_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.views.report import report
-
-    if arguments.html:
-        _write_page(arguments)
-        return
-    counted = report(arguments.spec, load(arguments))
-    if arguments.json:
-        _print_json({**asdict(counted), "generated": counted.generated, "ratio": counted.ratio})
-    else:
-        print(counted, end="")
-
-
-def _write_page(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.simulation.software_run import system_stimuli
-    from fusesoc_firm.system.views.diagram import dark_style, diagram
-    from fusesoc_firm.system.views.page import page
-    from fusesoc_firm.text.outputs import check_output, write
-    from fusesoc_firm.tools.pictures import picture
-
-    check_output(arguments.html, (".html",))
-    loaded = load(arguments)
-    path = arguments.stimuli or loaded.folder / "stimuli.yaml"
-    is_known = arguments.stimuli is not None or path.exists()
-    stimuli = system_stimuli(path, loaded) if is_known else []
-    messages = [(item.subscriber.block, item.message) for item in stimuli]
-    drawn = picture(diagram(loaded.system), "svg", dark_style()).decode()
-    reports = sorted(loaded.folder.glob("build/*/*/report.json"))
-    write(arguments.html, page(loaded.system, drawn, reports, messages))
-    print(arguments.html)
+def _add_schema(actions: Any) -> None:
+    command(
+        actions,
+        "schema",
+        "print the JSON Schema of specifications, for editors",
+        "firm system schema > specification.schema.json",
+        _print_schema,
+    )
 
 
 def _print_schema(_: argparse.Namespace) -> None:
@@ -339,3 +371,7 @@ def _print_schema(_: argparse.Namespace) -> None:
     from fusesoc_firm.text.yaml_schema import json_schema
 
     print(json.dumps(json_schema(Specification, "System specification of fusesoc_firm"), indent=2))
+
+
+def _print_json(data: object) -> None:
+    print(json.dumps(data, indent=2, ensure_ascii=False))

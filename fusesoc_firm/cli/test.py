@@ -13,8 +13,6 @@ from fusesoc_firm.cli.build_options import (
     add_reports,
     add_sandbox,
     add_selection,
-    is_sandboxed,
-    limits_of,
     outputs_of,
     run_options_of,
     selection_of,
@@ -23,9 +21,9 @@ from fusesoc_firm.cli.common import command, positive
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.plan import Plan
-    from fusesoc_firm.building.run_options import RunOptions
-    from fusesoc_firm.building.selection import Selection
+    from fusesoc_firm.builds.setup.plan import Plan
+    from fusesoc_firm.builds.setup.run_options import RunOptions
+    from fusesoc_firm.builds.setup.selection import Selection
 
 
 def add_test(commands: Any) -> None:
@@ -53,27 +51,11 @@ def add_test(commands: Any) -> None:
 
 
 def _test(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.building.steps import Steps
     from fusesoc_firm.cli.build_report import Report, Words
-    from fusesoc_firm.cli.cached import run_cached
-    from fusesoc_firm.plugin.build import How
+    from fusesoc_firm.cli.cached import how_to_run, run_cached
 
     selection, options = selection_of(arguments, has_default=True), run_options_of(arguments)
-    flags = tuple(options.use_flags().items())
-    steps = Steps(
-        ("build", "run"),
-        has_outputs=False,
-        is_rerun=arguments.rerun,
-        flags=flags,
-        is_sandboxed=is_sandboxed(arguments),
-    )
-    how = How(
-        is_locked=arguments.locked,
-        jobs=arguments.jobs or 0,
-        is_failing_fast=arguments.fail_fast,
-        limits=limits_of(arguments),
-        steps=steps,
-    )
+    how = how_to_run(arguments, "build", "run", has_outputs=False)
     report = Report(Words("test", "passed", is_cached=True), outputs_of(arguments))
     chosen = ("test", *selection.words(), options.command_line())
     run_cached(chosen, partial(_plan, selection, options, arguments.build_root), how, arguments.build_root, report)
@@ -81,7 +63,7 @@ def _test(arguments: argparse.Namespace) -> None:
 
 def _plan(selection: Selection, options: RunOptions, build_root: Path | None) -> Plan:
     """Return the plan of the tests. May raise `InputError`."""
-    from fusesoc_firm.building.plan import plan_tests
+    from fusesoc_firm.builds.setup.plan import plan_tests
 
     plan = plan_tests(selection, options, build_root)
     if not plan.builds and not selection.cores and selection.affected is None:

@@ -48,8 +48,8 @@ def _tell_why(arguments: argparse.Namespace) -> None:
 
 
 def _tell_steps(core: str, target: str, build_root: Path | None) -> None:
-    from fusesoc_firm.building.plan import make_plan
-    from fusesoc_firm.building.steps import steps_of
+    from fusesoc_firm.builds.setup.plan import make_plan
+    from fusesoc_firm.builds.setup.steps import steps_of
 
     (build,) = make_plan([core], [target], build_root).builds
     if not (steps := steps_of(build)):
@@ -63,7 +63,7 @@ def _tell_steps(core: str, target: str, build_root: Path | None) -> None:
 
 
 def _tell_lines(written: str) -> None:
-    from fusesoc_firm.plugin.why import why
+    from fusesoc_firm.builds.call.why import why
 
     path, number = _split(written)
     if not path.is_file():

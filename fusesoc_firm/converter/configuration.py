@@ -61,7 +61,7 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
         "has_trailing": frame.trailing_bytes > 0,
         "lengths": frame.trailing_bytes + 1,
         "length_beats": (length_beats := _length_beats(frame, stream)),
-        # Without trailing bytes, one comparison tells whether the length is right.
+        # Without trailing bytes, one comparison checks the length.
         "is_length_early": len(length_beats) == 1
         and stream.beat(ends[0]) > 0
         and frame.checked_prefix > 0
@@ -199,7 +199,7 @@ def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
         "beat": is_beat(stream.beat(last_byte), stream.beat(last_byte)),
         "lane": lane,
         "is_last_lane": lane + 1 == stream.lanes,
-        # The highest lane before `lane`, and the lowest one after its neighbour.
+        # The nearest lane below `lane`, and the lane after its upper neighbour.
         "below": below,
         "above": above,
         "has_others": [{}] if below is not None or above is not None else [],

@@ -14,8 +14,8 @@ from typing import Any
 
 from fusesoc_firm.converter.vhdl import vhdl_type, wrapped
 from fusesoc_firm.frame.model import COUNT_BYTES
-from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import Constant, Definitions, MessageName, StringType, nested_message
+from fusesoc_firm.message.middleware import Definitions, Middleware
+from fusesoc_firm.message.model import Constant, MessageName, StringType, nested_message
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER
 from fusesoc_firm.text.naming import distinct_constants, entity_name, prefixed
@@ -62,7 +62,7 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
     texts = [item for item in placed if isinstance(item.constant.type, StringType)]
     numbers = [item for item in placed if not isinstance(item.constant.type, StringType)]
     parts = [(*item.words, part) for item in texts for part in ("length", "bytes")]
-    # Names from the definition take precedence over names added for texts.
+    # Names from the definition take precedence over added names for texts.
     names = distinct_constants([*(item.words for item in (*numbers, *texts)), *parts], [SIGNATURE])
     values, heads = names[: len(numbers)], names[len(numbers) : len(placed)]
     lengths, contents = names[len(placed) :: 2], names[len(placed) + 1 :: 2]
@@ -81,7 +81,7 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
 
 
 def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
-    """Yield the constants of a message, then those of each nested message once, in the order of the fields."""
+    """Yield the constants of a message, then of each nested message once, in the order of the fields."""
     messages: list[MessageName] = []
     _collect(name, definitions, messages)
     for message in messages:

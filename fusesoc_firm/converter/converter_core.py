@@ -18,18 +18,18 @@ from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_conf
 from fusesoc_firm.converter.order import ENTITIES, Order, Selection, order_of_config, order_of_message
 from fusesoc_firm.converter.pipeline import pipeline_of
 from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
+from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import Definitions, MessageName
-from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
+from fusesoc_firm.message.middleware import Definitions, middleware_of
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.render import Context, render
 
 VHDL = "vhdlSource-93"
 
 
 def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], str | None]:
-    """Return the sources of a request's messages as arguments of `MessageLibrary`."""
+    """Return the sources of a request's messages as arguments for `MessageLibrary`."""
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)

@@ -18,11 +18,11 @@ from dataclasses import dataclass, field
 
 from fusesoc_firm.converter.ports import FieldPort, field_ports, port_width, ros_path
 from fusesoc_firm.converter.program import Program, Scope, has_bytes, subscriber_program
-from fusesoc_firm.converter.reserved import reserved_names
 from fusesoc_firm.converter.steps import SET_NAMES
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
 from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.reserved import reserved_names
 
 LENGTH_BITS = 32
 
@@ -82,7 +82,7 @@ class ElementPorts:
 
     @property
     def valid(self) -> str:
-        """The port that signals that the element is complete and its streams have ended."""
+        """The port that marks an element as complete, with all its streams ended."""
         return f"{self.name}_valid"
 
     @property
@@ -92,7 +92,7 @@ class ElementPorts:
 
     @property
     def ready(self) -> str:
-        """The port that signals that the element is accepted."""
+        """The port that accepts the element."""
         return f"{self.name}_ready"
 
     @property
@@ -181,7 +181,7 @@ class _Naming:
     taken: set[str] = field(default_factory=lambda: set(_TAKEN))
 
     def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
-        """Name the ports of all parts, even of unused ones, so that names do not depend on the selection of fields."""
+        """Name the ports of all parts, including unused parts, so that names are independent of the field selection."""
         for node in nodes:
             match node:
                 case Fixed(fields=fields):

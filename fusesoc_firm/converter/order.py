@@ -16,12 +16,12 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Paths, select
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
-from fusesoc_firm.message.model import Definitions, MessageName
+from fusesoc_firm.message.middleware import MIDDLEWARES, Definitions, Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
+from fusesoc_firm.tools.reads import Input
 
 # The directions, with the function that names the converter's entity in each direction.
 ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
@@ -54,8 +54,8 @@ class Wanted:
 class Order:
     """All requested messages, each once, for streams of `width` bits; `files` are the files that were read.
 
-    `libraries` are the libraries of the messages. `prefix` precedes the names of all design units that the user did not
-    name. `pipeline` is one of `PIPELINES`, or None for that which each message needs.
+    `libraries` are the libraries of the messages. `prefix` precedes the names of all design units without a name from
+    the user. `pipeline` is one of `PIPELINES`; None selects the default of each message.
     """
 
     title: str
@@ -132,7 +132,7 @@ def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) 
 def _wanted(
     entry: MessageInterfaces, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Wanted | None:
-    """Return the requested message in an item of the file; after a fault, note it and return None."""
+    """Return the requested message of an item in the file, or None after a fault, which is noted."""
     if not entry.type or not entry.name:
         return None
     library = libraries[MIDDLEWARES[entry.type]]

@@ -1,8 +1,8 @@
 """Frame -> configuration of `<pkg>_<type>_length`, which computes a payload's length from the lengths of its parts.
 
-This is the dissertation's listing 6.5 as hardware, with ROS's own sizes: nothing precedes a nested message, and CDR
-adds padding. The size of an element does not depend on its position, so the sizes of all elements are simply added.
-Padding only depends on positions modulo the largest alignment, so a chain of two or three bits beside the sum suffices.
+This is the dissertation's listing 6.5 as hardware, with ROS's sizes: a nested message has no header, and CDR adds
+padding. The size of an element does not depend on its position, so the sizes of all elements are simply added. Padding
+depends only on positions modulo the largest alignment, so a chain of two or three bits beside the sum suffices.
 """
 
 from __future__ import annotations
@@ -109,13 +109,13 @@ def _chain_length(statements: Sequence[Statement]) -> int:
 
 
 def _modulus(terms: Sequence[Term]) -> int:
-    """The largest alignment; 1 if there is none."""
+    """The largest alignment, at least 1."""
     inner = [_modulus(term.body) for term in terms if isinstance(term, Repeat)]
     return max([1, *inner, *(term.alignment for term in terms if isinstance(term, Align))])
 
 
 def _counted_parts(terms: Sequence[Term]) -> list[Data | Loop]:
-    """The parts with a variable number of elements whose elements take bytes."""
+    """The parts with a variable number of elements of nonzero size."""
     return [
         term.part
         for term in terms

@@ -1,19 +1,19 @@
-"""The register stages of subscribers of variable size: the words of the key and of the parameter `pipeline`."""
+"""The register stages of subscribers of variable size: the values of the key and parameter `pipeline`."""
 
 from __future__ import annotations
 
 from fusesoc_firm.frame.model import Fixed, Frame, all_nodes
 
-# No further registers; register slices where paths lead to other blocks; and fields that are stored a cycle late, too.
+# No additional registers; register slices on paths to other blocks; these slices, and fields stored a cycle later.
 NONE, BORDERS, FULL = PIPELINES = ("none", "borders", "full")
-# With more bytes of fields, the enables of their registers are the longest paths of a subscriber (ECP5).
+# With more bytes of fields, the registers' enables are the critical paths of a subscriber (ECP5).
 _MANY_BYTES = 256
 
 
 def pipeline_of(frame: Frame, given: str | None = None, least: str = NONE) -> str:
-    """Return the stages of a frame's subscriber: the `given` ones, or by default what its timing needs.
+    """Return the stages of a frame's subscriber: `given` or, by default, the stages that its timing needs.
 
-    The default is `full` for more than 256 bytes of fields, and otherwise `least`.
+    The default is `full` for more than 256 bytes of fields, otherwise `least`.
     """
     if given is not None:
         return given

@@ -114,12 +114,12 @@ class Places:
         return self.program.behind(number)
 
     def _moments(self, number: int) -> int:
-        """The number of places of a step without words; 0 if another step does the work of this step."""
+        """The number of places of a step without words; 0 if another step replaces this step."""
         match self.program.steps[number]:
             case Guard() | Stream() | Padding():
                 return 1
             case Open(part=part):
-                # A guard opens the part before its padding; an array without a body has nothing to iterate over.
+                # A guard opens the part before its padding. An array without a body has no elements to iterate over.
                 return int(not self._is_guarded(part) and (isinstance(part, Data) or bool(part.body)))
             case Close():
                 return int(not isinstance(self.program.steps[number - 1], Block))
@@ -155,7 +155,7 @@ class Places:
 
 
 def size_of(step: Step) -> int:
-    """The size of a step in bytes, if the size is the same each time the step is reached."""
+    """The size of a step in bytes, if the size is constant."""
     match step:
         case Header():
             return ID_BYTES + LENGTH_BYTES

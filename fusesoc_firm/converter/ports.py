@@ -8,19 +8,22 @@ from dataclasses import dataclass
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Frame, FrameField, Path
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
+from fusesoc_firm.text.reserved import declared_names
 
-# Names that the templates declare or use; the port of a field with one of these names has a different name.
-_TAKEN = """
-    clk rst_n s_axis_tdata s_axis_tkeep s_axis_tuser s_axis_tvalid s_axis_tlast s_axis_tready
-    m_axis_tdata m_axis_tkeep m_axis_tuser m_axis_tvalid m_axis_tlast m_axis_tready
-    segment_valid msg_valid msg_ready frame_error frame_error_code
-    id code_t no_fault bad_length short_frame long_frame bad_encoding no_length frame_beats first_position last_position
-    position_t position_r position_last withdrawn beat_taken goes_on ahead_word u_ahead next_position
-    broken ended complete beyond is_first is_waiting is_told
-    broken_beat are_ones match match_r compare fault ready beat store fields_r frame check follow receive send
-    u_select rtl firm firm_axis_select firm_axis_select_ahead ieee work std numeric_std std_logic_1164
-    std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
-""".split()
+_TEMPLATES = (
+    "vhdl/subscriber.vhd",
+    "vhdl/publisher.vhd",
+    *(f"partials/{name}" for name in ("store_signals", "store_enables", "store_beats", "store_resets", "stored_field")),
+)
+# The port of a field with one of these names has a different name. The templates use the first names without declaring
+# them, and declare `store` and `fields_r` with an empty suffix. The last line keeps the names of ports of version 0.1.
+_TAKEN = declared_names(*_TEMPLATES) | set(
+    """
+    rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural integer resize
+    store fields_r to_unsigned rising_edge failure true false
+    beyond broken complete ended frame_beats is_told is_waiting
+    """.split()
+)
 # The names of each store if there are several stores.
 _NUMBERED = re.compile(r"(store|fields|turns?|used)_\d+(_\w+)?", re.IGNORECASE)
 

@@ -37,9 +37,9 @@ Scope = tuple[Loop, ...]
 class Segment:
     """Values that become valid together: segment `number` of a message or of a loop's element, counted from 0.
 
-    A segment consists of the used fields of fixed size up to the next variable part, and the length of this part if it
-    is used. A message always has a first segment, which contains the payload's length. All other segments exist only if
-    they hold a value.
+    A segment consists of the used fields of fixed size up to the next variable part, and of this part's length if the
+    part is used. The first segment of a message always exists and contains the payload's length. Any other segment
+    exists only if it holds a value.
     """
 
     scope: Scope
@@ -184,12 +184,12 @@ class Program:
 
     @cached_property
     def _openings(self) -> dict[int, int]:
-        """The place of each part's `Open`, by the part's identity, since `==` on parts compares contents."""
+        """The index of each part's `Open`, by the part's identity, since `==` on parts compares contents."""
         return {id(step.part): place for place, step in enumerate(self.steps) if isinstance(step, Open)}
 
     @cached_property
     def _closings(self) -> dict[int, int]:
-        """The place of each loop's `Close`, by the loop's identity."""
+        """The index of each loop's `Close`, by the loop's identity."""
         return {id(step.loop): place for place, step in enumerate(self.steps) if isinstance(step, Close)}
 
 
@@ -218,8 +218,8 @@ def publisher_program(frame: Frame) -> Program:
 class _Builder:
     """The state of one walk through the nodes of a message.
 
-    `block` is the current block. `open_steps` are the places of the steps of the current segment, and `is_valued` tells
-    whether that segment holds a value. `numbers` are the next segment numbers, one for each enclosing scope.
+    `block` is the current block. `open_steps` are the indices of the current segment's steps, and `is_valued` means
+    that this segment holds a value. `numbers` are the next segment numbers, one for each enclosing scope.
     """
 
     is_publisher: bool = False
@@ -390,7 +390,7 @@ def _is_valued(step: Step) -> bool:
 
 
 def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Replace the steps after the last used one by a `Tail` and a `Drop`, unless they only close a text."""
+    """Replace the steps after the last used step by a `Tail` and a `Drop`, unless they only close a text."""
     last = max(place for place, step in enumerate(steps) if _is_used(step))
     # A loop always runs to its end.
     closings = {step.loop.path: place for place, step in enumerate(steps) if isinstance(step, Close)}
@@ -400,7 +400,7 @@ def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
     rest = steps[last + 1 : -1]
     if not any(isinstance(step, Count | Open) or (isinstance(step, Block) and not step.checks) for step in rest):
         return tuple(steps)
-    # A stream's bytes, and a text's terminating zero, are counted when the stream opens, so the cut is behind them.
+    # Opening a stream counts its bytes and a text's terminating zero, so the cut is after them.
     if opens_data(steps[last]):
         last += 1
     return (*steps[: last + 1], *_terminator(steps[last]), Tail(), Drop(), steps[-1])
@@ -412,7 +412,7 @@ def opens_data(step: Step) -> bool:
 
 
 def _terminator(step: Step) -> Iterator[Block]:
-    """Yield the step that reads a text's terminating zero after the text, if there is one."""
+    """Yield the step that reads a text's terminating zero, if present, after the text."""
     if isinstance(step, Stream) and step.part.terminator:
         yield _terminating(step.scope, step.part)
 
@@ -438,7 +438,7 @@ def _is_used(step: Step) -> bool:
 
 
 def has_bytes(loop: Loop) -> bool:
-    """Whether the loop has a body; if its elements take no bytes, only their number is transferred."""
+    """Whether the loop's elements have bytes; otherwise, only their number is transferred."""
     return any(not isinstance(node, Fixed) or node.size for node in loop.body)
 
 

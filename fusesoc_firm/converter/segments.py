@@ -1,4 +1,4 @@
-"""The segments of a message of variable size: when the value of each field is valid."""
+"""The segments of a message of variable size, which determine when each field is valid."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fusesoc_firm.frame.model import Frame, Path
 
 @dataclass
 class Segments:
-    """The number of the segment with each field's value, and of the segment after which each part begins."""
+    """The number of each field's segment, and of the segment that precedes each part."""
 
     fields: dict[Path, int] = field(default_factory=dict)
     parts: dict[Path, int] = field(default_factory=dict)

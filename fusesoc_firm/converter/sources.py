@@ -32,7 +32,7 @@ class ConverterSource(NamedTuple):
 def subscriber_source(frame: Frame, width: int, entity: str = "", pipeline: str = NONE) -> ConverterSource:
     """Return the source of a subscriber; `entity` is by default `subscriber_entity`. May raise `InputError`.
 
-    `pipeline` is one of `PIPELINES`; subscribers of fixed size are the same with all of them.
+    `pipeline` is one of `PIPELINES`; it does not affect subscribers of fixed size.
     """
     check_width(width)
     if frame.is_fixed_size:

@@ -13,7 +13,8 @@ from fusesoc_firm.text.yaml_text import yaml_dump
 if TYPE_CHECKING:
     from fusesoc_firm.converter.sources import ConverterSource
     from fusesoc_firm.message.library import MessageLibrary
-    from fusesoc_firm.message.model import Definitions, MessageName
+    from fusesoc_firm.message.middleware import Definitions
+    from fusesoc_firm.message.model import MessageName
     from fusesoc_firm.message.services import Interface
 
 

@@ -24,7 +24,7 @@ from fusesoc_firm.frame.model import COUNT_BYTES, LENGTH_BYTES, Data, Loop
 from fusesoc_firm.text.render import Context
 
 _WORD_BITS = 32
-# No multiple of 32, so no row is a constant that GHDL may lose (`is_lossy`).
+# Not a multiple of 32, so GHDL loses no row (`is_lossy`).
 _DIGITS_IN_A_ROW = 60
 _NUMBERS_IN_A_ROW = 16
 
@@ -87,7 +87,7 @@ def alignment_of(step: Step) -> int:
 
 
 def is_stream(step: Step) -> bool:
-    """Whether the step takes a number of bytes that the step before it knows."""
+    """Whether the previous step determines the number of bytes of the step."""
     return isinstance(step, Stream | Drop)
 
 
@@ -96,7 +96,7 @@ def _takes(step: Step) -> bool:
 
 
 def _settles(step: Step, lanes: int) -> bool:
-    """Whether the step decides a cycle before it acts: on a count only if no earlier beat tells part of it."""
+    """Whether the step decides a cycle before it acts; for a count, a single beat must hold the whole count."""
     return isinstance(step, Tail | End) or (is_count_whole(lanes) and (is_counted(step) or isinstance(step, Guard)))
 
 
@@ -148,10 +148,10 @@ def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
 
 
 def is_lossy(entries: int) -> bool:
-    """Whether GHDL 2.0 may lose a table of so many bits.
+    """Whether GHDL 2.0 may lose a table of `entries` bits.
 
-    A constant of 64, 96, ... bits becomes zero if only its highest 32 contain ones. Such a table therefore gets a
-    further bit, which is zero and never read.
+    A constant of 64, 96, ... bits becomes zero if only its highest 32 bits contain ones. Such a table therefore gets
+    one more bit, which is zero and never read.
     """
     return entries > _WORD_BITS and entries % _WORD_BITS == 0
 
@@ -179,7 +179,7 @@ _REGISTERS = {
 
 
 def step_classes(sets: Sequence[Context]) -> list[Context]:
-    """The sets that a subscriber keeps in a register for its current step."""
+    """The sets that a subscriber registers for its current step."""
     names = {found["name"] for found in sets}
     return [
         {"set": name, "register": register, "about": about}
@@ -196,7 +196,7 @@ def number_rows(numbers: Sequence[int]) -> list[str]:
 
 
 def step_list(steps: Sequence[Step]) -> list[str]:
-    """The steps for the list at the head of an architecture."""
+    """The list of steps at the head of an architecture."""
     column = len(str(len(steps) - 1))
     return [f"{number:>{column}}  {_description(step)}" for number, step in enumerate(steps)]
 

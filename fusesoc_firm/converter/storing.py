@@ -17,8 +17,8 @@ from fusesoc_firm.converter.stream import Store, StoreMap, ranges
 from fusesoc_firm.converter.vhdl import bits, within
 from fusesoc_firm.text.render import Context
 
-# With many windows and many beats, a table takes less logic (at 8 bits: 45 LUTs plus 1.3 per window, against 40 plus
-# 2.3 for comparisons). With few beats, the comparisons reduce to a small function of the counter.
+# With many windows and many beats, a table takes less logic (at 8 bits: 45 LUTs plus 1.3 per window; comparisons take
+# 40 plus 2.3). With few beats, the comparisons reduce to a small function of the counter.
 _MOST_COMPARED = 8
 _TABLE_BEATS = 1024
 _NUMBERS_IN_A_ROW = 12
@@ -32,10 +32,10 @@ def is_beat(first: int, last: int) -> str:
 
 
 def enables(store: Store, position: str, last_beat: int, *, is_part: bool) -> list[str]:
-    """The conditions on the signal `position`, of which any enables a store; none if every beat does.
+    """The alternative conditions on the signal `position` that enable a store; empty if every beat enables it.
 
-    The windows' bytes shift earlier ones out, so the first window needs no lower limit. A part of a larger store keeps
-    it, since a simulator would otherwise copy all parts in each beat. No beat follows `last_beat`.
+    The windows' bytes shift out earlier bytes, so the first window needs no lower limit. A part of a larger store keeps
+    the limit; otherwise, a simulator would copy all parts in each beat. No beat follows `last_beat`.
     """
     (first, last), *others = ranges(store.beats)
     windows = [(first if is_part else 0, last), *others]
@@ -50,10 +50,7 @@ def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
 
 
 def store_configuration(stores: Sequence[Store], last_beat: int) -> Context:
-    """The partials' configuration for `stores`, which have the form that `stores_of` returns.
-
-    `last_beat` is that of the longest frame.
-    """
+    """The partials' configuration for `stores` from `stores_of`; `last_beat` is the last beat of the longest frame."""
     tables: list[Context] = []
     conditions: list[list[str]] = []
     for _, group in groupby(stores, lambda store: store.lanes):
@@ -90,7 +87,7 @@ def store_data(register: str, store: Store, source: str) -> list[str]:
 
 
 def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> Iterator[Context]:
-    """The pieces of a port's slice that are contiguous in a store, for the partial `stored_field`."""
+    """The pieces of a port's slice, each contiguous in a store, for the partial `stored_field`."""
     low = piece.low
     for stored in places.pieces(piece.offset, piece.bytes):
         part = piece if piece.is_bit else replace(piece, low=low, width=8 * stored.count)
@@ -106,7 +103,7 @@ def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> I
 
 
 def _table(windows: Sequence[tuple[int, int]]) -> Context:
-    """The table of beats after which a window begins or ends, with a pointer to the next entry."""
+    """The table of beats after which windows begin or end, with a pointer to the next entry."""
     turns = [beat for first, last in windows for beat in (first - 1, last)]
     # A window that begins with the first beat is open from the start.
     is_open = turns[0] < 0

@@ -1,7 +1,7 @@
 """The positions of a frame's bytes on a stream of a given width, and the registers that store the fields.
 
 A subscriber's stream carries the frame without the id. An 8-bit stream starts with the length. On wider streams, the
-id's lane (the lowest lane of the first beat) remains but is void (docs/explanation/design.md).
+id's lane (the lowest lane of the first beat) remains, but its content is invalid (docs/explanation/design.md).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 
-# A larger store is split, since a simulator copies a whole store on each accepted beat; each split costs an enable.
+# Larger stores are split, since a simulator copies a whole store on each accepted beat; each split costs an enable.
 _MOST_BITS = 2048
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
 

@@ -51,7 +51,7 @@ _COUNTER_BITS = 32
 _LARGEST_NATURAL = 2**31 - 1
 _ZEROS = "(others => '0')"
 _ALWAYS = ""
-# From here on, the multiplexer of all words has so many levels that nothing may follow it.
+# With at least this many places, the multiplexer of all words has too many levels for further logic after it.
 _MANY_PLACES = 80
 # The words of a longer block are selected a cycle ahead, in groups of 2**6 words, or of 2**7 if words are wide.
 _MANY_WORDS = 64
@@ -150,7 +150,7 @@ class _Publisher:
     def _ahead_keys(self) -> Context:
         """The ranges of bits whose words are selected a cycle ahead, and the other ranges.
 
-        The first word of a long block is not among them: its place waits for the block's values, which then stay valid.
+        The first word of a long block is excluded: its place waits for the block's values, which then stay valid.
         """
         ends = [0, *(area.last + 1 for area in self._long_areas)]
         starts = [*(area.first + 1 for area in self._long_areas), self.places.end + 1]
@@ -188,7 +188,7 @@ class _Publisher:
         return f"std_logic_vector(unsigned({length}) + {terminator})" if terminator else length
 
     def _slices(self, leaf: FrameField) -> Iterator[Slice]:
-        """The pieces of the leaf's port; another `Fixed` may hold the leaf's preceding elements."""
+        """The pieces of the leaf's port in this step; another `Fixed` may hold the leaf's preceding elements."""
         port = self.side.field(leaf)
         for piece in slices_of(FieldPort(port.name, port.width, leaf)):
             yield Slice(port, piece.low + leaf.first * leaf.type.bits, piece.width, piece.offset, piece.bytes)
@@ -196,7 +196,7 @@ class _Publisher:
     # --- inputs and sizes of places -----------------------------------------------------------------------------
 
     def _supplies(self) -> Iterator[tuple[int, Context]]:
-        """(last place, the inputs that all places up to it await); an element's last place also waits for `valid`."""
+        """(last place, the inputs that all places up to it need); an element's last place also waits for `valid`."""
         yield 0, {"signal": "segment_valid(0)", "element": ""}
         for area in self.places.areas:
             signal = self._supply(area.step)
@@ -274,7 +274,7 @@ class _Publisher:
         }
 
     def _count_words(self) -> list[Context]:
-        """The words of streams' counts, if a tree of their own is faster: that of all words has many levels."""
+        """The words of streams' counts, if the multiplexer of all words is too deep and a separate one is faster."""
         if self.places.end - sum(area.last - area.first for area in self._long_areas) < _MANY_PLACES:
             return []
         places = [place for area in self._data_counts for place in range(area.first, area.last + 1)]
@@ -287,7 +287,7 @@ class _Publisher:
 
     @property
     def _near_bits(self) -> int:
-        """The bits of a number of bytes that can end with the next beat; a text's count has one byte more."""
+        """The width of a number of bytes that can end with the next beat; a text's count includes one more byte."""
         return max(2, self.lanes.bit_length())
 
     @property
@@ -315,7 +315,7 @@ class _Publisher:
                 {
                     "places": _any_place(place for place, part in data if _shift(part) == shift),
                     "shift": shift,
-                    # From this bit on, the number of elements is zero if they take at most two beats.
+                    # This bit and all higher bits of the number of elements are zero if they take at most two beats.
                     "near_bit": max(0, self._near_bits - shift),
                 }
                 for shift in sorted({_shift(part) for _, part in data} - {0})
@@ -453,9 +453,9 @@ def _by_place(choices: Iterable[tuple[int, Context]]) -> list[Context]:
 
 
 def _gathered(choices: Iterable[tuple[int, Context]], *, is_dense: bool = True) -> list[Context]:
-    """The different values of the choices in order, each with the condition that it applies.
+    """The distinct values of the choices in order, each with the condition under which it applies.
 
-    A choice applies from the place after the choice before, or at its own place only unless `is_dense`.
+    A choice applies from the place after the previous choice if `is_dense`, otherwise only at its own place.
     """
     found: list[tuple[Context, list[tuple[int, int]]]] = []
     first = 0
@@ -472,13 +472,13 @@ def _gathered(choices: Iterable[tuple[int, Context]], *, is_dense: bool = True) 
 
 
 def _one_of(ranges: Sequence[tuple[int, int]]) -> str:
-    """The bit that is '1' at the places of these ranges only, as an operand."""
+    """The bit that is '1' only at the places of these ranges, as an operand."""
     places = any_of(_within(*span) for span in ranges)
     return f"({places})" if len(ranges) > 1 else places
 
 
 def _at(places: Iterable[int]) -> str:
-    """The bit that is '1' at these places only."""
+    """The bit that is '1' only at these places."""
     return any_of(_within(place, place) for place in places)
 
 
@@ -488,12 +488,12 @@ def _within(first: int, last: int) -> str:
 
 
 def _any_place(places: Iterable[int]) -> str:
-    """A condition that holds at these places only."""
+    """A condition that holds only at these places."""
     return any_of(within("place_r", place, place) for place in places)
 
 
 def _any_area(areas: Iterable[Area]) -> str:
-    """A condition that holds at the places of these areas only, without parentheses around all of it."""
+    """A condition that holds only at the places of these areas, without outer parentheses."""
     areas = list(areas)
     if len(areas) == 1:
         return between("place_r", areas[0].first, areas[0].last)

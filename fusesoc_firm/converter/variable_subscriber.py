@@ -146,7 +146,7 @@ class _Subscriber:
                 for place, step in enumerate(self.steps)
                 if isinstance(step, Header | Block | Open) and (bit := self._segment_bit(step.completes))
             ],
-            # A segment that the header completes.
+            # The segment that the header completes.
             "opens_at_once": [
                 {} for step in self.steps if isinstance(step, Header) and self._segment_bit(step.completes)
             ],
@@ -207,7 +207,7 @@ class _Subscriber:
         prefix = self.frame.prefix[: self.frame.checked_prefix]
         beats = [prefix[first : first + self.lanes] for first in range(0, len(prefix), self.lanes)]
         has_zeros = any(map(closes_text, self.steps))
-        # Otherwise, the number is that of elements without a terminating zero.
+        # A whole count includes the terminating zero; otherwise, the number of elements excludes it.
         is_whole = is_count_whole(self.lanes)
         counts: list[Context] = [{"bound": None}] if any(map(is_text, self.steps)) else []
         counts += [
@@ -282,7 +282,7 @@ class _Subscriber:
 
     @cached_property
     def _ends(self) -> dict[int, int]:
-        """The steps with which an element may end, and the `Close` of each."""
+        """The steps that may end an element, each with its `Close`."""
         closes = [place for place, step in enumerate(self.steps) if isinstance(step, Close)]
         return {place - joined: place for place in closes for joined in (0, 1) if not joined or self._is_joined(place)}
 
@@ -291,7 +291,7 @@ class _Subscriber:
         return isinstance(self.steps[place - 1], Block | Stream)
 
     def _aligned(self, alignment: int) -> str:
-        """The digits of the steps and choices that lead to padding of an alignment."""
+        """The digits that mark the steps and choices with a transition to padding of this alignment."""
         choices = product(range(len(self.steps)), (False, True))
         return "".join(str(int(alignment_of(self.steps[self._successor(*choice)]) == alignment)) for choice in choices)
 

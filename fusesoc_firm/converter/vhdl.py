@@ -14,7 +14,7 @@ def vhdl_type(width: int | None) -> str:
 
 
 def index_bits(values: int) -> int:
-    """Return the bits of an index of so many values, like `index_bits` of firm_axis_pkg."""
+    """Return the width of an index of `values` values, like `index_bits` of firm_axis_pkg."""
     return max(1, (values - 1).bit_length())
 
 
@@ -39,7 +39,7 @@ def hexadecimal(data: bytes) -> str:
 
 
 def bits_of_bool(port: str) -> str:
-    """Return the expression for the byte that is sent for a bool's bit."""
+    """Return the expression for the wire byte of a bool's bit."""
     return f'"0000000" & {port}'
 
 
@@ -71,10 +71,10 @@ def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
 
 
 def all_of(conditions: Iterable[str]) -> str:
-    """Return the expression that is '1' if all conditions are '1'."""
+    """Return the bit that is '1' if all conditions are '1'."""
     return " and ".join(conditions)
 
 
 def any_of(conditions: Iterable[str]) -> str:
-    """Return the condition that at least one condition is true, or an empty string without conditions."""
+    """Return the condition that at least one of the conditions is true, or an empty string without conditions."""
     return " or\n        ".join(wrapped(conditions, "or", LINE))

@@ -1,1 +1,1 @@
-"""A node in fabric: what its hardware sends and compares, as plain values."""
+"""A node in fabric: the data that its hardware sends and compares, as plain values."""

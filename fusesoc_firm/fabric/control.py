@@ -1,9 +1,9 @@
 """The program of a ROS 2 node in fabric (`ros2_node.seq`), assembled for `firm_rtps_sequencer`.
 
-The sequencer has one memory, in which an instruction works on numbers of 1 to 28 bytes, the lowest byte first. A
-program is text. Each line is `label:`, an instruction with its operands, a comment after `;`, or the name of a place:
+An instruction operates on little-endian numbers of 1 to 28 bytes in the sequencer's single memory. A program is text.
+Each line is `label:`, an instruction with its operands, a comment after `;`, or the name of a place:
 
-    global NAME ADDRESS       in the memory, of which the record of `firm_rtps_walker` is the begin
+    global NAME ADDRESS       in the memory, which begins with the record of `firm_rtps_walker`
     peer NAME OFFSET          in the entry of the peer P: `P.NAME`
     entry NAME OFFSET         in the entry of the source or sink E: `E.NAME`
     table NAME OFFSET         in the table W: `W.NAME`
@@ -21,7 +21,7 @@ byte. An operation may be followed by the number of its bytes, as in `copy.4 a, 
 | `bit` | z unless number X is in the set of the record |
 | `jump L`, `jump COND, L` | z, nz, c, nc; tick, early, frame, work (one of these, or a submessage); `no_` with each |
 | `call L`, `return` | up to eight levels |
-| `take` | takes what has come of a submessage, with c if it is complete |
+| `take` | takes the received part of a submessage; c if it is complete |
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
 from fusesoc_firm.fabric.packets import Field, packets_of
 from fusesoc_firm.fabric.rtps import Kind
@@ -54,8 +55,7 @@ _CONDITIONS |= {name: 8 + 2 * number for number, name in enumerate(_EVENTS)}
 _CONDITIONS |= {f"no_{name}": 9 + 2 * number for number, name in enumerate(_EVENTS)}
 _NUMBER = 1 << 31
 _OUTSIDE = 256
-# What firm_rtps_control has outside the memory.
-_PORTS = {
+PORTS = {
     "key": 0x80,
     "number": 0x90,
     "note": 0x98,
@@ -69,7 +69,7 @@ _PORTS = {
     "matches": 0xA0,
     "facts": 0xA3,
     "entity": 0xA4,
-    # Eight bytes that are read, at addresses of others that are only written.
+    # Eight readable bytes at addresses of write-only ones.
     "next_fragment": 0x98,
     "early_number": 0xA8,
     "early_source": 0xAC,
@@ -85,9 +85,10 @@ _PORTS = {
     "look": 0xB9,
     "fragment": 0xBA,
 }
+"""The registers of `firm_rtps_control` outside the memory, into which `make constants` writes these addresses."""
 # Tables of the node's own writers with frames, of the writer of ros_discovery_info, and of the readers.
 _GRAPH, _FIRST_READER = 15, 16
-# The bank of the builder's fields for all packets but those that are prepared, whose banks are their writers'.
+# The bank of the builder's fields for all packets except prepared ones, which use their writers' banks.
 _OWN_BANK, _NO_PACKET = 15, 0
 _TIMES = {
     "AFTER_FAREWELL": 200,
@@ -100,15 +101,15 @@ _TIMES = {
     "LONGEST_REQUEST": 320,
     "UNHEARD_REQUEST": 500,
     "USER_HEARTBEAT": 100,
-    # Seconds, and one more: the first one may be short.
+    # Seconds, plus one since the first may be short.
     "USUAL_LEASE": 101,
 }
-# Of samples to send: the new one, and that whose slot is looked at.
+# Facts about samples to send: the new one, and the one in the selected slot.
 _SAMPLE_FACTS = ("IS_STARTED", "IS_LONG", "IS_LAST", "IS_BEYOND", "IS_NEW_LONG")
 _FACTS = ("RELIABLE", "KNOWN", "TRANSIENT", "HAS_UNICAST", "HAS_METATRAFFIC", "HAS_DEFAULT", "GONE", "HAS_LEASE")
 _OTHERS = {
-    # Announcements, and samples, that are asked for at once: peers put more of them into one datagram, whose fragments
-    # a node without a reassembly drops.
+    # Announcements or samples per request: peers combine more of them in one datagram, whose fragments a node without
+    # reassembly drops.
     "WINDOW": 2,
     "BEYOND_WINDOW": 3,
     "MOST_REQUESTED": 8,
@@ -119,13 +120,19 @@ _OTHERS = {
     "OWN_BANK": _OWN_BANK,
     "NO_PACKET": _NO_PACKET,
     "FIRST_READER": _FIRST_READER,
+    # Parts of the ids of discovery's entities: the first two bytes, the third one, and the kind.
+    "PARTICIPANTS": int.from_bytes(rtps.PARTICIPANT_WRITER[:2], "little"),
+    "PUBLICATIONS": rtps.PUBLICATIONS_WRITER[2],
+    "SUBSCRIPTIONS": rtps.SUBSCRIPTIONS_WRITER[2],
+    "BUILTIN_WRITER": rtps.PUBLICATIONS_WRITER[3],
+    "BUILTIN_READER": rtps.PUBLICATIONS_READER[3],
     **{kind.name: int(kind) for kind in Kind},
     **{name: 1 << number for names in (_FACTS, _SAMPLE_FACTS) for number, name in enumerate(names)},
 }
 
 
 class ProgramError(Exception):
-    """The program is wrong: the text names the line."""
+    """An error in a program; the text contains the line."""
 
 
 @dataclass(frozen=True)
@@ -138,13 +145,13 @@ class Sizes:
 
     @classmethod
     def of(cls, node: Node) -> Sizes:
-        """Return room for each topic of the node at each peer."""
+        """Return the sizes for each topic of the node at each peer."""
         return cls(max(1, MOST_PEERS * len(node.readers)), MOST_PEERS * len(node.writers))
 
 
 @dataclass(frozen=True)
 class Ring:
-    """The slots of a writer in the history: a power of two, one of them for the sample that comes."""
+    """The slots of a writer in the history: a power of two, including one for the incoming sample."""
 
     base: int
     size: int
@@ -174,7 +181,7 @@ def slots_of(node: Node) -> int:
 
 
 def generics_of(node: Node, sizes: Sizes) -> dict[str, int]:
-    """Return the generics of `firm_rtps_node` for which the program is made."""
+    """Return the generics of `firm_rtps_node` that match the program."""
     return {
         "WRITERS": len(node.writers),
         "READERS": len(node.readers),
@@ -202,7 +209,7 @@ def _assembled(node: Node, sizes: Sizes) -> tuple[list[int], dict[str, int]]:
 
 
 def memory_of_control(node: Node, entity: str, sizes: Sizes) -> Rendering:
-    """Return the memory of a node's program, as an entity for `firm_rtps_node`; it has the generics of that one."""
+    """Return the memory of a node's program, as an entity for `firm_rtps_node` with the same generics."""
     words = [f'"{word:0{WORD_BITS}b}"' for word in words_of(node, sizes)]
     return Rendering(
         "vhdl/control.vhd",
@@ -240,7 +247,7 @@ def _constants(node: Node, sizes: Sizes) -> dict[str, int]:
 
 
 def _tables(node: Node) -> str:
-    """The part of the program that writes what is constant of the node's endpoints."""
+    """The part of the program that writes the constants of the node's endpoints."""
     lines = ["begin_tables:"]
     for number, (item, ring) in enumerate(zip(node.writers[1:], rings_of(node), strict=True)):
         lines += [*_endpoint(number, item), *_writer(item)]
@@ -264,13 +271,13 @@ def _writer(item: Endpoint) -> Iterator[str]:
 
 
 class _Assembler:
-    """Turns the text of a program into words."""
+    """Converts the text of a program to words."""
 
     def __init__(self, constants: Mapping[str, int]) -> None:
         self._constants = constants
         self._places = {
             **{f"field.{item.name}": _OUTSIDE + item.address for item in Field},
-            **{f"io.{name}": _OUTSIDE + place for name, place in _PORTS.items()},
+            **{f"io.{name}": _OUTSIDE + place for name, place in PORTS.items()},
         }
         self.labels: dict[str, int] = {}
 

@@ -1,7 +1,7 @@
-"""The packets of a node that gets its address by DHCP (`firm_dhcp_client`), as programs for `firm_packet_builder`.
+"""The packets of a node with an address by DHCP (`firm_dhcp_client`), as programs for `firm_packet_builder`.
 
-Messages follow RFC 2131, their options RFC 2132. Options that only some messages have are pads in the others, or are
-after the end of a DHCPDECLINE, which must not have them.
+Messages follow RFC 2131, their options RFC 2132. An option of only some messages is replaced by pads in the others, or
+follows the end option in a DHCPDECLINE, which must not contain it.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _REQUEST, _ETHERNET, _MAC_BYTES = 1, 1, 6
 _HARDWARE_BYTES, _NAME_BYTES, _FILE_BYTES, _SHORTEST = 16, 64, 128, 300
 _MAGIC = bytes.fromhex("63825363")
 _LONGEST_LABEL = 63
-# The forms of `own_select`: bytes that are 0 without an address, those that are 0 in a message without a choice of
-# server and address, and constants that are 0 there.
+# The forms of `own_select`: bytes that are 0 without an address, bytes that are 0 in a message without a selected
+# server and address, and constants that are 0 in such a message.
 _IF_BOUND, _IF_CHOSEN, _CONSTANT = 1 << 5, 2 << 5, 3 << 5
 _SERVER_SLOT, _NUMBER_SLOT, _SENDER_SLOT, _END_SLOT, _TYPE_SLOT = 4, 8, 12, 30, 31
 # Bits 5 and 4 of such a constant are the same.
@@ -68,12 +68,12 @@ def programs_of(network: Network) -> dict[str, Words]:
 
 
 def host_name(network: Network) -> str:
-    """Return the node's name as that of a host: letters, digits and single '-' (RFC 1123), up to 63 of them."""
+    """Return the node's name as a host name: letters, digits and single '-' (RFC 1123), up to 63 of them."""
     return re.sub("_+", "-", network.name)[:_LONGEST_LABEL].strip("-")
 
 
 def _message(network: Network) -> tuple[Part, ...]:
-    """All messages are one: what differs between them, the client tells.
+    """Return the parts of all messages; the client supplies the bytes that differ.
 
     The broadcast flag is not set, and the seconds since the first message are 0.
     """
@@ -96,6 +96,6 @@ def _option(tag: Option, value: bytes) -> bytes:
 
 
 def _chosen(tag: Option, value: Own) -> tuple[Part, ...]:
-    """An option that only a message with a choice has."""
+    """An option of messages with a selected server and address only."""
     constants = tuple(_CONSTANT | number & _CONSTANT_BITS for number in (tag, len(value.selects)))
     return Own(constants), Own(tuple(_IF_CHOSEN | select for select in value.selects))

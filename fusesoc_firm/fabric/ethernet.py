@@ -25,9 +25,9 @@ from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS, node_entit
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Context, Rendering, render
 
-# The bits of a byte of discovery that waits (firm_rtps_inbox).
+# The memory bits of each waiting byte of discovery (firm_rtps_inbox).
 _DISCOVERY_BITS = 17
-# Packets in memory for each one that is reassembled (firm_net_link).
+# Packets in memory for each reassembly (firm_net_link).
 _PLACES = 2
 _NODE_TEMPLATE = "vhdl/net_node.vhd"
 
@@ -53,7 +53,7 @@ def node_files(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibr
 def ethernet_node(system: DerivedSystem, libraries: Mapping[Middleware, MessageLibrary]) -> Node | None:
     """Return the node of a system by Ethernet, or None for other systems.
 
-    Raise `InputError` if a name is longer than those that the hardware compares.
+    Raise `InputError` if a name is too long for the hardware's comparison.
     """
     if system.network is None or system.network.kind is not NetworkKind.ETHERNET:
         return None
@@ -82,7 +82,7 @@ def fragment_bytes(system: DerivedSystem, node: Node) -> int:
 
 
 def _others(node: Node) -> dict[str, Words]:
-    """Return the programs of the packets that do not come from RTPS."""
+    """Return the programs of the packets other than RTPS."""
     network = node.network
     if network.has_dhcp:
         return dhcp.programs_of(network)

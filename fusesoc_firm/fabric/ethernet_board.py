@@ -22,13 +22,13 @@ from fusesoc_firm.text.diagnostics import fail
 _DEVICE = "/dev/net/tun"
 # Of linux/sockios.h and linux/if.h: the request for a device's flags, and the flag of a device that is up.
 _SIOCGIFFLAGS, _IFF_UP = 0x8913, 1
-# Of linux/if_tun.h: the request, and the flags for frames without a header of their own.
+# Of linux/if_tun.h: the request, and the flags for frames without an additional header.
 _TUNSETIFF, _IFF_TAP, _IFF_NO_PI = 0x400454CA, 0x0002, 0x1000
 _LONGEST_NAME = 15
 _NO_ROOM = (errno.EAGAIN, errno.ENOBUFS, errno.ENOMEM)
 _PREAMBLE = b"\x55" * 7 + b"\xd5"
 _SHORTEST, _FCS_BYTES = 60, 4
-# The type of Ethernet and the head of a request of ARP; the places of its addresses.
+# The Ethernet type and the beginning of an ARP request; the offsets of addresses in its frame.
 _ARP_REQUEST = bytes.fromhex("0806 0001 0800 06 04 0001")
 _TYPE_IPV4, _DHCP_PORTS = b"\x08\x00", b"\0\x44\0\x43"
 _SENDER_PLACE, _TARGET_PLACE, _ADDRESS_BYTES = 28, 38, 4
@@ -41,7 +41,7 @@ class Tap:
     """A TAP device, at which frames of this machine arrive."""
 
     def __init__(self, name: str) -> None:
-        """Open the device. Raise `InputError` if it is missing, not up, or not for this user."""
+        """Open the device. Raise `InputError` if it is missing, not up, or inaccessible to this user."""
         self.name = name
         if not name or len(name) > _LONGEST_NAME or "/" in name:
             fail(f"'{name}' is not the name of a network device", hint=f"legal: up to {_LONGEST_NAME} characters")
@@ -105,8 +105,8 @@ def _how_to_make(name: str) -> str:
 class Board(SimulatedBoard):
     """A running board at a TAP device.
 
-    Each address that the board announces by ARP, and that differs from the last one, is given to `on_address`, and no
-    text when the board has lost its address and asks for another one by DHCP.
+    `on_address` is called with each new address that the board announces by ARP, and with "" when the board has lost
+    its address and requests another one by DHCP.
     """
 
     def __init__(self, command: Sequence[str], folder: Path, tap: Tap, hertz: int) -> None:
@@ -135,7 +135,7 @@ class Board(SimulatedBoard):
         self._tap.close()
 
     def _receive(self, cycles: int) -> None:
-        """Give the board a frame, or none when the time of the board has come."""
+        """Send the board a frame, or no bytes when the board's time is reached."""
         frame = self._tap.read(self.early(cycles))
         line = b""
         if frame:
@@ -158,13 +158,13 @@ class Board(SimulatedBoard):
 
 
 def _announced(frame: bytes) -> str:
-    """Return the address that a frame announces (RFC 5227, section 2.3), or nothing."""
+    """Return the address that a frame announces (RFC 5227, section 2.3), or ""."""
     sender, target = frame[_SENDER_PLACE:][:_ADDRESS_BYTES], frame[_TARGET_PLACE:][:_ADDRESS_BYTES]
     return str(IPv4Address(sender)) if frame[12:22] == _ARP_REQUEST and sender == target else ""
 
 
 def _is_without_address(frame: bytes) -> bool:
-    """Return whether a frame is a message of DHCP of a board that has no address."""
+    """Return whether a frame is a DHCP message of a board without an address."""
     return frame[12:14] == _TYPE_IPV4 and frame[26:30] == bytes(4) and frame[34:38] == _DHCP_PORTS
 
 

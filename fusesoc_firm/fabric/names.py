@@ -1,7 +1,7 @@
-"""The names by which the hardware recognises the endpoints of peers that match those of a node (`firm_rtps_endpoint`).
+"""The names with which the hardware finds the endpoints of peers that match those of a node (`firm_rtps_endpoint`).
 
 The memory has 256 places each for topics, types and hashes. A place has a byte for each endpoint, the first one in the
-lowest bits. Topics and types are strings as on the wire, little-endian. A hash is as in an endpoint's user data.
+lowest bits. Topics and types are strings as on the wire, little-endian. A hash has the form in an endpoint's user data.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The node that a system is in the graph of ROS 2, and the constant payloads by which others discover it.
+"""A system as a node in the graph of ROS 2, and the constant payloads with which peers discover it.
 
-What a peer receives follows DDSI-RTPS 2.5, section 8.5 (SPDP and SEDP), and the design of ROS 2 on DDS: the names of
-topics and types (`rmw_dds_common`'s `rt/` and `::dds_::`), the type's hash in an endpoint's user data (REP-2016), and
-`ros_discovery_info`, a message that says which endpoints belong to which node.
+The payloads follow DDSI-RTPS 2.5, section 8.5 (SPDP and SEDP), and the design of ROS 2 on DDS: the names of topics and
+types (`rmw_dds_common`'s `rt/` and `::dds_::`), the type's hash in an endpoint's user data (REP-2016), and
+`ros_discovery_info`, a message that assigns endpoints to nodes.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from fusesoc_firm.system.derived.model import DerivedSystem, Network, Quality, T
 from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
 from fusesoc_firm.system.written.specification import ETHERNET
 
-# Seconds without a packet after which peers forget the node. The time of a simulated board may be much slower than
-# theirs, so it has more of them.
+# Seconds without a packet after which peers remove the node. A simulated board needs more, since its time may be much
+# slower than theirs.
 LEASE_SECONDS, SIMULATED_LEASE_SECONDS = 20, 100
 _GRAPH_TOPIC = "ros_discovery_info"
 _GRAPH_TYPE = MessageName("rmw_dds_common", "ParticipantEntitiesInfo")
@@ -81,7 +81,7 @@ class Node:
 
     @property
     def compared(self) -> tuple[Endpoint, ...]:
-        """The endpoints as the hardware compares them with those of peers: `ros_discovery_info` is the last one."""
+        """The endpoints in the order of the hardware's comparison with peers: `ros_discovery_info` is the last one."""
         return (*self.readers, *self.writers[1:], self.writers[0])
 
     @cached_property
@@ -101,13 +101,13 @@ class Node:
 
     @property
     def locators(self) -> tuple[bytes, bytes]:
-        """Where the node listens, for discovery and for messages; addresses of DHCP are 0.0.0.0."""
+        """The node's locators for discovery and for messages; with DHCP, the address is 0.0.0.0."""
         metatraffic, user = (port(self.network.domain) for port in (rtps.metatraffic_port, rtps.user_port))
         return self._locator(metatraffic), self._locator(user)
 
     @cached_property
     def farewell(self) -> tuple[dict[Parameter, bytes], bytes]:
-        """The inline parameters and the payload that dispose the node: its key, and nothing else."""
+        """The inline parameters and the payload that dispose the node: only its key."""
         guid = self.prefix + rtps.PARTICIPANT
         status = bytes([0, 0, 0, rtps.DISPOSED | rtps.UNREGISTERED])
         key = rtps.parameter_list(parameter(Parameter.PARTICIPANT_GUID, guid))

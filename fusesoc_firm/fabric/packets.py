@@ -1,8 +1,8 @@
 """The programs from which the hardware builds a node's packets (`firm_packet_builder`), made from constant payloads.
 
 A program is a list of words, one for each byte of the frame: a constant, a byte of a field that the hardware fills in,
-a length or checksum that it computes, or the payload of a sample. RTPS is little-endian here. If the node gets its
-address by DHCP, the bytes of the address are words of their own (`Own`).
+a length or checksum that it computes, or the payload of a sample. RTPS is little-endian here. If the node obtains its
+address by DHCP, the bytes of the address are separate words (`Own`).
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ FRAGMENT_BYTES = LONGEST_IN_FRAME
 
 _LAST = 1 << 10
 _FROM_FIELD, _FROM_PAYLOAD, _FROM_RESULT = 1 << 8, 2 << 8, 3 << 8
-# A field that the host gets while it runs.
+# A field that the host obtains at run time.
 _OWN = 1 << 7
-# The arguments of the results that depend on what is before the payload, the low byte first.
+# The arguments of the results that depend on the bytes before the payload, the low byte first.
 _DATA_BYTES = 6, 7
 _LITTLE, _INLINE, _DATA, _KEY = 1, 2, 4, 8
 _IP_BYTES, _UDP_BYTES = 20, 8
-# Words of the prelude, and those of a host with DHCP after them.
+# Words of the prelude, and the following ones of a host with DHCP.
 _PRELUDE_WORDS, _OWN_WORDS = 8, 4
-# A header of IPv4 without options; its protocol.
+# Values in the IPv4 header: version 4 without options, the time to live, the protocol UDP, and Don't Fragment.
 _IPV4, _TIME_TO_LIVE, _UDP, _DO_NOT_FRAGMENT = 0x45, 64, 17, 0x4000
 _TYPE_IPV4, _NO_CHECKSUM = b"\x08\x00", bytes(2)
-# The group of Ethernet for the group of all participants (RFC 1112).
+# The Ethernet multicast address of the group of all participants (RFC 1112).
 _GROUP_MAC = bytes.fromhex("01005e7f0001")
-# Bytes between the field that says it and the inline parameters.
+# The values of octetsToInlineQos: bytes between this field and the inline parameters.
 _TO_INLINE, _TO_INLINE_OF_FRAGMENT = 16, 28
 
 Words = list[int]
 
 
 class Field(Enum):
-    """What the hardware fills in: address and bytes. Multi-byte values are as on the line."""
+    """The fields that the hardware fills in: address and number of bytes. Multi-byte values are in wire order."""
 
     MAC = 0, 6
     FLAGS = 6, 1
@@ -75,12 +75,12 @@ class Field(Enum):
 
     @property
     def size(self) -> int:
-        """Its bytes."""
+        """Its number of bytes."""
         return int(self.value[1])
 
 
 class Result(Enum):
-    """What the hardware computes: the argument of each byte, in the order of the line."""
+    """The results that the hardware computes: the argument of each byte, in wire order."""
 
     PACKET_BYTES = 0, 1
     DATAGRAM_BYTES = 2, 3
@@ -95,14 +95,14 @@ class Payload(Enum):
 
 @dataclass(frozen=True)
 class DataBytes:
-    """The bytes of the submessage with the payload: the hardware adds those of the payload to `before`."""
+    """The size of the submessage with the payload: the hardware adds the payload's size to `before`."""
 
     before: int
 
 
 @dataclass(frozen=True)
 class Own:
-    """Bytes that a host with DHCP gets while it runs, as `own_select` of `firm_dhcp_client` counts them."""
+    """Bytes that a host with DHCP obtains at run time, numbered as in `own_select` of `firm_dhcp_client`."""
 
     selects: tuple[int, ...]
 
@@ -123,14 +123,14 @@ class Packet:
 
 @dataclass(frozen=True)
 class Programs:
-    """All programs of a node in one memory, and where each begins."""
+    """All programs of a node in one memory, and the start of each."""
 
     words: tuple[int, ...]
     entries: Mapping[str, int]
 
     @property
     def address_bits(self) -> int:
-        """The bits of an address."""
+        """The number of bits in an address."""
         return max(4, (len(self.words) - 1).bit_length())
 
 
@@ -158,7 +158,7 @@ def program_of(prelude: Iterable[Part], parts: Iterable[Part]) -> Words:
 
 
 def packets_of(node: Node) -> dict[str, Packet]:
-    """Return the packets that a node sends: what announces it, its endpoints, and the kinds of all others."""
+    """Return the packets of a node: the announcements of the node and its endpoints, and the kinds of all others."""
     announcement = _constant_data(rtps.NO_ENTITY, rtps.PARTICIPANT_WRITER, 1, *_participant_data(node))
     graph = _constant_data(Field.READER, node.writers[0].entity, 1, node.graph)
     publications = rtps.PUBLICATIONS_READER, rtps.PUBLICATIONS_WRITER
@@ -209,7 +209,7 @@ def datagram(
 
 
 def header_prelude(network: Network, constant: bytes, length: int, source: Part, target: Part) -> tuple[Part, ...]:
-    """Return the prelude for a header of IPv4: `constant` are all of its words but the length and the addresses.
+    """Return the prelude for a header of IPv4: `constant` contains its words except length and addresses.
 
     The address of a host with DHCP is part of the prelude; otherwise it is a constant of the sum.
     """
@@ -235,7 +235,7 @@ def _words(part: Part) -> Iterable[int]:
 
 
 def _size(part: Part) -> int:
-    """The bytes of a part, without those of the payload."""
+    """The number of bytes in a part, without the payload."""
     match part:
         case bytes():
             return len(part)
@@ -271,7 +271,7 @@ def _to_group(node: Node, *submessages: Submessage) -> Packet:
 
 
 def _to_all(node: Node, *submessages: Submessage) -> Packet:
-    """A packet to the address of a peer that names no receiver."""
+    """A packet to the address of a peer, without a named receiver."""
     return Packet((_header(node), *chain.from_iterable(submessages)))
 
 
@@ -297,7 +297,7 @@ def _constant_data(reader: bytes | Field, writer: bytes, number: int, *payload: 
 
 
 def _participant_data(node: Node) -> Iterator[Part]:
-    """What announces the node; its own address is the end of each locator."""
+    """The announcement of the node; its own address is the end of each locator."""
     data = node.participant_data
     for locator in node.locators if node.network.has_dhcp else ():
         before, _, data = data.partition(locator)
@@ -346,7 +346,7 @@ def _heartbeat() -> Submessage:
 
 
 def _acknack(*, has_set: bool) -> Submessage:
-    """A request; the flags are a field, since they tell whether an answer is wanted."""
+    """A request; the flags are a field, since they determine whether an answer is required."""
     listed: Sequence[Part] = (Field.SET_SIZE, Field.SET) if has_set else (bytes(4),)
     return _submessage(Kind.ACKNACK, Field.FLAGS, Field.READER, Field.WRITER, Field.NUMBER, *listed, Field.COUNT)
 

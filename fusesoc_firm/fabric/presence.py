@@ -1,4 +1,4 @@
-"""The constant frames by which a board keeps its place in its network (`firm_net_presence`)."""
+"""The constant frames with which a board keeps its place in its network (`firm_net_presence`)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ REPORT, PROBE = "report", "probe"
 _TYPE_IPV4, TYPE_ARP = b"\x08\x00", b"\x08\x06"
 ALL_HOSTS = b"\xff" * 6
 _GROUP_PREFIX = bytes.fromhex("01005e")
-# A header of IPv4 with an option, with the precedence of control; the option tells routers to look at the packet.
+# An IPv4 header with the precedence of control, and with the option that makes routers examine the packet.
 _IPV4, _PRECEDENCE, _DO_NOT_FRAGMENT, _TO_NEIGHBOURS, _IGMP = 0x46, 0xC0, 0x4000, 1, 2
 _ROUTER_ALERT = b"\x94\x04\x00\x00"
 _REPORT_TYPE = 0x16
-# Of ARP: Ethernet and IPv4, with the sizes of their addresses, and a request.
+# The fields of an ARP request: Ethernet and IPv4, the sizes of their addresses, and the operation.
 ARP_REQUEST = bytes.fromhex("0001 0800 06 04 0001")
 
 

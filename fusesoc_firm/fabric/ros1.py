@@ -1,8 +1,8 @@
 """A system as a node of ROS 1 in the sockets of a W5500 or W5200: the memory of its sequencer.
 
-The memory has the program `ros1_node.seq`, all texts that the node sends, and tries of the strings that it must know.
-What is sent follows the master's and the slave's API of ROS, XML-RPC and TCPROS. Texts are pieces; pieces that several
-texts share are stored once.
+The memory has the program `ros1_node.seq`, all texts that the node sends, and tries of the strings that it recognises.
+Messages follow the master's and the slave's API of ROS, XML-RPC and TCPROS. Texts are pieces; pieces that several texts
+share are stored once.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ _COMMANDS = {
     "RECV": 0x40,
 }
 _STATES = {"LISTEN": 0x14, "SYN_RECEIVED": 0x16, "ESTABLISHED": 0x17, "CLOSE_WAIT": 0x1C}
-# What differs between the chips: the register with a bit for each socket with an interrupt, that of the PHY with the
-# bit of its link, and the interrupt after which a W5200 may have to SEND again.
+# The differences between the chips: the register with an interrupt bit for each socket, the PHY's register with its
+# link bit, and the interrupt after which a W5200 may need another SEND.
 _CHIPS = {
     5500: {"INTERRUPTS": 0x17, "LINK": 0x2E, "LINK_IS_UP": 0x01, "SENT_AGAIN": 0},
     5200: {"INTERRUPTS": 0x34, "LINK": 0x35, "LINK_IS_UP": 0x20, "SENT_AGAIN": 0x10},
@@ -87,18 +87,18 @@ _METHODS = (
     "paramUpdate",
 )
 _TAGS = {b"param": 1, b"/methodName": 2, b"/methodCall": 3, b"/methodResponse": 4}
-# A text is sent in parts of what the chip's transmit buffer holds.
+# A text is sent in parts of at most the chip's transmit buffer.
 _BUFFER = 2048
 _PIECE = 124
 _PART = 127
 _SHORTEST_WORD = 4
-# The sequencer's unit of time in seconds, and how many of them an alarm may be away.
+# The sequencer's unit of time in seconds, and the longest time until an alarm in these units.
 _UNIT = 0.064
 _LONGEST_PERIOD = 125
 
 
 class Insert(IntEnum):
-    """What is inserted in a text when it is sent: the codes in the ROM."""
+    """The texts inserted during transmission, with their codes in the ROM."""
 
     REFUSED = 125
     UNKNOWN = 126
@@ -138,7 +138,7 @@ class Server:
 class Node:
     """A node: its absolute name, its place in the network, its master's, its topics and services.
 
-    The topics of each direction have the ids that no service has, in their order.
+    The topics of each direction have the ids that services do not use, in order.
     """
 
     name: str
@@ -166,12 +166,12 @@ class Node:
 
     @property
     def to_hardware(self) -> dict[int, Endpoint | Server]:
-        """What frames to the hardware belong to, by their ids."""
+        """The topics and services of frames to the hardware, by id."""
         return _by_id(self.subscribers, {item.request: item for item in self.services})
 
     @property
     def from_hardware(self) -> dict[int, Endpoint | Server]:
-        """What frames of the hardware belong to, by their ids."""
+        """The topics and services of frames from the hardware, by id."""
         return _by_id(self.publishers, {item.response: item for item in self.services})
 
     def uri(self) -> str:
@@ -265,7 +265,7 @@ def image(node: Node, chip: int) -> bytes:
     rom.add(gateway + network.netmask.packed + network.mac + network.address.packed)
     rom.label("master")
     rom.add(node.master[0].packed + node.master[1].to_bytes(2, "big"))
-    rom.add([0])  # the sequencer reads a byte more than it sends
+    rom.add([0])  # the sequencer reads one byte more than it sends
     return rom.image()
 
 
@@ -362,7 +362,7 @@ def _answers(node: Node) -> list[Text]:
 
 
 def _calls(node: Node) -> Iterable[Text]:
-    """Return the calls to the master: first those that unregister the node from before a reset, then the others."""
+    """Return the calls to the master: first those that undo a registration before a reset, then the others."""
     name, uri, services = node.name.encode(), node.uri().encode(), node.service_uri().encode()
     kinds = ((b"Publisher", node.publishers), (b"Subscriber", node.subscribers))
     for kind, items in kinds:
@@ -418,7 +418,7 @@ def _fault(message: str) -> Text:
 
 
 def _header(*fields: str) -> Text:
-    """A header of TCPROS: its length, and each field with its own."""
+    """A header of TCPROS: its length, and each field with its length."""
     encoded = [field.encode() for field in fields]
     length = sum(4 + len(field) for field in encoded)
     body = [piece for field in encoded for piece in (struct.pack("<I", len(field)), field)]
@@ -514,7 +514,7 @@ def _add_tables(rom: Rom, node: Node, texts: Mapping[str, Text]) -> None:
     taken, given = node.to_hardware, node.from_hardware
     for table, numbers in (("request", taken), ("greeting", taken), ("header", given)):
         labels = [f"{table}_{number}" for number in numbers]
-        # Services have no text in some of the tables, where nothing reads their entries.
+        # Some tables have no text for services; these entries are never read.
         rom.add_table(f"{table}s", [label if label in texts else "refusal" for label in labels])
     limits = [_periods(item.time_limit) if isinstance(item, Server) else (0, 0) for item in taken.values()]
     tables: dict[str, Iterable[int]] = {
@@ -544,7 +544,7 @@ def _topics_of_calls(node: Node) -> list[int]:
 
 
 def _periods(seconds: float) -> tuple[int, int]:
-    """Return a number of periods and their units that are at least a time limit; the first unit has begun."""
+    """Return a number of periods, and the units of each, that cover a time limit; the first unit may be short."""
     units = math.ceil(seconds / _UNIT) + 1
     periods = math.ceil(units / _LONGEST_PERIOD)
     return periods, math.ceil(units / periods)

@@ -1,4 +1,7 @@
-"""The numbers of RTPS that the packets of a node contain (OMG DDSI-RTPS 2.5, chapter 9; ports: section 9.6.2)."""
+"""The numbers of RTPS that the packets of a node contain (OMG DDSI-RTPS 2.5, chapter 9; ports: section 9.6.2).
+
+`make constants` writes those that hardware compares into `cores/net/rtl/firm_rtps_pkg.vhd`.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from enum import IntEnum
 HEADER = b"RTPS\x02\x02"
 # The vendor id of implementations without one.
 VENDOR = bytes(2)
-# The group of all participants, on the multicast port of their domain.
+# The multicast address of all participants, on the multicast port of their domain.
 MULTICAST = "239.255.0.1"
 
 PARTICIPANT = bytes.fromhex("000001c1")
@@ -73,7 +76,7 @@ class Reliability(IntEnum):
 
 
 class Durability(IntEnum):
-    """The value of a durability, as far as ROS 2 uses it."""
+    """The values of a durability that ROS 2 uses."""
 
     VOLATILE = 0
     TRANSIENT_LOCAL = 1

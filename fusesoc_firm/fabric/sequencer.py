@@ -1,9 +1,9 @@
-"""The instructions of `firm_wiznet_sequencer`, and the assembler that makes its memory of a program and texts.
+"""The instructions of `firm_wiznet_sequencer`, and the assembler that creates its memory from a program and texts.
 
-The sequencer runs nine coroutines in turn: one for each socket of the chip, and one for what they share. Each has a
-page of 32 bytes, whose first two hold the address at which it goes on. The rest of the memory is global. The two
-highest bits of an instruction are the number of the bytes that follow it. Addresses and fields of 16 bits have their
-high byte first.
+The sequencer runs nine coroutines in turn: one for each socket of the chip, and one for shared tasks. Each has a page
+of 32 bytes, whose first two contain the address at which it continues. The rest of the memory is global. The two
+highest bits of an instruction are the number of the bytes that follow it. Addresses and fields of 16 bits are
+big-endian.
 
 A program is text. Each line is `label:`, an instruction with its operands, or a declaration:
 
@@ -36,7 +36,7 @@ class Operation(IntEnum):
     the pointer in the ROM; `z` and `c` are flags.
     """
 
-    YIELD = 0x00  # store the address, go on with the next coroutine
+    YIELD = 0x00  # store the address, continue with the next coroutine
     PAGE = 0x01  # fields and socket are those of page a
     OWN = 0x02  # fields and socket are the coroutine's own again
     BIT = 0x03  # a := 2 to the power of the page
@@ -55,14 +55,14 @@ class Operation(IntEnum):
     ADDC = 0x46  # a := a + f + c, z, c
     SUBC = 0x47  # a := a - f - c, z, c
     STORE = 0x48  # f := a
-    RETURN = 0x50  # go on at ff
+    RETURN = 0x50  # continue at ff
     POINT = 0x51  # p := ff
     TEXT = 0x52  # t := ff
     MATCH = 0x53  # ff, a place in a trie, advances by a
     MATCHED = 0x54  # a := number of the string that ends at ff, or 0, z
     POINTED = 0x55  # ff := p
     TEXTED = 0x56  # ff := t
-    FILL = 0x57  # bytes of the Manager to f and following, as many as COUNT says
+    FILL = 0x57  # COUNT bytes of the Manager to f and following
     SET = 0x60  # the same with a number n for f
     ADDI = 0x61
     SUBI = 0x62
@@ -77,14 +77,14 @@ class Operation(IntEnum):
     AT = 0x86  # t := address
     LOOKUP = 0x87  # a := ROM at address + a, z
     JUMP_ABORTED = 0x88  # if the Manager has aborted its frame, whose missing bytes were zeros until now
-    JUMP_BUSY = 0x89  # if the Manager has not yet taken all bytes; otherwise, 64 have room
-    CALL = 0xC0  # ff := the next instruction's address, go on at address
+    JUMP_BUSY = 0x89  # if the Manager has not yet accepted all bytes; otherwise, there is room for 64
+    CALL = 0xC0  # ff := the next instruction's address, continue at address
     READ = 0xC1  # bytes of the chip to f: kind, register, f
     WRITE = 0xC2  # bytes to the chip: kind, register, f
 
 
 class Space(IntEnum):
-    """Where bytes of the chip are: the two highest bits of a transfer's kind.
+    """The address spaces of the chip: the two highest bits of a transfer's kind.
 
     The lowest four bits are the number of bytes less one. With a buffer, p is the address, and COUNT the number.
     """
@@ -101,11 +101,11 @@ class Side(IntEnum):
     MEMORY = 0x00
     ROM = 0x10  # at t
     MANAGER = 0x20
-    MANAGER_LAST = 0x30  # the last byte is that of its frame
+    MANAGER_LAST = 0x30  # the last byte ends the frame
 
 
 class AssemblyError(Exception):
-    """A program is wrong: the text names the line."""
+    """An error in a program; the text contains the line."""
 
 
 # Marks in a trie. A place is a character, a choice (a character and the place that follows it), or an end.
@@ -149,14 +149,14 @@ def trie(strings: Mapping[bytes, int]) -> tuple[bytes, list[int]]:
 
 @dataclass
 class Rom:
-    """The memory while it is assembled: bytes, and the places where the addresses of labels are missing."""
+    """The memory while it is assembled: bytes, and the places of missing label addresses."""
 
     text: bytearray = field(default_factory=bytearray)
     labels: dict[str, int] = field(default_factory=dict)
     fixes: list[tuple[int, str, str]] = field(default_factory=list)  # place, label, part: '', '>' or '<'
 
     def label(self, name: str) -> None:
-        """Name the present address."""
+        """Define a label at the current address."""
         if name in self.labels:
             raise AssemblyError(f"label '{name}' is there twice")
         self.labels[name] = len(self.text)
@@ -221,13 +221,13 @@ class Assembler:
     """Reads a program and appends its instructions to a ROM."""
 
     def __init__(self, rom: Rom, constants: Mapping[str, int]) -> None:
-        """`constants` are names that the program uses beside its own."""
+        """`constants` are further names for the program."""
         self._rom = rom
         self.names = dict(constants)
         self._next = {"local": 0, "global": PAGE_BYTES}
 
     def read(self, program: str) -> None:
-        """Append a program. Raise `AssemblyError` for a line that is wrong."""
+        """Append a program. Raise `AssemblyError` for an invalid line."""
         for number, line in enumerate(program.splitlines(), 1):
             words = line.partition(";")[0].split()
             try:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import tempfile
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -13,10 +11,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.tools import piped
 
-_SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
 _PIECE_BYTES = 65536
-# A board that is later than this does not catch up: its peers would see seconds of it at once.
+# A board that lags further behind does not catch up: its peers would receive seconds of traffic at once.
 _MOST_LATE = 0.05
 _SHOWN_BYTES = 4000
 
@@ -29,24 +27,7 @@ class SimulatedBoard(ABC):
         self._hertz = hertz
         self._data = b""
         self._due = time.monotonic()
-        from_us, to_simulator = os.pipe()
-        from_simulator, to_us = os.pipe()
-        self._answers, self._reports = to_simulator, from_simulator
-        self._printed = tempfile.TemporaryFile()  # noqa: SIM115
-        try:
-            self._process = subprocess.Popen(
-                ["/bin/sh", "-c", _SHELL, "sh", f"/dev/fd/{from_us}", f"/dev/fd/{to_us}", *command],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=self._printed,
-                stderr=subprocess.STDOUT,
-                pass_fds=(from_us, to_us),
-                # Ctrl-C reaches only this process.
-                start_new_session=True,
-            )
-        finally:
-            os.close(from_us)
-            os.close(to_us)
+        self._process, self._answers, self._reports, self._printed = piped.start(command, folder)
 
     @abstractmethod
     def run(self, is_over: Callable[[], bool] = ...) -> None:
@@ -79,7 +60,7 @@ class SimulatedBoard(ABC):
             self.fail()
 
     def early(self, cycles: int) -> float:
-        """Return the seconds by which the board, `cycles` later than before, is ahead of the time; 0 if it is late."""
+        """Advance the board's time by `cycles`; return the seconds by which it is ahead of real time, or 0."""
         self._due += cycles / self._hertz
         early = self._due - time.monotonic()
         if early < -_MOST_LATE:
@@ -87,11 +68,11 @@ class SimulatedBoard(ABC):
         return max(0.0, early)
 
     def go_on(self) -> None:
-        """Let the board's time be that of its peers, if it is ahead."""
+        """Set the board's time to real time, if it is ahead."""
         self._due = min(self._due, time.monotonic())
 
     def fail(self) -> NoReturn:
-        """Raise `InputError` with what the simulator printed."""
+        """Raise `InputError` with the simulator's output."""
         self._process.kill()
         self._process.wait()
         size = os.fstat(self._printed.fileno()).st_size

@@ -61,9 +61,9 @@ def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int,
 
 
 class _Reader:
-    """A reader that is at `position` in a payload; `used` lists the (first, end) ranges that carry values.
+    """A reader at `position` in a payload; `used` lists the (first, end, names) ranges that carry values.
 
-    The names on the path to its field follow each range; the prefix has none.
+    The names are the path to the range's field; they are empty for the prefix.
     """
 
     def __init__(self, frame: Frame, payload: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Compute the bytes of fields without a value: the default, or zeros."""
+"""Compute the bytes of fields without a value: defaults or zeros."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
 
 
 def completed(frame: Frame, message: MessageValue) -> MessageValue:
-    """Return the message with added values for missing fields: the default, zero or empty."""
+    """Return the message with missing fields filled in: defaults, zeros or empty values."""
     filled: MessageValue = _filled(_whole(frame.nodes, message, 0), message)
     return filled
 

@@ -1,4 +1,4 @@
-"""Describe a Frame as plain data, for people and for other programs."""
+"""Describe a Frame as plain data, for users and for other programs."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The faults of frames: the codes that converters, the Manager and links report in `frame_error_code`.
 
-The counterparts are `node/c/firm/firm_faults.h`, `node/cpp/firm/faults.hpp` and `cores/axis/rtl/firm_fault_pkg.vhd`.
+`make constants` writes `node/c/firm/firm_faults.h`, `node/cpp/firm/faults.hpp` and `cores/axis/rtl/firm_fault_pkg.vhd`.
 """
 
 from __future__ import annotations

@@ -20,14 +20,13 @@ from fusesoc_firm.frame.model import (
     Step,
 )
 from fusesoc_firm.frame.position import Position
+from fusesoc_firm.message.middleware import Definitions, MessageDefinition
 from fusesoc_firm.message.model import (
     ArrayType,
     DefaultValue,
-    Definitions,
     ElementType,
     Field,
     FieldType,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,
@@ -55,7 +54,7 @@ def frame_of(name: MessageName, definitions: Definitions) -> Frame:
 
 @dataclass
 class _Types:
-    """Properties of types; each property is computed once, since types are nested and may occur many times."""
+    """Properties of types, each computed once, since types are nested and may occur many times."""
 
     rules: WireRules
     definitions: Definitions

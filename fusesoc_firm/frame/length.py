@@ -1,7 +1,7 @@
 """Compute the length of a payload as an expression over the counts of the variable parts, suitable for hardware.
 
-An expression is a list of terms, evaluated in order from the first byte: add bytes, pad to an alignment, repeat. CDR's
-padding depends on all previous bytes, which evaluation in this order takes into account.
+An expression is a list of terms: add bytes, pad to an alignment, repeat. Evaluation goes from the first byte to the
+last, since CDR's padding depends on all previous bytes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad
 from fusesoc_firm.frame.values import MessageValue, part_of, units_of
 
-# The longest payload in bytes of messages without bounds, unless another one is given; and the hardware's limit.
+# The default of the longest payload in bytes for messages without bounds, and the hardware's limit.
 DEFAULT_LONGEST = 65_536
 MOST_BYTES = 2**30 - 1
 
@@ -95,13 +95,13 @@ def length_of(frame: Frame) -> Length:
 
 
 def bounded_payload(frame: Frame) -> int | None:
-    """Return the longest payload in bytes, with what a writer may append; None if the message has no bounds."""
+    """Return the longest payload in bytes, including trailing bytes; None if the message has no bounds."""
     longest = length_of(frame).maximum
     return None if longest is None else min(longest + frame.trailing_bytes, MOST_BYTES)
 
 
 def longest_payload(frame: Frame) -> int:
-    """Return the longest payload in bytes that a subscriber accepts unless it is told otherwise."""
+    """Return the longest payload in bytes that a subscriber accepts by default."""
     bounded = bounded_payload(frame)
     return DEFAULT_LONGEST if bounded is None else bounded
 
@@ -217,8 +217,7 @@ class _Walk:
             first = self.behind(term.body, position)
             return None if first is None else first + (len(elements) - 1) * term.stride
         if isinstance(elements, range):
-            # Parts are nested, so without this cache every walk of a parent part would walk each nested part many
-            # times.
+            # Parts are nested: without this cache, every walk of a part would walk each nested part many times.
             key = id(term), position % _PERIOD
             if key not in self._grown:
                 self._grown[key] = self._growth_alike(term, key[1], len(elements))

@@ -6,7 +6,7 @@ docs/explanation/frames.md shows an example:
 * `Fixed`: bytes with a known layout, including padding.
 * `Pad`: padding that depends on the position, which is known only at run time.
 * `Data`: a string, or a variable array of numbers.
-* `Loop`: an array whose elements are messages or strings; its body consists of nodes, too.
+* `Loop`: an array whose elements are messages or strings; its body also consists of nodes.
 """
 
 from __future__ import annotations
@@ -55,8 +55,7 @@ class FrameField:
 
     `path` leads from the message to the leaf. Each fixed array on the path multiplies the number of elements, which are
     numbered in wire order. `runs` contains the positions of the elements. If a `Pad` separates the elements, each
-    `Fixed` has a field with this path for the elements in that `Fixed`, and `first` is the number of the first of these
-    elements.
+    `Fixed` has a field with this path for its own elements, and `first` is the number of the first of them.
     """
 
     path: Path
@@ -186,7 +185,7 @@ class Frame:
     trailing_bytes: int
 
     def __hash__(self) -> int:
-        """Return the hash of all parts, computed once, since tables have frames as keys and these may be large."""
+        """Return the hash of all parts, computed once, since frames are dictionary keys and may be large."""
         return self._hash
 
     @cached_property

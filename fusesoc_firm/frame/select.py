@@ -50,7 +50,7 @@ def used_part(message: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
 
 
 def _part(value: Any, leaves: Collection[Names]) -> Any:
-    """Return the part of a value that is on the paths to the leaves; all elements of an array are treated equally."""
+    """Return the part of a value on the paths to the leaves; all elements of an array are treated equally."""
     if () in leaves:
         return value
     if not isinstance(value, Mapping):

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import Fixed, Frame, Pad, all_nodes
-from fusesoc_firm.message.model import ArrayType, Definitions, MessageDefinition, MessageName, MessageType, SequenceType
+from fusesoc_firm.message.middleware import Definitions, MessageDefinition
+from fusesoc_firm.message.model import ArrayType, MessageName, MessageType, SequenceType
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class CodecError(ValueError):
 
 
 class SignallingNan(float):
-    """A signalling NaN of a float32, which conversion to a double, Python's float, would turn into a quiet NaN.
+    """A signalling NaN of a float32; conversion to a double, Python's float, would make it a quiet NaN.
 
     The value prints and calculates like any other NaN; `bits` are the bits on the wire.
     """
@@ -111,7 +111,7 @@ def put_leaf(message: dict[str, Any], path: Path, elements: Iterator[Any]) -> No
 
 
 def reject_unknown(frame: Frame, message: MessageValue) -> None:
-    """Raise `CodecError` for an unknown name, unless there are no values below that name."""
+    """Raise `CodecError` for an unknown name that contains values."""
     for names in _unknown(message, frame.names, ()):
         raise CodecError(f"{frame.message} has no field '{dotted(names)}'")
 
@@ -149,7 +149,7 @@ def check_bound(part: Data | Loop, count: int) -> None:
 
 
 def _member(value: Any, name: str) -> Any:
-    """Return the member `name`, or `_MISSING`; a missing message has no members, since it may consist of defaults."""
+    """Return the member `name`, or `_MISSING`; a missing message has no members, but its fields may have defaults."""
     if value is _MISSING or not isinstance(value, Mapping):
         return _MISSING
     return value.get(name, _MISSING)

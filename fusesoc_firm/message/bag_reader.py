@@ -31,8 +31,8 @@ from fusesoc_firm.message.joint import separate_texts
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.store.reads import in_part
 from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.tools.reads import in_part
 
 Reader = Rosbag1Reader | Rosbag2Reader
 
@@ -169,7 +169,7 @@ def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> Ba
 
 @contextmanager
 def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
-    """Open a bag for reading within the context. Raise `InputError`, with `hint` if the path is not a bag."""
+    """Open a bag for reading within the context. Raise `InputError`, with `hint` for a path that is not a bag."""
     with ExitStack() as stack:
         with _readable(path, hint):
             _check_databases(path)
@@ -195,9 +195,9 @@ def _readers(path: Path) -> list[Reader]:
 
 
 def _check_databases(path: Path) -> None:
-    """Raise `ValueError` if messages are not in a file of SQLite: not yet written to it, or cut off.
+    """Raise `ValueError` if messages are missing from an SQLite file: still in the journal, or cut off.
 
-    rosbags would miss the former, and read zeros in place of the end of the latter.
+    rosbags would miss messages in the journal, and would read zeros in place of a missing end.
     """
     for file in path.glob("*.db3") if path.is_dir() else [path]:
         journal = file.with_name(f"{file.name}-wal")
@@ -209,14 +209,14 @@ def _check_databases(path: Path) -> None:
 
 
 def _database_size(file: Path) -> int:
-    """Return the size, in bytes, that a file has according to its header (SQLite's file format, 1.3), or 0."""
+    """Return the size in bytes according to a file's header (SQLite's file format, 1.3), or 0 if it is unknown."""
     with file.open("rb") as opened:
         header = opened.read(_SQLITE_HEADER_BYTES)
     is_known = len(header) == _SQLITE_HEADER_BYTES and header.startswith(_SQLITE_MAGIC)
-    # An old writer does not update the number of pages, which the second number tells.
+    # If these numbers differ, an old writer has not updated the number of pages.
     if not is_known or header[24:28] != header[92:96]:
         return 0
-    # 65,536 does not fit, and is written as 1.
+    # 65,536 does not fit and is encoded as 1.
     page_bytes = int.from_bytes(header[16:18], "big")
     return int.from_bytes(header[28:32], "big") * (65536 if page_bytes == 1 else page_bytes)
 

@@ -1,7 +1,7 @@
 """Limit the size of messages; the definitions are checked before any further work.
 
-Because of nesting, a few lines of text can define a huge message. Real messages are far below the limits: the maxima
-among 5,900 messages are 17 levels, 1,982 fields and 6,049 bytes.
+With nesting, a few lines of text can define a huge message. Real messages are far below the limits: the maxima among
+5,900 messages are 17 levels, 1,982 fields and 6,049 bytes.
 """
 
 from __future__ import annotations
@@ -9,16 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 
-from fusesoc_firm.message.model import (
-    ArrayType,
-    Definitions,
-    FieldType,
-    MessageDefinition,
-    MessageName,
-    MessageType,
-    PrimitiveType,
-    SequenceType,
-)
+from fusesoc_firm.message.middleware import Definitions, MessageDefinition
+from fusesoc_firm.message.model import ArrayType, FieldType, MessageName, MessageType, PrimitiveType, SequenceType
 from fusesoc_firm.message.wire import WireRules
 from fusesoc_firm.text.diagnostics import fail
 

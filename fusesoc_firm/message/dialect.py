@@ -94,7 +94,7 @@ _LOWER_SNAKE = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 _LOWER_SNAKE_TEXT = "lower-case letters, digits and single '_' between them, and starts with a letter"
 _UPPER_SNAKE = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
 _UPPER_SNAKE_TEXT = "upper-case letters, digits and single '_' between them, and starts with a letter"
-# The suffixes end the names of messages that ROS 2 derives from services and actions.
+# ROS 2 adds the suffixes to the names of messages that it derives from services and actions.
 _UPPER_CAMEL = re.compile(
     r"[A-Z][A-Za-z0-9]*(?:_(?:Request|Response|Event|Goal|Result|Feedback|FeedbackMessage|SendGoal|GetResult))*"
 )

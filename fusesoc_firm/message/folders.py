@@ -59,7 +59,7 @@ def _entries(variable: str) -> list[Path]:
 
 
 def _walk(folder: Path, suffixes: Collection[str]) -> Iterator[Path]:
-    """Yield the files in a fixed order. Links are followed, since workspaces contain links; cycles of links are not."""
+    """Yield the files in a fixed order. Links are followed, since workspaces contain links, except in cycles."""
     seen: set[str] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
         real = os.path.realpath(parent)
@@ -78,7 +78,7 @@ def _package_name(parent: Path, folder: Path) -> str:
     """
     # If the user names the `msg` folder itself, the package is still the folder above.
     top = folder.resolve().parent if folder.resolve().name in _KINDS else folder.resolve()
-    # Links are kept (a linked package is named after its link), but `..` is resolved, or the walk would miss `top`.
+    # A linked package has the name of its link, so links are kept; `..` is resolved, or the walk would miss `top`.
     start = Path(os.path.abspath(parent))  # noqa: PTH100
     for candidate in (start, *start.parents):
         if name := _declared_name(candidate / "package.xml"):

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 from graphlib import CycleError, TopologicalSorter
 
 from fusesoc_firm.message.bounds import check_extents
-from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import Definitions, MessageName, nested_message
+from fusesoc_firm.message.middleware import Definitions, Middleware
+from fusesoc_firm.message.model import MessageName, nested_message
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.signature import signature

@@ -1,7 +1,7 @@
 """Find definitions: first in the user's folders, then in a sourced ROS, then in the distributions of rosbags.
 
-A library reads and parses each definition once, on request. The library itself reads no environment variables, so that
-equal arguments and files always result in equal definitions.
+A library reads and parses each definition once, on request. It reads no environment variables, so equal arguments and
+files always result in equal definitions.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from pathlib import Path
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files
-from fusesoc_firm.message.middleware import Middleware, known_suffixes, middlewares
-from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, nested_message
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware, known_suffixes, middlewares
+from fusesoc_firm.message.model import InterfaceKind, MessageName, nested_message
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.services import EVENT_INFO, Interface
 from fusesoc_firm.message.unsupported import unsupported_word
-from fusesoc_firm.store.reads import Input, Part
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.text.files import read_regular
+from fusesoc_firm.tools.reads import Input, Part
 
-# The means by which users name additional sources.
+# The hint about additional sources.
 _FURTHER = "; add places with 'paths' in the specification or core, or with --path"
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
@@ -35,7 +35,7 @@ _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 class _Source:
     """The files that define a message, which must be equal, and the service or action that they define, if any.
 
-    If the source is a bag, `texts` holds the bag's definitions of the message, which must be equivalent.
+    For a bag, `texts` holds its definitions of the message, which must be equivalent.
     """
 
     paths: tuple[Path, ...]
@@ -144,7 +144,7 @@ class MessageLibrary:
         return closure
 
     def origin(self, name: MessageName) -> str:
-        """Return a text for users that names the file or the distribution that defines a known message."""
+        """Return a text for users that names the file or distribution with a known message's definition."""
         return str(self._sources[name].paths[0]) if name in self._sources else self._store.title
 
     def content(self, name: MessageName) -> bytes:
@@ -156,7 +156,7 @@ class MessageLibrary:
     def files(self, names: Iterable[MessageName]) -> list[Input]:
         """Return the files of these messages, sorted by message name; messages in a distribution have no files.
 
-        For a bag, the result contains only the part that defines the message.
+        For a bag, the result contains only the part with the message's definition.
         """
         known = [(name, self._sources[name]) for name in sorted(set(names)) if name in self._sources]
         found = [_part(name, source) if source.texts else source.paths[0] for name, source in known]
@@ -164,7 +164,7 @@ class MessageLibrary:
 
     @cached_property
     def _has_events(self) -> bool:
-        # Read only for services, since loading the distribution takes time, and ROS 1 messages do not need it.
+        # Only services read this, since loading the distribution takes time; ROS 1 does not need it.
         return self.ros is ROS2 and (EVENT_INFO in self._messages or EVENT_INFO in self._store.names)
 
     def _is_message(self, name: MessageName) -> bool:

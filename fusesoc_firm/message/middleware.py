@@ -1,4 +1,4 @@
-"""The interface of a middleware: the sources of its messages, and their serialisation rules.
+"""The interface of a middleware: the sources of its messages, their definitions, and their serialisation rules.
 
 A middleware consists of a module with one `Middleware` value, and of the line in `message/__init__.py` that registers
 the value. docs/how-to/add-a-middleware.md explains how to add one.
@@ -12,9 +12,25 @@ from pathlib import Path
 from typing import Protocol
 
 from fusesoc_firm.message.dialect import Dialect
-from fusesoc_firm.message.model import Definitions, InterfaceKind, MessageDefinition, MessageName
+from fusesoc_firm.message.model import Constant, Field, InterfaceKind, MessageName
 from fusesoc_firm.message.wire import WireRules
-from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+
+
+@dataclass(frozen=True)
+class MessageDefinition:
+    """The definition of a message in a `.msg` file or, depending on `kind`, derived from a `.srv` or `.action` file."""
+
+    name: MessageName
+    ros: Middleware
+    fields: tuple[Field, ...]
+    constants: tuple[Constant, ...]
+    source: SourceRef
+    kind: InterfaceKind = InterfaceKind.MESSAGE
+
+
+Definitions = Mapping[MessageName, MessageDefinition]
+"""The definitions of a message and of all nested messages, by name."""
 
 
 class Store(Protocol):
@@ -43,7 +59,7 @@ class Parse(Protocol):
 
 
 class Signature(Protocol):
-    """A function that computes a text that is equal at both ends of a topic if both ends use the same message."""
+    """A function that computes a text for comparison at both ends of a topic; equal messages have equal texts."""
 
     def __call__(
         self,

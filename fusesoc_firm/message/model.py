@@ -1,20 +1,15 @@
-"""The message model, the first stage: definitions as their authors wrote them.
+"""The message model, the first stage: fields and constants as their authors wrote them.
 
-This module knows neither the wire layout (`frame`) nor the hardware (`converter`). All values are frozen, so a
-definition can be a dictionary key and can be shared.
+This module knows neither the wire layout (`frame`) nor the hardware (`converter`). All values are frozen, so they
+can be dictionary keys and can be shared. `middleware.py` adds the definition that consists of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from fusesoc_firm.text.diagnostics import SourceRef
-
-if TYPE_CHECKING:
-    from fusesoc_firm.message.middleware import Middleware
 
 
 class InterfaceKind(StrEnum):
@@ -131,19 +126,3 @@ class Constant:
     value: Scalar
     text: str
     source: SourceRef
-
-
-@dataclass(frozen=True)
-class MessageDefinition:
-    """The definition in a `.msg` file or, depending on `kind`, of a message derived from a `.srv` or `.action` file."""
-
-    name: MessageName
-    ros: Middleware
-    fields: tuple[Field, ...]
-    constants: tuple[Constant, ...]
-    source: SourceRef
-    kind: InterfaceKind = InterfaceKind.MESSAGE
-
-
-Definitions = Mapping[MessageName, MessageDefinition]
-"""The definitions of a message and of all nested messages, by name."""

@@ -17,7 +17,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from fusesoc_firm.message.dialect import LARGEST_SIZE, Dialect, NameRule
-from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     Constant,
@@ -26,7 +26,6 @@ from fusesoc_firm.message.model import (
     Field,
     FieldType,
     InterfaceKind,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,
@@ -49,7 +48,7 @@ def parse_name(text: str) -> MessageName:
 
 
 def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
-    """Parse a name like `parse_name`, and also return the kind that the text names, or None."""
+    """Parse a name like `parse_name`, and also return the kind in the text, or None."""
     match = _NAME.fullmatch(text.strip())
     if match is None:
         fail(f"'{text}' is not a message name", hint="write 'package/Type', such as 'geometry_msgs/Quaternion'")

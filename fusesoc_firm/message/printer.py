@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fusesoc_firm.message import ROS1
-from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import Constant, DefaultValue, Definitions, MessageDefinition, MessageName, Scalar
+from fusesoc_firm.message.middleware import Definitions, MessageDefinition, Middleware
+from fusesoc_firm.message.model import Constant, DefaultValue, MessageName, Scalar
 
 # The line between a message and its nested messages in ROS's bags and connection headers.
 _SEPARATOR = "=" * 80

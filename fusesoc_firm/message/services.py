@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from fusesoc_firm.message import ROS1
-from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
+from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.message.parser import action_names, parse_message, parse_sections, service_names
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# ROS 2 has had service events and hashes since Iron, the distribution that introduced this message.
+# ROS 2 introduced this message, service events and hashes in Iron.
 EVENT_INFO = MessageName("service_msgs", "ServiceEventInfo")
 
 # The suffix of a derived message and its text; `{0}` is the name of the service or action.

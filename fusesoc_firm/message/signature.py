@@ -14,9 +14,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from fusesoc_firm.message.middleware import Definitions
 from fusesoc_firm.message.model import (
     ArrayType,
-    Definitions,
     FieldType,
     InterfaceKind,
     MessageName,

@@ -1,4 +1,4 @@
-"""The definitions in rosbags, which cover every ROS distribution, so that common messages do not require ROS."""
+"""The definitions in rosbags for every ROS distribution, so that common messages do not require ROS."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fusesoc_firm.text.diagnostics import fail, nearest
 # The newest distributions with long-term support that the round-trip tests use.
 _DEFAULTS = {1: "noetic", 2: "jazzy"}
 _TRANSFORMS = "geometry_msgs/TransformStamped[] transforms\n"
-# Messages of tf2 and tf, which most bags contain but the tables of rosbags do not.
+# Messages of tf2 and tf, which most bags contain but which are missing from the tables of rosbags.
 _ADDED = {
     1: {
         MessageName("tf2_msgs", "TFMessage"): _TRANSFORMS,

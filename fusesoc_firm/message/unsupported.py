@@ -87,7 +87,7 @@ FEATURES = (
 
 
 def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
-    """Return the feature that a line (without its comment) uses, and the part of the line that uses it."""
+    """Return the unsupported feature in a line (without its comment), and the part of the line that uses it."""
     for feature in FEATURES:
         if match := feature.form.match(code.text):
             return feature, code.part(0, match.end())

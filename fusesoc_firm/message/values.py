@@ -161,7 +161,7 @@ def _string(text: str, kind: StringType, dialect: Dialect) -> str:
 
 
 def _unquoted(text: str) -> str:
-    """Return a text without surrounding quotes; a text that is not quoted at both ends is unchanged."""
+    """Return a text without surrounding quotes; a text without quotes at both ends is unchanged."""
     for quote in _QUOTES:
         if text.startswith(quote) and text.endswith(quote):
             inner = text[1:-1]

@@ -54,10 +54,10 @@ WIDE_CHARACTER = WireType("wide character", 4, "I")
 class WireRules:
     """The layout rules of a serialisation.
 
-    `scalars` maps each primitive with one value to its wire type; `compounds` lists the named parts of a primitive that
-    is sent as several values (ROS 1's `time`). `max_alignment` is 1 if values are not aligned; positions for alignment
-    count from the end of `prefix`. `empty_bytes` is the serialised form of a message without fields.
-    `string_terminator` is the number of zeros that end a string and are included in the count (a wstring has none).
+    `scalars` maps each primitive with one value to its wire type; `compounds` lists the named parts of a primitive with
+    several values (ROS 1's `time`). `max_alignment` is 1 if values are not aligned; positions for alignment count from
+    the end of `prefix`. `empty_bytes` is the serialised form of a message without fields. `string_terminator` is the
+    number of zeros that end a string; the count includes them (a wstring has none).
     """
 
     scalars: MappingProxyType[str, WireType]

@@ -99,7 +99,7 @@ def _correct_rotation(gate: Instance, drivers: Mapping[int, Instance]) -> None:
 def _correct_comparison(gate: Instance, drivers: Mapping[int, Instance], numbers: Iterator[int]) -> Instance | None:
     """Compare the vector before its extension with a new constant, which is returned, or make the result constant.
 
-    `numbers` are those of new nets.
+    `numbers` are the numbers of new nets.
     """
     for index in (0, 1):
         number, lengthened = _driver(gate, index, drivers), _driver(gate, 1 - index, drivers)

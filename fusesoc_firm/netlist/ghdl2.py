@@ -1,11 +1,11 @@
-"""Whether the installed GHDL has the faults of GHDL 2's synthesis that GHDL 3.0 no longer has.
+"""The faults in GHDL 2's synthesis that GHDL 3.0 corrects, and whether the installed GHDL has them.
 
 * A constant of 64, 96, ... bits becomes zero if only its highest 32 bits are not zero (`lost_constants.py`).
-* A constant for a whole signal is taken apart from the wrong end if another branch assigns parts of the signal
+* A constant for a whole signal is split from the wrong end if another branch assigns parts of the signal
   (`corrections.doubts`).
 * An assignment to some bits of a signal is lost, or GHDL crashes, if a table grows during it (`padding.py`).
 
-All other faults that this room corrects are in each version that was tried: 2.0.0, 3.0.0, 4.1.0, 5.0.1 and 6.0.0.
+All other corrected faults are in each tested version: 2.0.0, 3.0.0, 4.1.0, 5.0.1 and 6.0.0.
 """
 
 from __future__ import annotations

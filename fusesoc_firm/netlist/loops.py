@@ -1,9 +1,9 @@
 """Finds combinational loops in a netlist: bits that depend on themselves without a register in between.
 
-Simulators rarely notice a loop; FPGA tools refuse it. The search is exact to the bit for everything that moves bits. An
+Simulators rarely notice a loop; FPGA tools refuse it. The search is bit-exact for gates that only move bits. An
 arithmetic result depends on the operands' bits up to its own, and any other result on all bits of its operands. Every
-module is searched once: its parent sees only which of its outputs depend on which of its inputs. A module without VHDL
-is taken as registered.
+module is searched once; its parent uses only the dependencies of outputs on inputs. A module without VHDL counts as
+registered.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _REGISTERED = frozenset(
     }
 )
 
-# A set of bits can have thousands of ports; the shortest loop through one of these is short enough to report.
+# A set of bits can have thousands of ports; the search for the shortest loop starts from this many of them.
 _CANDIDATES = 32
 
 # For each bit of each output of a module: the module's input bits on which it depends, as the bits of a number.
@@ -58,7 +58,7 @@ def loops(modules: Modules) -> list[str]:
 
 
 class _Search:
-    """Searches modules, each once and after those that it instantiates."""
+    """A search of modules, each once and after the modules that it instantiates."""
 
     def __init__(self, modules: Modules) -> None:
         self.modules: Final = modules
@@ -86,7 +86,7 @@ class _Step:
 
 
 class _Bits:
-    """The bits of a module's nets: a number for each, and the bits on which it depends."""
+    """The bits of a module's nets: each has a number, and the bits on which it depends."""
 
     def __init__(self, module: Module, search: _Search) -> None:
         self.module: Final = module
@@ -228,7 +228,7 @@ class _Bits:
                 yield min(found, key=lambda loop: (len([*_of_instances(loop)]), len(loop)))
 
     def _loop(self, start: int, inside: set[int]) -> list[_Step]:
-        """The shortest way from a bit back to itself, from each bit to one on which it depends."""
+        """The shortest path from a bit back to itself, from each bit to one on which it depends."""
         reader: dict[int, int] = {}
         ahead = deque([start])
         while start not in reader:

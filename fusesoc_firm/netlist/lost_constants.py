@@ -1,4 +1,4 @@
-"""Find constants that GHDL 2.0 turns into zero: 64, 96, ... bits wide, with bits set only in the highest 32.
+"""Find constants that GHDL 2.0 replaces with zero: 64, 96, ... bits wide, with bits set only in the highest 32.
 
 In the netlist, a lost constant looks like any other zero. If the netlist contains a zero of one of these widths, a copy
 of the sources with probes is therefore synthesised; a probe is a function that reports the value of a constant

@@ -56,7 +56,7 @@ class Instance:
 
     @property
     def is_gate(self) -> bool:
-        """Whether it is a gate, and not an instance of a module."""
+        """True for a gate, False for an instance of a module."""
         return self.kind.startswith("$")
 
     @property
@@ -89,7 +89,7 @@ class Module:
     arguments: Sequence[Net] = ()
 
     def first_unused(self) -> int:
-        """Return the first of the numbers that no net has."""
+        """Return the first unused net number."""
         driven = (net.number for instance in self.instances for net in instance.outputs)
         return 1 + max(chain(driven, (net.number for net in self.arguments)), default=0)
 

@@ -16,7 +16,7 @@ _BEGIN = "begin"
 
 @dataclass(frozen=True)
 class Padding:
-    """A number of assignments in the architecture of `unit`; the signal is unused, so no gates are left of them."""
+    """A number of assignments in the architecture of `unit`; the unused signal results in no gates."""
 
     unit: str
     assignments: int

@@ -1,4 +1,4 @@
-"""The VHDL functions of the probes for constants that GHDL 2.0 turns into zero (`lost_constants.py`).
+"""The VHDL functions of the probes for constants that GHDL 2.0 replaces with zero (`lost_constants.py`).
 
 A function returns its argument, and reports its highest bits if GHDL would lose it.
 """

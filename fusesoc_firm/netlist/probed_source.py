@@ -59,7 +59,7 @@ _OF_ZEROS = re.compile(r"""(?:'0'|[xb]?"[0_]*"|\b(?:others|downto|to|\d+)\b|[\s(
 class Probe:
     """A text that replaces a part of a file; `constant` is the span of the examined expression, if any.
 
-    If GHDL rejects the text, the first text in `others` takes its place.
+    If GHDL rejects the text, the first text in `others` replaces it.
     """
 
     start: int
@@ -203,7 +203,7 @@ class Source:
         return self._seen(start, end) if "&" in self.code[start:end] else None
 
     def _associated(self, scalars: Collection[str]) -> Iterator[Probe]:
-        """Yield the probes of actual and default values of ports and generics, each on a line of its own."""
+        """Yield the probes of actual and default values of ports and generics, each on a separate line."""
         lost = {position for position, _ in self.literals()}
         for begin, start, end in chain(self._actuals(), self._defaults()):
             value = self._with_literals[start:end]

@@ -1,4 +1,4 @@
-"""Put constants that GHDL 2.0 turns into zero back into the netlist where an instance's port reads them.
+"""Restore in the netlist constants that GHDL 2.0 replaces with zero, where an instance's port reads them.
 
 There, the netlist shows where the constant belongs: the instance has the place of its label, and its input reads the
 zero directly. GHDL computes the constant's value (`lost_constants.py`).
@@ -21,7 +21,7 @@ Actual = tuple[str, int]
 def restore(
     modules: Modules, sources: Mapping[str, Source], values: Mapping[Actual, Collection[str]]
 ) -> dict[Actual, int]:
-    """Restore constants in place; return 0 for those that are right now, and the width of the others.
+    """Restore constants in place; return 0 for constants that are now correct, and the width of the others.
 
     `values` has the levels of the highest bits of each constant whose other bits are equal, and of one other bit; it
     has no levels for another constant. If a constant has several values, which depend on generics or a loop, the

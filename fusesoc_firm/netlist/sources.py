@@ -232,7 +232,7 @@ class Copies:
         return "".join([*parts, text[last:]]), added
 
     def _changes(self, code: str) -> Iterator[tuple[int, int, str]]:
-        """Yield the start and the end of each part of the code to replace, and what replaces it."""
+        """Yield the start and the end of each part of the code to replace, and the new text."""
         if self.has_numbers:
             for place in _FULL_NAME.finditer(code):
                 yield place.start(), place.end(), " " * len(place[0])

@@ -161,7 +161,7 @@ def find_loops(translation: Translation, folder: Path) -> list[str]:
 
 
 def _padded(made: Callable[[_Ghdl], _T], translation: Translation, folder: Path) -> _T:
-    """Return what is made with GHDL; if a growing table makes GHDL crash, repeat it with other paddings."""
+    """Return the result of `made`; if a growing table makes GHDL crash, retry with other paddings."""
     crash: GrownTableError | None = None
     for assignments in _PADDINGS:
         try:
@@ -237,7 +237,7 @@ class _Ghdl:
         return self.copies.original(printed), self.copies.original(said)
 
     def check_constants(self, modules: Modules) -> str:
-        """Restore constants that GHDL turns into zero; return a warning if GHDL cannot evaluate the constants.
+        """Restore constants that GHDL replaces with zero; return a warning if GHDL cannot evaluate the constants.
 
         Raise `NetlistError` if some cannot be restored.
         """

@@ -1,4 +1,4 @@
-"""Find what a board under Linux lacks for a node with AXI DMA, in the order in which it is to be mended.
+"""Find missing requirements of a node with AXI DMA on a board under Linux, in the order of repair.
 
     for finding in examine(Path("/")):
         print(finding.subject, finding.fault or "in order", finding.remedy)
@@ -207,7 +207,7 @@ def _number(path: Path) -> int:
 
 
 def _text(path: Path) -> str:
-    """Return a file's text without white space at the end, or nothing if it cannot be read."""
+    """Return a file's text without white space at the end, or "" if it cannot be read."""
     try:
         return path.read_text(encoding="utf-8", errors="replace").strip()
     except OSError:

@@ -7,7 +7,7 @@ A message waits in its subscriber's queue (section 6.3.3: one queue per subscrib
 two subscribers of an action share one, which loses only feedback) and is sent as a frame. If no message waits and the
 hardware is ready, the thread that takes the message sends it. The response returns as bursts, which are joined. If
 software is part of the system, the thread that delivers a message calls the software's functions. While a function
-runs, the node takes no burst from the hardware; the hardware stalls as with any accelerator that is not ready. A
+runs, the node accepts no burst; back-pressure stalls the hardware, as with any accelerator that is not ready. A
 function's output never waits for space in a queue, since this could cause a deadlock: if the output's queue to the
 hardware is full, a message is dropped and counted.
 """
@@ -22,24 +22,25 @@ from functools import partial
 from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.actions import NodeActions
-from fusesoc_firm.node.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
-from fusesoc_firm.node.calls import NodeCalls
-from fusesoc_firm.node.carrier import Answered, Called, Carrier, CarrierError, Event, Lost, Published, Taken
-from fusesoc_firm.node.description import (
+from fusesoc_firm.node.actions.actions import NodeActions
+from fusesoc_firm.node.engine.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
+from fusesoc_firm.node.engine.calls import NodeCalls
+from fusesoc_firm.node.engine.carrier import Answered, Called, Carrier, CarrierError, Event, Lost, Published, Taken
+from fusesoc_firm.node.engine.queues import ClosedError, Overflow, SubscriberQueues
+from fusesoc_firm.node.engine.software import NodeSoftware
+from fusesoc_firm.node.engine.trace import Entry, Trace
+from fusesoc_firm.node.engine.watch import Latency, Load, Watch
+from fusesoc_firm.node.interface.description import (
     Crossing,
     NodeDescription,
     channel_names,
     converter_names,
 )
-from fusesoc_firm.node.diagnostics import INTERVAL_SECONDS, READING_SECONDS, Report
-from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
-from fusesoc_firm.node.software import NodeSoftware
+from fusesoc_firm.node.interface.diagnostics import INTERVAL_SECONDS, READING_SECONDS, Report
+from fusesoc_firm.node.interface.topics import DEFAULT_DEPTH, NodeTopic
 from fusesoc_firm.node.statistics import Statistics
-from fusesoc_firm.node.status import StatusWatch
-from fusesoc_firm.node.status_exchange import ANSWER_SECONDS, NO_ANSWER, StatusExchange
-from fusesoc_firm.node.topics import DEFAULT_DEPTH, NodeTopic
-from fusesoc_firm.node.trace import Entry, Trace
+from fusesoc_firm.node.status.status import StatusWatch
+from fusesoc_firm.node.status.status_exchange import ANSWER_SECONDS, NO_ANSWER, StatusExchange
 from fusesoc_firm.node.transport.status_registers import StatusRegisters
 from fusesoc_firm.node.transport.transport import (
     Burst,
@@ -48,7 +49,6 @@ from fusesoc_firm.node.transport.transport import (
     TransportError,
     TransportResetError,
 )
-from fusesoc_firm.node.watch import Latency, Load, Watch
 from fusesoc_firm.system.status_frames import answered, read_request
 
 # The interval at which waiting threads check whether to end.
@@ -63,7 +63,7 @@ class HardwareListener(Protocol):
     """The receiver of a transport's events other than bursts; any thread may call its methods."""
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
-        """Handle the event that simulated hardware took the next sent frame in these cycles of clk."""
+        """Handle the transfer of the next sent frame to simulated hardware in these cycles of clk."""
 
     def refused(self, converter: int | None) -> None:
         """Handle a fault from the hardware: of a converter, numbered as in `frame_error`, or in a frame's id (None)."""
@@ -74,7 +74,7 @@ class HardwareListener(Protocol):
     def waited(self, first: int, cycle: int, counts: Sequence[int]) -> None:
         """Handle these counts, from the cycle `first` to the one before `cycle`.
 
-        See `Waits` of `node/transport/simulator.py`.
+        See `Waits` in `node/transport/simulator.py`.
         """
 
 
@@ -148,7 +148,7 @@ class Node:
         self._open_transport = open_transport
         self._settings = settings
         self._software = software
-        # The trace knows which message caused which.
+        # The trace determines the cause of each message.
         self._trace = trace or (Trace(None, description) if settings.watch else None)
         self._watch = settings.watch
         self._inputs = description.inputs
@@ -211,7 +211,7 @@ class Node:
         latest = time.monotonic() + (self._settings.drain if is_whole else 0.0)
         self._actions.give_up(_left(latest))
         if isinstance(self._fault, TransportError):
-            # Nobody sends any more, so what waits for room in a queue would wait until the limit.
+            # Without a sender, a message that waits for room in a queue would wait until the limit.
             self._queues.close()
         for carrier in carriers.values():
             carrier.stop()
@@ -236,7 +236,7 @@ class Node:
         self._is_wanted_to_end.set()
 
     def close(self) -> None:
-        """Close the transport and the queues, so that nothing waits for either; a second call does nothing."""
+        """Close the transport and the queues, which wakes all waiting threads; a second call does nothing."""
         self._is_over.set()
         self._hardware.transport.close()
         self._queues.close()
@@ -244,7 +244,7 @@ class Node:
     def access_status(self, request: bytes, seconds: float = ANSWER_SECONDS) -> bytes:
         """Return the answer of the hardware's status to a request; any thread may call this method.
 
-        Raise `TransportError` if there is none after some seconds.
+        Raise `TransportError` after this time without an answer.
         """
         if self._settings.registers:
             return self._settings.registers.access(request)
@@ -269,7 +269,7 @@ class Node:
         def guarded() -> None:
             try:
                 work()
-            except BaseException as error:  # noqa: BLE001 - the run would wait for what the thread no longer does
+            except BaseException as error:  # noqa: BLE001 - the run would wait forever for the ended thread
                 self._fail(error)
 
         thread = threading.Thread(target=guarded, daemon=True)
@@ -344,7 +344,7 @@ class Node:
             self._take_message(event)
 
     def _note_lost(self, event: Lost) -> None:
-        # The messages of actions have no input of their own.
+        # The messages of actions have no separate input.
         topic = self._description.taken_topics[event.topic]
         self.statistics.inputs[topic.block].lost += event.count
 
@@ -356,9 +356,9 @@ class Node:
         self._put_own(block, payload, None)
 
     def _put_own(self, block: str, payload: bytes, timeout: float | None) -> None:
-        """Add a message that the node or its software makes to a queue; without hardware to take it, it is dropped.
+        """Add a message from the node or its software to a queue; without hardware, the message is dropped.
 
-        The thread goes on, as it may still have messages to publish.
+        The thread continues, since it may still have messages to publish.
         """
         number = self._numbers[block]
         try:
@@ -390,7 +390,7 @@ class Node:
             self._decline(number)
 
     def _decline(self, number: int) -> None:
-        """Count a message that no queue took, and that no other thread counts."""
+        """Count a message that no queue accepted and no other thread counts."""
         with self._lock:
             self.statistics.inputs[self._inputs[number].block].dropped += 1
             self._declined += 1
@@ -490,7 +490,7 @@ class Node:
                 self._actions.rest()
 
     def _is_at_rest(self, hardware: _Hardware) -> bool:
-        """Return whether all messages have been processed, as far as the transport can know."""
+        """Return whether all messages have been processed, as far as the transport can determine."""
         if self._waiting() or hardware.joiner.unfinished or not (self._calls.is_idle and self._actions.is_idle):
             return False
         is_silent = time.monotonic() - self._last_traffic > self._settings.settle
@@ -526,7 +526,7 @@ class Node:
             self._watch.granted(block, burst.first_cycle, burst.last_cycle)
 
     def _refuse_call(self, burst: Burst, reason: str) -> None:
-        """Let the call fail whose response had a fault, if the burst belongs to a response."""
+        """Fail the call with a faulty response, if the burst belongs to a response."""
         block = self._publisher_names.get(burst.data[0]) if burst.data else None
         if block is not None:
             self._refuse(block, reason)
@@ -575,7 +575,7 @@ class Node:
     # --- reports from the hardware ---------------------------------------------------------------------------------
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
-        """Record that simulated hardware took the next sent frame; any thread may call this method."""
+        """Record that simulated hardware accepted the next sent frame; any thread may call this method."""
         if self._trace:
             self._trace.taken(first_cycle, last_cycle)
 
@@ -595,7 +595,7 @@ class Node:
             )
 
     def wants_waits(self) -> bool:
-        """Return whether somebody watches the run; any thread may call this method."""
+        """Return whether the run is watched; any thread may call this method."""
         return self._watch is not None and self._watch.is_watched()
 
     def waited(self, first: int, cycle: int, counts: Sequence[int]) -> None:
@@ -624,7 +624,7 @@ class Node:
             return True
 
     def _forget(self, transport: Transport, why: str) -> None:
-        """Continue with hardware that was reset, and forget all messages that the hardware held."""
+        """Continue with hardware after a reset, and discard all messages in the hardware."""
         self._report(f"{why}; the hardware is restarted, and the messages in it are lost")
         self.statistics.restarts += 1
         if self._trace:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.interface.description import NodeDescription
 from fusesoc_firm.node.node import HardwareListener, OpenTransport
-from fusesoc_firm.node.status import check_digest
+from fusesoc_firm.node.status.status import check_digest
+from fusesoc_firm.node.transport.built_simulator import BuiltSimulator
 from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import (
     ErrorPulse,
@@ -20,7 +21,6 @@ from fusesoc_firm.node.transport.simulator import (
 )
 from fusesoc_firm.node.transport.status_registers import StatusRegisters, open_registers_at
 from fusesoc_firm.node.transport.transport import Transport, TransportError
-from fusesoc_firm.simulation.simulator import BuiltSimulator
 
 # After this many cycles without a beat, the simulation runs only at intervals. These suffice for accelerators that send
 # spontaneously or compute for longer. A simulation that never sleeps would use the processor time that an arriving
@@ -43,7 +43,7 @@ def at_address(address: str) -> OpenTransport:
 
 
 def status_registers(description: NodeDescription, address: str, transport: str) -> StatusRegisters | None:
-    """Return the registers of the hardware's status, unless frames read it, it has none, or it is a simulator's.
+    """Return the registers of the hardware's status, or None if frames read it, it is missing, or it is a simulator's.
 
     `address` is that of the registers; if it is empty, the overlay's device is searched. `transport` is the address of
     the transport, empty for a simulator. May raise `TransportError`.
@@ -95,7 +95,7 @@ def _checked_by_frames(open_transport: OpenTransport, description: NodeDescripti
 
 
 class _LateListener:
-    """A listener that is not told of the frames that read the digest."""
+    """A listener that ignores the frames that read the digest."""
 
     def __init__(self, listener: HardwareListener) -> None:
         self._listener = listener

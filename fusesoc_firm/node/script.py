@@ -7,11 +7,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fusesoc_firm.node.description import NodeDescription
-from fusesoc_firm.node.options import ROS_ARGUMENTS, add_node_options, remappings
-from fusesoc_firm.node.parameters import PARAMETERS, option_words, parameters_of
+from fusesoc_firm.node.interface.description import NodeDescription
+from fusesoc_firm.node.interface.options import ROS_ARGUMENTS, add_node_options, remappings
+from fusesoc_firm.node.interface.parameters import PARAMETERS, option_words, parameters_of
+from fusesoc_firm.node.live_run import run_node, run_options
 from fusesoc_firm.node.reopening import at_address
-from fusesoc_firm.node.run import run_node, run_options
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.interrupts import accept_interrupts

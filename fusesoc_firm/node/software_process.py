@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from fusesoc_firm.accelerator.functions import Functions, Message, importable_sources
 from fusesoc_firm.frame.codec import CodecError, decode, pack_frame
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
-from fusesoc_firm.simulation.functions import Functions, Message, importable_sources
 from fusesoc_firm.system.derived.model import DerivedSystem, End, Topic
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.diagnostics import InputError, fail

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 
-from fusesoc_firm.node.action_end import GoalCounts
-from fusesoc_firm.node.calls import CallCounts
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.actions.action_end import GoalCounts
+from fusesoc_firm.node.engine.calls import CallCounts
+from fusesoc_firm.node.interface.description import NodeDescription
 
 
 @dataclass

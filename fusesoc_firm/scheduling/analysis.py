@@ -9,7 +9,6 @@ from math import floor, inf
 
 from fusesoc_firm.scheduling import area, response
 from fusesoc_firm.scheduling.area import Areas
-from fusesoc_firm.scheduling.dissertation import dissertation
 from fusesoc_firm.scheduling.policies import POLICIES, TABLE_ORDER, Order
 from fusesoc_firm.scheduling.response import Overheads
 from fusesoc_firm.scheduling.tasks import Task
@@ -137,14 +136,9 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
 def luts(policy: str, requesters: int) -> int | None:
     """Return the LUTs of a scheduler, plus the Manager's LUTs for bursts if the scheduler is preemptive.
 
-    The values are measured. Without a measurement, the value is from the dissertation's table 4.1 and does not include
-    bursts. The result is None if both values are missing.
+    The values are measured. The result is None if one is missing.
     """
     measured = area.measured()
-    if not measured:
-        areas = dissertation().area.get(policy, {})
-        known = {number: lut for number, (lut, _) in areas.items() if number >= requesters}
-        return int(known[min(known)]) if known else None
     scheduler = area.at(measured, policy, requesters)
     bursts = _burst_luts(measured, requesters) if POLICIES[policy].is_preemptive else 0
     return None if scheduler is None or bursts is None else scheduler.lut + bursts
@@ -324,10 +318,7 @@ def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float, na
 def _lut_words(analysis: Analysis) -> str:
     if analysis.lut is None:
         return "needs an unknown number of LUTs"
-    if not area.measured():
-        source = "from the dissertation's table 4.1"
-    else:
-        source = "measured, with the Manager's bursts" if POLICIES[analysis.policy].is_preemptive else "measured"
+    source = "measured, with the Manager's bursts" if POLICIES[analysis.policy].is_preemptive else "measured"
     return f"needs the fewest LUTs of these policies, {analysis.lut} ({source})"
 
 

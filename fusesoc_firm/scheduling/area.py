@@ -8,13 +8,11 @@ all other designs and numbers of requesters are unknown.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from pathlib import Path
 
-COLUMNS = ("design", "requesters", "lut", "ff")
 FILE = "area.csv"
 MANAGER = "manager"
 MANAGER_PREEMPTIVE = "manager_preemptive"
@@ -46,13 +44,6 @@ def read(text: str) -> dict[tuple[str, int], Area]:
     """Return the areas in the text of a CSV file, by design and number of requesters."""
     rows = csv.DictReader(text.splitlines())
     return {(row["design"], int(row["requesters"])): Area(int(row["lut"]), int(row["ff"])) for row in rows}
-
-
-def write(path: Path, areas: Areas) -> None:
-    """Write the measured areas to a CSV file, sorted by design and number of requesters."""
-    lines: Iterable[tuple[object, ...]] = ((*key, area.lut, area.ff) for key, area in sorted(areas.items()))
-    text = "\n".join(",".join(map(str, line)) for line in (COLUMNS, *lines))
-    path.write_text(f"{text}\n", encoding="utf-8")
 
 
 def at(areas: Areas, design: str, requesters: int) -> Area | None:

@@ -1,7 +1,6 @@
 """The scheduling policies, each with a row here, a model in `models` and a core in cores/sched.
 
-`make policies` writes the cores' lists of policies (tests/cores/policies.py). docs/scheduling.md explains how to add a
-policy.
+`make policies` writes the cores' lists of policies (tools/policies).
 """
 
 from __future__ import annotations

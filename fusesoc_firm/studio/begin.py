@@ -1,4 +1,4 @@
-"""A new project from the page, as `firm init` makes it, in a folder below the one that is open."""
+"""A new project from the page, as `firm init` creates it, in a subfolder of the open folder."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Begin:
 
 
 def _project(body: Mapping[str, Any]) -> Project:
-    """Return the project that a request describes; raise 400 for answers that no form has."""
+    """Return the project that a request describes; raise 400 for answers that the form does not offer."""
     return Project(
         str(body.get("name", "")),
         str(body.get("in", "")),

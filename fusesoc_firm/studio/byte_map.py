@@ -1,4 +1,4 @@
-"""The bytes of a message's frame in wire order, as far as their places are the same in every message."""
+"""The bytes of a message's frame in wire order, with their offsets where these are constant."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fusesoc_firm.frame.model import (
 
 @dataclass(frozen=True)
 class Part:
-    """Successive bytes with one meaning: `size` bytes from `offset`, or None where that differs between messages.
+    """Successive bytes with one meaning: `size` bytes from `offset`, or None where these differ between messages.
 
     `depth` counts the arrays of messages or texts whose elements repeat the part. Padding has no `name`.
     """
@@ -44,7 +44,7 @@ def byte_map(frame: Frame, id_bytes: int) -> list[Part]:
 
 
 class _Walk:
-    """A way through the nodes of a frame; `offset` is the next byte's place, or None after a variable part."""
+    """A traversal of the nodes of a frame; `offset` is that of the next byte, or None after a variable part."""
 
     def __init__(self, offset: int, prefix: int) -> None:
         self.offset: int | None = offset

@@ -1,4 +1,4 @@
-"""A specification that is open in the page: its text, which follows the file, and the way back from each edit."""
+"""A specification that is open in the page: its text, which follows the file, and the history of its edits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_STEPS = 1000
 
 
 class Document:
-    """A file and the texts that it had; the file stays the truth, so a change by another program ends the way back."""
+    """A file and its former texts; a change of the file by another program clears the history."""
 
     def __init__(self, path: Path) -> None:
         """Read the file; raise `InputError` if that is not possible."""
@@ -34,21 +34,21 @@ class Document:
 
     @property
     def version(self) -> str:
-        """The name of the text, which changes with it."""
+        """The version of the text: a digest."""
         return hashlib.sha256(self.text.encode()).hexdigest()[:16]
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is an edit to undo."""
+        """Whether an edit can be undone."""
         return bool(self._done)
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is an undone edit."""
+        """Whether an undone edit can be repeated."""
         return bool(self._undone)
 
     def follow(self) -> bool:
-        """Read the file if it has changed, and return whether its text has. May raise `InputError`."""
+        """Read the file if it has changed, and return whether its text differs. May raise `InputError`."""
         try:
             time = self.path.stat().st_mtime_ns
             if time == self._time:
@@ -73,17 +73,17 @@ class Document:
         self._replace(edited(self.text, edit))
 
     def write(self, version: str, text: str) -> None:
-        """Replace the whole text, as an editor does; raise `EditError` if the file has another version by now."""
+        """Replace the whole text, as an editor does; raise `EditError` if the version has changed."""
         self._check(version)
         self._replace(text)
 
     def undo(self, version: str) -> None:
-        """Take the last edit back."""
+        """Undo the last edit."""
         self._check(version)
         self._step(self._done, self._undone, "undo")
 
     def redo(self, version: str) -> None:
-        """Make the edit again that was taken back last."""
+        """Repeat the edit that was undone last."""
         self._check(version)
         self._step(self._undone, self._done, "redo")
 
@@ -113,7 +113,7 @@ class Document:
         if len(data) > SMALL.bytes:
             raise EditError(f"a specification has at most {SMALL.bytes} bytes")
         try:
-            # Through a link, the file that it names is replaced.
+            # For a link, its target is replaced.
             write_whole(os.path.realpath(self.path), data)
             self._time = self.path.stat().st_mtime_ns
         except OSError as error:

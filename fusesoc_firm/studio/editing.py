@@ -1,4 +1,4 @@
-"""What the page asks about specifications: their scenes, the search of messages, and edits of the files."""
+"""The page's requests about specifications: scenes, search for messages, and edits of the files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fusesoc_firm.studio.scene import content_of, grammar, outline, scene
 from fusesoc_firm.studio.workspace import MOST_NAMES, Workspace, with_words
 from fusesoc_firm.text.diagnostics import InputError
 
-# The seconds between two looks at the opened files.
+# The seconds between two checks of the opened files for changes.
 _LOOK = 0.3
 # The largest number of specifications in a list.
 _MOST_FILES = 1000
@@ -53,7 +53,7 @@ class Editing:
         return in_json(grammar())
 
     async def _outline(self, _: web.Request) -> web.Response:
-        """Return the scene of the first file as far as it is written, without faults and derived facts."""
+        """Return the written part of the first file's scene, without faults and derived facts."""
         name = await asyncio.to_thread(lambda: next(self._workspace.specifications(), None))
         if name is None:
             return in_json(None)
@@ -100,7 +100,7 @@ class Editing:
     # --- edits -----------------------------------------------------------------------------------------------------
 
     async def _check_text(self, request: web.Request) -> web.Response:
-        """Return the scene of a text that is not in the file yet."""
+        """Return the scene of a text before it is saved."""
         body = await body_of(request)
         document = self._workspace.document(body.get("file"))
         return await self._answer(document, str(body.get("text", "")))
@@ -124,7 +124,7 @@ class Editing:
     # --- changes by others -----------------------------------------------------------------------------------------
 
     async def _changes(self, request: web.Request) -> web.WebSocketResponse:
-        """Tell the page which open file another program has changed."""
+        """Report to the page each open file that another program has changed."""
         socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024)
         await socket.prepare(request)
         self._listeners.add(socket)

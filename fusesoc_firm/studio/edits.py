@@ -1,7 +1,7 @@
-"""Edits of a specification by its grammar: each is the smallest change of the file.
+"""Edits of a specification according to its grammar; each changes as little of the file as possible.
 
-An edit addresses a section by the keys and indices that lead to it, such as `["blocks", 2, "outgoing", 0]`. Whether the
-result is a sound system is said by its check, as for a file that was edited by hand.
+An edit addresses a section by the keys and indices that lead to it, such as `["blocks", 2, "outgoing", 0]`. The check
+of the specification determines whether the result is valid, as after an edit by hand.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from fusesoc_firm.text.yaml_text import yaml_data
 def edited(text: str, edit: Mapping[str, Any]) -> str:
     """Return the text of a specification after an edit.
 
-    The key `edit` names it: `set` (a key of the section at `path` to `value`, or to nothing), `add` (an item to the
-    list at `path`, at its end or at `index`), `remove` (the item at `path`, with all that refers to it), `rename`
-    (the item at `path`, with all that refers to it), `connect` and `disconnect` (blocks `source` and `sink`). Raise
-    `EditError` with the reason if the edit cannot be made.
+    The key `edit` names the kind: `set` (the key of the section at `path` receives `value`, or is removed without one),
+    `add` (an item to the list at `path`, at its end or at `index`), `remove` (the item at `path` and all references to
+    it), `rename` (the item at `path` and all references to it), `connect` and `disconnect` (blocks `source` and
+    `sink`). Raise `EditError` with the reason for an impossible edit.
     """
     kind = edit.get("edit")
     if not isinstance(kind, str) or kind not in _EDITS:
@@ -37,7 +37,7 @@ def edited(text: str, edit: Mapping[str, Any]) -> str:
 
 
 def section_at(path: Path) -> type[Section]:
-    """Return the grammar of the section at a path. Raise `EditError` if no section can be there."""
+    """Return the grammar of the section at a path. Raise `EditError` if the path cannot lead to a section."""
     section: type[Section] = Specification
     steps = iter(path)
     for step in steps:
@@ -75,7 +75,7 @@ def _set(text: str, edit: Mapping[str, Any]) -> str:
 
 
 def _value(entry: Key, value: Any, old: Any) -> Any:
-    """Return a value in the form that the file has: one text of a list may stand without brackets."""
+    """Return a value in the file's form: a list with a single text may have no brackets."""
     if entry.form != "texts":
         if isinstance(value, list | dict):
             raise EditError("the value must be a word")
@@ -114,14 +114,14 @@ def _remove(text: str, edit: Mapping[str, Any]) -> str:
     name = value_at(yaml_data(text), path).get("name")
     text = _without(text, path)
     if len(path) == 2 and path[0] == "blocks":
-        # From the end, so that the other places stay.
+        # From the end, so that the other places remain valid.
         for place in sorted(_references(text, path, name), key=_order, reverse=True):
             text = remove(text, place) if place[-1] == "publishers" else _without(text, _item(place))
     return text
 
 
 def _without(text: str, path: Path) -> str:
-    """Return the text without an item, and without its list's key if the list may be missing."""
+    """Return the text without an item, and without the key of an optional list that becomes empty."""
     siblings = value_at(yaml_data(text), path[:-1])
     parent = path[:-2]
     is_optional = len(path) > 1 and not _key(section_at(parent), path[-2]).is_required
@@ -163,7 +163,7 @@ def _named(items: Sequence[Any], name: object) -> Iterator[Path]:
 
 
 def _members(group: Any, name: object) -> Iterator[Path]:
-    """Yield the places of a publisher in a group; a single one may stand without brackets."""
+    """Yield the places of a publisher in a group; a single publisher may have no brackets."""
     if isinstance(group, dict) and _is(group.get("publishers"), name):
         yield ["publishers"]
     for number, item in enumerate(_list(group, "publishers")):

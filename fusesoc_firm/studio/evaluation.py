@@ -1,4 +1,4 @@
-"""The synthesis that the page asks for: one at a time, in the background, as long as the page listens."""
+"""The synthesis that the page requests: one at a time, in the background, while the page is connected."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Evaluation:
             await socket.close()
 
     async def _resources(self, request: web.Request) -> web.WebSocketResponse:
-        """Synthesise the system of a file, and tell steps and resources; the synthesis ends with the connection."""
+        """Synthesise the system of a file, and report steps and resources; the synthesis ends with the connection."""
         document = self._workspace.document(request.query.get("file", ""))
         socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024)
         await socket.prepare(request)
@@ -69,7 +69,7 @@ class Evaluation:
 
 
 def wanted(system: DerivedSystem) -> dict[str, float]:
-    """Return the clocks of a system in MHz: clk by the name "", and by its name each block's that has another."""
+    """Return the clocks of a system in MHz: clk under "", and a block with a different clock under its name."""
     clocks = {block.block: system.clock_of(block.block) for block in system.accelerators}
     found = {name: float(clock.frequency) / 1e6 for name, clock in clocks.items() if clock}
     return found if system.clock is None else {"": float(system.clock) / 1e6} | found

@@ -1,7 +1,8 @@
 """The messages of a run over Foxglove's WebSocket protocol, for Foxglove, Lichtblick, PlotJuggler and other programs.
 
-Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md. `foxglove-sdk` serves it without a secret in the
-address, so that every page in the browser could read, and refuses clients of the protocol's first version.
+Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md. `foxglove-sdk` is unsuitable: without a secret
+in the address, every page in the browser could read the messages, and it rejects clients of the protocol's first
+version.
 """
 
 from __future__ import annotations
@@ -19,15 +20,15 @@ from aiohttp import WSMsgType, web
 
 from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.joint import joint_text
-from fusesoc_firm.studio.run import Run
+from fusesoc_firm.studio.page_run import Run
 from fusesoc_firm.system.derived.model import absolute_name
 
 FOXGLOVE = "foxglove"
 """The last part of the address."""
 PROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
-"""The names of the protocol that clients may offer; both have the messages that are used here."""
+"""The names of the protocol that clients may offer; both contain the messages used here."""
 _SECONDS = 0.02
-# The number of messages that are sent at once, and of subscriptions of a client.
+# The limits of messages sent at once, and of a client's subscriptions.
 _MOST_NEW, _MOST_SUBSCRIPTIONS = 1000, 10_000
 _MESSAGE_DATA = 1
 _WARNING = 1
@@ -35,7 +36,7 @@ _WARNING = 1
 
 @dataclass
 class _Client:
-    """A connected program: the channels that it knows, by block, and its subscriptions, by the channels' ids."""
+    """A connected program: its known channels by block, and its subscriptions by channel id."""
 
     socket: web.WebSocketResponse
     numbers: Iterator[int] = field(default_factory=count)
@@ -46,7 +47,7 @@ class _Client:
 async def serve_foxglove(socket: web.WebSocketResponse, current: Callable[[], Run | None]) -> None:
     """Send the messages of the current run to a client until it leaves.
 
-    A slow client misses messages and is told how many; the run never waits for it.
+    For a slow client, messages are dropped and their number is reported; the run never waits.
     """
     client = _Client(socket)
     await socket.send_json({"op": "serverInfo", "name": "firm studio", "capabilities": [], "metadata": {}})
@@ -64,7 +65,7 @@ async def serve_foxglove(socket: web.WebSocketResponse, current: Callable[[], Ru
 
 
 def _take(client: _Client, wish: Mapping[str, Any]) -> None:
-    """Note what a client subscribes to; other wishes are for capabilities that are not offered."""
+    """Record a client's subscriptions; other requests are for capabilities that are not offered."""
     if wish["op"] == "subscribe":
         for item in wish["subscriptions"]:
             number, channel = int(item["id"]), int(item["channelId"])
@@ -100,7 +101,7 @@ async def _send(client: _Client, current: Callable[[], Run | None]) -> None:
 
 
 async def _advertise(client: _Client, run: Run) -> None:
-    """Tell the topics of a run; those of the run before are gone."""
+    """Advertise the topics of a run instead of those of the previous run."""
     if client.channels:
         await client.socket.send_json({"op": "unadvertise", "channelIds": [*client.channels.values()]})
     client.subscriptions.clear()

@@ -1,7 +1,7 @@
-"""What the page gets of a run: its news over a WebSocket, the record, single messages and their pictures.
+"""The page's view of a run: reports over a WebSocket, the record, single messages and their pictures.
 
-The page gets reports by itself and confirms them when it has shown them, several at once: an answer to a question for
-each picture would take the run more time. A slow page gets fewer reports; the run never waits for it.
+The server sends reports unasked. The page confirms several displayed reports at once, since a request for each would
+slow the run. A slow page receives fewer reports; the run never waits for it.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from aiohttp import WSMsgType, web
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.node.watch import Seen
-from fusesoc_firm.simulation.simulator import MOST_SEED, MOST_STALL_PERCENT
+from fusesoc_firm.node.engine.watch import Seen
+from fusesoc_firm.node.transport.built_simulator import MOST_SEED, MOST_STALL_PERCENT
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, has_pose, numbers_of, picture_of, pose_of
+from fusesoc_firm.studio.page_run import Run, SimulatedRun, Wishes
 from fusesoc_firm.studio.reports import Reports, row
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
-from fusesoc_firm.studio.run import Run, SimulatedRun, Wishes
 from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Topic
 from fusesoc_firm.tools.simulators import fitting
 
-# The time between two reports, and the number of reports that a page need not have shown.
+# The time between two reports, and the largest number of unconfirmed reports.
 _SECONDS, _MOST_AHEAD = 0.05, 20
 # The number of messages in an answer about the record.
 _MOST_ROWS = 200
@@ -35,13 +35,13 @@ _MOST_ROWS = 200
 _MOST_GRANTS, _MOST_WAITS, _MOST_POINTS = 500, 500, 500
 # The number of beats in a wave.
 _MOST_BEATS = 24
-# What can be plotted of each message beside its own numbers.
+# The quantities of each message that can be plotted besides its own numbers.
 LATENCY, BYTES = "latency", "bytes"
 # The highest rate of messages a second that the page may ask for.
 _MOST_RATE = 100_000
-# What a page may send: the number of reports that it has shown since it said so last.
+# The legal texts from a page: the number of reports displayed since its last confirmation.
 _SHOWN = {str(count) for count in range(1, _MOST_AHEAD + 1)}
-# Reports are plain data without circles.
+# Reports contain no circular references.
 _IN_JSON = json.JSONEncoder(check_circular=False, separators=(",", ":")).encode
 _CONTROLS = ("pause", "resume", "step", "stop")
 
@@ -59,7 +59,7 @@ class Live:
         self.run: Run | None = None
 
     def take(self, run: Run) -> None:
-        """Watch another run; the former one ends."""
+        """Watch another run; the previous one ends."""
         if self.run:
             self.run.stop()
         self.run = run
@@ -95,8 +95,8 @@ class Live:
     # --- requests --------------------------------------------------------------------------------------------------
 
     async def _watch(self, request: web.Request) -> web.WebSocketResponse:
-        """Send reports as long as the page confirms them; it sends how many it has shown."""
-        # Compression would cost more than loopback saves.
+        """Send reports while the page confirms them by the number displayed."""
+        # On loopback, compression costs more than it saves.
         socket = web.WebSocketResponse(heartbeat=20, max_msg_size=1024, compress=False)
         await socket.prepare(request)
         self._sockets.add(socket)
@@ -117,7 +117,7 @@ class Live:
         return socket
 
     async def _foxglove(self, request: web.Request) -> web.WebSocketResponse:
-        """Serve a program that speaks Foxglove's protocol."""
+        """Serve a program with Foxglove's protocol."""
         socket = web.WebSocketResponse(heartbeat=20, max_msg_size=2**16, protocols=PROTOCOLS)
         await socket.prepare(request)
         self._sockets.add(socket)
@@ -128,14 +128,14 @@ class Live:
         return socket
 
     async def _send(self, socket: web.WebSocketResponse, ahead: asyncio.Semaphore) -> None:
-        """Send what is new, at most every `_SECONDS` and as far `ahead` of the page as it may be."""
+        """Send new reports, at most one per `_SECONDS`; `ahead` limits the unconfirmed ones."""
         reports, now = Reports(), asyncio.get_running_loop().time
         while True:
             await ahead.acquire()
             while (report := reports.next(self.run, self._count, self._file)) is None:
                 await asyncio.sleep(_SECONDS)
             await socket.send_json(report, dumps=_IN_JSON)
-            # To the next of regular times, so that the work between them does not delay them.
+            # Sleep until the next multiple of the period, so that delays do not accumulate.
             await asyncio.sleep(_SECONDS - now() % _SECONDS)
 
     async def _record(self, request: web.Request) -> web.Response:
@@ -161,11 +161,11 @@ class Live:
         return web.Response(body=found[0], content_type=found[1])
 
     async def _poses(self, request: web.Request) -> web.Response:
-        """Return the pose in a message, and before it those of the block's messages before this one."""
+        """Return the poses of a block's earlier messages, and last the pose in this message."""
         run, seen = self._seen(request)
         frame, messages = run.topics[seen.block].frame, run.watch.of(seen.block, _MOST_POINTS, seen.number)
         found = await asyncio.to_thread(lambda: [pose_of(frame, message.payload) for message in messages])
-        # Without its own pose, an earlier one would be shown as that of this message.
+        # Without its own pose, the page would show an earlier pose for this message.
         return in_json({"poses": [pose for pose in found if pose] if found and found[-1] else []})
 
     async def _wave(self, request: web.Request) -> web.Response:
@@ -186,7 +186,7 @@ class Live:
         )
 
     async def _status(self, _: web.Request) -> web.Response:
-        """Return what the hardware's status has counted."""
+        """Return the counters of the hardware's status."""
         run = self._current()
         return in_json({"access": run.system.status and run.system.status.value, "counts": run.watch.status})
 
@@ -200,7 +200,7 @@ class Live:
         return in_json(await asyncio.to_thread(series, topic.frame, seen, request.query.get("field", LATENCY)))
 
     async def _run(self, request: web.Request) -> web.Response:
-        """Simulate the system of a file with the stimuli of its core; the run before ends."""
+        """Simulate the system of a file with the stimuli of its core; the previous run ends."""
         body, workspace = await body_of(request), self._workspace
         document, wishes = workspace.document(body.get("file")), _wishes(body)
 
@@ -238,9 +238,9 @@ class Live:
 
 
 def wave(system: DerivedSystem, topic: Topic, seen: Seen) -> dict[str, Any]:
-    """Return the frame of a message in beats: the bytes of the first ones, how many there are, and their cycles.
+    """Return the frame of a message in beats: the bytes of the first beats, the number of beats, and their cycles.
 
-    A message of software has no frame, and so no beats.
+    A message of software has no frame, and therefore no beats.
     """
     if not isinstance(topic, Converter):
         return {"beats": [], "count": 0, "cycles": None}
@@ -250,9 +250,9 @@ def wave(system: DerivedSystem, topic: Topic, seen: Seen) -> dict[str, Any]:
 
 
 def series(frame: Frame, messages: Sequence[Seen], field: str) -> dict[str, Any]:
-    """Return the value of a field in messages: points of seconds and value, and the names of all that can be asked for.
+    """Return the value of a field in messages: points of seconds and value, and the names of all available fields.
 
-    The value is None where the message has no such number.
+    The value is None if the message lacks this number.
     """
     fields = [LATENCY, BYTES, *(numbers_of(frame, messages[-1].payload) if messages else ())]
     return {"fields": fields, "points": [(seen.time_ns / 1e9, _value(frame, seen, field)) for seen in messages]}
@@ -267,7 +267,7 @@ def _value(frame: Frame, seen: Seen, field: str) -> float | None:
 
 
 def _wishes(body: Mapping[str, Any]) -> Wishes:
-    """Return what a request asks of a simulation; raise 400 for anything else."""
+    """Return a request's options of a simulation; raise 400 for an invalid request."""
     tools = [*fitting(is_live=True)]
     tool, rate = body.get("tool", tools[0]), body.get("rate", 0)
     is_endless, is_paused = body.get("isEndless", False), body.get("isPaused", False)

@@ -12,12 +12,12 @@ from typing import Any
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.model import Frame
 
-# The largest parts of a message that the page gets.
+# The largest parts of a message that are sent to the page.
 _MOST_FIELDS, _MOST_ITEMS, _MOST_CHARACTERS, _MOST_BYTES = 500, 16, 500, 32
 _MOST_PIXELS = 2**24
-# The longest payload in bytes of which single numbers are plotted.
+# The longest payload in bytes whose numbers can be plotted.
 _MOST_PLOTTED = 2**16
-# Where messages have a pose: the field that contains it, and the names of its place and of its rotation.
+# The place of a message's pose: its field, and the names of its position and rotation.
 _POSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "geometry_msgs/Pose": ((), "position", "orientation"),
     "geometry_msgs/PoseStamped": (("pose",), "position", "orientation"),
@@ -41,14 +41,14 @@ _ENCODINGS: dict[str, tuple[int, tuple[int, ...], int]] = {
     "16UC1": (16, (0,), 1),
     **{f"bayer_{order}8": (8, (0,), 1) for order in ("rggb", "bggr", "gbrg", "grbg")},
 }
-# What browsers show, by its first bytes; other formats might contain scripts.
+# The media types that browsers may show, by first bytes; other formats might contain scripts.
 _SAFE = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 
 
 def fields_of(frame: Frame, payload: bytes) -> dict[str, Any]:
-    """Return the fields of a message: rows of a dotted name and a shortened text, and how many rows are left out.
+    """Return the fields of a message: rows of a dotted name and a shortened text, and the number of omitted rows.
 
-    A payload that is not a message of the frame has a `fault`.
+    For an invalid payload, the result has a `fault`.
     """
     try:
         rows = [*islice(_rows("", decode(frame, payload)), _MOST_FIELDS + 1)]
@@ -60,7 +60,7 @@ def fields_of(frame: Frame, payload: bytes) -> dict[str, Any]:
 def numbers_of(frame: Frame, payload: bytes) -> dict[str, float | None]:
     """Return the numbers in a message by their dotted names, None for those that are not finite.
 
-    A payload that is not a message of the frame, or a long one, has none.
+    An invalid or long payload has no numbers.
     """
     if len(payload) > _MOST_PLOTTED:
         return {}
@@ -76,9 +76,9 @@ def has_pose(frame: Frame) -> bool:
 
 
 def pose_of(frame: Frame, payload: bytes) -> list[float] | None:
-    """Return the pose in a message: x, y and z of its place, then x, y, z and w of its rotation, a unit quaternion.
+    """Return the pose in a message: x, y and z of its position, then x, y, z and w of its rotation, a unit quaternion.
 
-    It is None if the message has no such fields, or if its numbers are not those of a pose.
+    Return None if these fields are missing, or if the numbers are not a valid pose.
     """
     if not has_pose(frame):
         return None
@@ -104,7 +104,7 @@ def has_picture(frame: Frame) -> bool:
 
 
 def picture_of(frame: Frame, payload: bytes) -> tuple[bytes, str] | None:
-    """Return the picture in a message, and its media type; None if it has none that a browser can show."""
+    """Return the picture in a message, and its media type; None without a picture that a browser can show."""
     if not has_picture(frame):
         return None
     try:

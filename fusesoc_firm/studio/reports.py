@@ -1,7 +1,7 @@
-"""Reports of a run to one page, each with what is new since the report before.
+"""Reports of a run to one page, each with the changes since the previous report.
 
-Reports are frequent, so that the page moves. What changes less often is left out of most of them, so that watching
-costs the run little.
+Reports are frequent, so that the page moves smoothly. Most of them omit data that change less often, so that watching
+hardly slows the run.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any
 
-from fusesoc_firm.node.watch import Count, Seen
-from fusesoc_firm.studio.run import RUNNING, Run
+from fusesoc_firm.node.engine.watch import Count, Seen
+from fusesoc_firm.studio.page_run import RUNNING, Run
 
 # The number of messages in a report.
 _MOST_NEW = 20
-# The time between two figures of a run, since these sort all latencies.
+# The time between two figures of a run, which is limited because figures sort all latencies.
 _FIGURE_SECONDS = 0.5
 
 
 class Reports:
-    """The reports to one page, which begins without any knowledge."""
+    """The reports to one page; the first one is complete."""
 
     def __init__(self) -> None:
         """Begin before the first report."""
@@ -32,10 +32,10 @@ class Reports:
         self._loads: Mapping[str, Any] = {}
 
     def next(self, run: Run | None, number: int, file: str) -> dict[str, Any] | None:
-        """Return what is new of the run with this number, of a file; None if nothing is.
+        """Return the changes of the run with this number, of a file; None without changes.
 
         `run` is the state of the run, which is None without a run; `messages` are the newest messages, after `skipped`
-        others; `figures` are counts and loads of all blocks. A report leaves out each of them if it is not new.
+        others; `figures` are counts and loads of all blocks. A report omits unchanged items.
         """
         state = state_of(run, number, file) if run else None
         report: dict[str, Any] = {}
@@ -57,7 +57,7 @@ class Reports:
             self._last, self._is_stale = news.last, True
 
     def _add_figures(self, run: Run, report: dict[str, Any]) -> None:
-        # Queues may change without a message, and without new messages, the rates of a run fall.
+        # Queues may change without messages, and the rates of a run then fall.
         is_running = run.state == RUNNING and not is_paused(run)
         is_changing = is_running or self._is_stale or run.watch.loads() != self._loads
         now = time.monotonic()
@@ -67,7 +67,7 @@ class Reports:
 
 
 def state_of(run: Run, number: int, file: str) -> dict[str, Any]:
-    """Return what a user calls the state of a run."""
+    """Return the state of a run as shown to the user."""
     clock = run.system.clock
     return {
         "number": number,
@@ -88,7 +88,7 @@ def is_paused(run: Run) -> bool:
 
 
 def figures(run: Run) -> dict[str, Any]:
-    """Return counts and loads of all blocks of a run, the waits of its wires, and the time for which they hold."""
+    """Return counts and loads of all blocks of a run, the waits of its wires, and the time that they cover."""
     watch = run.watch
     return {
         "seconds": time.monotonic() - watch.start_ns / 1e9,

@@ -1,4 +1,4 @@
-"""What the parts of the server share: a request's name and handler, its body, and answers in JSON."""
+"""The shared parts of the server: a request's name and handler, its body, and answers in JSON."""
 
 from __future__ import annotations
 
@@ -34,5 +34,5 @@ def number_of(request: web.Request, name: str) -> int:
 
 def in_json(data: object, status: int = 200) -> web.Response:
     """Return an answer in JSON."""
-    # YAML has values, such as dates, that JSON has not.
+    # YAML has values, such as dates, that JSON lacks.
     return web.json_response(data, status=status, dumps=lambda value: json.dumps(value, default=str))

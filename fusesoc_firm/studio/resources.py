@@ -1,7 +1,7 @@
-"""The cells and the clock of each block of a system on an FPGA, by the programs that are installed.
+"""The cells and the clock of each block of a system on an FPGA, computed by the installed programs.
 
-FuseSoC and GHDL make a netlist of the system's core, Yosys maps it with its hierarchy to an ECP5, and nextpnr places it
-without pins. Yosys optimises no logic across the borders of blocks, so each cell belongs to one block.
+FuseSoC and GHDL create a netlist of the system's core, Yosys maps it with its hierarchy to an ECP5, and nextpnr places
+it without pins. Yosys does not optimise logic across the boundaries of blocks, so each cell belongs to one block.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from typing import Any
 
 import yaml
 
-from fusesoc_firm.request.core_reader import CoreFile
-from fusesoc_firm.simulation.simulator import fusesoc_run, project_folder
-from fusesoc_firm.store import own_code
-from fusesoc_firm.store.layout import default_root
+from fusesoc_firm.core.core_reader import CoreFile
+from fusesoc_firm.node.transport.built_simulator import fusesoc_run, project_folder
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.files import write_whole
+from fusesoc_firm.tools import own_code
+from fusesoc_firm.tools.digests import default_root
 from fusesoc_firm.tools.programs import facts_of, find, missing, ways
 
 DEVICE = "LFE5U-85F, speed grade 8"
@@ -42,7 +42,7 @@ _PLACING = f"{_DEVICE_OPTIONS} --out-of-context --freq 200 --timing-allow-fail -
 _MAPPED, _REPORT = "mapped.json", "report.json"
 _FILES = f"--json {_MAPPED} --report {_REPORT} --detailed-timing-report -q"
 _TARGET = "synth_ecp5"
-# The resource of a cell, and how many of it the cell takes.
+# The resource of a cell, and the number that the cell uses.
 _CELLS = {
     "LUT4": ("lut", 1),
     "CCU2C": ("lut", 2),
@@ -52,7 +52,7 @@ _CELLS = {
     "PDPW16KD": ("ram", 1),
     "MULT18X18D": ("dsp", 1),
 }
-# GHDL notes where an instance was written, in a folder that is new each time.
+# GHDL's comments contain the source's folder, which is new each time.
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _MOST_KEPT = 200
 _SHOWN_LINES = 20
@@ -65,7 +65,7 @@ Tell = Callable[[dict[str, Any]], Awaitable[None]]
 class Resources:
     """The cells of a block, and the highest frequency in MHz of the paths that end in its registers, if known.
 
-    `lut` are LUT4; a carry cell takes two, a distributed RAM four.
+    `lut` counts LUT4: a carry cell uses two, a distributed RAM four.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Resources:
 
 
 async def resources_of(spec: Path, tell: Tell) -> dict[str, Any]:
-    """Return the resources of each block of a specification's system, from the cache if they are known.
+    """Return the resources of each block of a specification's system, from the cache if possible.
 
     The keys are `device`, `blocks`, `clocks` (MHz by name, empty without nextpnr) and `missing` (how to install
     nextpnr). A cancelled call ends the programs that it started. May raise `InputError`.
@@ -103,7 +103,7 @@ async def resources_of(spec: Path, tell: Tell) -> dict[str, Any]:
 
 
 async def _netlist(spec: Path, core: CoreFile, folder: Path) -> tuple[Path, str]:
-    """Make the netlist of a core in a folder, and return it and the name of its top level."""
+    """Create the netlist of a core in a folder, and return it and the name of its top level."""
     await _run(fusesoc_run(core, _TARGET, folder, "--setup"), project_folder(spec))
     (request,) = folder.glob("*.ghdlsynth")
     await _run([sys.executable, "-m", "fusesoc_firm.netlist", request.name], folder)
@@ -156,7 +156,7 @@ def blocks_of(modules: Mapping[str, Any], top: str) -> list[dict[str, Any]]:
 def slowest(report: Mapping[str, Any]) -> dict[str, float]:
     """Return the time in ns of the slowest path to a register of each block, in nextpnr's report.
 
-    Paths from one clock to another do not count, since their times mean nothing.
+    Paths between two clocks are ignored, since their times are meaningless.
     """
     found: dict[str, float] = {}
     for net in report["detailed_net_timings"]:
@@ -168,7 +168,7 @@ def slowest(report: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _name(instance: str) -> str:
-    """Return the name of a block by that of its instance."""
+    """Return the name of an instance's block."""
     return instance.removeprefix("u_")
 
 
@@ -204,7 +204,7 @@ async def _run(command: Sequence[str], folder: Path) -> None:
     process = await asyncio.create_subprocess_exec(
         *command,
         cwd=folder,
-        # The launcher of firm's own builds would run the steps from its cache.
+        # The launcher of our own builds would answer the steps from its cache.
         env={name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"},
         stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
@@ -224,7 +224,7 @@ async def _run(command: Sequence[str], folder: Path) -> None:
 
 
 def _key(netlist: Path, yosys: Path, nextpnr: Path | None) -> str:
-    """Return the SHA-256 of all that decides the result: the netlist, the programs and this package."""
+    """Return the SHA-256 of everything that determines the result: the netlist, the programs and this package."""
     text = _COMMENT.sub("", netlist.read_text(encoding="utf-8"))
     tools = [facts_of(program, path) for program, path in (("yosys", yosys), ("nextpnr-ecp5", nextpnr)) if path]
     return hashlib.sha256(json.dumps([text, tools, own_code.digest()]).encode()).hexdigest()
@@ -242,7 +242,7 @@ def _read(file: Path) -> dict[str, Any] | None:
 
 
 def _keep(file: Path, answer: Mapping[str, Any]) -> None:
-    """Keep a result, and forget the oldest ones; without a place for it, the next call computes it again."""
+    """Store a result, and remove the oldest ones; if that fails, the next call computes it again."""
     with suppress(OSError):
         write_whole(file, json.dumps(answer).encode())
         for old in sorted(file.parent.glob("*.json"), key=lambda path: path.stat().st_mtime)[:-_MOST_KEPT]:

@@ -1,4 +1,4 @@
-"""What the page shows of a specification: its sections as written, its faults, and what is derived from it.
+"""The page's view of a specification: its sections as written, its faults, and the derived facts.
 
 The picture needs only a text that is YAML; the rest of the specification may be faulty or unfinished.
 """
@@ -28,8 +28,7 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
     """Return a specification as plain data; diagnostics call it `file`.
 
     `specification` is the file's content (None if it is not a mapping in YAML), `faults` are its faults and warnings,
-    each with the `path` of what it concerns, and `derived` is what `firm system show` prints (None if there are
-    faults).
+    each with the `path` of its item, and `derived` is what `firm system show` prints (None if there are faults).
     """
     derived = None
     diagnostics: Iterable[Diagnostic]
@@ -73,7 +72,7 @@ def _content(read: YamlText | None) -> dict[str, Any] | None:
 
 
 def _read(text: str) -> YamlText | None:
-    """Return the nodes of a text, or of the part above the place from which it is invalid YAML.
+    """Return the nodes of a text, or of the part before the first error in its YAML.
 
     A text that exceeds the limits has no nodes.
     """
@@ -83,7 +82,7 @@ def _read(text: str) -> YamlText | None:
 
 
 def _fault(root: yaml.Node | None, file: str, fault: Diagnostic) -> dict[str, Any]:
-    """Return a fault with the path of the value at its place, if that is in the specification."""
+    """Return a fault with the path of the value at its place, if the place is in the specification."""
     source = fault.source
     path = path_at(root, source.line, source.column) if root and source and source.file == file else None
     return fault.data() | {"path": path}

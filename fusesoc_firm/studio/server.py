@@ -1,7 +1,7 @@
-"""The server of the page: on loopback alone, under an address with a secret, for the files of one folder.
+"""The server of the page: only on loopback, at an address with a secret, for the files of one folder.
 
-Another page in the same browser knows neither the secret nor may it send requests here: hosts and origins other than
-our own are refused, which also ends attacks by names that lead to loopback (DNS rebinding).
+Another page in the same browser does not know the secret. Its requests are refused, like all from other hosts and
+origins; this also prevents attacks by names that resolve to loopback (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Studio:
     """The page's server for a folder of specifications, or for one specification."""
 
     def __init__(self, place: Path, tools: Tools) -> None:
-        """Serve a file or folder with what the command line uses."""
+        """Serve a file or folder with the tools of the command line."""
         workspace = Workspace(place, tools)
         self._editing, self._evaluation, self.live = Editing(workspace), Evaluation(workspace), Live(workspace)
         self._parts = (self._editing, self.live, Views(workspace), self._evaluation, Begin(workspace))
@@ -75,10 +75,10 @@ class Studio:
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Refuse requests that our own page would not send, and turn faults into answers."""
+        """Refuse requests that our own page would not send, and convert faults to answers."""
         origin = request.headers.get("Origin")
         is_own = request.headers.get("Host", "") in self._own_hosts
-        # Foxglove's page comes from another server; like every program, it needs the secret.
+        # Foxglove's page is from another server; like every program, it needs the secret.
         is_foxglove = request.path.endswith(f"/api/{FOXGLOVE}")
         is_own = is_own and (is_foxglove or origin is None or origin.removeprefix("http://") in self._own_hosts)
         secret = request.path.split("/")[1] if "/" in request.path else ""
@@ -101,6 +101,6 @@ class Studio:
             text = (_PAGE / "index.html").read_text(encoding="utf-8")
         except OSError:
             text = "The page is not built; 'make studio' builds it.\n"
-        # The browser requests the first picture's data at once, not when the page's program has begun.
+        # The browser requests the first picture's data at once, before the page's program starts.
         headers = {"Link": "<api/outline>; rel=preload; as=fetch; crossorigin"}
         return web.Response(text=text, content_type="text/html", headers=headers)

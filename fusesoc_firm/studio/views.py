@@ -1,4 +1,4 @@
-"""What the page shows on demand of a system that is opened: bytes of frames, generated VHDL, and schedulers."""
+"""The page's views of an open system on request: bytes of frames, generated VHDL, and schedulers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from aiohttp import web
 
-from fusesoc_firm.plugin.why import Reason, names_of, reasons
+from fusesoc_firm.builds.call.why import Reason, names_of, reasons
 from fusesoc_firm.scheduling.analysis import choose
 from fusesoc_firm.scheduling.choice import as_data
 from fusesoc_firm.studio.byte_map import byte_map
@@ -22,7 +22,7 @@ from fusesoc_firm.text.render import Rendering
 
 
 class Views:
-    """The requests about what is derived from a specification."""
+    """The requests about data derived from a specification."""
 
     def __init__(self, workspace: Workspace) -> None:
         """Show the specifications of a workspace."""
@@ -43,7 +43,7 @@ class Views:
         return in_json(await self._workspace.in_turn(generated, loaded, request.query.get("name", "")))
 
     async def _schedulers(self, request: web.Request) -> web.Response:
-        """Return the analysis of all schedulers for the system, or the times that it is missing."""
+        """Return the analysis of all schedulers for the system, or the missing times."""
         loaded = await self._loaded(request)
         try:
             return in_json(await self._workspace.in_turn(schedulers, loaded))
@@ -66,7 +66,7 @@ def layouts(loaded: LoadedSystem) -> dict[str, Any]:
 def generated(loaded: LoadedSystem, name: str) -> dict[str, Any]:
     """Return the names of all generated files, and the lines of the file `name` with their origins.
 
-    An unknown name stands for the top level.
+    An unknown name selects the top level.
     """
     found = {item.path: item for item in artifacts(loaded)}
     chosen = found.get(name) or found[f"{loaded.system.entity}.vhd"]

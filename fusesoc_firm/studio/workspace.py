@@ -1,4 +1,4 @@
-"""The folder that is open in the page: its specifications, and what the command line does with them."""
+"""The open folder of the page: its specifications, and the command line's functions for them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from typing import ParamSpec, TypeVar
 from aiohttp import web
 
 from fusesoc_firm.studio.document import Document
-from fusesoc_firm.studio.run import Build
+from fusesoc_firm.studio.page_run import Build
 from fusesoc_firm.studio.scene import content_of
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostic
 from fusesoc_firm.text.files import is_file
 from fusesoc_firm.text.yaml_text import SMALL
 
-# The names that a specification may end with, and folders in which nobody writes one.
+# The endings of specifications' names, and folders without specifications.
 _SUFFIXES = (".yaml", ".yml")
 _NO_SOURCES = ("build", "node_modules")
 # The largest number of messages in an answer to a search.
@@ -39,7 +39,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class Tools:
-    """What the command line uses for a specification; `paths` and `distro` are the sources of messages."""
+    """The command line's functions for a specification; `paths` and `distro` are the sources of messages."""
 
     load: Load
     check: Check

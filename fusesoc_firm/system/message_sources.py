@@ -1,7 +1,7 @@
-"""The message sources that the core next to a specification names, so that all commands search where a build does.
+"""The message sources in the core next to a specification, so that commands and builds search the same places.
 
-Commands and builds also search in the same order: the specification's `paths`, the command's arguments, the core's
-paths, a sourced ROS, a distribution.
+Their order is also the same: the specification's `paths`, the command's arguments, the core's paths, a sourced ROS, a
+distribution.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from fusesoc_firm.core.core_reader import CoreFile, read_core
+from fusesoc_firm.core.request import CoreFolders, no_core_folders
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.request.core_reader import CoreFile, read_core
-from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
 from fusesoc_firm.system.written.specification import Draft
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
@@ -26,14 +26,14 @@ _INSTANCE = "system"
 
 @dataclass(frozen=True)
 class MessageSources:
-    """The sources of a system's messages in order of precedence, except the sources that the specification names."""
+    """The sources of a system's messages in order of precedence, without the specification's own sources."""
 
     paths: tuple[Path, ...] = ()
     distro: str | None = None
 
 
 def core_of(spec: Path) -> CoreFile | None:
-    """Return the core file in a specification's folder that generates the system, or None if there is no such file."""
+    """Return the core file in a specification's folder that generates the system, or None if it is missing."""
     # Path.resolve() raises a different error for a cyclic link.
     spec = Path(os.path.realpath(spec))
     for path in sorted(spec.parent.glob("*.core")):
@@ -55,7 +55,7 @@ def spec_of(core: Path) -> Path | None:
 def sources_of(
     spec: Path, paths: Sequence[Path] = (), distro: str | None = None, core_folders: CoreFolders = no_core_folders
 ) -> MessageSources:
-    """Return the command's arguments, followed by the message sources that the core next to a specification names.
+    """Return the command's arguments, followed by the message sources of the core next to a specification.
 
     Unknown message cores are ignored here, because the build reports them.
     """

@@ -33,7 +33,7 @@ def _frame(address: int, word: int, id_bytes: int) -> bytes:
 
 
 def answered(frame: bytes) -> tuple[int, int] | None:
-    """Return the address and the word of an answer, whatever the size of its id, or None for another frame."""
+    """Return the address and the word of an answer, with an id of any size, or None for any other frame."""
     address, word = frame[-2 * _WORD_BYTES : -_WORD_BYTES], frame[-_WORD_BYTES:]
     found = int.from_bytes(address, "little"), int.from_bytes(word, "little")
     return found if frame in [_frame(*found, id_bytes) for id_bytes in (ONE_BYTE, TWO_BYTES)] else None

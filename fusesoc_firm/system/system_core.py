@@ -16,12 +16,11 @@ from fusesoc_firm.converter.converter_core import VHDL, constants_configurations
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.pipeline import BORDERS, FULL, NONE, pipeline_of
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
+from fusesoc_firm.core.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
-from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
-from fusesoc_firm.message.model import Definitions, MessageName
+from fusesoc_firm.message.middleware import MIDDLEWARES, Definitions, Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.request.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
-from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.boards.block_design import (
     BLOCK_DESIGN_TEMPLATE,
     PACKAGE_TEMPLATE,
@@ -75,6 +74,7 @@ from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, S
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.text.yaml_text import Text
+from fusesoc_firm.tools.reads import Input
 
 # FuseSoC's file types by suffix, and the suffixes of files that are not compiled separately.
 _FILE_TYPES = {
@@ -88,7 +88,7 @@ _FILE_TYPES = {
 # Parameters of a call that replace keys of the project.
 _REPLACING = ("interconnect", "clock")
 _INCLUDE_SUFFIXES = (".vh", ".svh")
-# Hz. Without register slices, a system in which messages of variable size are passed through reaches 99 MHz on an ECP5.
+# In Hz. Without register slices, a system that passes through messages of variable size reaches 99 MHz on an ECP5.
 _SLICED_ABOVE = 100 * 10**6
 _BYTE_BITS = 8
 
@@ -142,9 +142,8 @@ def load_system(
 ) -> LoadedSystem:
     """Read a specification and derive its system; raise `InputError` with all faults.
 
-    The system is that of the `changed` specification, such as for a board. Missing source files of accelerators are an
-    error only if `needs_sources` is set. Messages in the `paths` of the specification take precedence over messages in
-    `libraries`.
+    `changed` adapts the specification, such as to a board. Missing source files of accelerators are an error only if
+    `needs_sources` is set. Messages in the `paths` of the specification take precedence over messages in `libraries`.
     """
     faults = Diagnostics()
     path = source.path if isinstance(source, Draft) else source
@@ -318,7 +317,7 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a loaded system, with its files in compilation order; may raise `InputError`."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
-    # Units that instantiate the user's follow them.
+    # Units that instantiate the user's units follow them.
     after = [*(f"{type_.entity}.vhd" for type_ in system.accelerator_types if type_.inner), f"{system.entity}.vhd"]
     files = {path: file for path, file in made.items() if path not in after}
     files |= _sources(system.accelerator_types, loaded.folder)

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-# The maximum number of reported faults; in a file of a different kind, every line would be a fault.
+# The maximum number of reported faults; a file of the wrong kind would have a fault on every line.
 _MOST_SHOWN = 200
 # The maximum number of characters shown around a fault, and the minimum length of a word that is shortened.
 _WIDEST = 200
@@ -138,7 +138,7 @@ def _position(diagnostic: Diagnostic) -> tuple[str, int, int]:
 
 
 def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoReturn:
-    """Raise an `InputError` with a single fault, after which no further checks are possible."""
+    """Raise an `InputError` with a single fault that prevents further checks."""
     raise InputError([Diagnostic(message, source, hint)])
 
 

@@ -1,7 +1,7 @@
 """A lock on a file or folder for one process on this machine, which the system releases when the process ends.
 
-Processes on several machines that share a folder may hold the lock at the same time. `building/folder_lock.py` provides
-a lock that also excludes processes on other machines.
+Processes on several machines that share a folder may hold the lock at the same time. The lock in
+`builds/setup/folder_lock.py` also excludes processes on other machines.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _POLL_SECONDS = 0.02
 
 @contextmanager
 def locked(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Wait for the lock of an existing file or folder, and hold it; create no file. May raise `OSError`."""
+    """Wait for the lock of an existing file or folder, and hold it without creating a file. May raise `OSError`."""
     handle = os.open(path, os.O_RDONLY)
     try:
         take(handle)

@@ -23,8 +23,8 @@ class Question:
     """A question; `name` is a short name, and `meaning` is an explanation in one sentence.
 
     The `words` complete an answer; if `is_choice` is set, all other answers are illegal. An empty answer means
-    `default`, which is empty if the answer is optional; if `is_required` is set and there is no default, an empty
-    answer is a fault. `check` returns the fault in an answer.
+    `default`, which is empty if the answer is optional. If `is_required` is set without a default, an empty answer is a
+    fault. `check` returns the fault in an answer.
     """
 
     name: str

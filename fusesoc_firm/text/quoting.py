@@ -88,7 +88,7 @@ def yaml_list(texts: Iterable[str]) -> str:
 
 
 def _yaml(value: str | list[str], text: str) -> str:
-    # PyYAML folds newlines. Unless everything is escaped, PyYAML also writes a NEL unescaped but reads it as a blank.
+    # PyYAML folds newlines. Without full escaping, PyYAML also writes a NEL unescaped but reads it as a blank.
     is_plain = text.isprintable()
     style = None if is_plain else '"'
     shown = yaml.safe_dump(value, default_style=style, default_flow_style=True, allow_unicode=is_plain, width=10**6)
@@ -103,7 +103,7 @@ def dot_text(text: str) -> str:
 def dot_markup(text: str) -> str:
     """Return `text` escaped for a label in Graphviz's markup, where a backslash also begins an escape sequence.
 
-    Graphviz rejects a bracket alone, but not its number.
+    Graphviz rejects a single bracket, but accepts its character code.
     """
     return html.escape(text).replace("\\", "\\\\").replace("]", "&#93;")
 

@@ -1,8 +1,8 @@
 """Render strict mustache templates: where mustache would guess, rendering fails with an error.
 
 Mustache was designed for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks up missing keys in
-outer scopes. In a hardware description, the result of each of these rules may compile but be wrong. Therefore chevron
-only parses the templates, and this module expands the tree by these rules:
+outer scopes. In a hardware description, each of these rules may give a result that compiles but is wrong. Therefore
+chevron only parses the templates, and this module expands the tree by these rules:
 
 * `{{x}}` prints a string or an integer unchanged. A bool or None is an error, since neither has a standard spelling.
 * `{{comment x}}` prints a user's text, quoted for this purpose in the language given by the ending of the template's
@@ -110,8 +110,8 @@ _Node = _Literal | _Value | _Section | _Partial
 class _Scope:
     """A scope for key lookup, entered from `outer` by `key`, and by the item's number if that is a list.
 
-    `turn` contains `@first` and `@last` of the innermost list around the scope. A template with many scopes is
-    expanded quickly since a path is computed only for a message.
+    `turn` contains `@first` and `@last` of the innermost list around the scope. A path is computed only for an error
+    message, so templates with many scopes expand quickly.
     """
 
     data: object
@@ -197,7 +197,7 @@ class _Expansion:
         return text if is_taken else ""
 
     def _node(self, node: _Node, scope: _Scope, is_taken: bool) -> str:
-        # Most nodes are values and literals.
+        # Values and literals are the most frequent nodes.
         if isinstance(node, _Value):
             value = _look_up(node.key, scope)
             return self._printed(node, value, scope) if is_taken else ""
@@ -255,7 +255,7 @@ class _TracedExpansion(_Expansion):
 
 
 def _turns(section: _Section, value: object, scope: _Scope) -> Iterator[tuple[_Scope, bool]]:
-    """Yield each scope in which a section's body is expanded, and whether the resulting text is used."""
+    """Yield each scope for the expansion of a section's body, and whether the resulting text is used."""
     if section.is_inverted:
         yield scope, not _is_there(value)
     elif section.is_question or isinstance(value, bool):

@@ -1,7 +1,7 @@
 """Edit the text of a YAML file in place: each edit changes only its own characters, so comments, order and style stay.
 
-An edit finds its place by the marks of PyYAML's nodes. Its result is parsed again and compared with the edited data, so
-an edit either does what it should or raises `EditError` (aliases, explicit keys and other rare forms of YAML).
+An edit finds its place by the marks of PyYAML's nodes. The result is parsed again and compared with the expected data,
+so an edit is either correct or raises `EditError` (aliases, explicit keys and other rare forms of YAML).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fusesoc_firm.text.yaml_text import LINE_END, LONGEST_NUMBER, data_of, is_nu
 Path = Sequence[str | int]
 """The keys and indices (from 0) that lead from a file's root to a value."""
 
-# What may stand between two items of a list in brackets: blanks, line ends and comments, with one comma.
+# The separator of two items of a list in brackets: blanks, line ends and comments, with one comma.
 _BETWEEN = re.compile(r"(?P<before>(?:\s|(?<=\s)#[^\n]*)*),[ \t]*")
 
 
@@ -40,7 +40,7 @@ class _Change:
 def put(text: str, path: Path, value: Any, order: Sequence[str] = ()) -> str:
     """Return the text with a new value of a key or of a list's item.
 
-    A missing key is added after those that precede it in `order`. Raise `EditError` if the path leads nowhere.
+    A missing key is added after the keys that precede it in `order`. Raise `EditError` for an invalid path.
     """
     source = _Source(text)
     expected = source.data()
@@ -52,7 +52,7 @@ def put(text: str, path: Path, value: Any, order: Sequence[str] = ()) -> str:
 
 
 def insert(text: str, path: Path, index: int, value: Any) -> str:
-    """Return the text with a further item at an index of the list at `path`. Raise `EditError` if there is no list."""
+    """Return the text with a further item at an index of the list at `path`. Raise `EditError` without such a list."""
     source = _Source(text)
     expected = source.data()
     items = _inside(expected, path)
@@ -64,7 +64,7 @@ def insert(text: str, path: Path, index: int, value: Any) -> str:
 
 
 def remove(text: str, path: Path) -> str:
-    """Return the text without a key or an item. Raise `EditError` if the path leads nowhere."""
+    """Return the text without a key or an item. Raise `EditError` for an invalid path."""
     source = _Source(text)
     expected = source.data()
     try:
@@ -77,7 +77,7 @@ def remove(text: str, path: Path) -> str:
 def word(answer: str) -> str:
     """Return a text as a scalar, in quotes if YAML would otherwise misread it, alone or in a list."""
     if is_number(answer):
-        # A number is also accepted as a word, and is easier to read without quotes.
+        # A number is also legal as a word, and is easier to read without quotes.
         return answer
     try:
         is_plain = yaml.safe_load(f"[{answer}]") == [answer] and yaml.safe_load(f"a: {answer}") == {"a": answer}
@@ -104,7 +104,7 @@ def path_at(node: yaml.Node | None, line: int, column: int) -> list[str | int]:
 
 
 def is_number(answer: str) -> bool:
-    """Return whether YAML reads a text as the integer that it shows."""
+    """Return whether a text is a decimal integer that YAML reads as the same number."""
     return answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer
 
 
@@ -139,14 +139,14 @@ def _root(text: str) -> yaml.Node:
 
 
 def _separate(data: Any) -> Any:
-    """Return data in which no two places share a value, as an anchor and its aliases do."""
+    """Return data without shared values; an anchor and its aliases share a value."""
     if isinstance(data, dict):
         return {key: _separate(value) for key, value in data.items()}
     return [*map(_separate, data)] if isinstance(data, list) else data
 
 
 def value_at(data: Any, path: Path) -> Any:
-    """Return the value at a path. Raise `EditError` if the path leads nowhere."""
+    """Return the value at a path. Raise `EditError` for an invalid path."""
     for step, part in enumerate(path):
         try:
             data = data[part]
@@ -164,7 +164,7 @@ def _inside(data: Any, path: Path) -> Any:
 
 
 class _Source:
-    """A text with its nodes: places are numbers of characters from the start."""
+    """A text with its nodes; a place is an offset in characters from the start."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -176,13 +176,13 @@ class _Source:
     def data(self) -> Any:
         """Return the data in the text. Raise `EditError` for invalid values."""
         try:
-            # The construction of data moves merged keys in the nodes.
+            # The construction of data moves merged keys in the nodes, so it uses separate nodes.
             return _separate(data_of(_root(self._text)))
         except yaml.YAMLError as error:
             raise EditError(str(error)) from error
 
     def changed(self, changes: Iterator[_Change], expected: Any) -> str:
-        """Return the changed text after a check that it has the expected data."""
+        """Return the changed text. Raise `EditError` unless it has the expected data."""
         made = self._text
         for change in sorted(changes, key=lambda item: item.start, reverse=True):
             made = made[: change.start] + change.new + made[change.end :]
@@ -234,7 +234,7 @@ class _Source:
             yield self._remove_key(parent, parts, index)
 
     def _empty(self, path: Path, node: yaml.CollectionNode) -> Iterator[_Change]:
-        """Yield the changes that leave nothing of a mapping or a list with one line per item."""
+        """Yield the changes that empty a mapping or a list with one line per item."""
         empty = "{}" if isinstance(node, yaml.MappingNode) else "[]"
         start, end = self._extent(node)
         above = self._node(path[:-1])
@@ -253,7 +253,7 @@ class _Source:
             raise EditError("a list has no keys")
         names = [key.value for key, _ in parent.value]
         before = {*order[: order.index(name)]} if name in order else set(names)
-        # Before the first key may be the dash of a list's item, so nothing is inserted there.
+        # The dash of a list's item may precede the first key, so nothing is inserted there.
         index = max((place + 1 for place, other in enumerate(names) if other in before), default=1)
         if parent.flow_style:
             yield self._insert_between(parent, min(index, len(names)), f"{name}: {_flow(value)}")
@@ -277,7 +277,7 @@ class _Source:
     # --- lists -----------------------------------------------------------------------------------------------------
 
     def _replace_items(self, node: yaml.CollectionNode, values: Sequence[Any]) -> _Change:
-        """Return the change of the items between the first and the last difference."""
+        """Return the change that replaces the items from the first to the last difference."""
         old = [item.value for item in node.value]
         new = [str(value) for value in values]
         first = _common(old, new)
@@ -367,7 +367,7 @@ class _Source:
         return "".join(line + self._line_end for line in lines)
 
     def _new_lines(self, end: int, lines: Sequence[str]) -> _Change:
-        """Return the change that adds lines below the line with a place."""
+        """Return the change that adds lines below the line of a place."""
         place = self._next_line(end)
         is_ended = place > 0 and LINE_END.fullmatch(self._text[place - 1]) is not None
         added = self._line_end.join(lines)
@@ -394,7 +394,7 @@ class _Source:
         return node
 
     def _parts(self, node: yaml.Node) -> list[tuple[int, int]]:
-        """Return where each key with its value, or each item, starts and ends."""
+        """Return the start and end of each key with its value, or of each item."""
         if isinstance(node, yaml.MappingNode):
             return [(self._place(key.start_mark), self._end(key, value)) for key, value in node.value]
         return [self._extent(item) for item in node.value]
@@ -403,7 +403,7 @@ class _Source:
         return max(self._place(key.end_mark), self._extent(value)[1])
 
     def _extent(self, node: yaml.Node) -> tuple[int, int]:
-        """Return where a node starts and ends, without the comments behind it."""
+        """Return the start and end of a node, without the comments after it."""
         start = self._place(node.start_mark)
         if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -424,12 +424,12 @@ class _Source:
         return min((start for start in self._starts if start > place), default=len(self._text))
 
     def _lines(self, start: int, end: int) -> _Change:
-        """Return the change that removes the lines from one place to another."""
+        """Return the change that removes all lines from `start` to `end`."""
         return _Change(self._line_start(start), self._next_line(end))
 
 
 def _child(node: yaml.Node, part: str | int) -> yaml.Node | None:
-    """Return the value of a key or the item with an index, or None if there is none."""
+    """Return the value of a key or the item at an index, or None if it is missing."""
     if isinstance(node, yaml.MappingNode):
         return next((value for key, value in node.value if key.value == part), None)
     if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and 0 <= part < len(node.value):
@@ -454,14 +454,14 @@ def _common(one: Sequence[str], other: Sequence[str]) -> int:
 
 
 def _quoted(text: str, style: str) -> str:
-    """Return a text in quotes of a style."""
+    """Return a text in quotes of this style."""
     if style == "'" and text.isprintable():
         return "'" + text.replace("'", "''") + "'"
     return json.dumps(text, ensure_ascii=False) if text.isprintable() else json.dumps(text)
 
 
 def _offsets(node: yaml.Node) -> Iterator[int]:
-    """Yield how far each list is indented below its key."""
+    """Yield the indentation of each list below its key."""
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             if isinstance(value, yaml.SequenceNode) and not value.flow_style and value.value:

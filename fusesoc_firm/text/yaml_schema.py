@@ -1,7 +1,6 @@
 """Describe the grammar of a YAML file as a JSON Schema, with which editors check and complete the file.
 
-The schema covers the same rules as the file's sections (`yaml_sections`). Unknown names are found only when the file is
-read.
+The schema covers the same rules as the file's sections (`yaml_sections`). Only reading the file detects unknown names.
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ class Text(str):
 class YamlText:
     """The lines and the root node of a YAML file; `file` is the file's name in messages.
 
-    `is_cut` means that the text becomes invalid YAML at some place, and that `root` contains only the part above it.
+    `is_cut` means that the text contains invalid YAML, and that `root` contains only the part above it.
     """
 
     file: str
@@ -145,7 +145,7 @@ def read_yaml(
 
 
 def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL) -> YamlText:
-    """Parse a YAML text; if it becomes invalid, report the place and return the part above."""
+    """Parse a YAML text; if a part is invalid, report its place and return the part above."""
     lines = tuple(LINE_END.split(text.rstrip()))
     _note_control_characters(text, file, faults)
     text = _CONTROL_CHARACTERS.sub(_REPLACEMENT, text)
@@ -171,7 +171,7 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
     problem = error.problem or error.context or "syntax error"
     context = error.context_mark
     mark = error.problem_mark or context
-    # If a colon is missing, or a construct is still open at the end, report the place where the construct began.
+    # If a colon is missing, or a construct is open at the end, report the start of the construct.
     is_late = problem.startswith("could not find expected ':'") or (mark is not None and mark.line >= len(lines))
     if context is not None and is_late:
         mark, context = context, None
@@ -191,7 +191,7 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
 
 
 def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
-    """Return a hint about a line that matches no open block, with the indentations; otherwise an empty string."""
+    """Return a hint with the indentations for a line that matches no open block, otherwise an empty string."""
     indent = len(lines[number]) - len(lines[number].lstrip(" "))
     # The first word of each open block by its indentation, the outermost first.
     open_blocks: dict[int, str] = {}

@@ -28,19 +28,19 @@ from fusesoc_firm.tools.interrupts import accept_interrupts
 
 # The options that precede the name of an output file.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
-# Variables from `firm_launcher.sh`: the file that shows that a program is in the manifest, and the program's path; the
-# user's note of the program, and what decides in which Python the package is found.
+# Variables from `firm_launcher.sh`: the file with the path of a program that is in the manifest, the user's note of the
+# program, and the settings that determine the package's Python.
 _NOTED, _NOTE, _ENVIRONMENT = "FIRM_NOTED", "FIRM_NOTE", "FIRM_ENVIRONMENT"
-# Where `launch.sh` leaves the names of programs, in the folder for temporary files.
+# The file in the temporary folder in which `launch.sh` records the names of programs.
 _LAUNCHED = "firm_launched"
-# The clock of a file system may be late by this.
+# The maximum delay of a file system's clock.
 _TICK_NANOSECONDS = 20 * 10**6
 
 
 def launch(program: str, arguments: Sequence[str], user_note: Path | None = None, environment: str = "") -> int:
     """Run a program until it ends, and return the exit status. Raise `InputError` if the program is not installed.
 
-    `user_note` is where other builds in this `environment` find the program's entries in the manifest.
+    `user_note` is the file with the program's manifest entries for other builds in this `environment`.
     """
     from fusesoc_firm.tools.manifest import note, note_for_other_builds
     from fusesoc_firm.tools.programs import find, ways
@@ -92,7 +92,7 @@ def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
 
 
 def starts_everything() -> bool:
-    """Return whether this package's launcher starts the build's programs; another launcher may find other programs."""
+    """Return whether this package's launcher starts the build's programs; other launchers may find other programs."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
     return not words or words[-1] in {"tool", __name__}
 

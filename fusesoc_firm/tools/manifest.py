@@ -1,7 +1,7 @@
 """The manifest of a build: the tools that took part in the build, stored next to the tools' outputs.
 
-Each program is added when it has run, so the tools of an output that is not rebuilt remain in the list. The file
-contains no dates and no paths, so equal tools and builds result in equal manifests on every machine.
+Each program is added after its run, so the tools of an output that is not rebuilt remain in the list. The file contains
+no dates and no paths, so equal tools and builds result in equal manifests on every machine.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
-from fusesoc_firm.store.own_code import PACKAGE
 from fusesoc_firm.text.file_lock import locked
+from fusesoc_firm.tools.own_code import PACKAGE
 from fusesoc_firm.tools.programs import PROGRAMS, facts_of, find, packages
 
 FILE = "manifest.json"
 # Edalize's description of a build.
 _OF_A_BUILD = "*.eda.yml"
 _PACKAGES = ("edalize", "fusesoc", "fusesoc-firm")
-# As in Linux.
+# Linux's limit.
 _MOST_LINKS = 40
 
 
 def note(program: str, folder: Path) -> str:
     """Record a program that has run in a build's folder, and the packages that started it, in the folder's manifest.
 
-    Several programs may be recorded at the same time. Return the text of the new entries; it is empty for an unknown
-    program, such as mkdir, and for a folder without a build of Edalize: `firm tool` can run anywhere.
+    Several programs may be recorded at the same time. Return the text of the new entries. It is empty for an unknown
+    program, such as mkdir, and for a folder without a build of Edalize, since `firm tool` can run anywhere.
     """
     if program not in PROGRAMS or not any(folder.glob(_OF_A_BUILD)):
         return ""
@@ -39,15 +39,15 @@ def note(program: str, folder: Path) -> str:
     # The lock is on the folder itself, so no lock file remains.
     with locked(folder):
         _replace(folder / FILE, _text(read(folder) | found))
-    # Without the lines of the braces around the entries.
+    # Omit the lines with the braces around the entries.
     return "".join(_text(found).splitlines(keepends=True)[2:-2])
 
 
 def note_for_other_builds(path: Path, environment: str, program: Path, entries: str, started: int) -> None:
     """Write a program's entries to the user's cache, where `firm_launcher.sh` finds them for other builds.
 
-    The note holds in an `environment` while no file that decides the entries changes after the time `started`, in
-    nanoseconds. A folder that cannot be written is ignored.
+    The note is valid in an `environment` until a file that determines the entries changes after the time `started`, in
+    nanoseconds. A folder that is not writable is ignored.
     """
     places = {name: str(metadata.distribution(name).locate_file("")) for name in _PACKAGES}
     starts = PROGRAMS[program.name].starts if program.name in PROGRAMS else ()
@@ -70,7 +70,7 @@ def read(folder: Path) -> dict[str, dict[str, str]]:
 
 
 def _links(path: Path) -> list[Path]:
-    """Return a path, the links to which it leads one after the other, and the file at their end."""
+    """Return a path, followed by the chain of its links and the file at the end."""
     found = [path]
     while found[-1].is_symlink() and len(found) < _MOST_LINKS:
         found.append(found[-1].parent / found[-1].readlink())

@@ -38,7 +38,7 @@ def draw(dot: str, path: Path | None, form: str | None, style: str = "") -> None
 
 
 def picture(dot: str, form: str, style: str = "") -> bytes:
-    """Return a DOT graph converted to `svg`, `png`, `pdf` or `dot`, an SVG with a style sheet.
+    """Return a DOT graph converted to `svg`, `png`, `pdf` or `dot`; `style` is a style sheet for SVG.
 
     Raise `InputError` if Graphviz is missing.
     """

@@ -8,7 +8,7 @@ from fusesoc_firm.text.files import read_file
 
 
 class Status(NamedTuple):
-    """Its state, such as R or Z (zombie); the id of its group; its start time, in the system's units."""
+    """A process's state, such as R or Z (zombie), its group's id, and its start time in the system's units."""
 
     state: str
     group: str
@@ -16,7 +16,7 @@ class Status(NamedTuple):
 
 
 def process_status(process: int | str) -> Status | None:
-    """Return the status of a process, or None if there is no such process."""
+    """Return the status of a process, or None if the process does not exist."""
     text = (read_file(f"/proc/{process}/stat") or b"").decode(errors="replace")
     # The fields follow the name in parentheses, which may contain anything.
     fields = text.rpartition(")")[2].split()
@@ -24,6 +24,6 @@ def process_status(process: int | str) -> Status | None:
 
 
 def start_time(process: int) -> str:
-    """Return when a process started, in the system's units, or "" if there is no such process."""
+    """Return the start time of a process in the system's units, or "" if the process does not exist."""
     status = process_status(process)
     return status.started if status else ""

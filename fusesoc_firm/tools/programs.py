@@ -138,7 +138,7 @@ def debian_package(path: Path) -> str:
     """Return the name and version of the Debian package that contains a program, or an empty text."""
     if not (query := shutil.which("dpkg-query")):
         return ""
-    # A package contains the program itself, and not the links to it; with merged /usr, it may be listed without /usr.
+    # A package contains the program, but not the links to it; with merged /usr, it may list the program without /usr.
     real = str(path.resolve())
     for place in (real, real.removeprefix("/usr")):
         found = subprocess.run([query, "-S", place], capture_output=True, text=True, errors="replace", check=False)
@@ -160,7 +160,7 @@ def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
     """Return the versions of Python packages; for our own package, also a digest of the files."""
     found = {name: {"version": metadata.version(name)} for name in names}
     if _OWN in found:
-        from fusesoc_firm.store.own_code import digest
+        from fusesoc_firm.tools.own_code import digest
 
         found[_OWN]["sha256"] = digest()
     return found

@@ -60,7 +60,7 @@ SIMULATORS: dict[str, Simulator] = {
         ", of the netlist that GHDL makes of the VHDL",
         programs=("iverilog",),
         system_verilog={"iverilog_options": "[-g2012]"},
-        # Edalize starts it with `-fst`.
+        # Edalize starts the simulator with `-fst`.
         waves="waves.fst",
     ),
     "verilator": Simulator(

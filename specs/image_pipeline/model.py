@@ -15,12 +15,12 @@ import numpy.typing as npt
 Message = dict[str, Any]
 Pixels = npt.NDArray[np.uint8]
 
-# Scaling down: of 3 columns 1 stays, of 9 rows 4.
+# Scaling keeps 1 of 3 columns and 4 of 9 rows.
 COLUMNS = (1, 3)
 ROWS = (4, 9)
-# The widest image that the integral is made of.
+# The widest image that the integral supports.
 MAX_COLUMNS = 2048
-# A longer frame_id is cut.
+# A longer frame_id is truncated.
 FRAME_ID_BYTES = 256
 _LARGEST_SIZE = 65535
 
@@ -32,12 +32,12 @@ def gray(pixels: Pixels) -> Pixels:
 
 
 def scaled(pixels: Pixels, columns: tuple[int, int] = COLUMNS, rows: tuple[int, int] = ROWS) -> Pixels:
-    """The nearest pixels of an image; `columns` and `rows` are so many out of so many."""
+    """The nearest pixels of an image; `columns` and `rows` are pairs (kept, total)."""
     return pixels[_nearest(pixels.shape[0], *rows)][:, _nearest(pixels.shape[1], *columns)]
 
 
 def _nearest(size: int, out: int, of: int) -> npt.NDArray[np.int64]:
-    """Where the pixels of a dimension come from; a begun part counts as one."""
+    """The source indices of a dimension's pixels, whose number is rounded up."""
     return np.arange(-(-size * out // of)) * of // out
 
 
@@ -52,7 +52,7 @@ def filtered(
     work: Callable[[Pixels], npt.NDArray[Any]],
     max_columns: int = _LARGEST_SIZE,
 ) -> Message:
-    """Return an accelerator's response to a message; `work` processes its pixels, `encodings` are in and out.
+    """Return an accelerator's response to a message; `work` processes its pixels, `encodings` are (input, output).
 
     The response is empty if the image is not in the encoding, or is larger than the accelerator supports, or if the
     length of its data does not match its height and step.

@@ -15,7 +15,7 @@ SPEED_FRACTION = 8
 _TWIST_BITS, _TWIST_FRACTION = 23, 16
 _GAIN_FRACTION, _BACK_FRACTION = 16, 32
 _PI = 3.14159265358979323846
-# Units of a motor's angle in a count.
+# Units of a motor's angle per count.
 _COUNT_STEPS = 1 << 24
 
 
@@ -39,13 +39,13 @@ class Parameters:
 
     @property
     def counts_per_metre(self) -> float:
-        """Counts a period for 1 m/s."""
+        """Counts per period at 1 m/s."""
         seconds_up = float(self.counts_per_turn) * float(self.pwm_cycles * self.pwm_periods) * 1.0e6
         return seconds_up / (2.0 * _PI * float(self.wheel_radius_um) * float(self.clock_hz))
 
     @property
     def counts_per_radian(self) -> float:
-        """Counts a period, of either side, for 1 rad/s."""
+        """Counts per period of either side at 1 rad/s."""
         return self.counts_per_metre * float(self.track_width_um) / 2.0e6
 
     @property
@@ -66,7 +66,7 @@ def to_fixed(number: float) -> int | None:
 
 
 def setpoints(parameters: Parameters, x: float, z: float) -> tuple[int, int]:
-    """The speeds of the left and the right wheels, in units of 2**-8 counts a period."""
+    """The speeds of the left and the right wheels, in units of 2**-8 counts per period."""
     forward, turning = to_fixed(x), to_fixed(z)
     if forward is None or turning is None:
         return 0, 0
@@ -82,7 +82,7 @@ def setpoints(parameters: Parameters, x: float, z: float) -> tuple[int, int]:
 
 
 def twist(parameters: Parameters, counts: list[int]) -> tuple[float, float]:
-    """The twist that the wheels' counts of a period mean: x in m/s, z in rad/s."""
+    """The twist of the wheels' counts in a period: x in m/s, z in rad/s."""
     front_left, front_right, rear_left, rear_right = counts
     x_back = round(0.25 / parameters.counts_per_metre * 2**_BACK_FRACTION)
     z_back = round(0.25 / parameters.counts_per_radian * 2**_BACK_FRACTION)
@@ -94,7 +94,7 @@ def twist(parameters: Parameters, counts: list[int]) -> tuple[float, float]:
 
 @dataclass
 class Pid:
-    """A wheel's controller; speeds in units of 2**-8 counts a period, the duty in cycles of the PWM."""
+    """A wheel's controller; speeds in units of 2**-8 counts per period, the duty in cycles of the PWM."""
 
     parameters: Parameters
     integral: int = 0
@@ -102,7 +102,7 @@ class Pid:
     standing: int = 0
 
     def duty(self, setpoint: int, counts: int) -> int:
-        """The duty for the next period, of the counts of the last one."""
+        """The duty for the next period, from the counts of the last one."""
         known = self.parameters
         limit = known.pwm_cycles
         error = setpoint - (counts << SPEED_FRACTION)
@@ -122,13 +122,13 @@ class Pid:
 
     @property
     def is_stalled(self) -> bool:
-        """Whether the wheel does not turn although it is driven as hard as can be."""
+        """Whether the wheel does not turn at full duty."""
         return self.standing == self.parameters.stall_periods
 
 
 @dataclass
 class Motor:
-    """A motor and its encoder; speed and angle in units of 2**-24 counts, a cycle and in all."""
+    """A motor and its encoder; speed in units of 2**-24 counts per cycle, angle in units of 2**-24 counts."""
 
     parameters: Parameters
     full_speed: int
@@ -136,11 +136,11 @@ class Motor:
     speed: int = 0
     angle: int = 0
     is_held: bool = False
-    # The angle where a decoder's view ends.
+    # The last angle that a decoder has seen.
     seen: int = 0
 
     def run(self, duty: int) -> None:
-        """A period of the PWM."""
+        """Run a period of the PWM."""
         cycles = self.parameters.pwm_cycles
         speed = 0 if self.is_held else self.speed
         self.seen = self.angle + speed * (cycles - self.parameters.seen_after - 1)
@@ -168,11 +168,11 @@ class Robot:
         self.pids = [Pid(self.parameters) for _ in self.motors]
 
     def period(self, command: tuple[float, float] | None) -> tuple[float, float]:
-        """A period of control, at whose end a command may be taken; the twist that was measured in it."""
+        """Run a control period, at whose end a command may be taken, and return the measured twist."""
         for wheel, motor in enumerate(self.motors):
             before = motor.seen // _COUNT_STEPS
             for number in range(self.parameters.pwm_periods):
-                # A duty found behind a period's end counts from the next one of the PWM on.
+                # A duty is computed after the end of its control period, so it applies from the next PWM period.
                 motor.run(self._running[wheel] if number == 0 else self.duties[wheel])
             self.counts[wheel] = motor.seen // _COUNT_STEPS - before
         self._running = list(self.duties)
@@ -188,11 +188,11 @@ class Robot:
         ]
         return twist(self.parameters, self.counts)
 
-    # The duties that the first period of the PWM still has.
+    # The old duties, which still apply in the first PWM period.
     _running: list[int] = field(default_factory=lambda: [0] * 4)
 
 
-# As tb/chassis.vhd has them.
+# As in tb/chassis.vhd.
 FULL_SPEEDS = (80_000, 75_000, 85_000, 80_000)
 _robot = Robot(Parameters(), [Motor(Parameters(), full_speed) for full_speed in FULL_SPEEDS])
 

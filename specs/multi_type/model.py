@@ -1,4 +1,4 @@
-"""Model of the multi-type system: each message leaves as it came."""
+"""Model of the multi-type system: each message is returned unchanged."""
 
 from __future__ import annotations
 

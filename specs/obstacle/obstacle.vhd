@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Tells whether something is nearer than NEAR, or so near that the sensor cannot measure it, which is minus infinity
--- (REP 117). What is below the sensor's range otherwise is no measurement, nor is what is no number.
--- Floats that are not negative are in the order of their bits, so nothing is calculated.
+-- Reports whether an obstacle is nearer than NEAR, or too near to be measured, which is minus infinity (REP 117).
+-- Other distances below the sensor's range and NaN are ignored.
+-- Non-negative floats have the order of their bits, so nothing is calculated.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -34,14 +34,14 @@ architecture rtl of obstacle is
   constant ZERO     : magnitude_t := (others => '0');
 
   signal distance : magnitude_t;
-  signal least    : magnitude_t;  -- what the sensor can measure
+  signal least    : magnitude_t;  -- the shortest valid distance
   signal is_below : std_logic;    -- the distance is negative
 
 begin
 
   distance <= unsigned(in_range_field(30 downto 0));
   is_below <= '1' when in_range_field(31) = '1' and distance /= ZERO else '0';
-  -- A negative bound is none; one that is no number lets nothing pass.
+  -- A negative bound is ignored; with NaN as the bound, all distances are.
   least    <= ZERO when in_min_range(31) = '1' and unsigned(in_min_range(30 downto 0)) <= INFINITE else
               unsigned(in_min_range(30 downto 0));
 

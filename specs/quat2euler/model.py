@@ -1,8 +1,8 @@
 """Bit-true model of the accelerator `quat2euler`: what rtl/quat2euler.vhd sends, to the last bit.
 
-Every function stands for one stage of the hardware and works on whole numbers alone, so the model shares
-neither rounding nor libm with the `math` it is tested against. Angles and lengths count in units of
-2**-FRACTION (rad, or the largest of x, y, z, w scaled into 1/2 to 1).
+Every function models one stage of the hardware in whole numbers alone, so the model shares neither rounding
+nor libm with the `math` it is tested against. Angles and lengths are in units of 2**-FRACTION (rad, or the
+largest of x, y, z, w scaled into 1/2 to 1).
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def quaternion_to_euler(x: float, y: float, z: float, w: float) -> tuple[float, 
     s = z - x
     alpha = math.atan2(r, q)
     beta = math.atan2(s, p)
-    # Not math.hypot, which rounds otherwise.
+    # Not math.hypot, which rounds differently.
     pitch = 2.0 * math.atan2(math.sqrt(p * p + s * s), math.sqrt(q * q + r * r)) - 0.5 * math.pi + 0.0
     return _wrap(alpha - beta), pitch, _wrap(alpha + beta)
 

@@ -2,8 +2,8 @@
 
     python3 cpu_node.py [--opencv]
 
-It has the topics of resize.yaml, and ends with Ctrl-C. NumPy gives the bytes that the hardware gives; those of OpenCV
-differ from them by one at most.
+It has the topics of resize.yaml, and ends with Ctrl-C. NumPy gives the bytes of the hardware; those of OpenCV differ
+from them by one at most.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ def larger_image(image: Image, double: Any) -> Image:
     pixels = double(rows[:, : image.width * CHANNELS].reshape(image.height, image.width, CHANNELS))
     height, width = pixels.shape[:2]
     result = Image(header=image.header, height=height, width=width, encoding="rgb8", step=width * CHANNELS)
-    # An array of Python's: rclpy looks at each element of anything else.
+    # An array of Python: rclpy checks each element of any other type.
     result.data.frombytes(pixels.tobytes())
     return result
 
 
 def larger_info(info: CameraInfo) -> CameraInfo:
-    """Return the calibration of the larger image, in the message that came."""
+    """Return the calibration of the larger image, in the received message."""
     info.height, info.width = 2 * info.height, 2 * info.width
     info.k[:6], info.p[:8] = 2 * info.k[:6], 2 * info.p[:8]
     roi = info.roi
@@ -64,7 +64,9 @@ def main() -> None:
     )
     node.create_subscription(CameraInfo, "/camera/camera_info", lambda info: infos.publish(larger_info(info)), DEPTH)
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(node)
+        # rclpy.spin may miss the wake-up of a Ctrl-C that comes between two of its waits, and then never ends.
+        while rclpy.ok():
+            rclpy.spin_once(node, timeout_sec=1)
 
 
 if __name__ == "__main__":

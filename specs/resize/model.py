@@ -1,7 +1,7 @@
 """Bit-accurate model of the replica of RobotPerf's a5, with NumPy, which rosbags depends on.
 
 `doubled` works on an array of rows and columns; `respond` adds the rules of the messages: an image that is not in rgb8
-becomes an empty one, and the calibration of the camera is of the larger image.
+becomes an empty one, and the calibration of the camera becomes that of the larger image.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Pixels = npt.NDArray[np.uint8]
 MAX_COLUMNS = 2048
 MAX_ROWS = 32767
 CHANNELS = 3
-# A longer frame_id is cut.
+# A longer frame_id is truncated.
 FRAME_ID_BYTES = 256
 
 
@@ -26,7 +26,7 @@ def doubled(pixels: Pixels) -> Pixels:
     """Return an image, (rows, columns, channels), twice as high and wide, interpolated between the pixels' centers.
 
     Each channel is the exact value of a bilinear interpolation, rounded to the nearest integer, halves up. Outside the
-    image, its border continues.
+    image, its border is repeated.
     """
     if not pixels.size:
         return np.zeros((2 * pixels.shape[0], 2 * pixels.shape[1], CHANNELS), np.uint8)

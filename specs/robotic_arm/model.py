@@ -1,7 +1,7 @@
 """Bit-true model of the accelerator `robotic_arm`: what rtl/arm_chain.vhd gives, to the last bit.
 
-It works on whole numbers alone, in the hardware's order. Lengths and elements of poses count in units of 2**-FRACTION
-(m), angles in units of 2**-FRACTION (rad). The reference of the kinematics themselves, in float64, is in the tests.
+It works on whole numbers alone, in the hardware's order. Lengths and elements of poses are in units of 2**-FRACTION
+(m), angles in units of 2**-FRACTION (rad). The tests contain the reference of the kinematics, in float64.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ A = (0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088, 0.0)
 D = (0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0, 0.107 + 0.1034)
 HAND_ANGLE = -math.pi / 4
 
-# Numbers from this on have no fixed-point form; of a given pose's elements, those that two's complement has up to
-# ELEMENT_LIMIT have a result.
+# Numbers from LIMIT on have no fixed-point form. An element of a given pose has a result if it is from -ELEMENT_LIMIT
+# to less than ELEMENT_LIMIT.
 LIMIT = 16
 ELEMENT_LIMIT = 4
 
-# What the CORDIC unit has behind its results' last bit, and what a square loses before it is added.
+# Guard bits of the CORDIC unit, and the bits that a square loses before it is added.
 _GUARD = 6
 _INNER = FRACTION + _GUARD
 _SQUARE_CUT = 8
@@ -62,7 +62,7 @@ def _arctangent(index: int, fraction: int) -> int:
 
 
 def _shortened() -> int:
-    """The length that all rotations of the CORDIC unit bring to 1, cut off."""
+    """The length that the rotations of the CORDIC unit scale to 1, truncated."""
     getcontext().prec = 50
     length = Decimal(1)
     for index in range(80):
@@ -120,7 +120,7 @@ def _product(left: int, right: int) -> int:
 
 
 def turn(row: Column, step: int, cosine: int, sine: int) -> Column:
-    """A row of the pose behind a step."""
+    """A row of the pose after a step."""
     sign = TURNS[step]
     x, turned, along = (row.x, row.z, row.y) if sign else (row.x, row.y, row.z)
     along_product = _product(along, _D[step])
@@ -151,7 +151,7 @@ def chain(angles: Sequence[float], given: Sequence[float]) -> tuple[list[Numbers
         cosine, sine = sincos(fold(fixed or 0))
         rows = [turn(row, step, cosine, sine) for row in rows]
         numbers = [number / ONE for number in _matrix(rows)]
-        # Only what is computed can be no number: the last row is a constant.
+        # Only computed elements can be NaN: the last row is constant.
         poses.append(
             numbers if is_fit else [math.nan if index % 4 < 3 else number for index, number in enumerate(numbers)]
         )

@@ -1,7 +1,7 @@
-"""Model of the Sobel filter, to the bit, with NumPy, which rosbags brings.
+"""Bit-accurate model of the Sobel filter, with NumPy, which rosbags depends on.
 
-`edges` works on an array of rows and columns; `respond` adds the rules of the message: what is no image in mono8
-becomes an empty one.
+`edges` works on an array of rows and columns; `respond` adds the rules of the message: a message that is not an image
+in mono8 becomes an empty one.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import numpy.typing as npt
 Message = dict[str, Any]
 Pixels = npt.NDArray[np.uint8]
 
-# The largest image that is taken.
+# The largest image that is supported.
 MAX_COLUMNS = 2048
 MAX_ROWS = 65535
-# A longer frame_id is cut.
+# A longer frame_id is truncated.
 FRAME_ID_BYTES = 256
 
 
 def edges(pixels: Pixels) -> Pixels:
-    """|Gx| + |Gy|, 255 at most; beyond the image its outermost pixels go on."""
+    """|Gx| + |Gy|, 255 at most; outside the image, its outermost pixels are repeated."""
     if not pixels.size:
         return pixels
     wide = np.pad(pixels.astype(np.int32), 1, mode="edge")
@@ -34,10 +34,10 @@ def edges(pixels: Pixels) -> Pixels:
 
 
 def filtered(message: Message) -> Message:
-    """The message that the accelerator makes of an image.
+    """The accelerator's response to an image.
 
-    An image is empty if it is not in mono8, or larger than the accelerator takes, or its data is not as long as its
-    height and step say.
+    The response is empty if the image is not in mono8, or is larger than the accelerator supports, or if the length of
+    its data does not match its height and step.
     """
     height, width, step, data = message["height"], message["width"], message["step"], bytes(message["data"])
     is_right = (

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Tells an engine without `tuser` of aborted frames: the burst that aborts a frame ends before its last beat, and a
+-- Reports aborted frames to an engine without `tuser`: the burst that aborts a frame ends before its last beat, and a
 -- record follows. A record is the id 255, a length of 2**32-1, which no frame has, the aborted id and the code 10.
--- Each beat waits for the next one, or is a last one. So an aborted frame never has the length that its header
--- announces, and a host cannot take it for a whole one.
+-- Each beat waits for the next one, or is a last one. An aborted frame therefore never has the length in its header,
+-- and a host cannot mistake it for a complete one.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -78,8 +78,8 @@ architecture rtl of firm_axis_abort_record is
   signal tkeep_r : std_logic_vector(WIDTH/8-1 downto 0);
   signal tlast_r : std_logic;
 
-  signal recording_r : std_logic;                                 -- a record is sent
-  signal record_r    : std_logic_vector(RECORD_BITS-1 downto 0);  -- its rest
+  signal recording_r : std_logic;                                 -- a record is being sent
+  signal record_r    : std_logic_vector(RECORD_BITS-1 downto 0);  -- its remaining bytes
   signal place_r     : std_logic_vector(BEATS-1 downto 0);        -- bit k is '1' at its beat k
 
   signal aborts : std_logic;  -- the arriving beat aborts its frame

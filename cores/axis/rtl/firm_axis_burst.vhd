@@ -2,7 +2,7 @@
 -- Forms bursts after a multiplexer whose source may change between any two beats: each run of beats from one source
 -- leaves as a burst that ends with `tlast`. The first burst of a frame starts with the frame's first beat. A resumed
 -- burst starts with an extra beat, whose lowest byte is the source's index and whose other bytes are meaningless.
--- Only a beat of another source shows that a run is over. Each beat is therefore held until the next one arrives, from
+-- Only a beat of another source reveals the end of a run. Each beat is therefore held until the next one arrives, from
 -- any source; the last beat of a frame is not held. A held beat never blocks another source, and a run has no gap.
 -- A memory with one bit per source records which frames have begun. It is cleared in the 2**n cycles after reset, for
 -- an index of n bits; no beat is taken meanwhile.
@@ -51,7 +51,7 @@ architecture rtl of firm_axis_burst is
   signal write_bit  : std_logic;
   signal begun      : std_logic_vector(0 downto 0);
   signal begun_next : std_logic_vector(0 downto 0);
-  signal cleared_r  : unsigned(INDEX_BITS_USED downto 0);  -- the next bit to clear; the highest bit: there is one
+  signal cleared_r  : unsigned(INDEX_BITS_USED downto 0);  -- the next bit to clear; its highest bit: not all are
   signal clearing   : std_logic;
 
   signal held_tdata_r  : std_logic_vector(WIDTH-1 downto 0);

@@ -39,7 +39,7 @@ entity firm_axis_demux is
     m_axis_tvalid : out std_logic_vector(DESTINATIONS-1 downto 0);
     m_axis_tready : in  std_logic_vector(DESTINATIONS-1 downto 0);
 
-    -- The same beats, for a part that listens: on offer, taken, and the number of their destination.
+    -- The same beats, for a listener: offered, accepted, and the number of their destination.
     offered  : out std_logic;
     beat     : out std_logic;
     selected : out std_logic_vector(index_bits(DESTINATIONS)-1 downto 0);

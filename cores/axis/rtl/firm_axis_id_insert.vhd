@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes ids of two bytes from ids of one byte: inserts `high` after the first byte of each frame. The frame's other
+-- Converts ids of one byte to ids of two bytes: inserts `high` after the first byte of each frame. The frame's other
 -- bytes move up by one lane, so a frame whose last beat is full gets one more beat. The paths from input to output are
--- combinational: put a register slice behind it. The insertion adds no pause between beats of a frame.
+-- combinational: put a register slice after it. The insertion adds no pause between beats of a frame.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -37,9 +37,9 @@ end entity firm_axis_id_insert;
 architecture rtl of firm_axis_id_insert is
 
   signal first_r : std_logic;  -- the input's beat is the first of a frame
-  signal extra_r : std_logic;  -- the input's beat has been sent, and one byte of it follows in a beat of its own
+  signal extra_r : std_logic;  -- the input's beat has been sent, and one byte of it follows in a separate beat
   signal splits  : std_logic;  -- the input's beat becomes two beats
-  signal ends    : std_logic;  -- the output's beat is the last that the input's beat becomes
+  signal ends    : std_logic;  -- the output's beat is the last one of the input's beat
   signal moves   : std_logic;
 
 begin
@@ -55,7 +55,7 @@ begin
   end generate byte_wide;
 
   wider : if WIDTH > 8 generate
-    signal carry_r : std_logic_vector(7 downto 0);  -- the highest lane of the beat before
+    signal carry_r : std_logic_vector(7 downto 0);  -- the highest lane of the previous beat
     signal lowest  : std_logic_vector(7 downto 0);
     signal second  : std_logic_vector(7 downto 0);
   begin

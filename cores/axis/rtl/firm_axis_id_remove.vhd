@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes ids of one byte from ids of two bytes: removes the second byte of each frame, which is `high` on the frame's
+-- Converts ids of two bytes to ids of one byte: removes the second byte of each frame, which is `high` on the frame's
 -- first beat. The frame's other bytes move down by one lane, so a frame whose last beat has one byte loses this beat.
 -- A lane that is not kept stays one, so a broken beat reaches the receiver as a broken beat. The part stores one beat
 -- and accepts a beat in every cycle; paths from input to output are combinational, as in the demux.
@@ -74,7 +74,8 @@ begin
   wider : if WIDTH > 8 generate
     constant LANES : positive := WIDTH/8;
   begin
-    -- A last beat with only its lowest lane. Any other last beat leaves by itself, even if it has no lane.
+    -- A last beat with only its lowest byte is merged into the held beat. Any other last beat is sent separately, even
+    -- if its tkeep is zero.
     merges   <= s_axis_tlast and s_axis_tkeep(0) and not s_axis_tkeep(1) and held_r and not last_r;
     stores   <= s_axis_tvalid and ready and not merges;
     valid    <= held_r and (last_r or s_axis_tvalid);

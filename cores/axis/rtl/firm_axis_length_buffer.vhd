@@ -236,7 +236,7 @@ begin
 
   -- Out -------------------------------------------------------------------------------------------------------------
 
-  -- When its length is there, all beats of a frame are.
+  -- When the length of a frame is stored, so are all its beats.
   between   <= not valid_r or word_r(WORD_BITS-1);
   start     <= next_valid and between and (m_axis_tready or not valid_r);
   read_beat <= start or (not between and m_axis_tready);

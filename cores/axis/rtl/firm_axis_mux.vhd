@@ -2,9 +2,9 @@
 -- Forwards one of SOURCES streams: `source` selects it while `enable` is '1'. The multiplexer is purely combinational
 -- and ignores frames: the driver of `source` keeps them whole (a scheduler), or a firm_axis_burst after it marks
 -- bursts.
--- The lowest bits of an index select in the first multiplexers of a tree, which are the most, so their wires are the
--- longest. Of more than 32 sources, `tvalid` and `tlast`, which return to the scheduler, have places whose numbers are
--- the indices with their halves exchanged: the wires of `tdata` then do not slow them down.
+-- The lowest bits of an index control the first, most numerous multiplexers of a tree, so their wires are the longest.
+-- Of more than 32 sources, `tvalid` and `tlast`, which return to the scheduler, have places whose numbers are the
+-- indices with their halves exchanged: the wires of `tdata` then do not slow them down.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

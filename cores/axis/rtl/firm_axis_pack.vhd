@@ -66,7 +66,7 @@ begin
     report "firm_axis_pack: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
 
-  -- The waiting byte is the beat; it is complete as soon as the input tells whether it is the last one.
+  -- The waiting byte is the beat; it is complete as soon as the input determines whether it is the last one.
   byte_wide : if WIDTH = 8 generate
 
     signal waiting_r : std_logic;  -- rest_r holds a byte
@@ -140,13 +140,13 @@ begin
     signal tail_r    : std_logic;                        -- they end a frame
     signal abort_r   : std_logic;                        -- with an abort
     signal begun_r   : std_logic;                        -- a beat of their frame has left
-    signal shift_r   : unsigned(SHIFT_BITS-1 downto 0);  -- the lane that the next byte gets
+    signal shift_r   : unsigned(SHIFT_BITS-1 downto 0);  -- the lane of the next byte
 
-    signal turned   : std_logic_vector(WIDTH-1 downto 0);  -- the input in the lanes where it belongs
+    signal turned   : std_logic_vector(WIDTH-1 downto 0);  -- the input, rotated to its lanes
     signal waits    : std_logic_vector(LANES-1 downto 0);  -- the lanes of rest_r that hold a byte
     signal arriving : count_t;
-    signal filled   : unsigned(COUNT_BITS downto 0);       -- the bytes of the frame that arrives
-    signal overflow : std_logic;                           -- they are more than a beat
+    signal filled   : unsigned(COUNT_BITS downto 0);       -- the bytes of the arriving frame
+    signal overflow : std_logic;                           -- they exceed a beat
 
   begin
 

@@ -4,8 +4,8 @@
 -- The memory has a place of BEATS beats for each of FRAMES frames, the arriving and the leaving one included. Two lists
 -- hold the first addresses of places: of waiting frames, oldest first, and of free places. Without a free place, an
 -- arriving frame waits, or one frame is dropped as a whole: either the arriving frame (DROP_NEWEST), or the oldest
--- waiting one (DROP_OLDEST), whose place the arriving frame gets in the same cycle. A frame that has begun to leave is
--- not dropped.
+-- waiting one (DROP_OLDEST), whose place the arriving frame takes in the same cycle. A frame that is being sent is not
+-- dropped.
 --
 -- A longer frame is cut after BEATS beats. With one beat above the longest legal frame, the subscriber after the queue
 -- therefore reports it.
@@ -56,7 +56,7 @@ architecture rtl of firm_axis_queue is
   constant LANES     : positive := WIDTH/8;
   constant WORD_BITS : positive := WIDTH + LANES + 2;
   constant DEPTH     : positive := FRAMES * BEATS;
-  -- Items of a list; one that is never used spares a memory of one word.
+  -- Items of a list; an additional, unused one avoids a memory of one word.
   constant ITEMS : positive := max(2, FRAMES);
   -- Errors that a subscriber may report of frames that have left.
   constant REPORTS : positive := 16;
@@ -79,7 +79,7 @@ architecture rtl of firm_axis_queue is
   signal free_count_r    : natural range 0 to FRAMES;
   signal unused_r        : natural range 0 to DEPTH;    -- places from here on have never been used
 
-  -- The frame that arrives, or is to arrive next.
+  -- The arriving frame, or the next one.
   signal place_r     : address_t;                       -- its place, if it has one
   signal has_place_r : std_logic;
   signal write_r     : address_t;                       -- the address of its next beat, once it has a place
@@ -102,7 +102,7 @@ architecture rtl of firm_axis_queue is
   signal is_waiting : std_logic;  -- a frame waits
   signal take_free  : std_logic;
 
-  -- The frame that leaves.
+  -- The leaving frame.
   signal leaving_r    : address_t;                      -- its place
   signal read_r       : address_t;                      -- the address of its next beat
   signal read_address : address_t;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Cuts every path of a stream at the full rate of a beat per cycle. All outputs are registered, including
 -- `s_axis_tready`. As this is a cycle late, a second register holds the beat that arrives when the output has just
--- stalled. `m_axis_tid` is the frame's id, the lowest byte of its first beat, on every beat; to add it here needs
+-- stalled. `m_axis_tid` is the frame's id, the lowest byte of its first beat, on every beat; adding it here needs
 -- neither logic nor a second register. `tuser` carries any other data: with a frame, bit 0 of the last beat marks an
 -- aborted one. Either costs nothing if left open.
 library ieee;
@@ -82,11 +82,11 @@ begin
       if ready_r = '1' then
         skid_r <= arriving;
       end if;
-      -- Without a beat, it does not matter what moves: so the path to the many registers is short.
+      -- Without a beat, the moved data are ignored, so that the path to the many registers is short.
       if move = '1' then
         output_r <= next_beat;
       end if;
-      -- But the output keeps its last beat's `tlast`, so it tells that the next one is a first one.
+      -- But the output keeps its last beat's `tlast`, which marks the next one as a first one.
       if available = '0' then
         output_r.tlast <= output_r.tlast;
       elsif move = '1' and output_r.tlast = '1' then

@@ -58,7 +58,7 @@ begin
 
   widen : if S_WIDTH < M_WIDTH generate
 
-    -- A one marks the piece that comes next.
+    -- A one marks the next piece.
     signal place_r : std_logic_vector(PIECES-1 downto 0);
     -- The pieces before the last one; missing ones are zero.
     signal rest_r  : std_logic_vector(M_WIDTH-NARROW-1 downto 0);
@@ -165,7 +165,7 @@ begin
     count : process (clk)
     begin
       if rising_edge(clk) then
-        -- A beat that disappears in the middle of its pieces was withdrawn.
+        -- A beat whose valid falls in the middle of its pieces was withdrawn.
         if rst_n = '0' or is_open = '0' or s_axis_tvalid = '0' then
           index_r <= (others => '0');
         elsif m_axis_tready = '1' then

@@ -2,7 +2,7 @@
 -- Selects one of many words with a tree of multiplexers, two levels of which fit a 6-input LUT per bit. A dynamic array
 -- index costs about twice as much with `ghdl --synth`. An index beyond the last word gives any word, or zeros. If
 -- DECODED, the tree consists of ANDs of words and decoded pairs of index bits, and ORs. Yosys maps this directly to
--- the 4-to-1 multiplexers that fit a LUT, but takes nested multiplexers apart. That saves a third of the LUTs for
+-- the 4-to-1 multiplexers that fit a LUT, but decomposes nested multiplexers. That saves a third of the LUTs for
 -- many unrelated words, and costs more for words with constants, which nested multiplexers absorb.
 library ieee;
 use ieee.std_logic_1164.all;

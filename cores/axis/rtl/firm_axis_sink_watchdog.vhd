@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Frees a stream of whole frames from a sink that takes nothing. After LIMIT cycles in which the source offers a beat
+-- Frees a stream of whole frames from a sink that accepts nothing. After LIMIT cycles in which the source offers a beat
 -- and the sink does not take the previous one, the rest of the arriving frame is dropped, and so are further frames
 -- until the sink takes a beat again. If a part of the first of them has left, an abort (`tuser`) then ends it, and the
--- sink gets the next frame from its first beat.
+-- sink receives the next frame from its first beat.
 --
 -- The beat at the output stays until the sink takes it. All outputs but `s_axis_tready` are registers.
 library ieee;
@@ -37,7 +37,7 @@ entity firm_axis_sink_watchdog is
     m_axis_tready : in  std_logic;
 
     -- Errors of the sink, and of this entity: code 9 for each frame that did not leave as a whole. The sink's own
-    -- report of an aborted frame is left out.
+    -- report of an aborted frame is omitted.
     s_frame_error      : in  std_logic                    := '0';
     s_frame_error_code : in  fault_t                      := NO_FAULT;
     frame_error        : out std_logic;

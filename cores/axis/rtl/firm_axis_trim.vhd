@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Watches that a frame is as long as its header announces. A frame that is shorter or longer, or whose source reports a
--- fault, ends with an abort at once, and the rest of what is offered is dropped. It is placed before firm_axis_pack and
--- has the same ports on both sides. Its output is a register; only `m_ready` reaches `ready` in the same cycle. The
--- remaining bytes are counted with 32 bits, but compared with few: they are less than two beats if they were before the
--- previous piece, or they are enough for any piece.
+-- Checks that a frame has the length in its header. A frame that is shorter or longer, or whose source reports a fault,
+-- ends with an abort at once, and the remaining input is dropped. It is placed before firm_axis_pack and has the same
+-- ports on both sides. Its output is a register; only `m_ready` reaches `ready` in the same cycle. The remaining bytes
+-- are counted with 32 bits, but compared with few: they are less than two beats if they were before the previous piece,
+-- or they are enough for any piece.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -83,12 +83,12 @@ architecture rtl of firm_axis_trim is
   signal near_r    : std_logic;         -- less than two beats remained before the previous piece
   signal open_r    : std_logic;         -- no length is announced: the frame may have any length
   signal closed_r  : std_logic := '0';  -- the frame was aborted
-  signal failed_r  : std_logic := '0';  -- it waits to be aborted
+  signal failed_r  : std_logic := '0';  -- it still has to be aborted
   signal is_failed : std_logic;
   signal cut_r     : std_logic;
   signal stuck_r   : std_logic;         -- the frame should end, but lacks a beat and more
   signal started_r : std_logic;         -- the frame has just begun
-  signal refused   : std_logic;         -- it announces too much
+  signal refused   : std_logic;         -- its length is too large
 
   signal wanted  : count_t;
   signal room    : count_t;    -- the remaining bytes, if they are few
@@ -136,7 +136,7 @@ begin
 
   is_refused <= refused;
 
-  -- All of these come a cycle after a piece that is not the frame's last one.
+  -- All of these are valid a cycle after a piece that is not the frame's last one.
   is_failed <= (fault or refused or cut_r or stuck_r or failed_r) and not closed_r;
 
   hold_piece : process (clk)

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Frees a stream of whole frames from a source that stops in the middle of a frame. After LIMIT cycles in which the
 -- receiver is ready and the source offers nothing, the frame ends with an abort (`tuser`) instead of its next beat, and
--- the scheduler is told that the frame is over. The source's late beats up to its `tlast` are taken and dropped; if
+-- its end is reported to the scheduler. The source's late beats up to its `tlast` are taken and dropped; if
 -- the source stops among them, its grant ends after LIMIT cycles as well. Then its next frame is forwarded. Only cycles
 -- with `tick` count, so that many watchdogs can share a timer.
 --
@@ -51,7 +51,7 @@ entity firm_axis_watchdog is
 
     -- For the scheduler: the frame ends without a beat of the source.
     cut : out std_logic;
-    -- Pulses when the source is found to have stopped, while its tready is high; its frame will be aborted.
+    -- Pulses when the source has stopped, while its tready is high; its frame will be aborted.
     expires : out std_logic;
     -- Pulses for each aborted frame, one bit for each source.
     expired : out std_logic_vector(SOURCES-1 downto 0)
@@ -73,7 +73,7 @@ architecture rtl of firm_axis_watchdog is
 
   signal inside_r : std_logic;                    -- a frame has begun
   signal waited_r : natural range 0 to LIMIT-1;   -- cycles with tick in a row without a beat
-  signal cut_r    : std_logic;                    -- the frame is to end
+  signal cut_r    : std_logic;                    -- the frame must end
   signal ends     : std_logic;                    -- it ends in this cycle
   signal stops    : std_logic;                    -- the source has been silent for LIMIT cycles with tick
 

@@ -4,8 +4,8 @@
 -- next one. One shifter of radix 4 joins the two: nothing else is between the registers and `window`, and no path leads
 -- from the stream to the window or from `take` to `s_axis_tready`. At any offset, a beat enters every cycle as long as
 -- all available bytes are taken. At 8 bits there is nothing to shift, and the window is the stream.
--- A broken beat (see is_broken_beat) ends its frame without a byte; what follows it up to `tlast` does not enter. At 8
--- bits every beat holds its byte, and `tkeep` is ignored.
+-- A broken beat (see is_broken_beat) ends its frame without a byte; the following beats up to `tlast` do not enter. At
+-- 8 bits every beat holds its byte, and `tkeep` is ignored.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -184,10 +184,10 @@ begin
     signal has_next   : std_logic;                      -- the next beat belongs to the frame
     signal is_empty   : std_logic;                      -- and holds no byte
     signal move       : std_logic;                      -- the next beat becomes the first
-    signal uses_up    : std_logic;                      -- its bytes are taken already
+    signal uses_up    : std_logic;                      -- its bytes have already been taken
     signal joined_r   : count_t;                        -- `joined` of the cycle before, unless it overflows
     signal overflow_r : std_logic;                      -- `overflow` of the cycle before
-    signal is_same_r  : std_logic := '0';               -- nothing has moved since
+    signal is_same_r  : std_logic := '0';               -- no beat has moved since
 
     signal s_axis_tready_out : std_logic;
 

@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The faults of frames: the codes that converters, the Manager and links report in frame_error_code.
+-- `make constants` writes them from fusesoc_firm/frame/faults.py.
 library ieee;
 use ieee.std_logic_1164.all;
 

@@ -12,7 +12,7 @@ entity firm_hls_results is
   port (
     clk : in std_logic;
 
-    -- While it is low, no message is under way.
+    -- While it is low, no message is in progress.
     is_open : in std_logic;
 
     din    : in  std_logic_vector(BITS-1 downto 0);

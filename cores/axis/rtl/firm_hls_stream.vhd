@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes the stream of a string or an array from the elements that an HLS kernel writes as into a FIFO (`ap_fifo`), an
--- element per cycle. The kernel writes after the length is known; what it writes beyond the length is dropped.
+-- Converts the elements that an HLS kernel writes as into a FIFO (`ap_fifo`) to the stream of a string or an array, an
+-- element per cycle. The kernel writes after the length is known; elements beyond the length are dropped.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,7 +17,7 @@ entity firm_hls_stream is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- While it is low, no message is under way.
+    -- While it is low, no message is in progress.
     is_open : in std_logic;
 
     length       : in std_logic_vector(31 downto 0);
@@ -39,7 +39,7 @@ architecture rtl of firm_hls_stream is
 
   signal runs    : std_logic;
   signal count_r : unsigned(31 downto 0);
-  signal is_over : std_logic;  -- all elements came
+  signal is_over : std_logic;  -- all elements have arrived
   signal is_last : std_logic;
   signal enters  : std_logic;
 
@@ -71,7 +71,7 @@ begin
     end if;
   end process count;
 
-  -- It cuts the path from `full_n` to `write`, which a kernel may have.
+  -- This cuts a possible path in the kernel from `full_n` to `write`.
   u_slice : entity firm.firm_axis_register_slice
     generic map (
       WIDTH => BITS

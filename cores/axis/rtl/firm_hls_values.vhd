@@ -12,7 +12,7 @@ entity firm_hls_values is
   port (
     clk : in std_logic;
 
-    -- While it is low, no message is under way.
+    -- While it is low, no message is in progress.
     is_open : in std_logic;
 
     values : in std_logic_vector(BITS*COUNT-1 downto 0);

@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Distributes one message to several sinks. Each takes it in its own time; the source is released when all have it. A
--- sink's valid does not wait for another sink's ready, so no sink delays the others by more than one message.
+-- Distributes one message to several sinks. Each sink accepts it independently; the source is released when all have
+-- accepted it. A sink's valid does not wait for another sink's ready, so no sink delays the others by more than one
+-- message.
 -- The beats of a stream and the elements of an array can be such messages, too.
 library ieee;
 use ieee.std_logic_1164.all;

@@ -6,8 +6,8 @@ use ieee.std_logic_1164.all;
 package firm_message_pkg is
 
   -- Whether a value equals a constant, as `value = reference` but bit by bit. GHDL 2.0 synthesises a 64-bit constant as
-  -- zero if its low half is zero, and writes one of more than 32 bits into Verilog as a text. This function leaves no
-  -- constant wider than a bit.
+  -- zero if its low half is zero, and writes a constant of more than 32 bits to Verilog as a string. This function uses
+  -- only constants of one bit.
   function is_equal(value, reference : std_logic_vector) return boolean;
 
 end package firm_message_pkg;

@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A window, whose bytes a packer joins again, between the simulation host's two streams. Without stalls the bytes go
--- over a whole window a cycle, and a source that never pauses must be passed on without a gap; else in random numbers.
+-- Tests a window and a packer, which joins its bytes again, between the simulation host's two streams. Without stalls,
+-- a whole window is transferred per cycle, and a source that never pauses must cause no gap at the output; otherwise,
+-- random numbers of bytes are transferred.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The length buffer between the simulation host's two streams. A frame that is sent must not pause of its own accord.
+-- Tests the length buffer between the simulation host's two streams. The buffer itself must not pause within a frame.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -15,7 +15,7 @@ entity firm_axis_length_buffer_tb is
     -- The host's stalls, and stalls of the sink only.
     STALL_PERCENT      : integer := 0;
     SINK_STALL_PERCENT : integer := 0;
-    -- So many errors of a publisher, early on.
+    -- The number of publisher errors at the beginning.
     PUBLISHER_ERRORS : integer := 0;
     WATCHDOG         : integer := 2000;
     QUIET            : integer := 200

@@ -17,15 +17,15 @@ entity firm_axis_pack_tb is
     PACKED_FILE   : string  := "packed.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    -- The chances, each cycle, that nothing is offered, and that the sink takes nothing.
+    -- The chances per cycle that nothing is offered, and that the sink takes nothing.
     SOURCE_STALL_PERCENT : integer := 0;
     SINK_STALL_PERCENT   : integer := 0;
-    -- A piece has `random` (0 to all lanes) bytes, and the end may come without a byte; or it is `full`, up to a
-    -- frame's last one; or it is full after a first one of a random number: `shifted`.
+    -- `random`: a piece has 0 bytes to all lanes, and the end may come without a byte. `full`: all pieces up to a
+    -- frame's last one are full. `shifted`: they are full after a first one of a random number.
     PIECES : string := "random";
-    -- Before each frame comes one without any byte, which must leave nothing.
+    -- An empty frame precedes each frame, and must have no effect.
     EMPTY_FRAMES : boolean := false;
-    -- The sink is ready only where it saw `tvalid`, which must not wait for it.
+    -- The sink is ready only after `tvalid`, which must not wait for it.
     LATE_READY : boolean := false;
     WATCHDOG   : integer := 1000
   );
@@ -175,7 +175,7 @@ begin
     variable watch      : natural := 0;
     variable is_stalled : boolean := false;
     variable stalled    : std_logic_vector(WIDTH+LANES+1 downto 0);
-    variable is_ending  : boolean;  -- lanes from here on hold nothing
+    variable is_ending  : boolean;  -- lanes from here on are empty
     variable random_1   : positive := SEED;
     variable random_2   : positive := 5;
     variable draw       : real;

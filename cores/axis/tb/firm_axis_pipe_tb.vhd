@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A part that a stream goes through unchanged, between the simulation host's two streams. A source that never pauses
--- must be passed on without a gap, whatever the sink does.
+-- Tests a part that forwards a stream unchanged, between the simulation host's two streams. A source that never pauses
+-- must cause no gap at the output, whatever the sink does.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -17,7 +17,7 @@ entity firm_axis_pipe_tb is
     -- The host's stalls, and stalls of the sink only.
     STALL_PERCENT      : integer := 0;
     SINK_STALL_PERCENT : integer := 0;
-    -- The sink takes nothing until the part is full, which must hold so many beats; 0: not tested.
+    -- The number of beats that the part must hold while the sink takes nothing; 0: not tested.
     CAPACITY      : integer := 0;
     WATCHDOG      : integer := 1000;
     QUIET         : integer := 100

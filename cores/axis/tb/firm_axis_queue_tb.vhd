@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The queue, or with LIMIT the watchdog, between a source of frames of random lengths and a sink that stops at random,
--- also for long. Each cycle becomes a line of the trace, which the models in tests/cores/queue_model.py and
+-- Tests the queue, or with LIMIT the watchdog, with frames of random lengths and a sink that stops for random times,
+-- also long ones. It writes a line of the trace per cycle, which the models in tests/cores/queue_model.py and
 -- tests/cores/test_axis_sink_watchdog.py replay.
 library ieee;
 use ieee.std_logic_1164.all;
@@ -60,7 +60,7 @@ architecture simulation of firm_axis_queue_tb is
   signal frame_error      : std_logic;
   signal frame_error_code : std_logic_vector(3 downto 0);
 
-  -- The bytes of a beat count upwards from a random one.
+  -- The bytes of a beat count up from a random value.
   function word_of(number : natural) return std_logic_vector is
     variable word : std_logic_vector(WIDTH-1 downto 0);
   begin

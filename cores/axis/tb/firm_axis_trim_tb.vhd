@@ -20,10 +20,10 @@ entity firm_axis_trim_tb is
     TRIMMED_FILE  : string  := "trimmed.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    -- The chances, each cycle, that nothing is offered, and that nothing is taken.
+    -- The chances per cycle that nothing is offered, and that nothing is taken.
     SOURCE_STALL_PERCENT : integer := 0;
     SINK_STALL_PERCENT   : integer := 0;
-    -- Pieces of all lanes up to a frame's last one; otherwise of 0 and more.
+    -- All pieces up to a frame's last one are full; otherwise, they have 0 and more bytes.
     FULL_PIECES : boolean := false;
     WATCHDOG    : integer := 1000
   );
@@ -146,7 +146,7 @@ begin
         size   := LANES;
         if place < HEADER_BYTES then
           header <= '1';
-          -- Of a narrow stream, the port is only right with the first bytes.
+          -- With a narrow stream, the port is valid only with the first bytes.
           if place = 0 then
             start  <= '1';
             length <= said;

@@ -2,7 +2,7 @@
 -- Sends frames from a file, whose first VOID_LANES bytes are invalid, through the window to a reader that takes random
 -- numbers of bytes, stalls and skips. The bytes taken go to a file, one line per frame: in hex, then `.` if the
 -- frame was taken to its end, `~` if it was skipped.
--- Inputs change at the falling edge: beyond 8 bits no output may change before the next rising one.
+-- Inputs change at the falling edge: above 8 bits, no output may change before the next rising edge.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -20,12 +20,12 @@ entity firm_axis_window_tb is
     TAKEN_FILE    : string  := "taken.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    -- The chances, each cycle, that the source offers no beat, that the reader takes nothing, that it skips.
+    -- The chances per cycle that the source offers no beat, that the reader takes nothing, that it skips.
     SOURCE_STALL_PERCENT : integer := 0;
     READER_STALL_PERCENT : integer := 0;
     SKIP_PERCENT         : integer := 0;
-    -- Each cycle the reader takes `random` (0 to what is available), `all` that is available, or `full`: a frame's
-    -- first bytes by a random number, then a whole window each time until the frame's last bytes.
+    -- Each cycle, the reader takes a `random` number of the available bytes, `all` of them, or `full`: a random number
+    -- of a frame's first bytes, then a whole window each time until the frame's last bytes.
     TAKE     : string  := "random";
     WATCHDOG : integer := 1000
   );
@@ -155,7 +155,7 @@ begin
     variable taken    : line;
     variable finished : natural := 0;
     variable is_open  : boolean := false;  -- bytes of the frame were taken
-    variable may_skip : boolean := true;   -- the window is not still busy with the last skip
+    variable may_skip : boolean := true;   -- the last skip is complete
     variable offered  : natural;
     variable wanted   : natural;
     variable at_least : natural := 0;  -- the bytes that must still be available
@@ -212,7 +212,7 @@ begin
       if may_skip and finished < frames and SKIP_PERCENT > 0 and chance(SKIP_PERCENT) then
         may_skip := false;
         skip       <= '1';
-        take_valid <= '1';  -- is without effect
+        take_valid <= '1';  -- has no effect
         take_count <= available;
         finish_frame('~');
       elsif not chance(READER_STALL_PERCENT) then
@@ -274,7 +274,7 @@ begin
     generic map (
       WIDTH => WIDTH,
       NAME  => "in",
-      -- The void lanes have no value.
+      -- The void lanes are undefined.
       KNOWN => VOID_LANES = 0,
       LEVEL => failure
     )

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The fork between a source and sinks that are ready at random. Each sink must see every message once and in order, no
--- offer may be withdrawn, a sink must not wait for another one, and without stalls a message must pass in every cycle.
+-- Tests the fork with sinks that are ready at random. Each sink must see every message once and in order, no offer may
+-- be withdrawn, a sink must not wait for another one, and without stalls, a message must pass in every cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -11,11 +11,11 @@ entity firm_message_fork_tb is
     SINKS    : integer := 3;
     MESSAGES : integer := 1000;
     SEED     : integer := 1;
-    -- The chance, each cycle, that the source has no message or a sink takes none.
+    -- The chance per cycle that the source has no message or a sink takes none.
     STALL_PERCENT : integer := 0;
-    -- The chance per cycle that a message is withdrawn. Then no sink has it any more.
+    -- The chance per cycle that a message is withdrawn, then at all sinks.
     WITHDRAW_PERCENT : integer := 0;
-    -- The last sink takes nothing for so many cycles at the start; the others must have the first message at once.
+    -- Cycles at the start in which the last sink takes nothing; the others must receive the first message at once.
     BLOCKED : integer := 0
   );
 end entity firm_message_fork_tb;
@@ -84,7 +84,7 @@ begin
     wait until rst_n = '1';
     wait until rising_edge(clk);
     while released < MESSAGES loop
-      -- An offer stays until it is taken.
+      -- An offer remains until it is taken.
       wait for 1 ns;
       draw(STALL_PERCENT, stalls);
       if source_valid = '0' and not stalls and not is_over then
@@ -127,7 +127,7 @@ begin
                    & integer'image(taken(sink)) severity failure;
           taken(sink) := taken(sink) + 1;
         end if;
-        -- Whatever another sink does.
+        -- Independent of the other sinks.
         assert source_valid = '0' or taken(sink) > released or sink_valid(sink) = '1'
           report "a sink waits for another one" severity failure;
       end loop;

@@ -19,7 +19,7 @@ entity firm_cobs_decoder is
 
     data  : out std_logic_vector(7 downto 0);
     valid : out std_logic;
-    -- A pulse after the last byte of each frame, with what was wrong with it.
+    -- A pulse after the last byte of each frame, with its faults.
     ends     : out std_logic;
     is_wrong : out std_logic;  -- the bytes are not valid COBS
     is_lost  : out std_logic  -- bytes were lost
@@ -34,7 +34,7 @@ architecture rtl of firm_cobs_decoder is
 
   signal begun_r : std_logic;  -- a frame has begun
   signal lost_r  : std_logic;  -- and has lost bytes
-  signal left_r  : unsigned(7 downto 0);  -- bytes of the block still to come; at zero, the code of the next one comes
+  signal left_r  : unsigned(7 downto 0);  -- remaining bytes of the block; at zero, the code of the next one follows
   signal due_r   : std_logic;             -- a zero is between this block and the next one
 
 begin

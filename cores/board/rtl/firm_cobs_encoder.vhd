@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Encodes frames with consistent overhead byte stuffing (COBS) and ends each with a zero byte. A code stands before the
--- bytes that it counts, so they wait in a ring: a place is kept for the code, and the code is written there when the
--- block ends. Bytes leave when their block has ended.
+-- Encodes frames with consistent overhead byte stuffing (COBS) and ends each with a zero byte. A code precedes the
+-- bytes that it counts, so they wait in a ring: a place is reserved for the code, which is written when the block ends.
+-- Bytes leave when their block has ended.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Holds each frame until its checksum is known to be right, and forgets it otherwise: nothing of a broken frame leaves.
--- A frame is id, length (4 bytes, lowest first), payload, and the CRC-32 of these; the checksum does not leave. The
--- ring holds at least one frame of LONGEST bytes of payload besides SPARE bytes, so a frame always finds room once the
--- earlier ones have left. A longer frame is not stored.
+-- Stores each frame until its checksum is checked; no byte of a broken frame leaves. A frame is id, length (4 bytes,
+-- lowest first), payload, and the CRC-32 of these; the checksum does not leave. The ring holds at least one frame of
+-- LONGEST bytes of payload besides SPARE bytes, so a frame always finds room once the earlier ones have left. A longer
+-- frame is not stored.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -45,7 +45,7 @@ architecture rtl of firm_link_store is
   constant LENGTH_BYTES   : positive := 4;
   constant HEADER_BYTES   : positive := 1 + LENGTH_BYTES;
   constant CHECKSUM_BYTES : positive := 4;
-  -- One place is never used, to tell a full ring from an empty one.
+  -- One place is never used, to distinguish a full ring from an empty one.
   constant PLACE_BITS     : positive := clog2(max(LONGEST, 1)+SPARE+HEADER_BYTES+1);
   constant LENGTH_BITS    : positive := clog2(max(LONGEST, 1)+1);
 
@@ -62,7 +62,7 @@ architecture rtl of firm_link_store is
   signal length   : length_t;                           -- the header's, with its last byte
   signal is_long  : std_logic;
   signal long_r   : std_logic;                          -- the frame is too long
-  signal full_r   : std_logic;                          -- there was no room for it
+  signal full_r   : std_logic;                          -- the ring had no room for it
 
   signal is_last  : std_logic;  -- the byte is the last of those that leave
   signal is_kept  : std_logic;  -- the byte belongs to those that leave
@@ -167,7 +167,7 @@ begin
 
   good <= is_right and not is_wrong and not is_lost when part_r = COMPLETE else '0';
 
-  -- A wrong checksum says that the length may be wrong, too, so it comes first.
+  -- With a wrong checksum, the length may be wrong, too, so the checksum is checked first.
   judge : process (clk)
   begin
     if rising_edge(clk) then

@@ -9,8 +9,8 @@
 --
 -- During the command, the host receives 80, plus 1 if bytes wait, plus 2 if a frame was not delivered since the last
 -- cut.
--- clk samples the pins, so a period of spi_sclk takes at least 10 cycles of clk. A byte counts when its last bit is
--- clocked; selections may end anywhere.
+-- clk samples the pins, so a period of spi_sclk takes at least 10 cycles of clk. A byte is accepted when its last bit
+-- is clocked; selections may end anywhere.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames as firm_link_streams
--- says. A break from the host drops an incomplete frame. uart_rts_n rises while there is little room, early enough for
+-- says. A break from the host drops an incomplete frame. uart_rts_n rises when little room remains, early enough for
 -- the bytes that an adapter still sends.
 library ieee;
 use ieee.std_logic_1164.all;

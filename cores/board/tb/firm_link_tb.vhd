@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A host link between the simulation host and a system that sends every frame back unchanged.
+-- Tests a host link between the simulation host and a system that returns every frame unchanged.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -15,7 +15,7 @@ entity firm_link_tb is
     SEED          : integer := 1;
     -- Of the host, of its adapter, and of the system.
     STALL_PERCENT : integer := 0;
-    -- Thousandths of the bit's time by which the host's clock is wrong.
+    -- The error of the host's clock in thousandths of the bit time.
     CLOCK_ERROR : integer := 0;
     WATCHDOG    : integer := 100000;
     QUIET       : integer := 2000

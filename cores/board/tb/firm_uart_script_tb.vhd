@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A serial line driven by a script; the resulting frames are written one per line, in hexadecimal. Each line of the
+-- Drives a serial line by a script, and writes the resulting frames, one per line, in hexadecimal. Each line of the
 -- script has a word of six characters and a number: `byte   171` sends a byte, `wrong  171` one with a low stop bit,
 -- `break  0` a break, `glitch 0` a pulse too short for a start bit; `pause  40` leaves the line idle for 40 bits;
 -- `system 0` stalls the system until `system 1`.
@@ -15,7 +15,7 @@ entity firm_uart_script_tb is
     WIDTH       : integer := 8;
     LONGEST     : integer := 64;
     SCRIPT_FILE : string  := "script.txt";
-    -- What the bench must print but `no room`; empty: anything.
+    -- The expected output without `no room`; empty: not compared.
     EXPECTED_FILE : string := ""
   );
 end entity firm_uart_script_tb;

@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Transfers the handshake of a message, or of an array's element, between two clock domains. The source shows one level
--- per segment, and one that tells that all have arrived. They cross to the sink and appear there in this order. The
--- sink returns the levels that it has seen, and whether it has taken the message. Both return to zero before the next
--- message, so nothing is lost or seen twice at any ratio of the clocks, and a message may be withdrawn at any time.
+-- per segment, and one level for the arrival of all segments. They cross to the sink and appear there in this order.
+-- The sink returns the levels that it has seen, and whether it has taken the message. Both return to zero before the
+-- next message, so nothing is lost or seen twice at any ratio of the clocks, and a message may be withdrawn at any
+-- time.
 --
 -- The fields are registered in the source's domain until the sink has released them, because a source that withdraws
 -- its message may change them at once. A source that never withdraws does not need this: its fields hold until
@@ -40,7 +41,7 @@ entity firm_cdc_message is
 
     -- The sink sees every segment that the source shows.
     s_settled   : out std_logic;
-    -- The sink sees nothing of the message, and nothing is on its way.
+    -- The sink sees nothing of the message, and nothing is in transit.
     s_idle      : out std_logic;
     s_part_idle : in  std_logic_vector(PARTS-1 downto 0) := (others => '1');
 
@@ -62,7 +63,7 @@ architecture rtl of firm_cdc_message is
   constant NONE      : std_logic_vector(SEGMENTS downto 0) := (others => '0');
   constant ALL_PARTS : std_logic_vector(PARTS-1 downto 0)  := (others => '1');
 
-  -- One bit per segment; the bit above tells that all have arrived.
+  -- One bit per segment; the bit above is set when all have arrived.
   subtype levels_t is std_logic_vector(SEGMENTS downto 0);
 
   -- Of the source's domain.
@@ -76,7 +77,7 @@ architecture rtl of firm_cdc_message is
   signal is_seen     : std_logic;  -- the sink has seen all requested levels
   signal begins      : std_logic;
 
-  -- In the sink's domain: the levels that it has seen; the bit above tells that it has finished the message.
+  -- In the sink's domain: the levels that it has seen; the bit above is set when it has finished the message.
   signal requested : levels_t;
   signal answer_r  : std_logic_vector(SEGMENTS+1 downto 0);
   signal is_fallen : std_logic;  -- the message was withdrawn

@@ -22,7 +22,7 @@ end entity firm_cdc_reset;
 
 architecture rtl of firm_cdc_reset is
 
-  -- The first stage has a name of its own, to which constraints refer.
+  -- The first stage has a separate name, to which constraints refer.
   signal first_r  : std_logic;
   signal stages_r : std_logic_vector(1 downto 0);
 

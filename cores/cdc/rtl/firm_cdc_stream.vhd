@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Transfers a stream of a message between two clock domains, and between two widths if they differ. It is a FIFO in
--- distributed RAM, as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It takes and gives a
--- beat per cycle; the slower clock, or the narrower end, limits the throughput.
+-- distributed RAM, as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It accepts and
+-- outputs a beat per cycle; the slower clock, or the narrower end, limits the throughput.
 --
 -- The last beat of a stream is taken from the source only when the sink has it. Later events at the source, such as the
 -- completion of the message, therefore never overtake the stream at the sink.
@@ -31,7 +31,7 @@ entity firm_cdc_stream is
     s_open   : in  std_logic := '1';
     -- The sink sees this message, so beats may follow.
     s_enable : in  std_logic := '1';
-    -- No data is under way.
+    -- No data is in transit.
     s_idle   : out std_logic;
 
     s_axis_tdata  : in  std_logic_vector(S_WIDTH-1 downto 0);

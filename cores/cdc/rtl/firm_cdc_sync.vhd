@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Brings levels into another clock domain: each bit passes a chain of registers, in which it has time to settle. Every
+-- Transfers levels to another clock domain: each bit passes a chain of registers, in which it has time to settle. Every
 -- bit must come directly from a register of its own domain, without logic after it. Bits that change together may
 -- arrive at different times.
 --
@@ -22,7 +22,7 @@ end entity firm_cdc_sync;
 
 architecture rtl of firm_cdc_sync is
 
-  -- The first stage has a name of its own, to which constraints refer. Place all stages side by side; they must never
+  -- The first stage has a separate name, to which constraints refer. Place all stages side by side; they must never
   -- become a shift register in RAM.
   signal first_r  : std_logic_vector(BITS-1 downto 0);
   signal stages_r : std_logic_vector((STAGES-1)*BITS-1 downto 0);

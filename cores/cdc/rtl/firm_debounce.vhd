@@ -39,7 +39,7 @@ begin
       synced   => synced
     );
 
-  -- It needs no reset, since it makes one.
+  -- It has no reset, since it may generate one.
   follow : process (clk)
   begin
     if rising_edge(clk) then

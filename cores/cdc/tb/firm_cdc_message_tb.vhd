@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A message of variable size between two clocks: a field, a stream, and an array of elements that have a field and a
--- stream each. Lengths and bytes derive from the message's number, which is its first field, so the sink can predict
--- them. It checks at every edge that fields hold while they are valid, that the order of events at the source is kept,
--- and that a withdrawn message leaves no trace. A source that withdraws drives 'X' from then on.
+-- Sends messages of variable size between two clocks: a field, a stream, and an array of elements, each with a field
+-- and a stream. Lengths and bytes derive from the message's number, which is its first field, so the sink can predict
+-- them. It checks at every edge that valid fields are stable, that the order of events at the source is kept, and that
+-- a withdrawn message has no effect. After a withdrawal, the source drives 'X'.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,13 +17,13 @@ entity firm_cdc_message_tb is
     M_PERIOD_PS : integer := 10000;
     SEED        : integer := 1;
     MESSAGES    : integer := 300;  -- at most 65535
-    -- The chance, each cycle, that an end does nothing.
+    -- The chance per cycle that an end does nothing.
     STALL_PERCENT : integer := 0;
-    -- The chance that a message is withdrawn at some time.
+    -- The chance that a message is withdrawn.
     WITHDRAW_PERCENT : integer := 0;
-    -- The chance of a message that a reset of one cycle meets it.
+    -- The chance of a reset of one cycle during a message.
     RESET_PERCENT : integer := 0;
-    -- The domain that the reset comes from.
+    -- The domain of the reset.
     IS_RESET_AT_SINK : boolean := false
   );
 end entity firm_cdc_message_tb;
@@ -109,7 +109,7 @@ architecture simulation of firm_cdc_message_tb is
     return std_logic_vector(to_unsigned((message * 101 + element * 31 + place * 7) mod 256, 8));
   end function byte_of;
 
-  -- The number, and bits that follow from it.
+  -- The number, and bits that derive from it.
   function fields_of(message, element : natural) return std_logic_vector is
   begin
     return std_logic_vector(to_unsigned((message * 251 + element * 17) mod 65536, 16) & to_unsigned(message, 16));
@@ -169,7 +169,7 @@ begin
     s_rst_n <= synced_rst_n when IS_RESET_AT_SINK else released;
     m_rst_n <= released when IS_RESET_AT_SINK else synced_rst_n;
 
-    -- A cycle of the domain that it comes from, at any time.
+    -- A cycle of its domain, at any time.
     pulse : process
       variable random_1 : positive := SEED;
       variable random_2 : positive := 13;
@@ -294,7 +294,7 @@ begin
   give : process
     variable random_1 : positive := SEED;
     variable random_2 : positive := 17;
-    variable is_over  : boolean;   -- the message is withdrawn, or a reset met it
+    variable is_over  : boolean;   -- the message was withdrawn or reset
     variable left     : integer;   -- cycles until it is withdrawn; negative: never
     variable number   : natural;
 
@@ -458,7 +458,7 @@ begin
     variable is_shown   : boolean  := false;
     variable was_taken  : boolean  := false;
     variable place      : natural;             -- bytes of the message's stream
-    variable element    : natural;             -- that is there, or comes next; from 1
+    variable element    : natural;             -- the present or next one; from 1
     variable is_element : boolean  := false;   -- it is shown
     variable in_element : natural;             -- bytes of its stream
 

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- How soon messages follow each other through the crossing, where source and sink never wait.
+-- Measures the interval of messages through the crossing with a source and a sink that never wait.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -10,7 +10,7 @@ entity firm_cdc_rate_tb is
     M_PERIOD_PS : integer := 10000;
     SEED        : integer := 1;
     MESSAGES    : integer := 1000;
-    -- Picoseconds from one to the next on average.
+    -- The limit of the mean interval in picoseconds.
     MOST_PS : integer := 200000
   );
 end entity firm_cdc_rate_tb;

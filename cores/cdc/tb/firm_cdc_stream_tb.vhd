@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Streams of random length through the crossing, or at one clock through the resizer alone: every byte must arrive
--- once, in order, in full beats from lane 0 up, with zeros in unused lanes. The last beat of a stream must not be taken
--- from the source before the sink has it.
--- Without stalls, the slower end sets the pace: the longest stream may take no more cycles than its beats there plus
--- SLACK.
+-- Sends streams of random length through the crossing, or at one clock through the resizer alone: every byte must
+-- arrive once, in order, in full beats from lane 0 up, with zeros in unused lanes. The last beat of a stream must not
+-- be taken from the source before the sink has it.
+-- Without stalls, the slower end limits the throughput: the longest stream may take no more cycles than its beats
+-- there plus SLACK.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -22,7 +22,7 @@ entity firm_cdc_stream_tb is
     SEED        : integer := 1;
     STREAMS     : integer := 200;
     LONGEST     : integer := 300;  -- bytes
-    -- The chance, each cycle, that an end does nothing.
+    -- The chance per cycle that an end does nothing.
     STALL_PERCENT : integer := 0;
     -- Cycles of the slower end; negative: not tested.
     SLACK : integer := -1
@@ -53,8 +53,8 @@ architecture simulation of firm_cdc_stream_tb is
   signal m_tlast  : std_logic;
   signal m_tready : std_logic := '0';
 
-  signal sent     : natural := 0;  -- streams that the source is rid of
-  signal received : natural := 0;  -- and those that the sink has
+  signal sent     : natural := 0;  -- streams that the source has sent
+  signal received : natural := 0;  -- streams that the sink has
 
   -- The first stream is the longest.
   function length_of(stream : natural) return positive is
@@ -292,7 +292,7 @@ begin
     wait;
   end process receive;
 
-  -- Nothing may move for longer than the slowest end needs.
+  -- Ends the simulation after a pause longer than the slowest end needs.
   watchdog : process
     variable before : natural;
   begin

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A button that bounces for random times: the output changes once for each press and release, and not too early or
--- late.
+-- Tests the debouncer with a button that bounces for random times: the output must change once for each press and
+-- release, neither too early nor too late.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -59,7 +59,7 @@ begin
       uniform(random_1, random_2, part);
       for change in 1 to 2 * integer(trunc(part * 8.0)) loop
         pin <= not pin;
-        -- Surely seen, and too short.
+        -- Always sampled, but too short.
         wait for drawn(20, (CYCLES - 4) * 10);
       end loop;
     end procedure bounce;

@@ -2,7 +2,7 @@
 -- Connects the host's two streams to the converters. From host to subscribers, it removes the id of a frame and routes
 -- the frame. From publishers to host, it sends the frames of the publisher that the scheduler in the slot grants.
 -- Register slices on the host's sides cut every path between the host and the converters.
--- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host gets bursts
+-- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host receives bursts
 -- (docs/reference/manager.md).
 library ieee;
 use ieee.std_logic_1164.all;
@@ -17,7 +17,7 @@ entity firm_manager is
     -- The scheduler may move the grant between any two beats of a frame.
     PREEMPTIVE : boolean := false;
     -- Cycles after which a publisher that stops in the middle of a frame is cut off; 0: never. A PREEMPTIVE scheduler
-    -- serves other publishers meanwhile, so there is nothing to watch.
+    -- serves other publishers meanwhile, and needs no watchdog.
     WATCHDOG : integer := 0
   );
   port (

@@ -56,7 +56,7 @@ entity firm_manager_tree is
     sub_axis_tvalid : out std_logic_vector(SUBSCRIBERS-1 downto 0);
     sub_axis_tready : in  std_logic_vector(SUBSCRIBERS-1 downto 0);
 
-    -- The same beats, for a part that listens: on offer, taken, and the subscriber's number.
+    -- The same beats, for a listener: offered, accepted, and the subscriber's number.
     sub_offered  : out std_logic;
     sub_beat     : out std_logic;
     sub_selected : out std_logic_vector(index_bits(SUBSCRIBERS)-1 downto 0);

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The Manager's path to the host under a grant that moves at random, even within frames and to publishers without a
--- request; or, for comparison, under a scheduler. The frames of each publisher derive from its index and the frame's
--- number, as the test that reads TRACE_FILE knows. TRACE_FILE has one line per burst: `tid`, a blank and the
--- bytes in hex. The last printed line has the beats taken from the publishers, those at the host, and the
+-- Tests the Manager's path to the host with a grant that moves at random, even within frames and to publishers without
+-- a request; or, for comparison, with a scheduler. The frames of each publisher derive from its index and the frame's
+-- number, so the test that reads TRACE_FILE can predict them. TRACE_FILE has one line per burst: `tid`, a blank and
+-- the bytes in hex. The last printed line has the beats taken from the publishers, the beats at the host, and the
 -- cycles from the first of the former to the last of the latter.
 library ieee;
 use ieee.std_logic_1164.all;
@@ -23,7 +23,7 @@ entity firm_manager_burst_tb is
     -- Frames of each publisher; of frame f of publisher p the payload has (17*p + 29*f) mod (LONGEST+1) bytes.
     FRAMES     : positive := 10;
     LONGEST    : natural  := 100;
-    -- Publisher 0 stops for good after its first beat.
+    -- Publisher 0 stops forever after its first beat.
     STOPPED       : boolean  := false;
     TRACE_FILE    : string   := "bursts.txt";
     EXPECTED_FILE : string   := "";
@@ -309,7 +309,7 @@ begin
     variable beats_out   : natural := 0;
     variable idle_cycles : natural := 0;
     variable kept        : natural;
-    variable is_shown    : boolean := false;  -- the beat was there in the cycle before and was not taken
+    variable is_shown    : boolean := false;  -- the beat was offered in the previous cycle and not taken
     variable old_tdata   : std_logic_vector(WIDTH-1 downto 0);
     variable old_rest    : std_logic_vector(LANES+8 downto 0);
   begin

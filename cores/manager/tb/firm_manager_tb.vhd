@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The Manager and a scheduler between the simulation host and one echo a channel. Subscriber k and publisher k are an
--- echo; a subscriber without publisher takes all and says nothing, a publisher without subscriber never speaks.
+-- Tests the Manager and a scheduler with the simulation host and one echo per channel. Subscriber k and publisher k
+-- are an echo; a subscriber without publisher drops all frames, and a publisher without subscriber sends none.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

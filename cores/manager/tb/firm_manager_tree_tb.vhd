@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The Manager of Managers between the simulation host and one echo a channel. Groups have GROUP_SIZE publishers, the
--- last one the rest. If REVERSED, publisher k is at the place PUBLISHERS-1-k. A subscriber without publisher takes all
--- and says nothing, a publisher without subscriber never speaks.
+-- Tests the Manager of Managers with the simulation host and one echo per channel. Groups have GROUP_SIZE publishers,
+-- the last one the rest. If REVERSED, publisher k is at the place PUBLISHERS-1-k. A subscriber without publisher drops
+-- all frames, and a publisher without subscriber sends none.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -16,7 +16,7 @@ entity firm_manager_tree_tb is
     PUBLISHERS    : integer := 2;
     GROUP_SIZE    : integer := 2;
     POLICY        : integer := 0;  -- of the groups; 0: round robin, 1: fixed priority, 2: least recently used
-    TOP           : integer := 0;  -- of the groups among each other
+    TOP           : integer := 0;  -- among the groups
     REVERSED      : boolean := false;
     STIMULUS_FILE : string  := "stimulus.txt";
     EXPECTED_FILE : string  := "expected.txt";

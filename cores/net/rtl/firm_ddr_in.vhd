@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A pin that shows a bit at each edge of a clock, for simulation: the cells of an FPGA's family have the same ports and
--- the same cycles. Both bits of a cycle, from its rising edge on, are shown at the next rising edge.
+-- A pin that receives a bit at each edge of a clock, for simulation: the cells of an FPGA's family have the same ports
+-- and latency. Both bits of a cycle, from its rising edge on, are shown at the next rising edge.
 library ieee;
 use ieee.std_logic_1164.all;
 

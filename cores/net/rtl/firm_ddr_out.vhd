@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A pin that takes two bits in each cycle of a clock, for simulation: the cells of an FPGA's family have the same
+-- A pin that sends two bits in each cycle of a clock, for simulation: the cells of an FPGA's family have the same
 -- ports. Both bits are taken at a rising edge; the second one is shown from the falling edge on.
 library ieee;
 use ieee.std_logic_1164.all;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Gets the address of a board by DHCP (RFC 2131), probes it before its use (RFC 5227), and keeps it. Its packets are
--- programs of firm_packet_builder, which fusesoc_firm.fabric.dhcp makes; `own_byte` has the bytes that they lack.
--- firm_dhcp_reader reads the messages of servers, and firm_dhcp_lease counts the seconds of what they grant.
+-- Obtains the address of a board by DHCP (RFC 2131), probes it before its use (RFC 5227), and keeps it. Its packets are
+-- programs of firm_packet_builder, which fusesoc_firm.fabric.dhcp creates; `own_byte` supplies their variable bytes.
+-- firm_dhcp_reader reads the messages of servers, and firm_dhcp_lease counts the seconds of the leases that they grant.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -29,9 +29,9 @@ entity firm_dhcp_client is
     wants_announcement : out std_logic;
     is_sent            : in  std_logic;
 
-    -- For the builder: which byte, and the byte. Bits 6 to 5 of `own_select` are 0 for the byte that bits 4 to 0
-    -- select, 1 for the same or 0 while the board has no address, 2 for the same or 0 in a message without a choice of
-    -- server and address, and 3 for the number of bits 4 to 0 with bit 4 repeated, or 0 likewise.
+    -- For the builder: the number of a byte, and the byte. Bits 6 to 5 of `own_select` are 0 for the byte that bits 4
+    -- to 0 select, 1 for the same or 0 while the board has no address, 2 for the same or 0 in a message without a
+    -- selected server and address, and 3 for the number in bits 4 to 0 with bit 4 repeated, or 0 in such a message.
     own_select : in  std_logic_vector(6 downto 0);
     own_byte   : out std_logic_vector(7 downto 0);
 
@@ -40,7 +40,7 @@ entity firm_dhcp_client is
     is_bound    : out std_logic;
     is_checking : out std_logic;
     is_taken    : in  std_logic;  -- a pulse if another host has the address
-    is_stopped  : in  std_logic;  -- what used the last address is at rest
+    is_stopped  : in  std_logic;  -- the users of the last address are at rest
     is_lost     : out std_logic   -- a pulse when the board loses its address
   );
 end entity firm_dhcp_client;
@@ -85,15 +85,15 @@ architecture rtl of firm_dhcp_client is
   signal has_server   : std_logic;
   signal is_chosen    : std_logic;
   signal is_fitting   : std_logic;
-  signal proper_r     : std_logic;  -- the message is of a server that may answer
+  signal proper_r     : std_logic;  -- the message is from a server that may answer
   signal told_valid   : std_logic;
   signal told_place   : unsigned(3 downto 0);
   signal told_byte    : byte_t;
   signal own_place    : unsigned(4 downto 0);
   signal own_known    : byte_t;
-  -- Of the message that leaves, for as long as it does.
+  -- Of the leaving message, until its end.
   signal own_type_r   : type_t := DISCOVER;
-  signal chooses_r    : std_logic;  -- it tells the address and the server
+  signal chooses_r    : std_logic;  -- it contains the address and the server
 
   -- Of firm_dhcp_lease.
   signal second   : std_logic;
@@ -302,8 +302,8 @@ begin
       length   := (others => '0');
       tries    := tries_r;
 
-      -- A register with a period of 2**32 - 1, disturbed by what the line brings and by the MAC address, so that boards
-      -- which start together differ. It stays in a reset: the numbers after it are not those after the last one.
+      -- A shift register with a period of 2**32 - 1, perturbed by received bytes and by the MAC address, so that boards
+      -- which start together differ. A reset does not clear it, so its numbers do not repeat after a reset.
       if rst_n = '1' then
         random_r <= random_r(30 downto 0)
                     & (random_r(31) xor random_r(21) xor random_r(1) xor random_r(0)
@@ -336,7 +336,7 @@ begin
         elsif is_owed = '1' then
           counts_r <= '1';
           step_r   <= COUNTING;
-        -- Without `is_wanted`, the reader is about to drop it.
+        -- Without `is_wanted`, the reader will drop it.
         elsif has_message = '1' and is_wanted = '1' then
           step_r <= READING;
         elsif due_r = '1' then
@@ -352,7 +352,7 @@ begin
             pause(ANNOUNCE_PAUSE);
           elsif state_r = REQUESTING and tries_r = LAST_REQUEST then
             lose(START_PAUSE);
-          -- A second announcement, but no third one.
+          -- A second announcement, but not a third one.
           elsif state_r /= BOUND or tries_r = 0 then
             pauses := true;
             step_r <= SENDING;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Counts the seconds of a lease, and compares them with the times that its server told (RFC 2131, section 4.4.5). All
--- are bytes in a memory, on which it works one by one. A lease begins with the second in which it was asked for, so it
--- ends early rather than late.
+-- Counts the seconds of a lease, and compares them with its server's times (RFC 2131, section 4.4.5). All times are
+-- bytes in a memory, and are processed one by one. A lease begins in the second of its request, so it ends early rather
+-- than late.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -14,25 +14,25 @@ entity firm_dhcp_lease is
     rst_n  : in std_logic;
     second : in std_logic;  -- a pulse each second
 
-    -- A lease is asked for, until the message has left: what was told before does not count.
+    -- A lease is being requested, until the message has left: earlier times are ignored.
     is_asked : in std_logic;
 
-    -- A byte of a time in seconds, of which there are up to three. Places 0 to 3 are the lease, 4 to 7 the time of its
-    -- renewal (T1), and 8 to 11 that of rebinding (T2), each with the highest byte first.
+    -- A byte of one of up to three times, in seconds. Places 0 to 3 are the lease, 4 to 7 the time of its renewal (T1),
+    -- and 8 to 11 that of rebinding (T2), each with the highest byte first.
     told_valid : in std_logic;
     told_place : in unsigned(3 downto 0);
     told_byte  : in byte_t;
 
-    -- Pulses, each answered by one of `is_done`: the lease that was told begins; a second that is owed is counted.
+    -- Pulses, each answered by a pulse of `is_done`: the received lease begins; a pending second is counted.
     begins  : in  std_logic;
     counts  : in  std_logic;
     is_done : out std_logic;
 
-    -- While there is a lease, seconds that pass are owed until they are counted.
+    -- During a lease, elapsed seconds are pending until they are counted.
     is_held : in  std_logic;
     is_owed : out std_logic;
 
-    -- After a second was counted: its time has come to end, to be rebound, and to be renewed.
+    -- After a second is counted: the lease must end, be rebound, or be renewed.
     ends    : out std_logic;
     rebinds : out std_logic;
     renews  : out std_logic
@@ -54,11 +54,11 @@ architecture rtl of firm_dhcp_lease is
   signal has_renew_r  : std_logic;
   signal has_rebind_r : std_logic;
 
-  signal owed_r  : unsigned(15 downto 0) := (others => '0');  -- many, since a packet may wait for its turn for long
-  signal owes_r  : std_logic;                               -- there is one of them
+  signal owed_r  : unsigned(15 downto 0) := (others => '0');  -- many, since a packet may wait long for its turn
+  signal owes_r  : std_logic;                               -- a second is pending
   signal since_r : unsigned(6 downto 0)  := (others => '0');  -- seconds since the message has left
 
-  -- A pass over four bytes of times: what is computed of which of them.
+  -- A pass over four bytes of times: the computation and its operands.
   -- RENEW finds half of the lease; HALF, QUARTER, EIGHTH and REBIND find seven eighths of it. CLEAR begins with the
   -- seconds since the request. ELAPSE adds a second; the others compare.
   type pass_t is (CLEAR, RENEW, HALF, QUARTER, EIGHTH, REBIND, ELAPSE, EXPIRED, TO_REBIND, TO_RENEW);

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Reads the messages of servers for firm_dhcp_client, and holds what they say (RFC 2131, 2132). A message that comes is
--- held in a memory and read twice: first to judge it, then to take what it says. So nothing of a message that is broken
--- or not wanted has an effect.
+-- Reads the messages of servers for firm_dhcp_client, and holds their contents (RFC 2131, 2132). An arriving message is
+-- stored in a memory and read twice: first to check it, then to take its contents. A broken or unwanted message
+-- therefore has no effect.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -21,24 +21,24 @@ entity firm_dhcp_reader is
     s_axis_tvalid : in std_logic;
     s_axis_tlast  : in std_logic;
 
-    -- While `draws` is high, up to `is_drawn`, the number of requests is drawn from random bytes. What comes until then
-    -- answers the number before, and is dropped.
+    -- While `draws` is high, up to `is_drawn`, the number of requests is drawn from random bytes. Messages until then
+    -- answer the previous number, and are dropped.
     draws    : in  std_logic;
     random   : in  byte_t;
     is_drawn : out std_logic;
 
     -- `has_message`: a message waits until `reads` is high, and is read then. Without `is_wanted`, it is dropped.
     is_wanted    : in  std_logic;
-    is_selecting : in  std_logic;  -- an offer is wanted, whose address is taken; that of another message is compared
+    is_selecting : in  std_logic;  -- an offer is wanted, whose address is taken; other messages' addresses are compared
     has_message  : out std_logic;
     reads        : in  std_logic;
 
-    -- The message can be judged for one cycle, in which `takes` has it read for the second time. When `has_message`
-    -- falls, `is_taken` tells whether it was.
+    -- The message can be checked for one cycle, in which `takes` starts the second reading. When `has_message` falls,
+    -- `is_taken` is set if it was taken.
     is_judged    : out std_logic;
     takes        : in  std_logic;
     is_taken     : out std_logic;
-    message_type : out unsigned(2 downto 0);  -- 0 for one that is not known
+    message_type : out unsigned(2 downto 0);  -- 0 for an unknown one
     has_lease    : out std_logic;
     has_server   : out std_logic;
     is_chosen    : out std_logic;  -- the server is that of the offer taken
@@ -49,8 +49,8 @@ entity firm_dhcp_reader is
     told_place : out unsigned(3 downto 0);
     told_byte  : out byte_t;
 
-    -- What is known: bytes 0 to 3 are the address, 4 to 7 the server, 8 to 11 the number of requests, and 12 to 17 the
-    -- MAC address from which the message came.
+    -- The known values: bytes 0 to 3 are the address, 4 to 7 the server, 8 to 11 the number of requests, and 12 to 17
+    -- the MAC address of the message's sender.
     known_place : in  unsigned(4 downto 0);
     known_byte  : out byte_t;
     address     : out std_logic_vector(31 downto 0)
@@ -117,7 +117,7 @@ architecture rtl of firm_dhcp_reader is
   type area_t is (OPTIONS, FILE_NAME, SERVER_NAME);
   type step_t is (RESTING, SENDER, ADDRESSING, TAG, SIZE, VALUE, ENDING, JUDGING);
 
-  -- The frame that comes, and the place in it, also when it is read.
+  -- The arriving frame, and the place in it, also when it is read.
   signal place_r   : place_t := (others => '0');
   signal inside_r  : std_logic;
   signal takes_r   : std_logic;  -- the frame is written
@@ -129,14 +129,14 @@ architecture rtl of firm_dhcp_reader is
   signal deep_r    : std_logic;  -- it has reached the options
   signal length_r  : unsigned(15 downto 0) := (others => '0');  -- of the packet
   signal at_end    : std_logic;
-  signal idles     : std_logic;  -- no frame is under way, and none waits
+  signal idles     : std_logic;  -- no frame is arriving or waiting
   signal writes    : std_logic;
   signal comes     : std_logic;  -- it was a reply to this host
-  signal got_r     : std_logic;  -- one waits to be read
+  signal got_r     : std_logic;  -- a message waits to be read
 
   signal step_r    : step_t;
-  signal shown_r   : byte_t := (others => '0');  -- the byte at the place before
-  signal data_r    : byte_t := (others => '0');  -- the same one cycle later, since the memory is slow
+  signal shown_r   : byte_t := (others => '0');  -- the byte at the previous place
+  signal data_r    : byte_t := (others => '0');  -- the same one cycle later, since the memory outputs late
   signal settles_r : std_logic;
   signal ready_r   : std_logic;  -- it is the byte at the place
   signal walks     : std_logic;  -- the frame is read
@@ -144,7 +144,7 @@ architecture rtl of firm_dhcp_reader is
   signal area_r    : area_t;
   signal writes_r  : std_logic;  -- the message is read for the second time
   signal option_r  : option_t;
-  signal size_r    : unsigned(7 downto 0) := (others => '0');  -- bytes of the option to come
+  signal size_r    : unsigned(7 downto 0) := (others => '0');  -- remaining bytes of the option
   signal count_r   : unsigned(4 downto 0) := (others => '0');
 
   -- Of the message.
@@ -153,7 +153,7 @@ architecture rtl of firm_dhcp_reader is
   signal has_lease_r  : std_logic;
   signal has_server_r : std_logic;
   signal chosen_r     : std_logic;
-  signal same_r       : std_logic;  -- it has the address that the board knows
+  signal same_r       : std_logic;  -- it has the board's known address
   signal legal_r      : std_logic;  -- it has an address of a host
   signal address_r    : std_logic_vector(31 downto 0) := (others => '0');
 
@@ -247,7 +247,7 @@ begin
           meant_r <= '0';
         end if;
       end if;
-      -- A frame under way may be an answer to the number before.
+      -- An arriving frame may be an answer to the previous number.
       if ended_r = '1' or draws = '1' then
         takes_r <= '0';
       end if;
@@ -286,8 +286,8 @@ begin
   is_server  <= '1' when option_r = SERVER else '0';
   is_drawn   <= '1' when count_r = 31 else '0';
 
-  -- A frame that comes is compared with the number of the request, and one that is read with the address, and with the
-  -- server.
+  -- An arriving frame is compared with the number of the request; during reading, it is compared with the address and
+  -- the server.
   read_slot  <= to_unsigned(SERVER_SLOT, 5) + count_r(1 downto 0) when step_r = VALUE else
                 to_unsigned(OFFERED_SLOT, 5) + count_r(1 downto 0) when got_r = '1' else
                 to_unsigned(XID_SLOT, 5) + place_r(1 downto 0);
@@ -426,7 +426,7 @@ begin
           if size_r = 1 then
             step_r <= TAG;
           end if;
-          -- The flags count only if the message does, so the first byte of a value sets them.
+          -- The flags are used only with a valid message, so the first byte of a value may set them.
           if option_r = MESSAGE_KIND then
             type_r <= (others => '0');
             if data_r(7 downto 3) = "00000" then

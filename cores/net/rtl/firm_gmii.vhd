@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Connects receiver and transmitter to a PHY by GMII, at 1 Gbit/s, full duplex. The PHY's receive clock is not the
--- system's, from which it differs by a few thousandths of a percent; the bytes of a frame cross between them. The
+-- system's; they differ by a few thousandths of a percent, and the bytes of a frame cross between them. The
 -- transmitter's bytes leave with `clk`, which is also the PHY's transmit clock (GTX_CLK).
 --
 -- `clk` may be slower than the receive clock by as much as two clocks of 125 MHz may differ: the FIFO fills by less
@@ -48,7 +48,7 @@ architecture rtl of firm_gmii is
   -- Of the PHY's receive clock.
   signal rx_rst_n  : std_logic;
   signal arrived_r : word_t;
-  signal was_r     : std_logic;  -- the byte before belongs to a frame
+  signal was_r     : std_logic;  -- the previous byte belongs to a frame
   signal arrives   : std_logic;
 
   signal received : word_t;      -- of the system's clock
@@ -108,7 +108,7 @@ begin
 
   -- ------------------------------------------------------------------ to the PHY
 
-  -- Registers of their own can be at the pins.
+  -- Separate registers can be packed into I/O cells.
   send : process (clk)
   begin
     if rising_edge(clk) then

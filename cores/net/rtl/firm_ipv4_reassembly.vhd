@@ -1,16 +1,16 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Reassembles the fragments of UDP datagrams (RFC 791). Frames pass through as they come; those with a fragment for
--- this host are aborted, since only here it is known whether one is missing. When a packet is complete, it is sent as
--- one frame without fragments. Frames that come meanwhile wait in a store, except fragments, and leave by turns with
--- further packets, in the order in which these were complete.
+-- Reassembles the fragments of UDP datagrams (RFC 791). Frames pass through at once; those with a fragment for this
+-- host are aborted, since missing fragments are detected only here. When a packet is complete, it is sent as one frame
+-- without fragments. Meanwhile, arriving frames except fragments wait in a store. They leave in turns with further
+-- packets, which are sent in the order of completion.
 --
--- The user has room for the content of one long packet. So the next long one waits until the user rests, but not for
--- ever. Other packets pass it; frames wait as well, as long as there is room, since they would tell the user of what it
--- has not got yet.
+-- The user has room for the content of one long packet. The next long one therefore waits until the user is idle, but
+-- not forever. Other packets overtake it. Frames also wait while there is room, since they may refer to data that the
+-- user has not yet received.
 --
--- Fragments of several packets may be interleaved, but those of each packet come in order, as hosts send them and an
--- Ethernet keeps them. So the state of a packet is its size so far, whatever the number of fragments. A packet that
--- lacks a fragment is given up; fragments with options are dropped.
+-- Fragments of several packets may be interleaved, but those of each packet must arrive in order, as sent by hosts and
+-- preserved by Ethernet. The state of a packet is therefore just its size so far. A packet with a missing fragment is
+-- dropped, and so are fragments with options.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -19,13 +19,13 @@ use firm.firm_axis_pkg.all;
 
 entity firm_ipv4_reassembly is
   generic (
-    PACKETS : integer := 2;     -- that are reassembled at the same time, 1 to 8
+    PACKETS : integer := 2;     -- reassembled at the same time, 1 to 8
     BYTES   : integer := 16384; -- of the longest one, without its header; a power of two, 2048 to 65536
     DEPTH   : integer := 4096;  -- bytes of frames that wait for the end of a packet, a power of two, 4 and more
-    TICKS   : integer := 1000;  -- without a fragment, after which a packet is given up, 1 to 65535
+    TICKS   : integer := 1000;  -- without a fragment, after which a packet is dropped, 1 to 65535
     LONG    : integer := 4096;  -- bytes from which on a packet is long, a power of two, 2 and more
-    -- After a long packet, after which the next one leaves anyway, 1 to 65535. The board of a simulation, whose
-    -- millisecond has 250 cycles, needs 262 for the longest message.
+    -- Milliseconds after a long packet until the next one leaves in any case, 1 to 65535. The board of a simulation,
+    -- whose millisecond has 250 cycles, needs 262 for the longest message.
     HOLD_TICKS : integer := 300
   );
   port (
@@ -49,10 +49,10 @@ entity firm_ipv4_reassembly is
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
 
-    rests : in std_logic;  -- the user is not busy with the content of packets
+    rests : in std_logic;  -- the user is not processing the content of packets
 
     -- Pulses.
-    is_dropped : out std_logic;  -- a packet that is given up, or a fragment that belongs to none
+    is_dropped : out std_logic;  -- an incomplete packet, or a fragment without a packet
     is_lost    : out std_logic   -- a frame that waited without room
   );
 end entity firm_ipv4_reassembly;
@@ -79,7 +79,7 @@ architecture rtl of firm_ipv4_reassembly is
   constant MAC_BYTES      : natural := 6;
   constant GAP            : natural := 6;      -- cycles between frames
   constant LONGEST        : natural := 65535;  -- a packet with its header
-  -- Cycles in which the user rests, after which it is not busy: it may take a while until it begins.
+  -- Idle cycles after which the user counts as idle, since it may begin with a delay.
   constant REST           : positive := 256;
 
   subtype byte_t is std_logic_vector(7 downto 0);
@@ -107,7 +107,7 @@ architecture rtl of firm_ipv4_reassembly is
   signal used_r  : slots_t;                                 -- it has fragments
   signal whole_r : slots_t;                                 -- it waits to be sent
   signal long_r  : slots_t;                                 -- and is long
-  signal older_r : orders_t := (others => NO_SLOT);         -- those that were whole before
+  signal older_r : orders_t := (others => NO_SLOT);         -- the packets completed earlier
   signal keys_r  : keys_t;
   signal sizes_r : sizes_t := (others => (others => '0'));  -- bytes so far
   signal sums_r  : sums_t := (others => (others => '0'));   -- of the words of the header that stay
@@ -124,17 +124,17 @@ architecture rtl of firm_ipv4_reassembly is
   signal key_r      : key_t := (others => '0');
   signal sum_r      : sum_t := (others => '0');
   signal check_r    : sum_t := (others => '0');
-  signal free_r     : slot_t := (others => '0');            -- the place that it gets if it is a first one
+  signal free_r     : slot_t := (others => '0');            -- its place if it is a first fragment
   signal has_free_r : std_logic;
 
   -- The packet of the fragment, which is known before the header ends.
   signal found_r   : slots_t;
   signal known     : slot_t;
   signal size_r    : size_t := (others => '0');
-  signal repeats_r : std_logic;                             -- the fragment has come before
+  signal repeats_r : std_logic;                             -- the fragment is a repetition
   signal follows_r : std_logic;                             -- it is the next one
   signal exceeds_r : std_logic;                             -- the packet has no room
-  signal fed       : slots_t;                               -- it is not given up: its fragment is under way
+  signal fed       : slots_t;                               -- it is not dropped: its fragment is arriving
 
   -- The beat one cycle later, and what is done with it.
   signal beat_r    : byte_t := (others => '0');
@@ -146,7 +146,7 @@ architecture rtl of firm_ipv4_reassembly is
   signal taken_r   : std_logic;                             -- these are the packet's next bytes
   signal refused_r : std_logic;                             -- the fragment belongs to no packet
   signal broken_r  : std_logic;                             -- a fragment before it is missing
-  signal left_r    : size_t := (others => '0');             -- bytes to come
+  signal left_r    : size_t := (others => '0');             -- remaining bytes
   signal write_r   : size_t := (others => '0');
   signal writes    : std_logic;
   signal is_whole  : std_logic;                             -- the frame had all bytes
@@ -162,7 +162,7 @@ architecture rtl of firm_ipv4_reassembly is
   type state_t is (PASSING, SENDING, RESTING, DRAINING);
   signal state_r     : state_t;
   signal turn_r      : std_logic;                           -- it is the store's turn
-  signal waits_r     : std_logic;                           -- the frame that comes goes to the store
+  signal waits_r     : std_logic;                           -- the arriving frame goes to the store
   signal waits       : std_logic;
   signal out_slot_r  : slot_t := (others => '0');
   signal out_place_r : size_t := (others => '0');
@@ -171,12 +171,12 @@ architecture rtl of firm_ipv4_reassembly is
   signal out_sum_r   : sum_t := (others => '0');
   signal checksum_r  : unsigned(15 downto 0) := (others => '0');
   signal gap_r       : natural range 0 to GAP;
-  signal shown_r     : std_logic;                           -- the memories show a byte of the packet
+  signal shown_r     : std_logic;                           -- the memories output a byte of the packet
   signal shown_at_r  : size_t := (others => '0');
   signal shows_end_r : std_logic;
   signal data_r      : byte_t := (others => '0');
   signal head_r      : byte_t := (others => '0');
-  -- One cycle later, since memories show their bytes late in a cycle.
+  -- One cycle later, since memories output their bytes late in a cycle.
   signal sends_r      : std_logic;                          -- a byte of the packet
   signal ends_sent_r  : std_logic;
   signal sent_at_r    : size_t := (others => '0');
@@ -187,19 +187,19 @@ architecture rtl of firm_ipv4_reassembly is
   signal store_data_r : byte_t := (others => '0');
   signal sent_byte    : byte_t;
 
-  signal user           : std_logic_vector(0 downto 0);      -- of the frame that comes; a fragment is aborted
+  signal user           : std_logic_vector(0 downto 0);      -- of the arriving frame; a fragment is aborted
   signal store_valid    : std_logic;
   signal stored_data    : byte_t;
   signal stored_valid   : std_logic;
   signal stored_last    : std_logic;
   signal stored_ready   : std_logic;
-  signal waiting_r      : std_logic;                         -- the next byte of the store, whose memory is late, too
+  signal waiting_r      : std_logic;                         -- the next byte of the store, whose memory is also late
   signal waiting_data_r : byte_t := (others => '0');
   signal waiting_last_r : std_logic;
   signal drains         : std_logic;
   signal loses          : std_logic;
 
-  -- The lowest one of several; 0 if there is none.
+  -- The lowest one of several, or 0.
   function lowest(slots : slots_t) return slot_t is
   begin
     for index in 0 to PACKETS-1 loop
@@ -256,7 +256,7 @@ begin
         elsif place_r = MAC_BYTES-1 and recent /= mac then
           mine_r <= '0';
         elsif place_r = MAC_BYTES and s_axis_tdata(0) = '1' then
-          -- A group of hosts is not a source.
+          -- A multicast address is not a valid source address.
           mine_r <= '0';
         elsif place_r = TYPE_PLACE+1 and word /= IPV4 then
           mine_r <= '0';
@@ -362,7 +362,7 @@ begin
         write_r <= offset_r;
         slot_r  <= known;
         if found_r /= NO_SLOT and repeats_r = '1' then
-          -- It has come before.
+          -- It is a repetition.
           null;
         elsif exceeds_r = '1' then
           refused_r <= '1';
@@ -404,8 +404,8 @@ begin
     end if;
   end process access_data;
 
-  -- The header of the place that the frame gets if it is a first fragment. When its first byte comes, the place is not
-  -- known yet; this byte is that of the board's address.
+  -- The header of the frame's place if it is a first fragment. When its first byte arrives, the place is not yet known;
+  -- this byte is that of the board's address.
   access_head : process (clk)
   begin
     if rising_edge(clk) then
@@ -417,7 +417,8 @@ begin
   end process access_head;
 
   is_good <= ends_r and not aborted_r;
-  -- A packet is not given up while its fragment comes, and none while that one's packet is found.
+  -- A packet is not dropped while its fragment arrives, and no packet while the fragment's packet is being searched
+  -- for.
   fed     <= (others => '1') when place_r >= SOURCE_PLACE+4 and place_r <= DATA_PLACE else
              found_r when mine_r = '1' and (place_r > DATA_PLACE or ends_r = '1') else
              NO_SLOT;
@@ -564,7 +565,7 @@ begin
       shown_at_r  <= out_place_r;
       if state_r = PASSING then
         out_place_r <= (others => '0');
-        -- In the last of these cycles, a packet begins: the next frame finds that it has to wait.
+        -- In the last of these cycles, a packet begins: the next frame must therefore wait.
         if s_axis_tvalid = '1' or place_r /= 0 then
           gap_r <= GAP-1;
         elsif gap_r /= 0 then

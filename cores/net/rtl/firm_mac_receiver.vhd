@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Receives Ethernet frames from the bytes of a GMII. It removes preamble and frame check sequence (FCS), and aborts
 -- each frame that is broken or too long: one with a wrong FCS, with fewer than 64 bytes, or with an error of the PHY.
--- The four bytes of the FCS wait in a delay line, so the last byte of a frame leaves when the verdict is known.
+-- The four bytes of the FCS wait in a delay line, so the last byte of a frame leaves when the result is known.
 --
--- Nothing stalls the line, so `m_axis` has no `tready`: the sink takes each beat at once.
+-- The line has no back-pressure, so `m_axis` has no `tready`: the sink accepts each beat at once.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -45,7 +45,7 @@ architecture rtl of firm_mac_receiver is
   constant SHORTEST      : positive := 64;  -- with FCS
   constant COUNT_BITS    : positive := clog2(LONGEST+FCS_BYTES+1);
 
-  -- SKIPPED lasts to the end of the burst, which has had its pulse.
+  -- SKIPPED lasts until the end of the burst, which has already had its pulse.
   type state_t is (IDLE, PREAMBLE, FRAME, SKIPPED);
   signal state_r : state_t;
 
@@ -113,7 +113,7 @@ begin
         count_r <= count_r + 1;
         error_r <= error_r or rx_er;
       end if;
-      -- The burst under way at the end of a reset is not a frame.
+      -- A burst in progress at the end of a reset is not a frame.
       if rst_n = '0' then
         state_r <= SKIPPED;
         count_r <= 0;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Holds each frame until its last beat says that it is good, and forgets an aborted one: no byte of a broken frame
--- leaves, and a good frame leaves without a pause. The source is not stalled; a frame that finds no room is dropped
--- whole. The first beat of a frame leaves two cycles after its last one came.
+-- Stores each frame until its last beat, and drops an aborted one: no byte of a broken frame leaves, and a good frame
+-- leaves without a pause. The source is not stalled; a frame without room is dropped completely. The first beat of a
+-- frame leaves two cycles after its last one arrived.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -27,7 +27,7 @@ entity firm_mac_store is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    is_lost : out std_logic  -- a pulse for each good frame that found no room
+    is_lost : out std_logic  -- a pulse for each good frame without room
   );
 end entity firm_mac_store;
 
@@ -45,7 +45,7 @@ architecture rtl of firm_mac_store is
   signal write_r : place_t := (others => '0');
   signal next_r  : place_t := (others => '0');  -- write_r + 1
   signal read_r  : place_t := (others => '0');
-  signal full_r  : std_logic;                   -- the incoming frame found no room
+  signal full_r  : std_logic;                   -- the incoming frame has no room
 
   signal has_room : std_logic;
   signal ends     : std_logic;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends frames as the bytes of a GMII, with preamble, padding to 60 bytes, frame check sequence (FCS) and the gap of 12
--- bytes. The first byte of the preamble follows the first beat by one cycle. A frame that cannot be sent whole is
--- spoiled, so that every receiver drops it: it ends with an inverted FCS and `tx_er`. That is so for an aborted frame,
--- for a source that pauses within a frame, and for a frame that is longer than LONGEST.
+-- bytes. The first byte of the preamble follows the first beat by one cycle. A frame that cannot be sent completely is
+-- invalidated, so that every receiver drops it: it ends with an inverted FCS and `tx_er`. This applies to an aborted
+-- frame, to a frame in which the source pauses, and to a frame longer than LONGEST.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,7 +17,7 @@ entity firm_mac_transmitter is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- From the destination address to the payload. Within a frame, a beat must be there whenever `tready` is high.
+    -- From the destination address to the payload. Within a frame, a beat must be valid whenever `tready` is high.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
     s_axis_tuser  : in  std_logic_vector(0 downto 0) := "0";
     s_axis_tvalid : in  std_logic;
@@ -55,9 +55,9 @@ architecture rtl of firm_mac_transmitter is
   signal spoiled_r : std_logic;
   signal drain_r   : std_logic;                       -- the source's frame is dropped up to its end
 
-  signal taken      : std_logic;  -- a beat of the frame that is sent
-  signal is_final   : std_logic;  -- nothing of the source follows on the line
-  signal is_padded  : std_logic;  -- nothing of padding follows
+  signal taken      : std_logic;  -- an accepted beat of the frame being sent
+  signal is_final   : std_logic;  -- no byte of the source follows on the line
+  signal is_padded  : std_logic;  -- no padding follows
   signal sum        : std_logic_vector(31 downto 0);
   signal sum_clear  : std_logic;
   signal sum_valid  : std_logic;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Connects receiver and transmitter to a PHY by MII, at 10 or 100 Mbit/s, full duplex. A nibble is half a byte, the
--- lower one first. Each direction has a clock of the PHY, from which and to which the bytes cross.
+-- lower one first. Each direction has a clock of the PHY; bytes cross between it and `clk`.
 --
 -- `clk` must be at least as fast as the PHY's clocks. Then the FIFO to the PHY never runs empty within a frame.
 library ieee;
@@ -43,7 +43,7 @@ architecture rtl of firm_mii is
   constant START_NIBBLE    : std_logic_vector(3 downto 0) := x"d";
   constant START_BYTE      : std_logic_vector(7 downto 0) := x"d5";
   constant PREAMBLE_BYTE   : std_logic_vector(7 downto 0) := x"55";
-  -- Neither of them: the receiver drops what begins with it.
+  -- Neither of them: the receiver drops a burst that begins with it.
   constant WRONG_BYTE      : std_logic_vector(7 downto 0) := x"00";
   -- Idle bytes that cross after each frame.
   constant GAP_BYTES       : positive                     := 12;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A table of keys: tells which of its entries equal a key that comes byte by byte. A key has a head, which is compared
--- once, and a tail, which may be compared again with another value.
+-- A table of keys: compares its entries with a key that arrives byte by byte. A key has a head, which is compared once,
+-- and a tail, which may be compared again with another value.
 --
--- An entry that is written while a key comes does not match that key.
+-- An entry that is written while a key arrives does not match that key.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -16,7 +16,7 @@ entity firm_net_keys is
   port (
     clk : in std_logic;
 
-    -- A byte of a key. The bytes come in their order; those of another tail follow without the head.
+    -- A byte of a key. The bytes arrive in order; those of another tail follow without the head.
     s_valid : in std_logic;
     s_place : in std_logic_vector(3 downto 0);
     s_data  : in std_logic_vector(7 downto 0);
@@ -43,8 +43,8 @@ architecture rtl of firm_net_keys is
   signal place_r : unsigned(3 downto 0) := (others => '0');
   signal data_r  : std_logic_vector(7 downto 0);
   signal equal   : mask_t;
-  signal heads_r : mask_t;  -- entries whose heads are equal, or were so far
-  signal tails_r : mask_t;  -- and those whose tails are equal, or were so far
+  signal heads_r : mask_t;  -- entries with equal heads so far
+  signal tails_r : mask_t;  -- and those with equal tails so far
 
 begin
 

@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams of a system that is a node of ROS 2 itself: firm_rtps_node between Ethernet frames, which come
--- from the bytes of a line, and streams of any width. The memories outside make it a node: its program, its packets
--- and its names. It answers ARP and ping, too, and keeps its place in the network.
+-- The host's two streams of a system that is a node of ROS 2 itself: firm_rtps_node between Ethernet frames on a line
+-- and streams of any width. External memories define the node: its program, its packets and its names. It also answers
+-- ARP and ping, and keeps its place in the network.
 --
--- The board does not ask for MAC addresses: it sends to peers only, and sends a peer's packets to the MAC address from
--- which the peer's announcement came, that of the peer or of the router to it.
+-- The board does not resolve MAC addresses: it sends only to peers, at the MAC address from which the peer's
+-- announcement arrived, that of the peer or of the router to it.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -24,15 +24,15 @@ entity firm_net_link is
     -- Numbers of packets.
     REPORT_PACKET : integer := 0;
     PROBE_PACKET  : integer := 0;
-    HAS_STATUS    : boolean := false; -- the system has a status, which is read by UDP
+    HAS_STATUS    : boolean := false; -- the system has a status, accessible by UDP
     DISCOVERY     : integer := 4096;  -- bytes of discovery and of payloads that wait, see firm_rtps_node
     PAYLOADS      : integer := 4096;
-    ASSEMBLED     : integer := 0;     -- bytes of the longest message that is put together, see firm_rtps_node
+    ASSEMBLED     : integer := 0;     -- bytes of the longest assembled message, see firm_rtps_node
     -- Packets whose fragments may be interleaved, 0 to 4, and the bytes of the longest one; without them, fragments
     -- are dropped.
     REASSEMBLIES : integer := 0;
     REASSEMBLED  : integer := 16384;
-    -- The address comes by DHCP, and the port `address` is not used.
+    -- The address is obtained by DHCP, and the port `address` is ignored.
     HAS_DHCP            : boolean := false;
     DHCP_PACKET         : integer := 0;
     RENEWAL_PACKET      : integer := 0;
@@ -51,7 +51,7 @@ entity firm_net_link is
     are_reliable  : in std_logic_vector(READERS+WRITERS-1 downto 0);
     are_transient : in std_logic_vector(READERS+WRITERS-1 downto 0);
 
-    -- The memories that fusesoc_firm.fabric.control, fusesoc_firm.fabric.packets and fusesoc_firm.fabric.names make.
+    -- The memories created by fusesoc_firm.fabric.control, fusesoc_firm.fabric.packets and fusesoc_firm.fabric.names.
     control_enable  : out std_logic;
     control_address : out std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
     control_word    : in  std_logic_vector(35 downto 0);
@@ -185,11 +185,11 @@ architecture rtl of firm_net_link is
   signal given_tready : std_logic;
   signal frame_tvalid : std_logic;
   signal frame_tready : std_logic;
-  -- Those that the node takes.
+  -- Those that the node accepts.
   signal offered_tvalid : std_logic;
   signal offered_tready : std_logic;
 
-  -- This host: constant without DHCP. Otherwise the node and all that has its address rest while it has none.
+  -- This host: constant without DHCP. With DHCP, the node and all users of its address are idle without one.
   signal own_address : std_logic_vector(31 downto 0);
   signal is_bound    : std_logic;
   signal node_runs   : std_logic;
@@ -197,7 +197,7 @@ architecture rtl of firm_net_link is
   signal watch_rst_n : std_logic;  -- of the presence
   signal node_takes  : std_logic;  -- frames of the system
   signal node_busy   : std_logic;
-  signal heard_valid : std_logic;  -- a byte received, for what has an address
+  signal heard_valid : std_logic;  -- a byte received, for the users of the address
   signal data_bytes  : std_logic_vector(15 downto 0);
   signal own_select  : std_logic_vector(6 downto 0);
   signal own_byte    : std_logic_vector(7 downto 0);
@@ -306,8 +306,8 @@ begin
     signal checks_r   : std_logic;
     signal runs_r     : std_logic;
     signal to_r       : std_logic;  -- inside a frame to the system
-    signal from_r     : std_logic;  -- inside a frame from it that the node takes
-    signal drops_r    : std_logic;  -- inside one that is dropped
+    signal from_r     : std_logic;  -- inside a frame from it that the node accepts
+    signal drops_r    : std_logic;  -- inside a dropped one
     signal sends_r    : std_logic;  -- a packet of DHCP leaves
     signal rests      : std_logic;
     signal is_own_r   : std_logic;  -- the packet is not the node's
@@ -345,20 +345,20 @@ begin
     -- The builder reads the bytes of the client up to the end of the packet.
     dhcp_sent   <= sends_r and not is_busy;
 
-    -- The node ends what it has begun, a packet and a frame in each direction. Then it is reset, and the next address
-    -- finds a node that announces itself anew.
+    -- The node completes the current packet, and the current frame in each direction. Then it is reset, so that it
+    -- announces itself again with the next address.
     node_runs  <= runs_r;
     node_rst_n <= rst_n and runs_r;
     is_stopped <= not runs_r;
     rests      <= not (is_bound or is_busy or node_start or to_r or given_tvalid or from_r);
-    -- A frame is taken or dropped as a whole.
+    -- A frame is accepted or dropped as a whole.
     node_takes <= from_r or (runs_r and is_bound and not drops_r);
 
-    -- The presence starts anew with each address. It also probes for the one that is not in use yet.
+    -- The presence restarts with each address. It also probes for an address before its use.
     watch_rst_n <= rst_n and (hears_r or checks_r);
     heard_valid <= received_tvalid and hears_r;
 
-    -- The node tells the size of its last payload, also while another packet leaves.
+    -- The node outputs the size of its last payload, also while another packet leaves.
     data_bytes <= (others => '0') when is_own_r = '1' else payload_bytes;
 
     follow_address : process (clk)
@@ -469,7 +469,7 @@ begin
     is_frame_lost     <= '0';
   end generate without_fragments;
 
-  -- Of another number, the part would complain first.
+  -- For an invalid number, the part would report an error first.
   with_fragments : if REASSEMBLIES >= 1 and REASSEMBLIES <= MOST_REASSEMBLIES generate
 
     signal rests : std_logic;
@@ -480,10 +480,10 @@ begin
 
     u_reassembly : entity firm.firm_ipv4_reassembly
       generic map (
-        -- As many may leave at the same time.
+        -- The same number may leave at the same time.
         PACKETS => 2*REASSEMBLIES,
         BYTES   => REASSEMBLED,
-        -- The payload of a shorter one has room among those that wait.
+        -- The payload of a shorter one has room in the queue of waiting ones.
         LONG    => PAYLOADS
       )
       port map (
@@ -536,10 +536,10 @@ begin
 
   -- ------------------------------------------------------------------ the node
 
-  -- A frame that the node does not take is dropped, so that the system goes on.
+  -- A frame that the node does not accept is dropped, so that the system does not stall.
   offered_tvalid <= frame_tvalid and node_takes;
   frame_tready   <= offered_tready or not node_takes;
-  -- In the cycle before its reset, the node may offer another frame, of which the rest would never come.
+  -- In the cycle before its reset, the node may offer another frame, whose rest would never arrive.
   given_tvalid   <= sample_tvalid and node_runs;
   sample_tready  <= given_tready and node_runs;
 
@@ -630,7 +630,7 @@ begin
     signal merged_tready : std_logic_vector(1 downto 0);
 
     signal inside_r      : std_logic;  -- the byte of the system is not the first one of its frame
-    signal is_answer_r   : std_logic;  -- its frame is of the status
+    signal is_answer_r   : std_logic;  -- its frame belongs to the status
     signal is_answer     : std_logic;
     signal answer_tvalid : std_logic;
 
@@ -735,8 +735,8 @@ begin
 
   -- ------------------------------------------------------------------ packets
 
-  -- The node starts a packet only while the builder is not busy. Its presence has constant frames, which neither need
-  -- nor change the fields and the payload that the node has prepared; so they may leave between any two packets.
+  -- The node starts a packet only while the builder is not busy. Its presence has constant frames, which neither use
+  -- nor change the node's prepared fields and payload, and may therefore leave between any two packets.
   -- Before the node has an address, there is nothing to report.
   node_busy   <= is_busy or not is_bound;
   node_starts <= node_start and node_runs;

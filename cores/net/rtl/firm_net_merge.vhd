@@ -1,7 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Sends the frames of several sources, one frame at a time. Of sources that wait, the next one after the source of
--- the last frame is sent, so that none keeps the others from sending. A source is chosen one cycle after it has begun
--- to wait, and each byte leaves one cycle later.
+-- Sends the frames of several sources, one frame at a time. The waiting sources are served round robin, so that none
+-- starves. A source is selected one cycle after it begins to wait, and each byte leaves one cycle later.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -32,18 +31,18 @@ architecture rtl of firm_net_merge is
   constant NO_SOURCE : sources_t := (others => '0');
 
   signal after_r  : sources_t;  -- the sources after that of the last frame
-  signal later    : sources_t;  -- those of them that wait
+  signal later    : sources_t;  -- the waiting ones of them
   signal waiting  : sources_t;
   signal first    : sources_t;  -- the source to begin with, if one waits
-  signal chosen_r : sources_t;  -- the source of the frame that is under way
+  signal chosen_r : sources_t;  -- the source of the current frame
   signal byte     : std_logic_vector(7 downto 0);
   signal valid    : std_logic;
   signal last     : std_logic;
-  signal takes    : std_logic;  -- a byte comes
+  signal takes    : std_logic;  -- a byte arrives
   signal valid_r  : std_logic;
   signal byte_r   : std_logic_vector(7 downto 0) := (others => '0');
   signal last_r   : std_logic;
-  -- A byte that came when the one before could not leave.
+  -- A byte that arrived while the previous one could not leave.
   signal full_r   : std_logic;
   signal spare_r  : std_logic_vector(7 downto 0) := (others => '0');
   signal final_r  : std_logic;

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Bytes of a frame, for cores that compare each one as it comes.
+-- Bytes of a frame, for cores that compare each byte on arrival.
 library ieee;
 use ieee.std_logic_1164.all;
 

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Keeps a board's place in its network: it has reports sent that it is a member of its group (IGMP version 2, RFC
--- 2236), and probes for its own address (ARP, RFC 5227). Both are sent four times, one second apart, and the same
--- again every 64 seconds, since a PHY or a switch may not be ready at first. A query of a router or switch is
--- answered. A host that uses the board's address is reported. Before the board uses the address itself, it only probes
--- for it, and another host that probes for it, too, is reported as well.
+-- Keeps a board's place in its network: it requests reports of its group membership (IGMP version 2, RFC 2236) and
+-- probes for its own address (ARP, RFC 5227). Both are sent four times, one second apart, and again every 64 seconds,
+-- since a PHY or a switch may not be ready at first. A query of a router or switch is answered. A host that uses the
+-- board's address is reported. Before the board uses the address itself, it only probes for it, and also reports
+-- another host that probes for it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -53,7 +53,7 @@ architecture rtl of firm_net_presence is
   constant SHORTEST_HEADER : natural := 5;  -- of IPv4, in words
   constant LAST_PLACE      : natural := 63;
   -- `count_r` counts down from the bytes of the header of IPv4, from its second byte on. So it is one at the first byte
-  -- of IGMP, and goes on from zero to the highest count.
+  -- of IGMP, and continues from zero to the highest count.
   constant TYPE_COUNT  : natural := 1;
   constant DELAY_COUNT : natural := 0;
   constant GROUP_COUNT : natural := 122;  -- of the last byte of the group
@@ -72,7 +72,7 @@ architecture rtl of firm_net_presence is
   signal count_r  : unsigned(6 downto 0) := (others => '0');
   signal recent_r : std_logic_vector(47 downto 0) := (others => '0');  -- the last six bytes
   signal arp_r    : std_logic;
-  signal other_r  : std_logic;  -- the ARP packet is of another host
+  signal other_r  : std_logic;  -- the ARP packet is from another host
   signal claims_r : std_logic;  -- it names the board's address as its sender's, or probes for it
   signal probes_r : std_logic;  -- it is a probe
   signal query_r  : std_logic;
@@ -182,8 +182,8 @@ begin
   wants_report <= report_r;
   wants_probe  <= probe_r and not report_r;
 
-  -- Boards that are asked together answer at different times: the lower bits of the MAC address tell the delay of up to
-  -- half a second. Of two queries, the one that is answered first counts.
+  -- Boards that are queried together answer at different times: the lower bits of the MAC address determine the delay
+  -- of up to half a second. Of two queries, the one with the earlier answer is used.
   delay <= unsigned(mac(5 downto 0)) & "000" and limit_r;
 
   keep_time : process (clk)

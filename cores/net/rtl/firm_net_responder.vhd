@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Answers ARP requests for its address (RFC 826) and ICMP echo requests (RFC 792). Most bytes of a reply are those of
--- its request in the same place, so it is made as the request arrives: a delay line gives the bytes that move, and
--- constants replace the others. The reply waits in a store until the request is known to be whole and meant for this
--- host; everything else is forgotten there.
+-- its request in the same place, so it is formed as the request arrives: a delay line supplies the moved bytes, and
+-- constants replace others. The reply waits in a store until the request is known to be complete and for this host;
+-- otherwise, it is dropped there.
 --
--- An echo request has an IPv4 header of 20 bytes with a right checksum, is not a fragment, and comes in a frame that is
--- long enough for it. Its checksum is not verified: the reply's is right if the request's is.
+-- An echo request has an IPv4 header of 20 bytes with a right checksum, is not a fragment, and arrives in a frame that
+-- is long enough. Its checksum is not verified: the reply's is right if the request's is.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -21,7 +21,7 @@ entity firm_net_responder is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- This host, the first byte on the line highest. A frame under way at a change may be dropped.
+    -- This host, the first byte on the line highest. A frame in progress at a change may be dropped.
     mac     : in std_logic_vector(47 downto 0);
     address : in std_logic_vector(31 downto 0);
 
@@ -37,7 +37,7 @@ entity firm_net_responder is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    is_lost : out std_logic  -- a pulse for each reply that found no room
+    is_lost : out std_logic  -- a pulse for each reply without room
   );
 end entity firm_net_responder;
 
@@ -58,7 +58,7 @@ architecture rtl of firm_net_responder is
   constant ADDRESS_BYTES     : natural := 4;
   constant ETHERNET_BYTES    : natural := 14;
   constant IPV4_BYTES        : natural := 20;
-  -- The place from which nothing more is decided; counts of places stop there.
+  -- The place after the last decision; counts of places stop there.
   constant PLACE_BITS        : natural := 6;
   constant END_PLACE         : natural := 2**PLACE_BITS-1;
 
@@ -76,7 +76,7 @@ architecture rtl of firm_net_responder is
   -- are ones.
   constant OVERFLOWING : std_logic_vector(7 downto 3) := "11111";
 
-  -- The newest byte first. A reply's byte of the same place is AHEAD bytes behind it: its first bytes are those of the
+  -- The newest byte first. A reply's byte of the same place follows AHEAD bytes later: its first bytes are those of the
   -- request's source.
   constant AHEAD     : natural := MAC_BYTES;
   constant ARP_MOVE  : natural := TARGET_PLACE - SENDER_PLACE;
@@ -90,23 +90,23 @@ architecture rtl of firm_net_responder is
   signal early_r   : natural range 0 to AHEAD;          -- shifts before the reply's first byte
 
   -- Of the request so far.
-  signal direct_r    : std_logic;                       -- it is sent to this host only
+  signal direct_r    : std_logic;                       -- it is sent only to this host
   signal broadcast_r : std_logic;
   signal arp_r       : std_logic;                       -- it is an ARP request for this host
   signal echo_r      : std_logic;                       -- it is an echo request for this host
   -- Of the IPv4 header's words; the highest bit is a carry, which is added with the next word.
   signal sum_r       : unsigned(16 downto 0) := (others => '0');
-  signal unseen_r    : unsigned(15 downto 0) := (others => '0');  -- bytes of the IPv4 packet to come, and four
+  signal unseen_r    : unsigned(15 downto 0) := (others => '0');  -- remaining bytes of the IPv4 packet, plus four
   signal enough_r    : std_logic;                       -- the packet has an ICMP header
   signal summed_r    : std_logic;                       -- the IPv4 header's checksum is right
   signal holds_r     : std_logic;                       -- the frame holds the IPv4 packet
   signal aborted_r   : std_logic;
 
-  -- What a reply's byte is: the request's byte of the same place, one of another place, or none of it.
+  -- The source of a reply's byte: the request's byte of the same place, one of another place, or a different byte.
   type origin_t is (SAME, SOURCE, ARP_MOVED, IPV4_MOVED, GIVEN);
 
-  -- The place after that of the reply's byte. What that byte is depends on its place only, and is decided one byte
-  -- before.
+  -- The place after that of the reply's byte. The source of that byte depends only on its place, and is determined one
+  -- byte earlier.
   signal reply_next_r : natural range 0 to END_PLACE;
   signal origin_r     : origin_t;
   signal given_r      : byte_t;
@@ -127,7 +127,7 @@ architecture rtl of firm_net_responder is
   signal chosen_tvalid : std_logic;
   signal chosen_tlast  : std_logic;
 
-  -- What the byte at `place` of a reply is.
+  -- The source of a reply's byte at `place`.
   function origin_of(place : natural; is_arp : std_logic) return origin_t is
     constant BITS : std_logic_vector(PLACE_BITS-1 downto 0) := std_logic_vector(to_unsigned(place, PLACE_BITS));
   begin
@@ -151,7 +151,7 @@ architecture rtl of firm_net_responder is
     return SAME;
   end function origin_of;
 
-  -- Which byte of the reply's opcode, this host's MAC address and address, and the reply's type has this place.
+  -- The byte of the reply's opcode, this host's MAC address and address, or the reply's type at this place.
   function given_of(place : natural; is_arp : std_logic) return natural is
     constant MAC_AT     : natural := 1;
     constant ADDRESS_AT : natural := MAC_AT+MAC_BYTES;
@@ -238,7 +238,7 @@ begin
                       or differs(place_r, s_axis_tdata, ECHO_REQUEST)
                       or differs(place_r, s_axis_tdata, placed(address, DESTINATION_PLACE));
       if place_r = MAC_BYTES then
-        -- A group of hosts is not a source.
+        -- A multicast address is not a valid source address.
         arp_differs  := s_axis_tdata(0) = '1' or (direct_r or broadcast_r) = '0';
         echo_differs := s_axis_tdata(0) = '1' or direct_r = '0';
       elsif place_r = FRAGMENT_PLACE and (s_axis_tdata and FRAGMENT) /= x"00" then
@@ -284,8 +284,8 @@ begin
     end if;
   end process check_header;
 
-  -- The words and the carries add up to all ones; the frame holds the packet. Registers of their own: there is time
-  -- until the reply ends.
+  -- The words and the carries add up to all ones; the frame holds the packet. Separate registers: there is time until
+  -- the reply ends.
   judge : process (clk)
   begin
     if rising_edge(clk) then
@@ -363,7 +363,7 @@ begin
 
   reply_tuser(0) <= aborted_r or not (arp_r or (echo_r and summed_r and holds_r));
 
-  -- A cycle of its own for the choice.
+  -- A separate cycle for the choice.
   hold_reply : process (clk)
   begin
     if rising_edge(clk) then

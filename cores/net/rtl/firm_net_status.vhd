@@ -1,12 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Reads and writes the status of a system by UDP datagrams: the payload of a request is that of a frame of the status
--- id, an address and a word. The frame goes to the system, and the system's answer back to the sender.
+-- Reads and writes the status of a system by UDP datagrams. A request has the payload of a frame of the status id, an
+-- address and a word. The frame is passed to the system, and the system's answer is returned to the sender.
 --
 -- The reply is the request with the parties exchanged, and without a checksum of UDP, so the checksum of IPv4 holds.
--- One request is under way at a time; others meanwhile are dropped, and their senders ask again.
+-- One request is in progress at a time; others meanwhile are dropped, and their senders repeat them.
 --
--- There is no time-out, since an answer always comes: firm_status_frames takes every request that is sent here, and
--- the registers answer an access to any address. A frame of the system that is under way delays the answer.
+-- There is no time-out, since an answer always comes: firm_status_frames accepts every request sent here, and the
+-- registers answer an access to any address. A frame in progress from the system delays the answer.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -144,7 +144,7 @@ begin
           if state_r = LISTENING then
             meant_r <= '1';
           end if;
-        -- A group of hosts is not a sender.
+        -- A multicast address is not a valid source address.
         elsif (place_r = MAC_BYTES-1 and recent /= mac)
               or (place_r = MAC_BYTES and s_axis_tdata(0) = '1')
               or (place_r = TYPE_PLACE+1 and recent(15 downto 0) /= TYPE_IPV4)
@@ -177,7 +177,7 @@ begin
     if rising_edge(clk) then
       if state_r = LISTENING then
         step_r <= (others => '0');
-        -- The shortest frame has more bytes than are looked at.
+        -- The shortest frame has more bytes than are checked.
         if s_axis_tvalid = '1' and s_axis_tlast = '1' and s_axis_tuser(0) = '0' and meant_r = '1'
            and place_r = END_PLACE then
           state_r <= ASKING;

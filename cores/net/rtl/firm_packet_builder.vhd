@@ -1,15 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Builds Ethernet frames with UDP datagrams from programs in a memory: constant bytes, bytes of fields that its user
--- wrote before, and one payload from a stream. Lengths and the checksum of IPv4 are computed; datagrams have no
--- checksum of their own (RFC 768 allows that). One byte leaves in every cycle.
+-- wrote earlier, and one payload from a stream. Lengths and the checksum of IPv4 are computed; datagrams have no UDP
+-- checksum (permitted by RFC 768). One byte leaves in every cycle.
 --
 -- A word of a program is one byte of the frame, or the payload: bit 10 marks the last one, bits 9 to 8 are the source,
 -- and bits 7 to 0 the argument. A program begins with eight words that are not sent: the sum of the header's constant
 -- words, the length of the packet without the payload, both with the high byte first, and the destination's address.
--- With HAS_OWN, four more follow, the address of this host, and bit 7 of a field's address tells a byte that this host
--- gets while it runs, such as one of its address.
+-- With HAS_OWN, four more follow, the address of this host, and bit 7 of a field's address selects a byte that this
+-- host obtains at run time, such as one of its address.
 --
--- There are several banks of fields. So a packet may be ready in one of them while others are written and sent.
+-- With several banks of fields, a packet may be ready in one bank while others are written and sent.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -26,8 +26,7 @@ entity firm_packet_builder is
 
     -- A packet begins if `start` is high and `is_busy` is low. The payload is padded to a multiple of four bytes. Its
     -- size, from three cycles after the start up to the end, is 0 if the program has no payload, and only then. If it
-    -- is 0 nevertheless, one byte is sent in its place: the frame cannot be right, but it has neither a pause nor
-    -- 64 KiB.
+    -- is 0 with a payload, one byte is sent instead: the frame is wrong, but it has neither a pause nor 64 KiB.
     start         : in  std_logic;
     entry         : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
     bank          : in  std_logic_vector(BANK_BITS-1 downto 0);
@@ -40,7 +39,7 @@ entity firm_packet_builder is
     field_address : in std_logic_vector(6 downto 0);
     field_data    : in std_logic_vector(7 downto 0);
 
-    -- With HAS_OWN: which byte of this host, and the byte in the same cycle.
+    -- With HAS_OWN: the number of a byte of this host, and the byte in the same cycle.
     own_select : out std_logic_vector(6 downto 0);
     own_byte   : in  std_logic_vector(7 downto 0) := x"00";
 
@@ -106,9 +105,9 @@ architecture rtl of firm_packet_builder is
   signal argument   : std_logic_vector(7 downto 0);
   signal payload    : std_logic;  -- it is the payload
   signal bytes      : number_t;                                 -- of the payload
-  signal real_r     : number_t := (others => '0');              -- of them that are to come
-  signal spent_r    : std_logic;                                -- none of them
-  signal single_r   : std_logic;                                -- at most one of them
+  signal real_r     : number_t := (others => '0');              -- the remaining ones of them
+  signal spent_r    : std_logic;                                -- none remain
+  signal single_r   : std_logic;                                -- at most one remains
   signal phase_r    : unsigned(1 downto 0) := (others => '0');  -- of the payload's byte in a group of four
   signal has_byte   : std_logic;
   signal moves      : std_logic;  -- a byte goes to the second stage
@@ -127,7 +126,7 @@ architecture rtl of firm_packet_builder is
   signal sent_r    : std_logic;  -- the prelude is over
   signal closes_r  : std_logic;  -- since this cycle
 
-  -- The third stage: a byte of the prelude. The memory of fields is slow, so it is added one cycle later.
+  -- The third stage: a byte of the prelude. The memory of fields outputs late, so the byte is added one cycle later.
   signal adds_r    : std_logic;
   signal added_r   : std_logic_vector(7 downto 0) := (others => '0');
   signal number_r  : natural range 0 to PRELUDE_WORDS-1;  -- of the word

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Connects receiver and transmitter to a PHY by RMII, at 100 Mbit/s, full duplex. `clk` is the reference clock of
--- 50 MHz, which the PHY has, too. Two bits are sent at a time, the lower ones first.
+-- Connects receiver and transmitter to a PHY by RMII, at 100 Mbit/s, full duplex. `clk` is the 50 MHz reference
+-- clock, shared with the PHY. Two bits are sent at a time, the lower ones first.
 --
 -- The PHY shows carrier and valid data on one pin: it may go high before the preamble, and after the carrier it is low
 -- in the first half of each nibble until the last nibble.
@@ -24,7 +24,7 @@ entity firm_rmii is
     rx_er   : out std_logic;
     rxd     : out std_logic_vector(7 downto 0);
 
-    -- From firm_mac_transmitter. There is no pin for tx_er; a frame with it has a wrong checksum, too.
+    -- From firm_mac_transmitter. A pin for tx_er is missing; a frame with tx_er also has a wrong checksum.
     tx_step : out std_logic;
     tx_en   : in  std_logic;
     txd     : in  std_logic_vector(7 downto 0)
@@ -41,17 +41,17 @@ architecture rtl of firm_rmii is
   constant START_PAIR    : pair_t := "11";
 
   constant START_BYTE : std_logic_vector(7 downto 0) := x"d5";
-  -- Not one of the preamble: the receiver drops what begins with it.
+  -- Not a pair of the preamble: the receiver drops a burst that begins with it.
   constant WRONG_BYTE : std_logic_vector(7 downto 0) := x"00";
 
   type rx_state_t is (IDLE, PREAMBLE, BYTES, SKIPPED);
   signal rx_state_r : rx_state_t;
   signal dv_r       : std_logic;
   signal pair_r     : pair_t;
-  signal was_dv_r   : std_logic;                        -- of the pair before
+  signal was_dv_r   : std_logic;                        -- of the previous pair
   signal place_r    : natural range 0 to PAIRS-1;       -- of the pair in its byte
   signal byte_r     : std_logic_vector(7 downto 0);
-  signal is_over    : std_logic;                        -- there was no valid data in two pairs
+  signal is_over    : std_logic;                        -- two pairs without valid data
 
   signal phase_r : natural range 0 to PAIRS-1;
   signal rest_r  : std_logic_vector(5 downto 0);        -- of the byte that is sent

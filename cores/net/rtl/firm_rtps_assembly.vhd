@@ -1,17 +1,17 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Puts a sample together that comes in fragments of RTPS (OMG DDSI-RTPS 2.5, section 8.3.8.3): one sample at a time.
+-- Assembles a sample from fragments of RTPS (OMG DDSI-RTPS 2.5, section 8.3.8.3): one sample at a time.
 --
--- Fragments of one writer come in order, as hosts send them and an Ethernet keeps them. So the state of a sample is the
--- number of its next fragment, whatever their number; after a lost one, the others are asked for again. Fragments of
--- another sample are dropped meanwhile. A sample that its reader no longer wants makes room for its successor, and one
--- without a new fragment for a while makes room for others.
+-- Fragments of one writer must arrive in order, as sent by hosts and preserved by Ethernet. The state of a sample is
+-- therefore just the number of its next fragment; after a lost fragment, the following ones are requested again.
+-- Meanwhile, fragments of another sample are dropped. A sample that its reader no longer wants is replaced by its
+-- successor; a sample without new fragments for a while is dropped.
 --
--- A fragment counts when its submessage has ended without a part of one, and its packet is known to be good. Until
--- then, its bytes are behind those that count, where the fragment can be written again.
+-- A fragment is accepted when its submessage ends with a complete fragment, and its packet is good. Until then, its
+-- bytes follow the accepted ones, where they can be overwritten.
 --
--- A DATA whose payload finds no room among those that wait is a sample, too: it is known to need the assembly when it
--- ends, so each DATA takes the assembly if it is free, and returns it if there was room. It takes that of an older
--- sample of its writer, of which no more will come.
+-- A DATA without room in the queue of payloads is also a sample. Since this is known only at its end, each DATA uses
+-- the assembly if it is free, and releases it if there was room. It also replaces an older sample of its writer, which
+-- will receive no more fragments.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -23,7 +23,7 @@ entity firm_rtps_assembly is
   generic (
     BYTES       : integer := 4096; -- of the longest sample, a power of two, 1024 to 65536; of these, 65535 are used
     SOURCE_BITS : integer := 3;    -- of the number of a writer
-    TICKS       : integer := 1000  -- without a fragment, after which a sample is given up, 1 to 65535
+    TICKS       : integer := 1000  -- without a fragment, after which a sample is dropped, 1 to 65535
   );
   port (
     clk   : in std_logic;
@@ -42,23 +42,23 @@ entity firm_rtps_assembly is
     -- Of the submessage that arrives, from the first byte of its payload on.
     is_wanted : in std_logic;  -- it is a sample for a reader of the node
     -- At least from one cycle later on; of a fragment, from its first byte on.
-    is_next   : in std_logic;  -- the reader takes a sample with this number
-    is_new    : in std_logic;  -- it has not taken this sample or a later one
+    is_next   : in std_logic;  -- the reader accepts a sample with this number
+    is_new    : in std_logic;  -- it has not accepted this sample or a later one
     source    : in unsigned(SOURCE_BITS-1 downto 0);
     number    : in std_logic_vector(47 downto 0);
 
-    -- One cycle after a submessage, and after the last one of a packet, nothing of which counts if it is spoilt.
+    -- One cycle after a submessage, and after the last one of a packet, which is ignored if it is broken.
     submessage  : in  std_logic;
     ends        : in  std_logic;
     spoils      : in  std_logic;
-    has_place   : in  std_logic;                      -- for a sample among those that wait
-    has_room    : in  std_logic;                      -- so has the payload, and waits there
+    has_place   : in  std_logic;                      -- for a sample in the queue
+    has_room    : in  std_logic;                      -- the payload also has room, and waits there
     is_complete : out std_logic;                      -- with `submessage`: it ends the sample
     is_long     : out std_logic;                      -- with `submessage`: it belongs to a sample that is too long
     is_dropped  : out std_logic;                      -- with `submessage`: it belongs to a sample without room
     size        : out std_logic_vector(15 downto 0);  -- of the sample that ends
 
-    -- The sample leaves from its first byte on, one after the other; then there is room for another one.
+    -- The sample leaves byte by byte from its first one; then there is room for another sample.
     is_sending : in  std_logic;
     moves      : in  std_logic;
     data       : out std_logic_vector(7 downto 0);
@@ -69,7 +69,7 @@ entity firm_rtps_assembly is
     renews  : in std_logic;
     renewed : in unsigned(SOURCE_BITS-1 downto 0);
 
-    -- What has come of the sample that is not whole.
+    -- The received part of the incomplete sample.
     is_open        : out std_logic;
     open_source    : out unsigned(SOURCE_BITS-1 downto 0);
     open_number    : out std_logic_vector(47 downto 0);
@@ -107,7 +107,7 @@ architecture rtl of firm_rtps_assembly is
   signal other_r     : std_logic;                     -- the sample's number differs from that of the assembly
   signal compares_r  : std_logic;                     -- the last byte of a field is one of a size or of that number
   signal field_r     : std_logic_vector(7 downto 0) := (others => '0');
-  signal wanted_r    : std_logic_vector(7 downto 0) := (others => '0');  -- what it has to be
+  signal wanted_r    : std_logic_vector(7 downto 0) := (others => '0');  -- the required value
   signal differs     : std_logic;                     -- a size differs, or the number of the next fragment
   signal differs_r   : std_logic;
   signal later_r     : std_logic;                     -- it is not the first one of its sample
@@ -123,9 +123,9 @@ architecture rtl of firm_rtps_assembly is
   signal is_free     : std_logic;                     -- the assembly is not whole
   signal continues   : std_logic;
   signal begins      : std_logic;
-  signal inside_r    : std_logic;                     -- a byte of the payload has come
+  signal inside_r    : std_logic;                     -- a byte of the payload has arrived
   signal is_first    : std_logic;                     -- this is the first one
-  signal taken_r     : std_logic;                     -- its bytes are taken
+  signal taken_r     : std_logic;                     -- its bytes are accepted
   signal closed_r    : std_logic;                     -- its sample, or the count of fragments, is full
   signal between_r   : std_logic;                     -- the bytes so far are whole fragments
   signal byte_r      : std_logic_vector(7 downto 0) := (others => '0');
@@ -141,8 +141,8 @@ architecture rtl of firm_rtps_assembly is
   signal over_r      : std_logic;                     -- these are too many
   signal is_placed   : std_logic;                     -- a DATA that ends is the sample, if there is a place for it
   signal ends_part   : std_logic;                     -- this is the last byte of a fragment
-  signal is_end      : std_logic;                     -- all of the sample has come
-  -- To come: bytes of the fragment, fragments, and bytes of the sample; and whether that is one, or none.
+  signal is_end      : std_logic;                     -- the sample is complete
+  -- Remaining bytes of the fragment, fragments, and bytes of the sample; and whether one or none remains.
   signal part_r      : half_t := (others => '0');
   signal parts_r     : half_t := (others => '0');
   signal left_r      : half_t := (others => '0');
@@ -156,12 +156,12 @@ architecture rtl of firm_rtps_assembly is
   signal one_count_r : std_logic;
   signal one_rest_r  : std_logic;
 
-  -- The end of a submessage or a packet; all that follows from it happens one cycle later.
-  signal keeps       : std_logic;                     -- its bytes count
-  signal completes   : std_logic;                     -- the sample has come, and has a place
+  -- The end of a submessage or a packet; its effects follow one cycle later.
+  signal keeps       : std_logic;                     -- its bytes are accepted
+  signal completes   : std_logic;                     -- the sample is complete, and has a place
   signal keeps_r     : std_logic;
   signal completes_r : std_logic;
-  signal fails_r     : std_logic;                     -- the sample is given up
+  signal fails_r     : std_logic;                     -- the sample is dropped
   signal ends_r      : std_logic;
   signal spoils_r    : std_logic;
 
@@ -170,12 +170,12 @@ architecture rtl of firm_rtps_assembly is
   signal began_r  : std_logic;                        -- in this packet
   signal ended_r  : std_logic;                        -- in this packet
   signal whole_r  : std_logic;
-  signal fed_r    : std_logic;                        -- it got a fragment in this packet
+  signal fed_r    : std_logic;                        -- it received a fragment in this packet
   signal source_r : unsigned(SOURCE_BITS-1 downto 0) := (others => '0');
   signal number_r : std_logic_vector(47 downto 0) := (others => '0');
   signal bytes_r  : half_t := (others => '0');
   signal length_r : half_t := (others => '0');        -- of each fragment
-  signal spot_r   : spot_t := BEGINNING;              -- as far as bytes have come
+  signal spot_r   : spot_t := BEGINNING;              -- of the received bytes
   signal counts_r : spot_t := BEGINNING;              -- with the last submessage
   signal kept_r   : spot_t := BEGINNING;              -- with the last packet
   signal age_r    : natural range 0 to 65535;
@@ -336,7 +336,7 @@ begin
         left_r      <= rest_r;
         part_r      <= each_r;
         parts_r     <= count_r;
-        -- If the bytes are taken, they begin a sample.
+        -- If the bytes are accepted, they begin a sample.
         if is_same = '0' then
           one_left_r <= equals(size_r, 1);
           left_r     <= size_r;
@@ -384,7 +384,7 @@ begin
 
   take_fragment : process (clk)
     variable counts : spot_t;
-    variable gives  : std_logic;  -- the sample is given up
+    variable gives  : std_logic;  -- the sample is dropped
     variable used   : std_logic;
     variable began  : std_logic;
     variable fed    : std_logic;
@@ -422,7 +422,7 @@ begin
         gives  := fails_r;
       end if;
 
-      -- A sample that is whole is known to be one of the writer before.
+      -- A complete sample is known to belong to the previous writer.
       if renews = '1' and renewed = source_r and whole_r = '0' then
         began := began or ended or completes;
         gives := gives or not (ended or completes);

@@ -1,7 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The control of a node in fabric: firm_rtps_sequencer with its program, and what the program reads and writes
--- outside the memory. fusesoc_firm.fabric.control has the addresses, and fusesoc_firm/fabric/ros2_node.seq the
--- program.
+-- The control of a node in fabric: firm_rtps_sequencer with its program, and the registers that the program accesses
+-- outside the memory. fusesoc_firm.fabric.control has the addresses, and fusesoc_firm/fabric/ros2_node.seq the program.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -66,7 +65,7 @@ entity firm_rtps_control is
     has_sample  : in  std_logic;
     writer      : in  std_logic_vector(2 downto 0);
     is_done     : out std_logic;
-    -- Of the sample that is looked at, and of its fragment.
+    -- Of the selected sample, and of its fragment.
     looks        : out std_logic;
     chooses      : out std_logic;
     sample_bytes : in  unsigned(RTPS_SAMPLE_BITS-1 downto 0);
@@ -92,7 +91,7 @@ entity firm_rtps_control is
     peer_count   : out std_logic_vector(7 downto 0);
     source_count : out std_logic_vector(7 downto 0);
     sink_count   : out std_logic_vector(7 downto 0);
-    -- Pulses: there was no room.
+    -- Pulses: a table is full.
     is_peer_refused     : out std_logic;
     is_endpoint_refused : out std_logic
   );
@@ -101,7 +100,7 @@ end entity firm_rtps_control;
 architecture rtl of firm_rtps_control is
 
   constant MOST_ENDPOINTS : positive := 24;
-  -- The program is held while a packet leaves: more milliseconds than these are lost.
+  -- The program is held while a packet leaves; milliseconds beyond this number are lost.
   constant TICK_BITS      : positive := 8;
   constant MOST_TICKS     : positive := 2**TICK_BITS-1;
   constant MOST_SOURCES   : positive := 64;
@@ -124,11 +123,10 @@ architecture rtl of firm_rtps_control is
   constant AT_SINKS     : address_t := x"b6";
   constant AT_BANK      : address_t := x"b7";  -- of the fields that are written
   constant AT_PREPARED  : address_t := x"b8";  -- the packet of this writer's next sample
-  constant AT_LOOK      : address_t := x"b9";  -- the slot of the sample that is looked at
+  constant AT_LOOK      : address_t := x"b9";  -- the slot of the selected sample
   constant AT_FRAGMENT  : address_t := x"ba";  -- of this sample, from 0 on
-  -- Words that are read, from x"a0" on; of the last one, the bytes are the early sample's source, the writer of the
-  -- sample to send, whether numbers are large, and facts about samples. After them comes the size of the sample that is
-  -- looked at.
+  -- Readable words, from x"a0" on; of the last one, the bytes are the early sample's source, the writer of the sample
+  -- to send, whether numbers are large, and facts about samples. They are followed by the size of the selected sample.
   constant WORD_OF_FACTS  : std_logic_vector(1 downto 0) := "00";
   constant WORD_OF_ENTITY : std_logic_vector(1 downto 0) := "01";
   constant WORD_OF_EARLY  : std_logic_vector(1 downto 0) := "10";
@@ -147,7 +145,7 @@ architecture rtl of firm_rtps_control is
   signal sample_facts  : std_logic_vector(7 downto 0);
   signal word          : std_logic_vector(31 downto 0);
 
-  -- What is written, unless everything waits.
+  -- The write, unless the sequencer is held.
   signal at_field_r   : std_logic;
   signal at_key_r     : std_logic;
   signal at_number_r  : std_logic;
@@ -168,9 +166,9 @@ architecture rtl of firm_rtps_control is
   signal at_part_r    : std_logic;
   signal builds_r     : std_logic;  -- one of the builder's, or of the payload's
 
-  signal ticks_r   : unsigned(TICK_BITS-1 downto 0);  -- that the program has not taken
+  signal ticks_r   : unsigned(TICK_BITS-1 downto 0);  -- not yet processed by the program
   signal has_tick  : std_logic;
-  signal work_r    : std_logic;                        -- there was something for the program
+  signal work_r    : std_logic;                        -- an event is pending for the program
   signal ends_tick : std_logic;
   signal locked_r  : std_logic;
   signal bank_r    : std_logic_vector(RTPS_BANK_BITS-1 downto 0) := RTPS_OWN_BANK;
@@ -401,7 +399,7 @@ begin
     end if;
   end process choose_word;
 
-  -- Numbers of sources, and what has come of a sample in fragments, are at the lower addresses.
+  -- Numbers of sources, and the state of a sample in fragments, are at the lower addresses.
   read_data <= number_byte when read_address(5) = '0' else
                word(7 downto 0) when read_address(1 downto 0) = "00" else
                word(15 downto 8) when read_address(1 downto 0) = "01" else

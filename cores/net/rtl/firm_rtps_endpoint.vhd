@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Reads how a peer announces a writer or a reader (SEDP), and tells which of the node's endpoints of the other kind
--- match it: those with the same topic, type and hash of the type, if what the writer offers is enough for the reader.
+-- Reads a peer's announcement of a writer or a reader (SEDP), and finds the matching endpoints of the other kind in the
+-- node: those with the same topic, type and type hash, if the writer's quality suffices for the reader.
 --
--- Of several parameters with the same id, the first one counts, as in the reference participant
+-- Of several parameters with the same id, the first one is used, as in the reference participant
 -- (tests/fabric/participant.py).
 library ieee;
 use ieee.std_logic_1164.all;
@@ -36,14 +36,14 @@ entity firm_rtps_endpoint is
     are_reliable  : in std_logic_vector(READERS+WRITERS-1 downto 0);
     are_transient : in std_logic_vector(READERS+WRITERS-1 downto 0);
 
-    -- A memory that fusesoc_firm.fabric.names makes: a byte for each endpoint, one cycle after the address.
+    -- A memory created by fusesoc_firm.fabric.names: a byte for each endpoint, one cycle after the address.
     names_address : out std_logic_vector(9 downto 0);
     names_data    : in  std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
 
     -- From RTPS_JUDGED cycles after the last word on.
     matches      : out std_logic_vector(READERS+WRITERS-1 downto 0);
     differs      : out std_logic;  -- a topic of the node's in another type, hash, quality, partition or encoding
-    is_known     : out std_logic;  -- the GUID was told, and is one of the sender
+    is_known     : out std_logic;  -- the GUID is present, and belongs to the sender
     is_reliable  : out std_logic;  -- the peer's endpoint
     is_transient : out std_logic;
     entity_id    : out std_logic_vector(31 downto 0)  -- the first byte on the line highest
@@ -78,11 +78,11 @@ architecture rtl of firm_rtps_endpoint is
   signal comes      : std_logic;
   signal at         : unsigned(15 downto 0);
   signal byte_place : unsigned(1 downto 0);           -- in a word, if it were little-endian
-  signal past_r     : unsigned(15 downto 0) := (others => '0');  -- bytes of it up to this one, without the first word
+  signal past_r     : unsigned(15 downto 0) := (others => '0');  -- its bytes up to this one, without the first word
   signal number_r   : unsigned(15 downto 0) := (others => '0');  -- the first word: a length or a number
   signal beyond_r   : std_logic;                      -- it is larger
 
-  -- Parameters that are looked at.
+  -- Parameters that are evaluated.
   constant OF_TOPIC    : natural := 0;
   constant OF_TYPE     : natural := 1;
   constant OF_USER     : natural := 2;
@@ -99,28 +99,28 @@ architecture rtl of firm_rtps_endpoint is
   signal at_r     : unsigned(15 downto 0) := (others => '0');
   signal last_r   : std_logic;
   signal place_r  : unsigned(1 downto 0) := (others => '0');
-  signal of_r     : ids_t;  -- of which parameter the byte that comes is
+  signal of_r     : ids_t;  -- the parameter of the arriving byte
   signal of_2_r   : ids_t;  -- and this one
-  signal over_r   : std_logic;  -- the byte is after those that the first word counts
+  signal over_r   : std_logic;  -- the byte follows those that the first word counts
   signal final_r  : std_logic;  -- it is the last one of them
   signal in_word  : std_logic;  -- it is in the first word
   signal inside   : std_logic;  -- it is one of them
-  signal coding_r : std_logic;  -- it is one of the encodings that are looked at
+  signal coding_r : std_logic;  -- it is one of the evaluated encodings
   signal part_r   : unsigned(7 downto 0) := (others => '0');  -- the place in a part of the user data
   signal is_hash  : std_logic;
-  signal zero_r   : std_logic;  -- the byte before this one was zero
+  signal zero_r   : std_logic;  -- the previous byte was zero
   signal found_r  : std_logic;  -- one of the encodings is XCDR version 1
 
   -- ------------------------------------------------------------------ two cycles later, while its names are read
   signal read_value_r  : std_logic_vector(7 downto 0) := (others => '0');
   signal read_checks_r : std_logic;  -- it is compared with names
-  signal read_first_r  : std_logic;  -- it is the first one of what is compared
+  signal read_first_r  : std_logic;  -- it is the first compared one
   signal part_ends     : std_logic;
   signal read_ends_r   : std_logic;  -- it is the last one of its value
   signal read_hash_r   : std_logic;  -- it is one of a part of the user data
   signal read_stop_r   : std_logic;  -- a part of the user data ends with it
   signal read_before_r : unsigned(7 downto 0) := (others => '0');  -- bytes of that part before it
-  signal read_ids_r    : ids_t;      -- of which parameter it is
+  signal read_ids_r    : ids_t;      -- its parameter
 
   -- ------------------------------------------------------------------ three cycles later
   signal value_r    : std_logic_vector(7 downto 0) := (others => '0');
@@ -135,14 +135,14 @@ architecture rtl of firm_rtps_endpoint is
   signal whole_it_r : std_logic;     -- the part has the length of a hash, if it ends with the byte
   signal bare_it_r  : std_logic;     -- it has the length of its name
   signal ids_r      : ids_t;
-  signal seen_r     : ids_t;         -- parameters that came before
+  signal seen_r     : ids_t;         -- earlier parameters
   signal is_new     : ids_t;
   signal coded_r    : std_logic;     -- found_r
   signal some_r     : std_logic;     -- the value has its first word
   signal counts_r   : std_logic;     -- which is not zero
   signal is_two_r   : std_logic;     -- which is RELIABLE
   signal fits_r     : std_logic;
-  signal room_r     : std_logic;     -- the value has as many encodings as are looked at
+  signal room_r     : std_logic;     -- the value has at least the evaluated encodings
   signal count      : unsigned(4 downto 0);
   signal part_bytes : unsigned(7 downto 0);  -- of a part that ends
   signal equal      : mask_t;
@@ -154,7 +154,7 @@ architecture rtl of firm_rtps_endpoint is
   signal hashes_r    : mask_t;
   signal has_hash_r  : std_logic;
   signal named_r     : std_logic;  -- the part is that of the hash
-  signal given_r     : std_logic := '0';  -- its reliability was told
+  signal given_r     : std_logic := '0';  -- its reliability is present
   signal reliable_r  : std_logic := '0';
   signal offers      : std_logic;
   signal transient_r : std_logic := '0';
@@ -171,7 +171,7 @@ architecture rtl of firm_rtps_endpoint is
   signal same_r        : std_logic := '0';
   signal whole_r       : std_logic := '0';
 
-  -- Which of the parameters it is.
+  -- The number of a parameter.
   function ids_of(name : std_logic_vector(15 downto 0)) return ids_t is
     variable found : ids_t := (others => '0');
   begin
@@ -193,7 +193,7 @@ architecture rtl of firm_rtps_endpoint is
     if name = RTPS_PARTITION then
       found(OF_PARTS) := '1';
     end if;
-    if name = RTPS_REPRESENTATION then
+    if name = RTPS_DATA_REPRESENTATION then
       found(OF_CODING) := '1';
     end if;
     if name = RTPS_ENDPOINT_GUID then
@@ -235,7 +235,7 @@ begin
          and (past_r(15 downto 5) = 0 or past_r(15 downto 1) = MOST_ENCODINGS) then
         coding_r <= '1';
       end if;
-      -- The id is there before the first byte of the value.
+      -- The id is valid before the first byte of the value.
       of_r   <= ids_of(id);
       of_2_r <= of_r;
       if comes = '1' then
@@ -405,7 +405,7 @@ begin
           if whole_it_r = '1' then
             hashes_r <= mask;
           elsif bare_it_r = '1' then
-            -- No hash is told.
+            -- The hash is missing.
             hashes_r <= (others => '1');
           end if;
         end if;
@@ -452,7 +452,7 @@ begin
     end if;
   end process note_value;
 
-  -- Each kind of endpoint has a default of its own.
+  -- Each kind of endpoint has a separate default.
   offers <= reliable_r when given_r = '1' else not is_reader;
 
   tell : process (clk)
@@ -469,7 +469,7 @@ begin
         found := (others => '0');
       end if;
       for index in found'range loop
-        -- What is wanted has to be offered, by the peer's writer or by the node's.
+        -- The writer, of the peer or of the node, must offer the requested quality.
         if index < READERS then
           towards(index) := not is_reader;
           is_enough := is_reader = '0' and (are_reliable(index) and not offers) = '0'

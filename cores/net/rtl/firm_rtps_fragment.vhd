@@ -10,7 +10,7 @@ entity firm_rtps_fragment is
   port (
     clk : in std_logic;
 
-    -- Another sample is looked at; `size` is its size two cycles later. Its fragment is the first one then.
+    -- Another sample is selected; `size` is its size two cycles later. Its first fragment is then selected.
     looks : in std_logic;
     size  : in unsigned(RTPS_SAMPLE_BITS-1 downto 0);
 

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Holds the last samples of a node's writers: takes frames `id | length | payload`, each into a slot of its writer,
--- and gives the payload of a slot to firm_packet_builder as often as it is asked for. Which slots are whose is in the
--- program of firm_rtps_sequencer, which tells where the next sample of each writer goes. The slot after the last one
--- is not among those that may be asked for, so that a sample can come while another one leaves. Samples of more than
--- 1344 bytes leave in fragments, of which it shows the one that the program chooses.
+-- Stores the last samples of a node's writers: writes each frame `id | length | payload` to a slot of its writer, and
+-- sends the payload of a slot to firm_packet_builder whenever requested. The program of firm_rtps_sequencer assigns
+-- slots to writers, and selects the slot of each writer's next sample. The slot after the last one cannot be requested,
+-- so that a sample can arrive while another one leaves. Samples of more than 1344 bytes leave in fragments, which the
+-- program selects.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -33,17 +33,17 @@ entity firm_rtps_history is
     slot_writer : in std_logic_vector(2 downto 0);
     slot_next   : in std_logic_vector(7 downto 0);
 
-    -- A sample of this writer comes, and has come from the next cycle on. The next one is not taken before `is_done`.
-    -- After a reset it is as if one had come: the program takes it when it has written the slots of all writers, so
-    -- that none comes before.
+    -- A sample of this writer arrives, and is complete from the next cycle on. The next one is not accepted before
+    -- `is_done`. After a reset, a sample seems to have arrived: the program handles it after writing the slots of all
+    -- writers, so that no sample arrives earlier.
     comes       : out std_logic;
     is_new_long : out std_logic;  -- it needs fragments
     has_sample  : out std_logic;
     writer      : out std_logic_vector(2 downto 0);
     is_done     : in  std_logic;
 
-    -- The slot whose sample is sent next, unless it is the last one that has come; and which fragment of it, from 0 on.
-    -- firm_rtps_fragment computes the rest.
+    -- The slot whose sample is sent next, unless it is the last received one; and the number of its fragment, from 0
+    -- on. firm_rtps_fragment computes the rest.
     looks        : in  std_logic;
     chooses      : in  std_logic;
     choice       : in  std_logic_vector(7 downto 0);
@@ -52,8 +52,8 @@ entity firm_rtps_history is
     is_last_part : out std_logic;
     is_beyond    : out std_logic;
 
-    -- Shows the payload of a slot, or of the last sample that has come: its size from two cycles after `shows` on, its
-    -- first byte from three cycles on.
+    -- Shows the payload of a slot, or of the last received sample: its size from two cycles after `shows` on, its first
+    -- byte from three cycles on.
     shows         : in  std_logic;
     shows_new     : in  std_logic;
     slot          : in  std_logic_vector(7 downto 0);
@@ -85,7 +85,7 @@ architecture rtl of firm_rtps_history is
   signal sizes : sizes_t := (others => (others => '0'));
   signal nexts : slots_t := (others => (others => '0'));
 
-  -- The frame that comes.
+  -- The arriving frame.
   signal head_r      : unsigned(2 downto 0);
   signal writer_r    : unsigned(2 downto 0) := (others => '0');
   signal size_r      : unsigned(BYTE_BITS downto 0) := (others => '0');
@@ -101,7 +101,7 @@ architecture rtl of firm_rtps_history is
   signal is_good     : std_logic;
   signal ends        : std_logic;
 
-  -- The payload that leaves.
+  -- The leaving payload.
   signal slot_r     : slot_t := (others => '0');
   signal shown_r    : unsigned(BYTE_BITS downto 0) := (others => '0');    -- the size in the slot
   signal place_r    : unsigned(BYTE_BITS-1 downto 0) := (others => '0');  -- after the byte that is shown
@@ -109,7 +109,7 @@ architecture rtl of firm_rtps_history is
   signal shows_r    : std_logic := '0';
   signal steps      : std_logic;                                          -- to the next byte
 
-  -- The fragment that the program chose.
+  -- The fragment selected by the program.
   signal size       : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- of the sample in the slot
   signal start      : unsigned(RTPS_SAMPLE_BITS-1 downto 0);  -- its first byte
   signal part_bytes : unsigned(10 downto 0);                  -- its bytes
@@ -234,7 +234,8 @@ begin
 
   with_fragments : if HAS_FRAGMENTS generate
 
-    -- A memory of many blocks shows its bytes late in a cycle. So each bank has a register, and one of them is shown.
+    -- A memory of many blocks outputs its bytes late in a cycle. Each bank therefore has a register, one of which is
+    -- selected.
     constant BANKS     : positive := max(1, SLOTS*SAMPLE/16384);
     constant BANK      : positive := SLOTS*SAMPLE/BANKS;  -- bytes
     constant BANK_BITS : positive := clog2(BANK);

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Holds the words of a packet until the packet is known to be good, then gives them one by one: bytes of the fields
+-- Stores the words of a packet until the packet is known to be good, then outputs them one by one: bytes of the fields
 -- that firm_rtps_walker finds, and of the payloads of the writers of discovery, with their parameters. A fragment of
 -- RTPS is not a list of parameters, so its payload is dropped.
 --
--- After the last word of a submessage, its user may act on it before it takes the next word.
+-- After the last word of a submessage, the user may process it before it takes the next word.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -51,7 +51,7 @@ entity firm_rtps_inbox is
     -- Of the submessage, from its last word on.
     writer   : out std_logic_vector(31 downto 0);
     is_large : out std_logic;  -- one of its sequence numbers has more than 32 bits
-    is_gone  : out std_logic;  -- its status says that the instance ended
+    is_gone  : out std_logic;  -- its status reports the end of the instance
 
     -- Of the byte of a payload, with that word: see firm_rtps_parameters.
     begins    : out std_logic;
@@ -75,7 +75,7 @@ architecture rtl of firm_rtps_inbox is
   constant AT_NOTHING : std_logic_vector(RECORD_BITS-1 downto 0) := x"fe";
 
   signal writer_r    : std_logic_vector(31 downto 0) := (others => '0');  -- of the submessage that arrives
-  signal listens_r   : std_logic;                                         -- its payload is read
+  signal listens_r   : std_logic;                                         -- its payload is evaluated
   signal ends_packet : std_logic;
   signal word_r      : std_logic_vector(16 downto 0) := (others => '0');
   signal valid_r     : std_logic;
@@ -93,7 +93,7 @@ architecture rtl of firm_rtps_inbox is
   signal new_kind    : std_logic;
   signal list_valid  : std_logic;
   signal in_list     : std_logic;
-  signal ended_r     : std_logic;  -- the word before was the last one of its submessage
+  signal ended_r     : std_logic;  -- the previous word was the last one of its submessage
 
   signal from_r  : std_logic_vector(31 downto 0) := (others => '0');  -- its writer
   signal large_r : std_logic := '0';
@@ -101,7 +101,7 @@ architecture rtl of firm_rtps_inbox is
 
   -- Of the packet that arrives.
   signal mine_r   : std_logic;  -- the last destination was this node, or any
-  signal mine     : std_logic;  -- the byte that comes is for this node
+  signal mine     : std_logic;  -- the arriving byte is for this node
   signal own_r    : std_logic_vector(95 downto 0) := (others => '0');  -- the prefix, turned
   signal ours_r   : std_logic;  -- the destination was this node, before this byte
   signal all_r    : std_logic;  -- the destination was zero, before this byte
@@ -174,7 +174,7 @@ begin
       elsif payload_valid = '1' and listens_r = '1' and mine = '1' then
         word_r(15 downto 8) <= AT_PAYLOAD;
       end if;
-      -- Nothing of a submessage for another node is kept, but each packet needs its end.
+      -- Submessages for another node are not stored, but each packet needs its end.
       valid_r     <= ends_packet or (mine and (field_valid or is_submessage or (payload_valid and listens_r)));
       ends_r      <= ends_packet;
       spoils_r(0) <= is_foreign or is_aborted;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Writes the fields of a submessage to the record, and what a peer tells in a payload of discovery besides names:
--- where the peer or its endpoint listens (the first locator of each kind for UDP over IPv4), and its lease.
+-- Writes the fields of a submessage to the record, and from a payload of discovery the locators of the peer or its
+-- endpoint (the first of each kind for UDP over IPv4), and the lease.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -28,7 +28,7 @@ entity firm_rtps_locators is
     record_address : out std_logic_vector(RECORD_BITS-1 downto 0);
     record_data    : out std_logic_vector(7 downto 0);
 
-    -- What the payload told.
+    -- The contents of the payload.
     has_metatraffic : out std_logic;
     has_default     : out std_logic;
     has_unicast     : out std_logic;
@@ -63,7 +63,7 @@ begin
   word  <= unsigned(place(15 downto 2));
   comes <= s_valid and is_value;
 
-  -- Id and size are there before the first byte of the value.
+  -- Id and size are valid before the first byte of the value.
   note_parameter : process (clk)
   begin
     if rising_edge(clk) then
@@ -72,15 +72,15 @@ begin
       of_unicast_r     <= '0';
       of_lease_r       <= '0';
       if unsigned(size) = LOCATOR_BYTES then
-        if id = RTPS_METATRAFFIC_LOCATOR then
+        if id = RTPS_METATRAFFIC_UNICAST_LOCATOR then
           of_metatraffic_r <= '1';
-        elsif id = RTPS_DEFAULT_LOCATOR then
+        elsif id = RTPS_DEFAULT_UNICAST_LOCATOR then
           of_default_r <= '1';
         elsif id = RTPS_UNICAST_LOCATOR then
           of_unicast_r <= '1';
         end if;
       end if;
-      if id = RTPS_LEASE and unsigned(size(15 downto 3)) /= 0 then
+      if id = RTPS_LEASE_DURATION and unsigned(size(15 downto 3)) /= 0 then
         of_lease_r <= '1';
       end if;
     end if;

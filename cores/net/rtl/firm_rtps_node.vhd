@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A node of ROS 2 above UDP: packets of RTPS in, frames `id | length | payload` and jobs for firm_packet_builder out,
--- and the other way round. It announces itself, finds its peers, and matches their readers and writers with its own.
+-- and vice versa. It announces itself, finds its peers, and matches their readers and writers with its own.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -34,7 +34,7 @@ entity firm_rtps_node is
     are_reliable  : in std_logic_vector(READERS+WRITERS-1 downto 0);
     are_transient : in std_logic_vector(READERS+WRITERS-1 downto 0);
 
-    -- The memory that fusesoc_firm.fabric.control makes.
+    -- The memory created by fusesoc_firm.fabric.control.
     program_enable  : out std_logic;
     program_address : out std_logic_vector(RTPS_CONTROL_BITS-1 downto 0);
     program_word    : in  std_logic_vector(35 downto 0);
@@ -46,7 +46,7 @@ entity firm_rtps_node is
     packet_tlast  : in std_logic;
     source_mac    : in std_logic_vector(47 downto 0);
 
-    -- The memory that fusesoc_firm.fabric.names makes.
+    -- The memory created by fusesoc_firm.fabric.names.
     names_address : out std_logic_vector(9 downto 0);
     names_data    : in  std_logic_vector(8*(READERS+WRITERS)-1 downto 0);
 
@@ -81,16 +81,16 @@ entity firm_rtps_node is
     peer_count   : out std_logic_vector(7 downto 0);
     source_count : out std_logic_vector(7 downto 0);
     sink_count   : out std_logic_vector(7 downto 0);
-    -- Pulses: something good found no room, or no place in a table.
+    -- Pulses: valid data without room, or without a place in a table.
     is_discovery_lost   : out std_logic;  -- a packet of discovery
     is_sample_lost      : out std_logic;  -- a sample in a packet
     is_peer_refused     : out std_logic;
     is_endpoint_refused : out std_logic;  -- one that matches
     is_frame_refused    : out std_logic;  -- a frame to send: without a payload, too long, or of another id
-    -- Pulses: something was wrong, or another than it should be.
+    -- Pulses: invalid or mismatching data.
     is_sample_parted    : out std_logic;  -- a packet with a sample that is skipped: in fragments, or too long
     is_packet_broken    : out std_logic;  -- a packet, or the list of parameters in it
-    is_endpoint_other   : out std_logic   -- the announcement of a topic of the node's that differs from it
+    is_endpoint_other   : out std_logic   -- an announcement of one of the node's topics that differs
   );
 end entity firm_rtps_node;
 

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Finds the parameters in a payload that is a list of them, as those of discovery are (OMG DDSI-RTPS 2.5, section
--- 9.4.2.11): tells of each byte whether it belongs to a value, and of which parameter. A list ends with its sentinel,
--- and one that begins with another encoding has no parameter.
+-- 9.4.2.11): determines for each byte whether it belongs to a value, and of which parameter. A list ends with its
+-- sentinel; a list with another encoding has no parameters.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,7 +17,7 @@ entity firm_rtps_parameters is
     s_valid : in std_logic;
     s_data  : in std_logic_vector(7 downto 0);
 
-    -- Of the byte before, one cycle later.
+    -- Of the previous byte, one cycle later.
     is_value  : out std_logic;
     id        : out std_logic_vector(15 downto 0);
     size      : out std_logic_vector(15 downto 0);  -- bytes of the value; it stays for two further cycles
@@ -102,7 +102,7 @@ begin
     end if;
   end process show;
 
-  -- A further parameter has other bytes first, so these are still those of the byte before.
+  -- A further parameter begins with other bytes, so these still belong to the previous byte.
   id        <= id_r;
   size      <= std_logic_vector(size_r);
   is_little <= little_r;

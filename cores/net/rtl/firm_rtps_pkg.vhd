@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The numbers of RTPS that firm_rtps_walker and its users share (OMG DDSI-RTPS 2.5, chapter 9), and the places of a
--- submessage's fields in the record that the walker writes.
+-- submessage's fields in the record that the walker writes. `make constants` writes the numbers of RTPS from
+-- fusesoc_firm/fabric/rtps.py.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -53,7 +54,7 @@ package firm_rtps_pkg is
   -- Of the packet.
   constant RECORD_SOURCE_MAC  : natural  := 128; -- 6 bytes, as on the line
   constant RECORD_SOURCE      : natural  := 144; -- 12 bytes: the sender's prefix
-  -- What a payload of discovery tells, which firm_rtps_locators adds.
+  -- The contents of a payload of discovery, which firm_rtps_locators adds.
   constant RECORD_METATRAFFIC_IP   : natural := 136; -- 4 bytes
   constant RECORD_METATRAFFIC_PORT : natural := 140; -- 2 bytes
   constant RECORD_DEFAULT_PORT     : natural := 142; -- 2 bytes
@@ -68,18 +69,18 @@ package firm_rtps_pkg is
   constant RTPS_SUBSCRIPTIONS_WRITER : std_logic_vector(31 downto 0) := x"000004c2";
 
   -- Parameters of discovery.
-  constant RTPS_LEASE               : std_logic_vector(15 downto 0) := x"0002";
-  constant RTPS_TOPIC_NAME          : std_logic_vector(15 downto 0) := x"0005";
-  constant RTPS_TYPE_NAME           : std_logic_vector(15 downto 0) := x"0007";
-  constant RTPS_RELIABILITY         : std_logic_vector(15 downto 0) := x"001a";
-  constant RTPS_DURABILITY          : std_logic_vector(15 downto 0) := x"001d";
-  constant RTPS_PARTITION           : std_logic_vector(15 downto 0) := x"0029";
-  constant RTPS_USER_DATA           : std_logic_vector(15 downto 0) := x"002c";
-  constant RTPS_UNICAST_LOCATOR     : std_logic_vector(15 downto 0) := x"002f";
-  constant RTPS_DEFAULT_LOCATOR     : std_logic_vector(15 downto 0) := x"0031";
-  constant RTPS_METATRAFFIC_LOCATOR : std_logic_vector(15 downto 0) := x"0032";
-  constant RTPS_ENDPOINT_GUID       : std_logic_vector(15 downto 0) := x"005a";
-  constant RTPS_REPRESENTATION      : std_logic_vector(15 downto 0) := x"0073";
+  constant RTPS_LEASE_DURATION              : std_logic_vector(15 downto 0) := x"0002";
+  constant RTPS_TOPIC_NAME                  : std_logic_vector(15 downto 0) := x"0005";
+  constant RTPS_TYPE_NAME                   : std_logic_vector(15 downto 0) := x"0007";
+  constant RTPS_RELIABILITY                 : std_logic_vector(15 downto 0) := x"001a";
+  constant RTPS_DURABILITY                  : std_logic_vector(15 downto 0) := x"001d";
+  constant RTPS_PARTITION                   : std_logic_vector(15 downto 0) := x"0029";
+  constant RTPS_USER_DATA                   : std_logic_vector(15 downto 0) := x"002c";
+  constant RTPS_UNICAST_LOCATOR             : std_logic_vector(15 downto 0) := x"002f";
+  constant RTPS_DEFAULT_UNICAST_LOCATOR     : std_logic_vector(15 downto 0) := x"0031";
+  constant RTPS_METATRAFFIC_UNICAST_LOCATOR : std_logic_vector(15 downto 0) := x"0032";
+  constant RTPS_ENDPOINT_GUID               : std_logic_vector(15 downto 0) := x"005a";
+  constant RTPS_DATA_REPRESENTATION         : std_logic_vector(15 downto 0) := x"0073";
 
   constant MOST_SET_BITS : positive := 256;
 
@@ -94,7 +95,7 @@ package firm_rtps_pkg is
 
   constant RTPS_CONTROL_BITS : positive := 11;  -- of an address in the program of firm_rtps_sequencer
 
-  -- Cycles from the last word of an announcement until firm_rtps_endpoint tells what it was.
+  -- Cycles from the last word of an announcement until the result of firm_rtps_endpoint is valid.
   constant RTPS_JUDGED : positive := 7;
 
   -- Whether an address of the record is one of `bytes` addresses from `first` on; both are multiples of four.

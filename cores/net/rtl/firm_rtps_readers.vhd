@@ -1,13 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The readers of a node in fabric: gives each sample of the writers of peers that match them as a frame
--- `id | length | payload`, once and in order. The id is the number of the reader. Which writers match, and what to do
--- about missing samples, is decided by the program of firm_rtps_sequencer.
+-- The readers of a node in fabric: outputs each sample of the peers' matching writers as a frame
+-- `id | length | payload`, once and in order. The id is the number of the reader. The program of firm_rtps_sequencer
+-- finds the matching writers, and requests missing samples.
 --
 -- The writer of a sample is looked up while the packet arrives. When the packet is known to be good, the sample's
--- number is compared with the next one of its writer: a reliable reader takes that one only, and another one takes
--- any later one as well. A sample that is taken waits for the host. One that comes in fragments is put together
--- elsewhere (firm_rtps_assembly), and takes its turn among the others when it is whole. So does one whose payload finds
--- no room among those that wait.
+-- number is compared with the next one of its writer: a reliable reader accepts only that one, a best-effort reader any
+-- later one as well. An accepted sample waits for the host. A sample in fragments, or without room in the queue, is
+-- assembled elsewhere (firm_rtps_assembly), and joins the others when it is complete.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -47,8 +46,8 @@ entity firm_rtps_readers is
     -- From firm_rtps_inbox: the submessage is for this node.
     is_mine : in std_logic;
 
-    -- What the program notes about the writer with number `source`: a byte of its GUID; whether there is one (bit 7),
-    -- its reader's reliability (bit 6) and number (bits 2 to 0); a byte of its next sample's number, the lowest
+    -- The program's data about the writer with number `source`: a byte of its GUID; whether it exists (bit 7), its
+    -- reader's reliability (bit 6) and number (bits 2 to 0); a byte of its next sample's number, the lowest
     -- first.
     source       : in  std_logic_vector(5 downto 0);
     key_write    : in  std_logic;
@@ -57,15 +56,15 @@ entity firm_rtps_readers is
     write_place  : in  std_logic_vector(3 downto 0);
     write_data   : in  std_logic_vector(7 downto 0);
     -- A byte of the next number; from place 8 on, of a sample in fragments that is not whole: its next fragment (two
-    -- bytes), the bytes to come (two), those of a fragment (two), and whether it is the writer's next sample.
+    -- bytes), the remaining bytes (two), those of a fragment (two), and whether it is the writer's next sample.
     read_place  : in  std_logic_vector(3 downto 0);
     number_byte : out std_logic_vector(7 downto 0);
-    -- While `is_locked` is high, no number changes but by the program. It may rise while `is_judging` is low.
-    -- `number_byte` is right from three cycles later on, and stays.
+    -- While `is_locked` is high, only the program changes numbers. It may rise while `is_judging` is low. `number_byte`
+    -- is valid and stable from three cycles later on.
     is_locked  : in  std_logic;
     is_judging : out std_logic;
 
-    -- A sample that a reliable reader cannot take yet.
+    -- A sample that a reliable reader cannot yet accept.
     has_early    : out std_logic;
     early_source : out std_logic_vector(5 downto 0);
     early_number : out std_logic_vector(31 downto 0);
@@ -123,9 +122,9 @@ architecture rtl of firm_rtps_readers is
 
   signal payloads : payloads_t;
   signal entries  : samples_t := (others => (others => '0'));
-  signal kept     : flags_t := (others => "0");                -- samples that the host gets
+  signal kept     : flags_t := (others => "0");                -- samples that the host receives
   signal ids      : ids_t := (others => (others => '0'));      -- the reader of each source
-  -- Changes when a source's place gets another writer, whose numbers begin anew: samples of the one before may wait.
+  -- Changes when another writer takes a source's place, since samples of the previous writer may still wait.
   signal marks      : marks_t := (others => (others => '0'));
   signal sources_r  : sources_t := (others => '0');
   signal reliable_r : sources_t;
@@ -143,7 +142,7 @@ architecture rtl of firm_rtps_readers is
   signal number_r  : std_logic_vector(NUMBER_BITS-1 downto 0) := (others => '0');
   signal large_r   : std_logic;
   signal reader_r  : std_logic_vector(31 downto 0) := (others => '0');
-  signal full_r    : std_logic;  -- its payload found no room
+  signal full_r    : std_logic;  -- its payload has no room
 
   -- One cycle later, when the number is complete.
   signal submessage_r : std_logic;
@@ -151,11 +150,11 @@ architecture rtl of firm_rtps_readers is
   signal filled_r     : std_logic;  -- with a payload that is whole
   signal fragment_r   : std_logic;  -- with a part of one
   -- Of the assembly.
-  signal is_complete  : std_logic;  -- the part completes a sample, or is one without room elsewhere
+  signal is_complete  : std_logic;  -- the part completes a sample, or is a sample without room elsewhere
   signal is_long      : std_logic;  -- the part is skipped with its sample
   signal is_unplaced  : std_logic;  -- the part is dropped
   signal whole_size   : std_logic_vector(SIZE_BITS-1 downto 0);
-  signal has_whole    : std_logic;  -- a sample that was put together waits
+  signal has_whole    : std_logic;  -- an assembled sample waits
   signal whole_r      : count_t := (others => '0');  -- which one
   signal whole_data   : std_logic_vector(7 downto 0);
   signal part_byte    : std_logic_vector(7 downto 0);
@@ -170,7 +169,7 @@ architecture rtl of firm_rtps_readers is
   signal has_room  : std_logic;
   signal is_wanted : std_logic;  -- the submessage that arrives is of a writer that matches
   signal is_sample : std_logic;
-  signal misses_r  : std_logic;  -- a sample of the packet found no room
+  signal misses_r  : std_logic;  -- a sample of the packet had no room
   signal skips_r   : std_logic;  -- a sample of the packet is a fragment that is skipped
   signal pushes    : std_logic;
   signal fills     : std_logic;  -- with a payload that waits
@@ -202,8 +201,8 @@ architecture rtl of firm_rtps_readers is
   signal chosen      : source_t;
 
   signal early       : early_t := (others => (others => '0'));
-  signal early_r     : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that came
-  signal told_r      : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after those that were taken
+  signal early_r     : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after the received ones
+  signal told_r      : unsigned(EARLY_BITS downto 0) := (others => '0');  -- after the processed ones
   signal early_full  : std_logic;
   signal early_write : std_logic;
   -- The oldest one: source, mark, and number.
@@ -218,8 +217,8 @@ architecture rtl of firm_rtps_readers is
   signal state_r   : state_t;
   signal shown     : std_logic_vector(SAMPLE_BITS-1 downto 0);
   signal keeps_r   : std_logic;
-  signal parts_r   : std_logic;  -- it was put together
-  signal is_left   : std_logic;  -- so it was, and has left
+  signal parts_r   : std_logic;  -- it was assembled
+  signal is_left   : std_logic;  -- an assembled one has left
   signal size_r    : size_t := (others => '0');
   signal left_r    : size_t := (others => '0');
   signal host_id_r : unsigned(ID_BITS-1 downto 0) := (others => '0');
@@ -230,7 +229,7 @@ architecture rtl of firm_rtps_readers is
 
   -- The lowest bit that is set.
   function lowest(mask : std_logic_vector; bits : positive) return unsigned is
-    -- An operator's result has indices of its own.
+    -- An operator's result has separate indices.
     variable numbered : std_logic_vector(mask'length-1 downto 0) := mask;
     variable result   : unsigned(bits-1 downto 0) := (others => '0');
   begin
@@ -376,7 +375,7 @@ begin
     is_sample <= is_wanted and (data_r or (fragment_r and (is_complete or is_long)));
   end generate all_samples;
 
-  -- The payload's last byte came before: the next submessage has a head first.
+  -- The payload's last byte arrived earlier, since the next submessage begins with a head.
   size <= unsigned(whole_size) when is_complete = '1' else
           resize(write_r - sample_r, SIZE_BITS) when filled_r = '1' else
           (others => '0');
@@ -503,7 +502,7 @@ begin
     signal next_fragment  : std_logic_vector(15 downto 0);
     signal left_bytes     : std_logic_vector(15 downto 0);
     signal fragment_bytes : std_logic_vector(15 downto 0);
-    -- What the program sees: it stays while the program reads it.
+    -- The program's view, which is stable while the program reads it.
     signal next_fragment_r  : std_logic_vector(15 downto 0);
     signal left_bytes_r     : std_logic_vector(15 downto 0);
     signal fragment_bytes_r : std_logic_vector(15 downto 0);
@@ -514,7 +513,7 @@ begin
 
   begin
 
-    -- An old sample without room for its payload is not counted: the reader has it already.
+    -- An old sample without room for its payload is not counted, since the reader already has it.
     is_sample <= is_wanted and ((data_r and (filled_r or not has_payload_r))
                                 or ((data_r or fragment_r) and (is_complete or is_long)));
     pushes    <= is_sample and spare_r;
@@ -772,7 +771,7 @@ begin
 
   shown     <= entries(to_integer(oldest_r(QUEUE_BITS-1 downto 0)));
   moves     <= m_axis_tready when state_r /= IDLE else '0';
-  -- One that is not kept is skipped.
+  -- A dropped one is skipped.
   read_next <= read_r when parts_r = '1' else
                read_r + resize(size_r, PLACE_BITS+1) when state_r = HEADING and keeps_r = '0' else
                read_r + 1 when state_r = SENDING and moves = '1' else

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Starts the packets of a node: those that the program asks for, and that of a new sample at once, if the program has
--- prepared it and the sample needs no fragments. Such a packet has a bank of fields for itself, with the number of the
--- writer, so it needs the sample only. Fields of a bank may be changed while no packet is prepared in it.
+-- Starts the packets of a node: those that the program requests, and at once the packet of a new sample, if the program
+-- has prepared it and the sample needs no fragments. Such a packet has a separate bank of fields, with the number of
+-- the writer, so it only waits for the sample. Fields of a bank may be changed while no packet is prepared in it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -21,9 +21,9 @@ entity firm_rtps_sender is
     chosen_slot_valid : in  std_logic;
     send_valid        : in  std_logic;
     data              : in  std_logic_vector(7 downto 0);
-    waits             : out std_logic;  -- a packet leaves, or is about to
+    waits             : out std_logic;  -- a packet is being sent, or will be
 
-    -- Of firm_rtps_history: a sample comes, and is there from the next cycle on.
+    -- Of firm_rtps_history: a sample arrives, and is complete from the next cycle on.
     comes       : in  std_logic;
     is_new_long : in  std_logic;  -- with `comes`: it needs fragments
     writer      : in  std_logic_vector(2 downto 0);
@@ -101,7 +101,7 @@ begin
       elsif begins = '1' and sample_r = '0' then
         chosen_r <= '0';
       end if;
-      -- Other packets have none.
+      -- Other packets have no payload.
       if is_busy = '0' then
         payload_r <= sample_r or (asked_r and chosen_r);
       end if;

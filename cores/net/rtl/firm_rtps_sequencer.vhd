@@ -5,7 +5,7 @@
 --
 -- An instruction is `operation (5 bits) | size (3) | destination (14) | source (14)`. An operand is a mode (2 bits)
 -- and a place (12): in the memory itself, or in the entry that register P, E or W selects. If the lowest bit of the
--- operation is set, the source is a number instead.
+-- operation is set, the source is a number.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -71,7 +71,7 @@ architecture rtl of firm_rtps_sequencer is
   constant OP_CMP    : std_logic_vector(3 downto 0) := "0011";  -- SUB without a result
   constant OP_AND    : std_logic_vector(3 downto 0) := "0100";
   constant OP_TEST   : std_logic_vector(3 downto 0) := "0101";  -- AND without a result
-  constant OP_MASK   : std_logic_vector(3 downto 0) := "0110";  -- a set of so many first numbers
+  constant OP_MASK   : std_logic_vector(3 downto 0) := "0110";  -- a set of this many first numbers
   constant OP_LOAD   : std_logic_vector(3 downto 0) := "0111";  -- a register
   constant OP_STORE  : std_logic_vector(3 downto 0) := "1000";  -- a register
   constant OP_BIT    : std_logic_vector(3 downto 0) := "1001";  -- tests number X of the record's set
@@ -237,7 +237,7 @@ begin
 
   -- ------------------------------------------------------------------ the order of things
 
-  -- Of a jump: bits 17 to 15 say which condition, bit 14 whether it is inverted.
+  -- Of a jump: bits 17 to 15 are the condition, and bit 14 inverts it.
   choose_condition : process (word_r, zero_r, carry_r, conditions)
   begin
     flag <= '1';
@@ -503,7 +503,7 @@ begin
   port_write_data    <= result_r;
   port_index         <= std_logic_vector(entry_r);
 
-  -- What TAKE has moved is written before a byte of the next instruction can be.
+  -- The data moved by TAKE are written before the first byte of the next instruction.
   write_place <= "00000" & unsigned(record_address) when record_valid = '1' else place_2_r;
   write_data  <= record_data when record_valid = '1' else result_r;
 

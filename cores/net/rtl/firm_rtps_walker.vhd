@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Takes RTPS packets apart while they arrive (OMG DDSI-RTPS 2.5, sections 8.3 and 9.4): writes the fields of each
--- submessage to a record, and forwards the payloads of samples. Both byte orders give the same record.
+-- Parses RTPS packets while they arrive (OMG DDSI-RTPS 2.5, sections 8.3 and 9.4): writes the fields of each submessage
+-- to a record, and forwards the payloads of samples. Both byte orders give the same record.
 --
--- A submessage of another kind is skipped. A wrong length or number ends the packet there, and what came before counts.
--- Whether the packet counts at all is known at its end.
+-- A submessage of another kind is skipped. A wrong length or number ends the packet there; the submessages before it
+-- are valid. The validity of the whole packet is known at its end.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -42,9 +42,9 @@ entity firm_rtps_walker is
 
     -- One pulse at the end of each packet.
     is_whole   : out std_logic;
-    is_faulty  : out std_logic;  -- the submessages before the fault count
+    is_faulty  : out std_logic;  -- the submessages before the fault are valid
     is_foreign : out std_logic;  -- not RTPS 2
-    is_aborted : out std_logic   -- nothing of it counts
+    is_aborted : out std_logic   -- the whole packet is invalid
   );
 end entity firm_rtps_walker;
 
@@ -57,7 +57,7 @@ architecture rtl of firm_rtps_walker is
     SKIP, ITEM, VALUE,
     PAYLOAD, REST, FOREIGN, FAULTY
   );
-  -- Kinds of submessages that are read.
+  -- Kinds of submessages that are evaluated.
   constant OF_DATA      : natural := 0;
   constant OF_FRAG      : natural := 1;
   constant OF_GAP       : natural := 2;
@@ -80,7 +80,7 @@ architecture rtl of firm_rtps_walker is
   constant ENDS_BYTES     : positive := 8;
   constant HASH_BYTES     : positive := 16;
   constant STATUS_BYTES   : positive := 4;
-  -- Bytes from the field that says where inline parameters begin to those without a further field.
+  -- Bytes from the field with the offset of the inline parameters to the parameters, without a further field.
   constant DATA_BYTES      : positive := 16;
   constant DATA_FRAG_BYTES : positive := 28;
   constant FRAGMENTS_BYTES : positive := 12;
@@ -97,9 +97,9 @@ architecture rtl of firm_rtps_walker is
   signal end_r      : std_logic;
   signal abort_r    : std_logic;
   signal recent_r   : std_logic_vector(15 downto 0) := (others => '0');  -- the bytes before it, the last one lowest
-  signal half       : std_logic_vector(15 downto 0);  -- the byte that comes and the one before
-  signal word       : std_logic_vector(31 downto 0);  -- the byte that comes and the three before
-  signal id         : std_logic_vector(15 downto 0);  -- of a parameter, whose head ends with the byte that comes
+  signal half       : std_logic_vector(15 downto 0);  -- the arriving byte and the previous one
+  signal word       : std_logic_vector(31 downto 0);  -- the arriving byte and the three before it
+  signal id         : std_logic_vector(15 downto 0);  -- of a parameter, whose head ends with the arriving byte
   signal half_r     : size_t := (others => '0');
   signal less_r     : size_t := (others => '0');      -- half_r - 1
   signal zero_r     : std_logic;                      -- half_r is zero, or one
@@ -137,7 +137,7 @@ architecture rtl of firm_rtps_walker is
   signal hash_r       : std_logic;  -- the parameter is the first key hash
   signal status_r     : std_logic;  -- the parameter is the first status
 
-  -- What follows a step of two bytes and more, as far as no byte of it tells; and its size, less one.
+  -- The step after one of two bytes or more, unless its bytes determine it; and its size, less one.
   signal plan          : steps_t;
   signal planned_r     : steps_t;
   signal plan_less_r   : unsigned(3 downto 0) := (others => '0');
@@ -184,7 +184,7 @@ architecture rtl of firm_rtps_walker is
     return found;
   end function kinds_of;
 
-  -- What follows a step whose successor depends on the kind alone.
+  -- The successor of a step that depends only on the kind.
   function next_of(step : steps_t; kinds : kinds_t) return steps_t is
     variable found     : steps_t := (others => '0');
     variable data      : std_logic;
@@ -286,7 +286,8 @@ begin
         if unsigned(half) = 1 then
           one_r <= '1';
         end if;
-        -- Fewer than 16 bytes, or than 28 ones; more than 256 numbers. Comparisons of parts need no adders.
+        -- short_r: fewer than 16 bytes; shorter_r: fewer than 28; much_r: more than 256 sequence numbers. Comparisons
+        -- of parts need no adders.
         if unsigned(half(15 downto 4)) = 0 then
           short_r <= '1';
         end if;
@@ -400,7 +401,7 @@ begin
   ends_body <= final_r or (open_r and end_r);
   is_done   <= step_r(PAYLOAD) or step_r(REST) or (last_r and next_done and not wrong);
 
-  -- Where the packet has ended or a fault was found, these numbers have no meaning.
+  -- After the end of the packet or a fault, these numbers are invalid.
   count_bytes : process (clk)
 
     procedure begin_step(less : size_t; is_one : std_logic) is
@@ -566,7 +567,7 @@ begin
       big     := to_unsigned(WORD_BYTES-1, RECORD_BITS);
       little  := (others => '0');
       if step_r(PROTOCOL) = '1' then
-        -- Nothing of the packet is noted here, so that there is time for its sender.
+        -- This cycle records nothing of the packet, which leaves time for its sender.
         base := RECORD_SOURCE_MAC;
         big  := (others => '0');
         data := selected(source_mac, place_r(2 downto 0));

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The master of an SPI bus with one slave, in mode 0 or 3: bits change at falling edges of the clock and are read at
--- rising ones, the highest first. The beats of a frame are the bytes to the slave; for each of them, a byte comes back.
--- spi_cs_n is low during a frame, also while the source pauses between two bytes, and high for at least one bit's time
--- between frames.
+-- rising ones, the highest first. The beats of a frame are the bytes to the slave; for each of them, a byte is
+-- received. spi_cs_n is low during a frame, also while the source pauses between two bytes, and high for at least one
+-- bit's time between frames.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

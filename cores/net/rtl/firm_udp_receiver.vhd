@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Takes the UDP datagrams for this host, or for its group, out of Ethernet frames (RFC 768, RFC 791, RFC 1112).
+-- Extracts the UDP datagrams for this host, or for its group, from Ethernet frames (RFC 768, RFC 791, RFC 1112).
 -- The payload is forwarded while it arrives. Its last byte waits for the end of the frame, since only then the frame,
 -- the packet and the datagram are known to be whole.
 --
--- Options of IPv4 are skipped. Fragments are not reassembled: they are dropped, and each is told.
+-- Options of IPv4 are skipped. Fragments are not reassembled: they are dropped, and each is reported.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -92,7 +92,7 @@ architecture rtl of firm_udp_receiver is
   signal port_r         : std_logic_vector(PORTS-1 downto 0);
   -- Bytes of the datagram after its length: those to come, and six.
   signal length_r       : unsigned(15 downto 0) := (others => '0');
-  signal has_data       : std_logic;  -- bytes of the payload are to come
+  signal has_data       : std_logic;  -- bytes of the payload remain
   signal misfit_r       : std_logic;  -- the datagram does not fit into the packet
   signal unsummed_r     : std_logic;  -- the datagram has no checksum
   signal sum_r          : unsigned(16 downto 0) := (others => '0');
@@ -109,7 +109,7 @@ architecture rtl of firm_udp_receiver is
   signal ended_r     : std_logic;
   signal judged_r    : std_logic;
   signal aborted_r   : std_logic;
-  signal past_r      : std_logic;  -- it went on after the header
+  signal past_r      : std_logic;  -- it continued after the header
   signal named_r     : std_logic;  -- it reached the end of the addresses
   signal full_r      : std_logic;  -- it holds the header of a datagram
   signal whole       : std_logic;  -- it holds the packet
@@ -207,7 +207,7 @@ begin
             grouped_r <= '1';
           end if;
         elsif place_r = MAC_BYTES and s_axis_tdata(0) = '1' then
-          -- A group of hosts is not a source.
+          -- A multicast address is not a valid source address.
           mine_r <= '0';
         elsif place_r = SOURCE_END-1 then
           source_mac_r <= recent;
@@ -251,8 +251,8 @@ begin
         elsif section_r = HEADER then
           header_sum_r <= added(header_sum_r, s_axis_tdata, odd_r, false);
         end if;
-        -- The four bytes up to here are counted at the end, and so are two of a datagram. So this is the packet's room
-        -- for the datagram, when its length has come.
+        -- The four bytes up to here are counted at the end, and so are two of a datagram. This is therefore the
+        -- packet's room for the datagram, when its length has arrived.
         if section_r = HEADER and place_r = 3 then
           packet_left_r <= unsigned(target_r(7 downto 0)) & unsigned(s_axis_tdata);
         elsif section_r /= ETHERNET and packet_left_r /= 0 and not (section_r = DATAGRAM and is_below(at, 2) = '1') then

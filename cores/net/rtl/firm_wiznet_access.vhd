@@ -3,9 +3,9 @@
 -- free-running 16-bit pointers: where they cross the end of a buffer, they wrap, for which an access to the W5200 is
 -- divided into two frames.
 --
--- An access begins with a request. A write then takes `request_length` bytes from s_axis; a read gives as many to
--- m_axis. `is_done` is a pulse after the last of them, when the next request is taken. The bus waits where either side
--- stalls.
+-- An access begins with a request. A write then takes `request_length` bytes from s_axis; a read sends the same number
+-- to m_axis. `is_done` is a pulse after the last of them, when the next request is accepted. The bus waits while either
+-- side stalls.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

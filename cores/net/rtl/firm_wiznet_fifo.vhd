@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A FIFO of 64 bytes, which tells its reader that it holds the next 64 bytes of a frame or the frame's end, and its
--- writer that it is empty. So neither has to wait in the middle of a transfer.
+-- A FIFO of 64 bytes, which reports to its reader that it holds the next 64 bytes of a frame or the frame's end, and to
+-- its writer that it is empty. Neither therefore waits in the middle of a transfer.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host's two streams of a system that is a node in the sockets of a W5500 or W5200: firm_wiznet_node with the
--- chip's reset, its milliseconds, and streams of any width. The ROM outside makes it a node.
+-- chip's reset, its milliseconds, and streams of any width. The external ROM defines the node.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

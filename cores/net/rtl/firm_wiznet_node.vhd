@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A node in the sockets of a W5500 or W5200: the sequencer, its way to the chip, and FIFOs, so that it never waits for
--- the Manager while the Manager waits for it. The ROM outside makes it a node.
+-- the Manager while the Manager waits for it. The external ROM defines the node.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

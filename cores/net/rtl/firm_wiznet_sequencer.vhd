@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Runs nine coroutines in turn over the accesses of firm_wiznet_access: one for each socket of the chip, and one for
--- what they share. The program, its texts and its tries are in a ROM outside. README.md lists the instructions.
+-- shared tasks. The program, its texts and its tries are in a ROM outside. README.md lists the instructions.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -16,7 +16,7 @@ entity firm_wiznet_sequencer is
     rom_data    : in  std_logic_vector(7 downto 0);
 
     -- Frames from the Manager, and to it. After the last byte of an aborted frame, the program reads zeros until it
-    -- asks for the abort.
+    -- checks for the abort.
     s_axis_tdata  : in  std_logic_vector(7 downto 0);
     s_axis_tuser  : in  std_logic_vector(0 downto 0);
     s_axis_tvalid : in  std_logic;
@@ -27,7 +27,7 @@ entity firm_wiznet_sequencer is
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
-    is_taken      : in  std_logic;  -- the Manager has taken all bytes, so there is room for 64
+    is_taken      : in  std_logic;  -- the Manager has accepted all bytes, so there is room for 64
 
     -- To firm_wiznet_access: requests, bytes to write, bytes that were read.
     request_valid   : out std_logic;
@@ -105,7 +105,7 @@ architecture rtl of firm_wiznet_sequencer is
 
   signal operation_r : byte_t;
   signal operands_r  : std_logic_vector(23 downto 0);
-  signal left_r      : unsigned(7 downto 0);            -- operands or bytes that are still to come
+  signal left_r      : unsigned(7 downto 0);            -- remaining operands or bytes
 
   signal next_r    : unsigned(15 downto 0);             -- address of the next byte of the program
   signal text_r    : unsigned(15 downto 0);
@@ -176,7 +176,7 @@ begin
                  std_logic_vector(word_r) when state_r = MARK or state_r = MARKED or state_r = TARGET_HIGH else
                  std_logic_vector(next_r);
 
-  -- What instructions compute. Bit 5 chooses a number instead of a field.
+  -- The results of instructions. Bit 5 selects a number instead of a field.
   value  <= operands_r(7 downto 0) when operation_r(5) = '1' else memory_data;
   sum    <= ('0' & unsigned(a_r)) - unsigned('0' & value) - ("00000000" & (carry_r and operation_r(2)))
             when operation_r(2 downto 0) = OF_SUB or operation_r(2 downto 0) = OF_COMPARE or

@@ -1,12 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A client of the board 02:00:00:00:00:02 between a line and a builder. A row of the file begins with what happens:
+-- Tests a client of the board 02:00:00:00:00:02 between a line and a builder. A row of the file begins with an event:
 --
 --   0 aborted size bytes   a frame; 256 to 259 are the bytes of the client's number, 260 to 263 their complements
---   1 ms                   nothing, for some milliseconds
---   2                      nothing, until the client has sent a packet
+--   1 ms                   no event for some milliseconds
+--   2                      no event until the client has sent a packet
 --   3                      another host has the address
---   4                      nothing, until a packet is due
---   5 ms                   the builder is busy, for some milliseconds from now on
+--   4                      no event until a packet is due
+--   5 ms                   the builder is busy for the next milliseconds
 --
 -- A row of the results is a millisecond and an event: `checking`, `bound` or `lost`, or a packet, `message`, `renewal`
 -- or `announcement`, with the bytes that the builder gets: the type, the current address, the option with the address,
@@ -25,9 +25,9 @@ entity firm_dhcp_client_tb is
     RESULT_FILE   : string  := "lease.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    SLOW_PERCENT  : integer := 0;  -- the chance, each cycle, that no byte comes
+    SLOW_PERCENT  : integer := 0;  -- the chance per cycle of no byte
     TICK_CYCLES   : integer := 8;  -- of a millisecond
-    STOP_CYCLES   : integer := 40  -- until the user of an address rests
+    STOP_CYCLES   : integer := 40  -- until the user of an address is idle
   );
 end entity firm_dhcp_client_tb;
 
@@ -36,8 +36,8 @@ architecture simulation of firm_dhcp_client_tb is
   constant RESET_CYCLES : positive := 4;
   constant GAP_CYCLES   : positive := 6;
   constant OWN_BYTES    : positive := 32;
-  constant NUMBER_PLACE : positive := 27;  -- of the number among them
-  constant NUMBER       : positive := 256; -- the first of the bytes that are the client's
+  constant NUMBER_PLACE : positive := 27;  -- of the client's number
+  constant NUMBER       : positive := 256; -- the code of its first byte
   constant MOST_MS      : positive := 150000;
   constant BYTE_CYCLES  : positive := 3;   -- from a byte of a packet to the next one
 
@@ -61,7 +61,7 @@ architecture simulation of firm_dhcp_client_tb is
   signal ms    : natural   := 0;
   signal due   : natural   := 0;  -- packets
   signal sent  : natural   := 0;
-  signal free  : natural   := 0;  -- the millisecond from which on the builder is not busy
+  signal free  : natural   := 0;  -- the millisecond from which the builder is ready
   signal xid   : number_t  := (others => 0);
 
   signal tdata  : std_logic_vector(7 downto 0) := (others => '0');

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Leases that begin one after the other. A row of the file has the seconds from the request to the answer, those that
--- are counted then, and, for the lease, its renewal and its rebinding, whether it is told (0 or 1) and its four bytes.
--- A row of the results has the first seconds, counted from the request, at which the lease is to be renewed, is to be
--- rebound, and ends; 0 for one that does not come.
+-- Tests consecutive leases. A row of the file has the seconds from the request to the answer, the seconds counted
+-- then, and, for the lease, its renewal and its rebinding, whether it is given (0 or 1) and its four bytes. A row of
+-- the results has the first seconds after the request at which the lease is to be renewed, is to be rebound, and ends;
+-- 0 if this does not occur.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

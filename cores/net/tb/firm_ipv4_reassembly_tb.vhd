@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends frames to the host 192.0.2.2, 02:00:00:00:00:02. A row of the file is a frame: the cycles before it, whether
--- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is a frame that leaves, in the
--- same form without the cycles; or `dropped`, or `lost`. After a long packet has left, the user is busy for some
--- cycles; the next one begins later, or when its time is over.
+-- it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results is an output frame in the same
+-- form without the cycles; or `dropped`, or `lost`. After a long packet, the user is busy for some cycles; the next
+-- one begins after them, or when its time is over.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -21,7 +21,7 @@ entity firm_ipv4_reassembly_tb is
     RESULT_FILE   : string  := "packets.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    SLOW_PERCENT  : integer := 0;     -- the chance, each cycle, that no byte comes
+    SLOW_PERCENT  : integer := 0;     -- the chance per cycle of no byte
     TICK_CYCLES   : integer := 1000;  -- of a millisecond
     LAST_CYCLES   : integer := 20000  -- after the last frame
   );
@@ -30,7 +30,7 @@ end entity firm_ipv4_reassembly_tb;
 architecture simulation of firm_ipv4_reassembly_tb is
 
   constant GAP  : positive := 6;   -- cycles between frames, at least
-  constant HEAD : positive := 34;  -- bytes of a packet before those that make it long
+  constant HEAD : positive := 34;  -- header bytes, which LONG does not count
   constant REST : positive := 20;  -- cycles until the user begins
 
   signal clk   : std_logic := '0';
@@ -139,7 +139,7 @@ begin
   be_busy : process (clk)
     variable count   : natural := 0;
     variable left    : natural := 0;  -- cycles until the user has taken all of a long packet
-    variable since   : natural := 0;  -- milliseconds, when it came
+    variable since   : natural := 0;  -- the millisecond of its arrival
     variable is_late : boolean := false;
   begin
     if rising_edge(clk) and rst_n = '1' then

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Plays bursts of bytes on the line of a GMII to the receiver, which passes its frames to the store. A row of the file
 -- is a burst: the idle bytes before it, the byte at which the PHY reports an error or -1, the number of bytes, and the
--- bytes. What comes from the receiver goes to one file, and what comes from the store to another: see firm_sim_record.
+-- bytes. The outputs of the receiver and of the store are written to one file each: see firm_sim_record.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -19,7 +19,7 @@ entity firm_mac_receiver_tb is
     STORED_FILE     : string  := "stored.txt";
     EXPECTED_STORED : string  := "";
     SEED            : integer := 1;
-    -- The chances, each cycle, that the line does not count, and that the store's reader takes nothing.
+    -- The chances per cycle that the line does not count, and that the store's reader takes nothing.
     SLOW_PERCENT    : integer := 0;
     STALL_PERCENT   : integer := 0
   );
@@ -27,7 +27,7 @@ end entity firm_mac_receiver_tb;
 
 architecture simulation of firm_mac_receiver_tb is
 
-  -- After the last burst, for the store's reader.
+  -- Cycles for the store's reader after the last burst.
   constant LAST_CYCLES : positive := 4 * DEPTH;
 
   signal clk   : std_logic := '0';

@@ -18,7 +18,7 @@ entity firm_mac_transmitter_tb is
     RESULT_FILE   : string  := "sent.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    -- The chance, each cycle, that the line does not move.
+    -- The chance per cycle that the line does not count.
     SLOW_PERCENT  : integer := 0
   );
 end entity firm_mac_transmitter_tb;
@@ -27,7 +27,7 @@ architecture simulation of firm_mac_transmitter_tb is
 
   -- Of the source, within a frame.
   constant PAUSE_CYCLES : positive := 100;
-  -- The line is quiet for as many cycles at the end.
+  -- Idle cycles of the line at the end.
   constant LAST_CYCLES  : positive := 1000;
 
   signal clk     : std_logic := '0';

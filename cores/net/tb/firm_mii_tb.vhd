@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A board with the pins of an MII, a GMII or an RMII that sends back each good frame. A row of the file is a burst on
--- the line to the board, in units of nibbles, bytes or two bits: the idle ones before it, the one at which the PHY
--- reports an error or -1, the number, and the values; one of 256 and more comes without rx_dv. What the board sends
--- goes to a file in the same form. The clocks are unrelated; an RMII has that of the system.
+-- Tests a board with the pins of an MII, a GMII or an RMII that returns each good frame. A row of the file is a burst
+-- on the line to the board, in units of nibbles, bytes or two bits: the idle ones before it, the one at which the PHY
+-- reports an error or -1, the number, and the values; one of 256 and more has no rx_dv. The output of the board is
+-- written to a file in the same form. The clocks are unrelated; an RMII has that of the system.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -300,7 +300,7 @@ begin
 
     procedure show(dv : in std_logic; er : in std_logic; data : in natural) is
     begin
-      -- As a PHY: off the rising edge.
+      -- Like a PHY, away from the rising edge.
       wait until falling_edge(rx_clk);
       pin_rx_dv <= dv;
       pin_rx_er <= er;

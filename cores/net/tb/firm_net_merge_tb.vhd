@@ -12,7 +12,7 @@ entity firm_net_merge_tb is
     RESULT_FILE   : string  := "merged.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    -- The chances, each cycle, that no byte comes, and that the reader takes nothing.
+    -- The chances per cycle of no byte, and that the reader takes nothing.
     SLOW_PERCENT  : integer := 0;
     STALL_PERCENT : integer := 0
   );

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sends frames to the board 192.0.2.2, 02:00:00:00:00:02, of which MAC_END is the last byte. A row of the file is a
 -- frame: the cycles before it, whether it is aborted (0 or 1), the number of bytes, and the bytes. A row of the results
--- is a millisecond, and what is asked for or reported then: `report`, `probe` or `taken`. A packet is sent up to four
--- cycles after it is asked for.
+-- is a millisecond, and its request or event: `report`, `probe` or `taken`. A packet is sent up to four cycles after
+-- its request.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -18,7 +18,7 @@ entity firm_net_presence_tb is
     EXPECTED_FILE : string  := "";
     MAC_END       : integer := 2;
     SEED          : integer := 1;
-    SLOW_PERCENT  : integer := 0;    -- the chance, each cycle, that no byte comes
+    SLOW_PERCENT  : integer := 0;    -- the chance per cycle of no byte
     TICK_CYCLES   : integer := 8;    -- of a millisecond
     LAST_TICKS    : integer := 1100; -- after the last frame
     IN_USE        : boolean := true  -- the board uses its address

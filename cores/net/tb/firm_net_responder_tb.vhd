@@ -13,7 +13,7 @@ entity firm_net_responder_tb is
     RESULT_FILE   : string  := "replies.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    -- The chances, each cycle, that no byte comes, and that the reader takes nothing.
+    -- The chances per cycle of no byte, and that the reader takes nothing.
     SLOW_PERCENT  : integer := 0;
     STALL_PERCENT : integer := 0
   );
@@ -21,7 +21,7 @@ end entity firm_net_responder_tb;
 
 architecture simulation of firm_net_responder_tb is
 
-  -- After the last frame, for the reader.
+  -- Cycles for the reader after the last frame.
   constant LAST_CYCLES : positive := 4 * DEPTH;
 
   signal clk   : std_logic := '0';

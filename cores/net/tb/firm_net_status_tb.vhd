@@ -13,7 +13,7 @@ entity firm_net_status_tb is
     RESULT_FILE   : string  := "replies.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    -- The chances, each cycle, that no byte comes, and that the reader or the system takes nothing.
+    -- The chances per cycle of no byte, and that the reader or the system takes nothing.
     SLOW_PERCENT  : integer := 0;
     STALL_PERCENT : integer := 0
   );
@@ -21,7 +21,7 @@ end entity firm_net_status_tb;
 
 architecture simulation of firm_net_status_tb is
 
-  -- After the last frame, for the reader.
+  -- Cycles for the reader after the last frame.
   constant LAST_CYCLES : positive := 1000;
 
   -- A frame of the status id: the id, the length, an address and a word.

@@ -3,7 +3,7 @@
 -- jobs is a packet: the program's entry, the 128 bytes of the fields, the number of the payload's bytes, and these. The
 -- fields of each packet are in the bank after that of the last one, and the next bank has other bytes. A row of the
 -- result is a frame: its number of bytes, and the bytes. If STALL_PERCENT is 0, a pause in a frame is a fault, and so
--- are more cycles from the start to the first byte than MOST_CYCLES.
+-- is a latency from the start to the first byte above MOST_CYCLES.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -19,8 +19,8 @@ entity firm_packet_builder_tb is
     EXPECTED_FILE : string  := "";
     ADDRESS_BITS  : integer := 12;
     SEED          : integer := 1;
-    STALL_PERCENT : integer := 0;  -- the chance, each cycle, that the frame's reader waits
-    SLOW_PERCENT  : integer := 0   -- the chance, each cycle, that no byte of the payload comes
+    STALL_PERCENT : integer := 0;  -- the chance per cycle that the frame's reader waits
+    SLOW_PERCENT  : integer := 0   -- the chance per cycle of no byte of the payload
   );
 end entity firm_packet_builder_tb;
 

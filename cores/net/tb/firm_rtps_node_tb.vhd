@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A node with firm_packet_builder, in a world of events. A row of the file is an event: its kind, the cycles before
--- it, the number of bytes, and the bytes. A negative number of cycles waits until the node has nothing to do.
+-- Tests a node with firm_packet_builder. A row of the file is an event: its kind, the cycles before it, the number of
+-- bytes, and the bytes. A negative number of cycles waits until the node is idle.
 --
 --   0 a packet, 1 a packet that is aborted with its last byte, 2 milliseconds (as many as the number of bytes, without
 --   bytes), 3 a frame to send, 4 a frame that is aborted with its last byte, 5 milliseconds, one in each cycle
 --
--- Results go to a file. A frame to the host is `frame` and its bytes; what the node sends is `sent` and the bytes of
--- the packet from the destination on; `refused`, `lost`, `peer` and `endpoint` are pulses; `done` follows each event
--- that waited for the node.
+-- Results go to a file. A frame to the host is `frame` and its bytes; a packet of the node is `sent` and its bytes
+-- from the destination on; `refused`, `lost`, `peer` and `endpoint` are pulses; `done` follows each event that waited
+-- for the node.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -27,7 +27,7 @@ entity firm_rtps_node_tb is
     RESULT_FILE   : string  := "results.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    STALL_PERCENT : integer := 0;              -- the chance, each cycle, that the host takes nothing
+    STALL_PERCENT : integer := 0;              -- the chance per cycle that the host takes nothing
     MAIN          : integer := 40;             -- the address of the program's loop
     WRITERS       : integer := 4;
     READERS       : integer := 3;
@@ -45,7 +45,7 @@ end entity firm_rtps_node_tb;
 architecture simulation of firm_rtps_node_tb is
 
   constant ENDPOINTS : positive := READERS+WRITERS;
-  -- The loop of the program takes fewer cycles if there is nothing to do, and a packet passes the node in fewer ones.
+  -- More cycles than an idle loop of the program takes, and more than a packet takes through the node.
   constant LOOP_CYCLES : positive := 24;
   constant LOOPS       : positive := 50;
   constant LAST_CYCLES : positive := 200;
@@ -311,7 +311,7 @@ begin
 
   -- ------------------------------------------------------------------ events
 
-  -- Counts how often the program's loop had nothing to do.
+  -- Counts the idle loops of the program.
   watch : process (clk)
   begin
     if rising_edge(clk) then

@@ -17,7 +17,7 @@ entity firm_rtps_walker_tb is
     RESULT_FILE   : string  := "submessages.txt";
     EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
-    SLOW_PERCENT  : integer := 0  -- the chance, each cycle, that no byte comes
+    SLOW_PERCENT  : integer := 0  -- the chance per cycle of no byte
   );
 end entity firm_rtps_walker_tb;
 

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Least recently used for few requesters: of those that request, it grants the one whose last task ended the longest
--- time ago. A matrix of one bit per pair tells which of the two has waited longer. All pairs are compared in one cycle,
--- so the next task is chosen in the cycle of the last beat. The area grows with the square of the requesters.
+-- time ago. A matrix of one bit per pair records which of the two has waited longer. All pairs are compared in one
+-- cycle, so the next task is chosen in the cycle of the last beat. The area grows with the square of the requesters.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

@@ -8,7 +8,8 @@
 --
 -- The set of known tasks is in distributed RAM, one row per word: a requester is known if its bits in `accepted` and
 -- `finished` differ. Accepted rows and finished tasks can therefore write to separate memories.
--- The RAM keeps its content during a reset: afterwards the rows are made equal, one per cycle.
+-- A reset does not clear the RAM. After it, each row of `accepted` is set to that of `finished`, one row per cycle, so
+-- that no requester is known.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -35,7 +36,7 @@ entity firm_sched_arrivals is
     row    : out std_logic_vector(row_bits_of(REQUESTERS)-1 downto 0);
     column : out std_logic_vector(2**column_bits_of(REQUESTERS)-1 downto 0);
 
-    -- A requester finishes a task, known or not. If the task has not left, it is dropped.
+    -- A requester finishes a task, known or not. A task that has not left is dropped.
     finished       : in std_logic;
     finished_known : in std_logic;  -- it is known and has left; only valid with `finished`
     finished_id    : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0)

@@ -5,12 +5,12 @@
 -- A task's key is its deadline (EDF), its deadline minus its transfer time, which is its latest start (LST), or the
 -- stamp of its requester's last completion (LRU). The slack of all tasks except the sending one shrinks by one per
 -- cycle. Instead of changing all other keys, the key of the sending task grows by one per beat.
--- When a task finishes, the next one is the queue's root; if the queue is empty, B; otherwise an arriving task. If
--- there is none, the grant is parked where it is: its requester may begin a task before this is accepted. Such a task
--- has no key yet, and keeps the grant until it has one. While the queue refills its root, B or an arriving task goes
--- first if the root can preempt it after a beat; otherwise there is no grant.
+-- When a task finishes, the next one is the queue's root; if the queue is empty, B; otherwise an arriving task. Without
+-- a task, the grant stays parked: its requester may begin a task before the task is accepted. Such a task has no key
+-- yet, and keeps the grant until it has one. While the queue refills its root, B or an arriving task goes first if the
+-- root can preempt it after a beat; otherwise there is no grant.
 -- A task with a smaller key (EDF, LST) takes the grant; the preempted one goes back into the queue through B.
--- `beat` and `last` pass through the Manager's multiplexer and arrive late. What they decide is therefore prepared for
+-- `beat` and `last` pass through the Manager's multiplexer and arrive late. Their effects are therefore prepared for
 -- each case; they only select, for keys a cycle later.
 -- Keys are compared as numbers that wrap around. They must stay less than half their range apart for any behaviour of
 -- the host. Time therefore stops while the key of the current task or of the root is overdue.
@@ -67,7 +67,8 @@ architecture rtl of firm_sched_engine is
   subtype id_t is std_logic_vector(ID_BITS-1 downto 0);
   subtype key_t is std_logic_vector(KEY_BITS-1 downto 0);
 
-  -- Selects what was prepared for a cycle without a beat, with a beat that is not its task's last, and with the last.
+  -- Selects among the values prepared for a cycle without a beat, with a beat before its task's last, and with the
+  -- last.
   function of_case(has_beat, is_last, paused, sent, ended : std_logic) return std_logic is
   begin
     if has_beat = '0' then
@@ -121,7 +122,7 @@ architecture rtl of firm_sched_engine is
   signal key_after_beat : key_t;      -- the same after a beat
   signal gets_key       : std_logic;  -- the current task gets its key
 
-  -- Its candidates of the last cycle: after a choice, or of a task that went on, with a beat or without.
+  -- Its candidates of the last cycle: after a choice, or of a continued task, with a beat or without.
   signal chose_r         : std_logic;
   signal beat_r          : std_logic;
   signal key_if_chosen_r : key_t;
@@ -144,10 +145,10 @@ architecture rtl of firm_sched_engine is
   signal keyed_if_kept   : std_logic;
   signal pop             : std_logic;
   signal may_leave       : std_logic;
-  signal may_preempt     : std_logic;  -- the root preempts the task if this goes on
+  signal may_preempt     : std_logic;  -- the root preempts the task if the task continues
   signal preempt         : std_logic;
 
-  -- What happens to arriving tasks if the next grant is chosen, at the end of a task, and if the task goes on.
+  -- The effects on arriving tasks if the next grant is chosen, at the end of a task, and if the task continues.
   signal b_is_free_if_chosen : std_logic;
   signal b_is_free_if_kept   : std_logic;
   signal leaves_if_chosen    : std_logic;
@@ -431,7 +432,7 @@ begin
     end if;
   end process hold_b;
 
-  -- Without a task in B, its content does not matter. Which task it is, is known late in the cycle in which it enters.
+  -- Without a task in B, its content is ignored. The entering task is known late in the cycle.
   hold_both : process (clk)
   begin
     if rising_edge(clk) then
@@ -473,7 +474,7 @@ begin
 
   gets_key <= a_valid and a_is_own;
 
-  -- Without a task that has a key, its content does not matter.
+  -- Without a task with a key, its content is ignored.
   hold_keys : process (clk)
   begin
     if rising_edge(clk) then

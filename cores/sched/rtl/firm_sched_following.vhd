@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Finds the next requesting index after a given one, cyclically; the given one itself is the last. Also tells whether
--- the given one requests. No registers.
+-- Finds the next requesting index after a given one, cyclically; the given one itself is the last. Also determines
+-- whether the given one requests. No registers.
 -- Requesters are arranged in rows. A later requester in the row of the given one goes first; otherwise, the lowest one
 -- of the next row with a request, which may be the same row. Both are searched for in parallel.
 library ieee;

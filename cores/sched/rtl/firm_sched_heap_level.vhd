@@ -56,7 +56,7 @@ architecture rtl of firm_sched_heap_level is
 
   -- The highest LEVEL bits of an item's index are the node's address; the node stores only the others.
   constant LOW_BITS     : natural  := ID_BITS - LEVEL;
-  constant SIDE         : natural  := LOW_BITS;  -- the bit of the index that tells left from right
+  constant SIDE         : natural  := LOW_BITS;  -- the bit of the index that distinguishes left and right
   -- A node: valid, key, the low bits of its item's index.
   constant NODE_BITS    : positive := 1 + KEY_BITS + LOW_BITS;
   subtype node_t is std_logic_vector(NODE_BITS-1 downto 0);

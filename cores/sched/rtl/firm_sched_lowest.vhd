@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Finds the lowest requesting index except a given one, and tells whether the given one requests, too. No registers.
+-- Finds the lowest requesting index except a given one, and determines whether the given one also requests. No
+-- registers.
 -- Requesters are arranged in rows. The requests of the given one's row are read at once, since its number is known.
 -- Meanwhile the first other row with a request is found, and its first request. The rows' numbers decide which of the
 -- two is lower.

@@ -39,7 +39,8 @@ end entity firm_sched_parallel;
 
 architecture rtl of firm_sched_parallel is
 
-  -- No two differ by half of this range: none begins at a quarter of it or more, and none grows beyond that.
+  -- No two urgencies differ by half of this range or more: each begins less than a quarter of it below 0, and all stop
+  -- growing when one is a quarter of it above 0.
   constant URGENCY_BITS : positive := max(TIME_BITS-1, 2);
   constant LEVELS       : positive := index_bits(REQUESTERS);
   constant LEAVES       : positive := 2**LEVELS;

@@ -80,7 +80,7 @@ package body firm_sched_pkg is
   constant SHORTEST_TIME : positive := 8;   -- bits
   constant LONGEST_TIME  : positive := 31;
 
-  -- Both are trees: synthesis makes long paths from a chain.
+  -- Both are trees: a chain would be synthesised to long paths.
   function any_of(bits : std_logic_vector) return std_logic is
     constant COUNT : positive := bits'length;
     alias numbered : std_logic_vector(COUNT-1 downto 0) is bits;

@@ -79,7 +79,7 @@ begin
   is_first(CELLS+2) <= '1';
 
   -- If the new item comes before `before_item`, that follows it, even if it is taken at the same time: as after every
-  -- removal, cell 1 then holds what is to be removed.
+  -- removal, cell 1 then holds the item to be removed.
   each_cell : for cell in 1 to CELLS generate
     signal valid_r     : std_logic;
     signal item_r      : std_logic_vector(ITEM_BITS-1 downto 0);

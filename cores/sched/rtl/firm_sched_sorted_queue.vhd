@@ -77,13 +77,14 @@ architecture rtl of firm_sched_sorted_queue is
   type items_t is array (natural range <>) of std_logic_vector(ITEM_BITS-1 downto 0);
 
   -- The root after a pop, and without one.
-  signal popped_r          : std_logic;  -- there was a pop in the last cycle: cell 1 holds what is the root
+  signal popped_r          : std_logic;  -- there was a pop in the last cycle: cell 1 holds the root
   signal valid_if_popped_r : std_logic;
   signal valid_if_kept_r   : std_logic;
   signal item_if_popped_r  : std_logic_vector(ITEM_BITS-1 downto 0);
   signal item_if_kept_r    : std_logic_vector(ITEM_BITS-1 downto 0);
 
-  -- The inputs of each segment: the root is before the first one. The last index is that of a segment never needed.
+  -- The inputs of each segment: the root is before the first one. The last index belongs to a segment that is never
+  -- needed.
   signal before_valid : std_logic_vector(0 to SEGMENTS-1);
   signal before_item  : items_t(0 to SEGMENTS-1);
   signal before_first : std_logic_vector(0 to SEGMENTS-1);

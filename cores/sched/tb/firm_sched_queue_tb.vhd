@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Random operations on a priority queue, recorded cycle by cycle for comparison with a model. A line is a cycle:
--- `insert id key` or `-`, `pop` or `-`, then the outputs of the queue: ready, empty, and `id key` of the root or `-`.
--- Keys are drawn near a number that grows and wraps around; it waits while the root lags behind.
+-- Records random operations on a priority queue for comparison with a model. A line is a cycle: `insert id key` or
+-- `-`, `pop` or `-`, then the outputs of the queue: ready, empty, and `id key` of the root or `-`. Keys are drawn near
+-- a number that grows and wraps around; it waits while the root lags.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -166,7 +166,7 @@ begin
       write_result(trace_file, wanted_file, EXPECTED, trace_line);
     end procedure write_cycle;
 
-    -- An item that is outside, the next one from a random index on; none if all are inside.
+    -- The next item from a random index on that is not in the queue; none if all are.
     procedure offer_item is
     begin
       insert_valid <= '0' after 1 ns;

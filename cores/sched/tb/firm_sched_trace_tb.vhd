@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Random tasks for the scheduler of any policy. The values of its ports in every cycle are written to a file, which
+-- Runs random tasks on the scheduler of any policy, and writes its ports in every cycle to a file, which
 -- tests/cores/sched_trace.py compares with the policy's model in Python.
 -- The behaviour of requesters and sink is drawn for each stretch of cycles: all requesters or a single one have tasks,
 -- of one beat or many, at once, in bursts or now and then, with or without pauses and stalls.
@@ -17,7 +17,7 @@ entity firm_sched_trace_tb is
     -- A name of policy_t; with groups, the policy among them.
     POLICY     : string  := "fixed_priority";
     REQUESTERS : integer := 5;
-    -- One digit a group: the place of its policy in policy_t. Empty: no groups, no combined scheduler.
+    -- One digit per group: the place of its policy in policy_t. Empty: no groups, no combined scheduler.
     GROUP_POLICIES : string  := "";
     TIME_BITS      : integer := 16;
     SHORTEST_RUN   : integer := 1;
@@ -28,7 +28,7 @@ entity firm_sched_trace_tb is
     CYCLES   : integer := 1000;  -- of a segment
     -- No pauses and no stalls, and every requester always has a task.
     SATURATED : boolean := false;
-    -- Beats of each task, 0 for a number that is drawn.
+    -- Beats of each task, 0: drawn.
     TASK_BEATS : integer := 0;
     -- Cycles of a stretch in addition to the drawn ones.
     STRETCH : integer := 0;
@@ -187,7 +187,7 @@ begin
 
     variable state : random_t := initial_state(0);
 
-    -- How requesters and sink behave in a stretch of cycles. Each `longest` may be 0.
+    -- The behaviour of requesters and sink in a stretch of cycles. Each `longest` may be 0.
     variable stretch_end   : natural;
     variable lone          : integer;  -- the only one with new tasks, or NOBODY
     variable longest_task  : positive;
@@ -199,11 +199,11 @@ begin
     variable stall_end     : natural;
 
     type numbers_t is array (0 to REQUESTERS-1) of natural;
-    variable wakes      : numbers_t;  -- when one that shows no request does something
+    variable wakes      : numbers_t;  -- the next action of an idle requester
     variable beats_left : numbers_t;  -- of the task that a requester is in, with the beat on offer
 
     variable asks        : std_logic_vector(REQUESTERS-1 downto 0);
-    variable asked       : std_logic_vector(REQUESTERS-1 downto 0);  -- in the cycle before
+    variable asked       : std_logic_vector(REQUESTERS-1 downto 0);  -- in the previous cycle
     variable granted     : integer;
     variable has_beat    : boolean;
     variable is_its_last : boolean;
@@ -279,7 +279,7 @@ begin
       end if;
     end procedure wake;
 
-    -- The granted one's beat was taken in the cycle before this one.
+    -- The beat of the granted requester was taken in the previous cycle.
     procedure take_beat(cycle : in natural) is
     begin
       asks(granted)       := '0';
@@ -356,7 +356,7 @@ begin
       write_result(trace_file, wanted_file, EXPECTED, text_line);
     end procedure write_times;
 
-    -- Highest requester first; "." if they are those of the cycle before.
+    -- Highest requester first; "." if they are unchanged.
     impure function requests_in_hex return string is
       constant DIGITS  : string(1 to 16) := "0123456789abcdef";
       constant LENGTH  : positive := (REQUESTERS+3) / 4;

@@ -14,13 +14,13 @@ module firm_axis_checker #(
   // End the simulation with the first violation.
   parameter IS_FATAL = 0,
 
-  // What is checked.
+  // The checked rules.
   //
   // A beat that is offered does not change until it is accepted.
   parameter STABLE = 1,
   // `tvalid` and `tready` are 0 or 1, and so are `tkeep`, `tlast` and the bytes kept of a beat.
   parameter KNOWN = 1,
-  // So is `tready` without a beat; 0 where `tready` depends on `tlast`, which then has no value.
+  // So is `tready` without a beat; 0 if `tready` depends on `tlast`, which is then undefined.
   parameter IDLE_READY = 1,
   // `tkeep` is contiguous from byte 0, not empty, and full before the last beat.
   parameter KEEP = 1,
@@ -56,7 +56,7 @@ module firm_axis_checker #(
 
   integer lane;
 
-  // No lane is kept above one that is not.
+  // No lane is kept above a lane that is not kept.
   wire is_contiguous = (axis_tkeep & ~((axis_tkeep << 1) | 1'b1)) === NONE;
   wire is_known_keep = (^axis_tkeep) !== 1'bx;
 

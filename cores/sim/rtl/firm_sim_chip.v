@@ -20,10 +20,10 @@ module firm_sim_chip (
 
   integer answers, reports;              // files
   integer answer;
-  integer bits;                          // of the present byte
+  integer bits;                          // of the current byte
   reg [31:0] cycles;                     // since the last frame of SPI
   reg [7:0]  taken, shown;
-  reg        sck, cs_n, reset_n;         // of the cycle before
+  reg        sck, cs_n, reset_n;         // of the previous cycle
 
   task next_byte;
     begin
@@ -74,7 +74,7 @@ module firm_sim_chip (
       load;
   endtask
 
-  // The slave sees what the system sees at the next rising edge.
+  // The slave samples the values that the system samples at the next rising edge.
   task sample;
     begin
       if (spi_rst_n === 1'b0 && reset_n !== 1'b0)

@@ -9,7 +9,7 @@ entity firm_sim_clock is
   generic (
     -- Period in picoseconds, 2 and more.
     PERIOD_PS : integer := 10000;
-    -- Different for each instance, 1 and more: the phase, and by how much the period is off.
+    -- Different for each instance, 1 and more: the phase and the deviation of the period.
     SEED : integer := 1
   );
   port (

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Replaces a pair of converters behind the Manager: takes frames without id, as a subscriber does, and sends them
--- back with ID, as a publisher does. It stalls at random on both sides. Simulation only.
+-- Replaces a pair of converters after the Manager: accepts frames without id, like a subscriber, and returns them with
+-- ID, like a publisher. It stalls at random on both sides. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -112,7 +112,7 @@ begin
 
   sent_tvalid <= kept_tvalid;
 
-  -- The id is a beat of its own before the first one.
+  -- The id is a separate beat before the first one.
   byte_wide : if WIDTH = 8 generate
     sent_tdata  <= std_logic_vector(to_unsigned(ID, 8)) when first_r = '1' else kept_tdata;
     sent_tkeep  <= "1";

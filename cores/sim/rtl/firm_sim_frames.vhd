@@ -51,7 +51,7 @@ begin
     variable whole  : natural := 0;  -- bytes of complete frames
 
     variable taken  : natural := 0;  -- coded bytes so far
-    variable left   : natural := 0;  -- coded bytes of the block still to come
+    variable left   : natural := 0;  -- remaining coded bytes of the block
     variable is_due : boolean := false;  -- a zero is between this block and the next one
     variable bytes  : natural := 0;  -- of the incoming frame, with its checksum
     variable header : unsigned(8*HEADER_BYTES-1 downto 0);

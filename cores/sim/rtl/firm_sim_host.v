@@ -85,7 +85,7 @@ module firm_sim_host #(
   integer label_at    [0:2*FRAMES-1];  // where the label begins in its file
   integer bytes_at    [0:2*FRAMES-1];
   integer size        [0:2*FRAMES-1];
-  integer cause       [0:2*FRAMES-1];  // the stimulus that causes it; NONE if the file does not say
+  integer cause       [0:2*FRAMES-1];  // the stimulus that causes it; NONE if the file has none
   integer next_of_id  [0:2*FRAMES-1];  // the next one with the same id
   integer first_cycle [0:FRAMES-1];    // cycles in which the first and the last beat of a stimulus were taken
   integer last_cycle  [0:FRAMES-1];
@@ -101,7 +101,7 @@ module firm_sim_host #(
   integer random_1, random_2;
 
   // The stream to the system.
-  integer sending;                     // NONE when all is sent
+  integer sending;                     // NONE after the last frame
   integer frames_sent;
   integer bytes_sent;                  // of `sending`, without the beat on offer
   reg     is_offered;
@@ -126,7 +126,7 @@ module firm_sim_host #(
   reg               id_pulse;
   reg [ERRORS-1:0]  frame_pulses;
 
-  // A beat that waited for `tready`, and that the stream from the system must still show.
+  // A beat that waited for `tready`, so that the stream from the system must hold it.
   reg               is_held, held_tlast, held_tuser;
   reg [WIDTH-1:0]   held_tdata;
   reg [LANES-1:0]   held_tkeep;
@@ -172,7 +172,7 @@ module firm_sim_host #(
       char = $fgetc(file);
   endtask
 
-  // A number of one to nine digits up to a blank or the end of the line; NONE if there is something else.
+  // A number of one to nine digits up to a blank or the end of the line; NONE if it is anything else.
   task read_number(output integer number);
     integer digits;
     begin

@@ -80,7 +80,7 @@ architecture simulation of firm_sim_host is
   end function percent_of;
 
   -- The id in the first beat of a frame. If the beat is narrower, the comparison of the bytes shows whether `tid` is
-  -- right.
+  -- correct.
   function id_of(tdata, tid : std_logic_vector) return std_logic_vector is
     variable beat : std_logic_vector(WIDTH+7 downto 0);
   begin

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// firm_sim_join.vhd for simulators of Verilog, cycle by cycle: joins the bursts of each publisher behind a Manager with
+// firm_sim_join.vhd for simulators of Verilog, cycle by cycle: joins the bursts of each publisher after a Manager with
 // a preemptive scheduler to frames, and forwards these in the order of their completion.
 // Verilog has no memory that grows, so it keeps at most BEATS beats. More beats, or an illegal burst, end the
 // simulation.
@@ -43,8 +43,8 @@ module firm_sim_join #(
   reg                      tuser     [0:BEATS-1];
   reg                      tlast     [0:BEATS-1];
   integer                  next_beat [0:BEATS-1];
-  integer                  free;                   // those released by a frame
-  integer                  used;                   // those ever used by a frame
+  integer                  free;                   // released by a frame
+  integer                  used;                   // ever used by a frame
 
   // The incomplete frame of each publisher.
   integer                  first     [0:255];

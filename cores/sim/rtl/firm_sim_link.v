@@ -161,7 +161,7 @@ module firm_sim_link #(
   integer    oldest, waiting;
   integer    whole;   // bytes of complete frames
   integer    left;    // coded bytes of the block still to come
-  reg        is_due;  // a zero is between this block and the next one
+  reg        is_due;  // a zero follows this block
   integer    bytes;   // of the incoming frame, with its checksum
   reg [39:0] header;
   reg [31:0] crc;
@@ -189,7 +189,7 @@ module firm_sim_link #(
     end
   endtask
 
-  // All bytes that wait are of complete frames now.
+  // All waiting bytes now belong to complete frames.
   task end_kept;
     begin
       store[(oldest + waiting - 1) % STORE_BYTES] = store[(oldest + waiting - 1) % STORE_BYTES] | 9'h100;

@@ -19,7 +19,7 @@ entity firm_sim_operation is
   generic (
     VECTORS  : string;
     RESULTS  : string;
-    -- A file of the wanted results, or none.
+    -- A file of the expected results, or none.
     EXPECTED : string;
     -- Widths of the operands and of the result.
     IN_BITS  : positive;
@@ -31,7 +31,7 @@ entity firm_sim_operation is
   port (
     clk       : in  std_logic;
     rst_n     : in  std_logic;
-    -- All results are there, so the clock may stop.
+    -- All results have arrived, so the clock may stop.
     is_done   : out boolean;
 
     in_valid  : out std_logic                            := '0';

@@ -32,7 +32,7 @@ module firm_sim_phy #(
   reg [7:0]  line [0:MOST_BYTES-1];
   reg [7:0]  shown, taken;
   reg [31:0] cycles;                     // since the last question
-  reg        is_inside;                  // a frame of the system is under way
+  reg        is_inside;                  // in the middle of a frame of the system
 
   task ask;
     begin

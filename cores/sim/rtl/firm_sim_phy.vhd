@@ -79,12 +79,12 @@ begin
     variable size       : natural := 0;               -- of the frame to the system
     variable place      : natural := 0;
     variable bits_shown : natural := 0;               -- of its byte
-    variable rest       : natural := QUIET_CYCLES;    -- cycles without a frame to come
-    variable cycles     : natural := 0;               -- since the last question
+    variable rest       : natural := QUIET_CYCLES;    -- remaining cycles without a frame
+    variable cycles     : natural := 0;               -- since the last request
     variable shown      : std_logic_vector(7 downto 0);
     variable taken      : std_logic_vector(7 downto 0) := (others => '0');
     variable bits_taken : natural := 0;
-    variable is_inside  : boolean := false;           -- a frame of the system is under way
+    variable is_inside  : boolean := false;           -- a frame of the system is in progress
 
     procedure open_pipes is
       variable status_3 : file_open_status;

@@ -100,7 +100,7 @@ module firm_sim_pipe #(
   reg [ERRORS-1:0]  frame_pulses;
   reg [WIRES-1:0]   wait_levels;         // only while waits are counted
 
-  // A beat that waited for `tready`, and that the stream from the system must still show.
+  // A beat that waited for `tready`, so that the stream from the system must hold it.
   reg               is_held, held_tlast, held_tuser;
   reg [WIDTH-1:0]   held_tdata;
   reg [LANES-1:0]   held_tkeep;

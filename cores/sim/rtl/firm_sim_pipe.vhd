@@ -51,7 +51,7 @@ entity firm_sim_pipe is
 
     id_error    : in std_logic                           := '0';
     frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0');
-    -- High in each cycle in which a wire has a message or a beat that is not taken.
+    -- High in each cycle in which a wire has a valid message or beat that is not accepted.
     waits       : in std_logic_vector(WIRES-1 downto 0)  := (others => '0')
   );
 end entity firm_sim_pipe;
@@ -167,7 +167,7 @@ begin
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
 
-    variable is_counting : boolean := false;    -- the host wants to know the waits
+    variable is_counting : boolean := false;    -- the host requests the waits
     variable waited      : counts_t(0 to WIRES+1) := (others => 0);
 
     -- Reports must be read before the simulation ends.

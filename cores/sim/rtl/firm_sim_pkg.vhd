@@ -15,7 +15,7 @@ package firm_sim_pkg is
   type frame_ptr_t is access frame_t;
   type frame_t is record
     label_text  : line;         -- without the mark and without `@n`
-    cause       : integer;      -- index of the stimulus frame that causes this one; -1 if the file does not say
+    cause       : integer;      -- index of the stimulus frame that causes this one; -1 if unknown
     bytes       : line;         -- byte k is character k+1
     any_byte    : line;         -- '.' at byte k+1 if it may have any value; null if there is no such byte
     size        : natural;      -- bytes
@@ -57,7 +57,8 @@ package firm_sim_pkg is
   -- frame is not copied for every line.
   procedure make_room(text : inout line; used : in natural; wanted : in positive);
 
-  -- A bench that writes results to a file can compare them at once. EXPECTED is the file with the right ones, or empty:
+  -- A bench that writes results to a file can compare them at once. EXPECTED is the file with the expected ones, or
+  -- empty:
   --   file wanted_file : text open read_mode is existing(EXPECTED);
   --   write_result(result_file, wanted_file, EXPECTED, row);  -- in place of writeline
   --   assert endfile(wanted_file)                             -- at the end
@@ -249,7 +250,7 @@ package body firm_sim_pkg is
     end if;
   end procedure append_byte;
 
-  -- The number of one to nine digits from `first` to the next blank or the end; -1 if there is something else.
+  -- The number of one to nine digits from `first` to the next blank or the end; -1 for other characters.
   function parse_number(text : string; first : positive) return integer is
     variable number : natural := 0;
     variable place  : positive := first;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Takes a stream of bytes with random stalls and writes it to a file. A row is a frame: the number of bytes, and the
--- bytes; with SHOWS_USER, tuser of the last byte before them. Each cycle of a pulse is a row of its own, its name:
+-- bytes; with SHOWS_USER, tuser of the last byte before them. Each cycle of a pulse is a separate row, its name:
 -- `dropped`. The rows are compared with those of EXPECTED_FILE, if it has a name. Prints PASS when `over` ends the run.
 library ieee;
 use ieee.std_logic_1164.all;

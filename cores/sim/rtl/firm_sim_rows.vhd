@@ -12,7 +12,7 @@ entity firm_sim_rows is
   generic (
     FRAME_FILE   : string;
     SEED         : integer := 1;
-    SLOW_PERCENT : integer := 0;  -- the chance, each cycle, that no byte comes
+    SLOW_PERCENT : integer := 0;  -- the chance, each cycle, that no byte is sent
     GAP_CYCLES   : natural := 6;  -- between two frames, at least
     LAST_CYCLES  : natural := 8   -- after the last frame
   );

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// firm_sim_spi.vhd for simulators of Verilog: the host as the master of an SPI link. It asks for the status, writes as
-// much as there is room for, reads what waits, and begins anew; selections are cut short at random where STALL_PERCENT
-// is not 0. Pins change and are read at the falling edge. SEED and STALL_PERCENT can be set at the start of the
-// simulator, as in +SEED=7. Simulation only.
+// firm_sim_spi.vhd for simulators of Verilog: the host as the master of an SPI link. It repeats three steps: it reads
+// the status, writes as many bytes as there is room for, and reads the waiting bytes. If STALL_PERCENT is not 0,
+// selections end early at random. Pins change and are read at the falling edge. SEED and STALL_PERCENT can be set at
+// the start of the simulator, as in +SEED=7. Simulation only.
 
 `timescale 1ns / 1ps
 
@@ -135,7 +135,7 @@ module firm_sim_spi #(
       end
       draw;
       is_over = is_happening;
-      // A byte that is not clocked to its end does not count.
+      // A byte that is not clocked to its end is ignored.
       send_bits(unsent, is_over ? 5 : 8);
       has_unsent = is_over;
       room       = room - 1;

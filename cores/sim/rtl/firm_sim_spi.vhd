@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host as the master of an SPI link: frames of firm_sim_host, and back. It asks for the status, writes as much as
--- there is room for, reads what waits, and begins anew; selections are cut short at random where STALL_PERCENT is not
--- 0. Simulation only.
+-- The host as the master of an SPI link: frames of firm_sim_host, and back. It reads the status, writes as many bytes
+-- as there is room for, reads the waiting bytes, and repeats; selections are cut short at random unless STALL_PERCENT
+-- is 0. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -139,7 +139,7 @@ begin
           pause;
         end if;
         if happens then
-          -- A byte that is not clocked to its end does not count.
+          -- An incompletely clocked byte is ignored.
           send_bits(unsent, 5);
           exit;
         end if;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Lets a stream through and stops it at random, both ways at once; a beat that it has shown stays until it is
--- taken. Simulation only.
+-- Forwards a stream and stalls it at random in both directions; an offered beat stays until it is accepted. Simulation
+-- only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;

@@ -1,6 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Watches a stream of whole frames and says the frame's id on every beat, for parts that do not make `tid`
--- themselves. Simulation only.
+-- Watches a stream of whole frames and outputs the frame's id on every beat, for parts without `tid`. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 

@@ -10,7 +10,7 @@ module firm_sim_uart #(
   // Cycles of clk in which the line carries a bit; at least 4.
   parameter BIT_CYCLES = 10,
   parameter SEED = 1,
-  // The chance that it pauses before a byte, and, as `uart_cts_n`, that it wants none.
+  // The chance that it pauses before a byte, and that it accepts none (`uart_cts_n`).
   parameter STALL_PERCENT = 0,
   parameter LAG = 16
 ) (
@@ -30,7 +30,7 @@ module firm_sim_uart #(
   output wire       m_axis_tlast,
   input  wire       m_axis_tready,
 
-  // As the hardware calls them: its `uart_rxd` is what the host sends.
+  // The names of the hardware: its `uart_rxd` is the output of the host.
   output reg        uart_rxd,
   input  wire       uart_txd,
   input  wire       uart_rts_n,

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host with its serial adapter: frames of firm_sim_host over two lines, and back. It sends as an adapter does: with
--- pauses, and up to LAG bytes more after the other side's `rts_n` has risen. It opens the line with a break, as the
--- host's software should. Simulation only.
+-- pauses, and up to LAG bytes more after the other side's `rts_n` has risen. It opens the line with a break, like the
+-- host's software. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -11,7 +11,7 @@ entity firm_sim_uart is
   generic (
     BIT_TIME : time    := 100 ns;
     SEED     : integer := 1;
-    -- The chance that it pauses before a byte, and, as `uart_cts_n`, that it wants none.
+    -- The chance that it pauses before a byte and, by `uart_cts_n`, that it accepts none.
     STALL_PERCENT : integer := 0;
     LAG           : integer := 16
   );
@@ -32,7 +32,7 @@ entity firm_sim_uart is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    -- As the hardware calls them: its `uart_rxd` is what the host sends.
+    -- As named in the hardware: `uart_rxd` is the host's output.
     uart_rxd   : out std_logic;
     uart_txd   : in  std_logic;
     uart_rts_n : in  std_logic;

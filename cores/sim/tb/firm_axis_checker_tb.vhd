@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A stream of random frames with random handshakes, and one fault in it, at a random time. What the rules leave open is
--- 'X': the stream without a beat, and bytes that are not kept.
+-- Sends a stream of random frames with random handshakes and one fault, at a random time. Values that no rule
+-- constrains are 'X': the stream without a beat, and bytes that are not kept.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -10,7 +10,7 @@ entity firm_axis_checker_tb is
   generic (
     WIDTH : integer := 16;
     SEED  : integer := 1;
-    -- The fault: none, or the rule and what breaks it, as in `break`.
+    -- The fault: none, or the rule and its violation, as in `break`.
     FAULT : string := "none";
     -- A rule that is not checked.
     UNCHECKED     : string  := "none";
@@ -67,7 +67,7 @@ begin
     variable from_cycle : natural;
     variable is_offered : boolean  := false;
     variable is_waiting : boolean;              -- since an earlier cycle
-    -- The beat that is offered
+    -- The offered beat.
     variable bytes      : std_logic_vector(WIDTH-1 downto 0);
     variable lanes_kept : positive;
     variable kept       : std_logic_vector(LANES-1 downto 0);
@@ -183,7 +183,7 @@ begin
       end if;
       ready := drawn_bit(READY_PERCENT);
       rst_n <= '1';
-      -- A reset in the middle, too.
+      -- Also a reset in the middle.
       if cycle <= 4 or (cycle > CYCLES/4 and cycle <= CYCLES/4 + 4) then
         rst_n      <= '0';
         is_offered := false;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Three gates: one without requests, one whose sink is always ready, one whose sink is sometimes ready. Checks that a
--- valid that passed a gate stays until it is taken, and counts the cycles in which each gate is closed.
+-- Tests three gates: one without requests, one whose sink is always ready, one whose sink is sometimes ready. Checks
+-- that a valid that passed a gate is held until it is taken, and counts the cycles in which each gate is closed.
 library ieee;
 use ieee.std_logic_1164.all;
 use std.textio.all;
@@ -10,7 +10,7 @@ entity firm_sim_gates_tb is
   generic (
     SEED          : integer := 1;
     STALL_PERCENT : integer := 30;
-    -- The source of gate 1 withdraws its valid, which must be found.
+    -- The source of gate 1 withdraws its valid, which must be reported.
     WITHDRAWS : boolean := false
   );
 end entity firm_sim_gates_tb;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// firm_sim_host_tb.vhd for simulators of Verilog: the host against a system that is a wire, which +FAULT=... breaks.
+// firm_sim_host_tb.vhd for simulators of Verilog: the host with a system that is a wire, which +FAULT=... breaks.
 
 `timescale 1ns / 1ps
 

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The joiner of bursts between the two streams of the simulation host: the frames of the stimulus file are bursts.
+-- Tests the joiner of bursts with the simulation host: the frames of the stimulus file are bursts.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

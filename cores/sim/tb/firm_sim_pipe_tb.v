@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// firm_sim_pipe_tb.vhd for simulators of Verilog: the host at the end of a pipe against a system that is a wire, which
+// firm_sim_pipe_tb.vhd for simulators of Verilog: the host at the end of a pipe with a system that is a wire, which
 // +FAULT=... breaks.
 
 `timescale 1ns / 1ps

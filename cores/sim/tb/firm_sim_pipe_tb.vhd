@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host at the end of a pipe against a system that is a wire, and may break the stream.
+-- Tests the host at the end of a pipe with a system that is a wire and may break the stream.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

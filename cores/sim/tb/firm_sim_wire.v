@@ -35,7 +35,7 @@ module firm_sim_wire #(
   integer          idle_r = 0;  // cycles since the last beat
   reg              held_r = 0;  // a beat has waited for a cycle
 
-  // The way to break the stream; the block `spoil` shows them all.
+  // The way to break the stream; the block `spoil` lists all ways.
   reg [8*16-1:0]   fault;
 
   initial

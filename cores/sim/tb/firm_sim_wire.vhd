@@ -7,7 +7,7 @@ use ieee.std_logic_1164.all;
 entity firm_sim_wire is
   generic (
     WIDTH : integer := 8;
-    -- The way to break the stream; "none" for none. The process `spoil` shows them all.
+    -- The way to break the stream, or "none". The process `spoil` lists all ways.
     FAULT : string := "none"
   );
   port (

@@ -66,7 +66,7 @@ begin
       takes_write_r <= '0';
       if state_r = WAITS then
         response_r <= OKAY;
-        -- The last access was a write, or nobody writes.
+        -- The last access was a write, or no write is requested.
         if s_axi_arvalid = '1' and (is_write_r = '1' or s_axi_awvalid = '0' or s_axi_wvalid = '0') then
           takes_read_r <= '1';
           is_write_r   <= '0';

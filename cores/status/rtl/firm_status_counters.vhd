@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Counts what passes between the Manager and the converters: for each channel its frames, its faults by code, and the
+-- Counts the traffic between the Manager and the converters: for each channel its frames, its faults by code, and the
 -- longest wait of a beat. Channels are the subscribers by id, then the publishers by id. The entity only listens.
 --
 -- Frames are counted in the cycle of their last beat, at any rate. Faults wait in one place for each channel until they
--- are counted, one in a cycle; a fault that finds its channel's place taken is not counted, and `lost` pulses.
+-- are counted, one in a cycle; a fault whose channel's place is occupied is not counted, and `lost` pulses.
 --
 -- With TIME_STAMPS, a counter runs freely. Each channel has the value of this counter one cycle after an event: the
 -- first beat of a subscriber's newest frame, or the last beat of a publisher's newest frame. The difference of both is

@@ -28,7 +28,7 @@ entity firm_status_faults is
     fault   : out std_logic;
     channel : out std_logic_vector(index_bits(CHANNELS)-1 downto 0);
     code    : out std_logic_vector(3 downto 0);
-    -- A pulse if a fault found its channel's place taken.
+    -- A pulse if a fault's channel already has a waiting fault.
     lost : out std_logic
   );
 end entity firm_status_faults;

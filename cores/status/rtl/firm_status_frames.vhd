@@ -71,7 +71,7 @@ architecture rtl of firm_status_frames is
   constant LENGTH_BIT  : positive := 8*ID_BYTES;
   constant ADDRESS_BIT : positive := LENGTH_BIT + 32;
   constant DATA_BIT    : positive := ADDRESS_BIT + 32;
-  -- A beat is shorter than an id, whose first byte alone does not tell a request from another frame.
+  -- A beat is shorter than an id, whose first byte alone does not distinguish a request from another frame.
   constant IS_SPLIT    : boolean  := WIDTH < 8*ID_BYTES;
   -- The payload's length, after the id.
   constant LENGTH      : std_logic_vector(31 downto 0) := (3 => '1', others => '0');

@@ -4,8 +4,8 @@
 -- by id, then the publishers by id. The entity only listens.
 --
 -- Frames are counted in the cycle of their last beat, those of publishers at the host's side of the Manager. Faults
--- wait in one place for each channel until they are counted, one in three cycles; a fault that finds the place of its
--- channel taken is not counted, and `lost` pulses. The waits of publishers are measured in turns (firm_status_waits).
+-- wait in one place for each channel until they are counted, one in three cycles; a fault whose channel's place is
+-- occupied is not counted, and `lost` pulses. The waits of publishers are measured in turns (firm_status_waits).
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -51,7 +51,7 @@ entity firm_status_tree_counters is
     fault         : out std_logic;
     fault_channel : out std_logic_vector(11 downto 0);
     fault_code    : out std_logic_vector(3 downto 0);
-    lost          : out std_logic;  -- a pulse if a fault found its channel's place taken
+    lost          : out std_logic;  -- a pulse if a fault's channel already has a waiting fault
 
     -- The counter of the time stamps; zeros without them.
     cycles : out std_logic_vector(31 downto 0);

@@ -41,7 +41,7 @@ architecture rtl of firm_status_waits is
   constant FULL       : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '1');
 
   type memory_t is array (natural range 0 to 2**TURN_BITS-1) of std_logic_vector(COUNT_BITS-1 downto 0);
-  signal current : memory_t := (others => (others => '0'));  -- of the waits under way
+  signal current : memory_t := (others => (others => '0'));  -- of the current waits
   signal longest : memory_t := (others => (others => '0'));
 
   signal turn_r     : unsigned(TURN_BITS-1 downto 0);

@@ -1,6 +1,6 @@
 """A simulated board with a chip: bytes of its SPI on one side, sockets of the kernel on the other.
 
-A simulator with `firm_sim_chip` (cores/sim) asks for the chip's bytes through a pipe.
+A simulator with `firm_sim_chip` (cores/sim) requests the chip's bytes through a pipe.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Board(SimulatedBoard):
         self._chip.close()
 
     def _select(self, cycles: int) -> None:
-        """Begin a frame when the time of the board has come, or earlier if its network has news."""
+        """Begin a frame when the board's time is reached, or earlier at an event on its network."""
         if early := self.early(cycles):
             self._chip.poll(early)
             self.go_on()

@@ -1,10 +1,10 @@
 """A chip of WIZnet with TCP/IP, as its host sees it: eight TCP sockets with registers and buffers.
 
-The sockets of the kernel play the chip's TCP. The model knows nothing of what is sent. Facts are those of the
-datasheets of W5500 and W5200; their address maps and SPI frames are in `w5500.py` and `w5200.py`.
+The sockets of the kernel play the chip's TCP. The model does not interpret the data. Facts are from the datasheets of
+W5500 and W5200; their address maps and SPI frames are in `w5500.py` and `w5200.py`.
 
-Unlike the chip, a connection that comes in is complete before the chip's socket leaves LISTEN, and a socket that is
-closed without a handshake (CLOSE) resets its connection at once instead of at the peer's next segment.
+Unlike with the chip, an incoming connection is complete before the chip's socket leaves LISTEN, and CLOSE (without a
+handshake) resets a connection at once instead of at the peer's next segment.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Status(IntEnum):
 
 
 class Command(IntEnum):
-    """Sn_CR, what a host tells a socket to do."""
+    """Sn_CR, a host's command to a socket."""
 
     OPEN = 0x01
     LISTEN = 0x02
@@ -56,7 +56,7 @@ class Command(IntEnum):
 
 
 class Interrupt(IntFlag):
-    """Sn_IR, what has happened to a socket since the host cleared the bit."""
+    """Sn_IR, the events of a socket since the host cleared their bits."""
 
     CON = 0x01
     DISCON = 0x02
@@ -123,7 +123,7 @@ class ChipSocket:
         return self.registers[RX_SIZE] * 1024
 
     def count(self, address: int) -> int | None:
-        """The 16-bit count whose first byte has this address, or None if none has."""
+        """The 16-bit count whose first byte has this address, or None."""
         counts: dict[int, Callable[[], int]] = {
             TX_FREE: lambda: self.tx_bytes - (self.tx_commanded - self.tx_acknowledged) % _COUNT,
             TX_READ: lambda: self.tx_acknowledged,
@@ -136,9 +136,9 @@ class ChipSocket:
 
 
 class Chip:
-    """The chip without its address map: common registers, sockets, and what they do in time.
+    """The chip without its address map: common registers, sockets, and their behaviour over time.
 
-    `misuses` lists what the host did that the datasheets forbid; the chip's answer to it is not defined.
+    `misuses` lists the host's actions that the datasheets forbid; the chip's reaction is undefined.
     """
 
     def __init__(self, common: int, address: int, retry: int) -> None:
@@ -165,13 +165,13 @@ class Chip:
         self._listen()
 
     def close(self) -> None:
-        """Give all sockets of the kernel back."""
+        """Close all sockets of the kernel."""
         self.reset()
 
-    # What the address maps call.
+    # The functions that the address maps call.
 
     def read_socket(self, number: int, address: int) -> int:
-        """A byte of a socket's registers. 0 where it has none."""
+        """A byte of a socket's registers, or 0 without a register."""
         item = self.sockets[number]
         if address == COMMAND:
             value, item.command = item.command, 0
@@ -189,7 +189,7 @@ class Chip:
         return count & 0xFF if address & 1 else count >> 8
 
     def write_socket(self, number: int, address: int, value: int) -> None:
-        """Write a byte of a socket's registers. Those that only the chip writes ignore it."""
+        """Write a byte of a socket's registers, except read-only ones."""
         item = self.sockets[number]
         if address == COMMAND:
             self._execute(item, value)
@@ -209,7 +209,7 @@ class Chip:
     # Time.
 
     def poll(self, seconds: float = 0) -> None:
-        """Let happen what has happened on the network; wait for it up to `seconds`."""
+        """Process the events on the network; wait up to `seconds` for one."""
         if seconds:
             self._wait(seconds)
         for item in self.sockets:
@@ -307,7 +307,7 @@ class Chip:
             self._guarded(item, self._transfer)
 
     def _send_keep(self, item: ChipSocket) -> None:
-        """Ask whether the peer is still there. The kernel asks again each second, and gives up as the chip does."""
+        """Send a keep-alive. The kernel repeats it each second, and gives up as the chip does."""
         if item.status not in _SENDING_STATES:
             self._misuse_without_connection(item, "SEND_KEEP")
         elif item.registers[KEEP_ALIVE]:
@@ -325,7 +325,7 @@ class Chip:
             item.interrupt |= Interrupt.RECV
 
     def _misuse_without_connection(self, item: ChipSocket, what: str) -> None:
-        """Note a command, unless the connection has ended after the host last read the status."""
+        """Record a misused command, unless the connection ended after the host last read the status."""
         if item.shown not in _SENDING_STATES:
             self._misuse(item, f"{what} without a connection")
 
@@ -395,7 +395,7 @@ class Chip:
 
     def _transfer(self, item: ChipSocket) -> None:
         if item.has_ended:
-            _raise_error(item)  # nothing is received any more that would tell of a reset
+            _raise_error(item)  # without further reception, a reset would remain unnoticed
         self._transmit(item)
         for data in _received(item):
             for byte in data:
@@ -428,7 +428,7 @@ class Chip:
             item.connection.shutdown(socket.SHUT_WR)
 
     def _guarded(self, item: ChipSocket, action: Callable[[ChipSocket], None]) -> None:
-        """Do something with a connection. If it ends that way, its socket is closed."""
+        """Apply `action` to a connection. If the connection ends, close its socket."""
         try:
             action(item)
         except OSError as error:
@@ -477,7 +477,7 @@ def _raise_error(item: ChipSocket) -> None:
 
 
 def _keep_alive(item: ChipSocket, seconds: int) -> None:
-    """Ask the peer whenever nothing has come from it for so long."""
+    """Send a keep-alive whenever the peer has been silent for this time."""
     assert item.connection
     item.connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL):
@@ -492,7 +492,7 @@ def _unacknowledged(item: ChipSocket) -> int:
 
 
 def _unacknowledged_bytes(item: ChipSocket) -> int:
-    """Bytes of data that the peer has not acknowledged; a FIN on the way counts as one for the kernel."""
+    """Bytes of data that the peer has not acknowledged; the kernel counts a FIN in transit as one."""
     return max(_unacknowledged(item) - item.has_sent_end, 0)
 
 
@@ -502,7 +502,7 @@ def _room(item: ChipSocket) -> int:
 
 
 def _received(item: ChipSocket) -> Iterator[bytes]:
-    """What has arrived and has room, in segments."""
+    """The received data that fit into the buffer, in segments."""
     assert item.connection
     while room := _room(item):
         try:

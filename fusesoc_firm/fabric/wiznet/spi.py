@@ -6,23 +6,23 @@ from typing import Protocol
 
 
 class Slave(Protocol):
-    """What a chip is for its host. A frame begins with `select` and ends with `deselect`."""
+    """A chip as its host sees it. A frame begins with `select` and ends with `deselect`."""
 
     def select(self) -> None:
         """The chip select becomes active."""
 
     def answer(self) -> int:
-        """The byte for the host, which the chip sends while the host's next one is on its way."""
+        """The byte for the host, which the chip sends during the host's next byte."""
 
     def take(self, byte: int) -> None:
-        """A byte of the host has come."""
+        """Receive a byte from the host."""
 
     def deselect(self) -> None:
         """The chip select becomes inactive."""
 
 
 def exchange(slave: Slave, byte: int) -> int:
-    """A byte to the chip, and the one that comes back."""
+    """Send a byte to the chip, and return the received one."""
     answer = slave.answer()
     slave.take(byte)
     return answer

@@ -1,7 +1,7 @@
 """W5200: one address space for registers and buffers.
 
-A frame: address (2 bytes), write (1 bit), length (15 bits), data. The socket's buffers lie one after another, and an
-address does not wrap at the end of one: the host splits what crosses it.
+A frame: address (2 bytes), write (1 bit), length (15 bits), data. The sockets' buffers are adjacent, and an address
+does not wrap at the end of a buffer: the host splits a transfer that crosses it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _HEADER = 4
 
 
 class W5200(Chip):
-    """The chip behind its SPI slave."""
+    """The chip with its SPI slave."""
 
     def __init__(self) -> None:
         super().__init__(_COMMON, _ADDRESS, _RETRY)
@@ -35,7 +35,7 @@ class W5200(Chip):
             self.misuses.append(f"a frame ends {self._left} bytes early")
 
     def answer(self) -> int:
-        """What is read at the present address, or 0."""
+        """The byte at the current address, or 0."""
         return 0 if len(self._header) < _HEADER or self._header[2] & 0x80 else self._read(self._position)
 
     def take(self, byte: int) -> None:

@@ -1,4 +1,4 @@
-"""W5500: blocks of registers and buffers, chosen by the third byte of each SPI frame.
+"""W5500: blocks of registers and buffers, selected by the third byte of each SPI frame.
 
 A frame: address (2 bytes), block (5 bits), write (1 bit), mode (2 bits: any length, or 1, 2 or 4 bytes), data.
 """
@@ -16,7 +16,7 @@ _HEADER = 3
 
 
 class W5500(Chip):
-    """The chip behind its SPI slave."""
+    """The chip with its SPI slave."""
 
     def __init__(self) -> None:
         super().__init__(_COMMON, _ADDRESS, _RETRY)
@@ -34,7 +34,7 @@ class W5500(Chip):
             self.misuses.append(f"a frame of fixed length ends {self._left} bytes early")
 
     def answer(self) -> int:
-        """What is read at the present address, or 0."""
+        """The byte at the current address, or 0."""
         if len(self._header) < _HEADER or self._header[2] & 4 or self._left == 0:
             return 0
         return self._read(self._header[2] >> 3, self._position)

@@ -23,7 +23,7 @@ LOST = b"L"
 CALL, ANSWER = b"Q", b"A"
 # The number of the topic `/diagnostics`.
 DIAGNOSTICS = 0xFFFF
-# STOP, to the bridge: accept no more messages. From the bridge: ROS asks the node to end.
+# STOP, to the bridge: accept no more messages. From the bridge: ROS requests the end of the node.
 STOP = b"S"
 # DONE, from the bridge: all messages accepted before STOP are handed over. FAULT, from the bridge: the error that ended
 # the bridge.

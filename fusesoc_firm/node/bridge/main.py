@@ -1,8 +1,8 @@
 """The ROS process of a Python node, which carries serialised messages between ROS topics and a socket.
 
 The bridge runs under the Python for which ROS is installed. That is rarely the Python that runs this package, so the
-bridge is a separate program, which needs only ROS and the standard library of Python 3.8. `node/carrier.py` starts the
-bridge.
+bridge is a separate program, which needs only ROS and the standard library of Python 3.8. `node/engine/carrier.py`
+starts the bridge.
 
     python3 bridge SOCKET [ARGUMENT OF ROS ...]         # SOCKET is a file descriptor, a stream of parcels
 """
@@ -55,7 +55,7 @@ def main() -> int:
     threading.Thread(target=_give_up, args=(channel, ready), daemon=True).start()
     try:
         ros = _VERSIONS[config["ros"]](config, sys.argv[2:], channel)
-    except Exception as error:  # noqa: BLE001 - whatever ROS raises is reported
+    except Exception as error:  # noqa: BLE001 - all exceptions of ROS are reported
         channel.send(FAULT, data=str(error).encode())
         return 1
     ros.ready()

@@ -15,7 +15,7 @@ def managed_node(name: str, change: Callable[[bool], None], end: Callable[[], No
     from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
     class ManagedNode(LifecycleNode):  # type: ignore[misc]
-        # rclpy ends the process if a client requests a transition that the state does not have.
+        # rclpy ends the process if a client requests a transition that the state does not permit.
         def _LifecycleNodeMixin__change_state(self, transition: int) -> Any:  # noqa: N802
             try:
                 return super()._LifecycleNodeMixin__change_state(transition)
@@ -41,7 +41,7 @@ def managed_node(name: str, change: Callable[[bool], None], end: Callable[[], No
 def waiting_group(is_active: Callable[[], bool]) -> Any:
     """Return a callback group for `transient_local` subscriptions, whose messages wait in ROS until the node is active.
 
-    Their publishers do not send them again.
+    Their publishers do not repeat them.
     """
     from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 

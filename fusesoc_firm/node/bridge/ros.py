@@ -28,7 +28,7 @@ class BridgeError(Exception):
 
 
 class Gaps:
-    """The numbers of a topic's messages, of which each publisher counts its own."""
+    """The numbers of a topic's messages; each publisher counts separately."""
 
     def __init__(self) -> None:
         self._last: dict[str, int] = {}
@@ -73,7 +73,7 @@ class Ros(ABC):
         self._reported: set[str] = set()
         self._servers = {item["number"]: item for item in config["services"] if item["is_server"]}
         self._clients = {item["number"]: item for item in config["services"] if not item["is_server"]}
-        # The calls of the hardware's services that are not answered yet, by their numbers.
+        # The unanswered calls of the hardware's services, by number.
         self._asked: dict[int, Any] = {}
         self._call_numbers = itertools.count()
 
@@ -135,7 +135,7 @@ class Ros(ABC):
             self._is_taking = False
 
     def report(self, text: str) -> None:
-        """Tell the user, once."""
+        """Report a text to the user, once."""
         if text not in self._reported:
             self._reported.add(text)
             print(text, file=sys.stderr, flush=True)

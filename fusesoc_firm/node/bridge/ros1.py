@@ -48,7 +48,7 @@ class Ros1(Ros):
         }
         self._callers = {number: Caller(self, rospy, item) for number, item in self._clients.items()}
         self._gaps = {topic["number"]: Gaps() for topic in config["subscribers"] if topic["is_numbered"]}
-        # The topics that must be connected before messages of another one are handed over.
+        # For each topic, the topics that must be connected before its messages are passed on.
         self._others = {first: others for first, *others in (group["subscribers"] for group in config["groups"])}
         self._given = {group["subscribers"][0]: group["publishers"] for group in config["groups"]}
         self._subscribers: dict[int, Any] = {}
@@ -128,7 +128,7 @@ class Ros1(Ros):
         self._channel.send(DONE)
 
     def spin(self) -> None:
-        """Wait for `end`, and look at the types of the topics: rospy works in its own threads."""
+        """Wait for `end`, and check the types of the topics: rospy works in its own threads."""
         while not self._ended.wait(LOOK_SECONDS):
             with contextlib.suppress(OSError, self._rospy.ROSException):  # the master does not answer
                 self._look_at_types(dict(self._rospy.get_published_topics()))
@@ -152,7 +152,7 @@ class Ros1(Ros):
 
 
 class _Once(logging.Filter):
-    """Passes each report of a refused peer once, since a peer with another type of a topic tries again and again."""
+    """Passes each report of a refused peer once, since a peer with another type of a topic retries endlessly."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -168,7 +168,7 @@ class _Once(logging.Filter):
 
 
 def _warn_without_master() -> None:
-    """Say how to start the master for which rospy waits, if it does not run."""
+    """Report how to start the master for which rospy waits, if it does not run."""
     import rosgraph  # type: ignore[import-not-found, unused-ignore]
 
     if not rosgraph.is_master_online():

@@ -5,16 +5,15 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from .ros1 import Ros1
+from .ros import Ros
 
 
 class Caller:
-    """A client of a service: a thread that calls it, and that a server without an answer may block."""
+    """A client of a service: a thread that calls it. A server that does not answer may block the thread."""
 
-    def __init__(self, ros: Ros1, rospy: Any, service: dict[str, Any]) -> None:
+    def __init__(self, ros: Ros, rospy: Any, service: dict[str, Any]) -> None:
         self.proxy = rospy.ServiceProxy(service["name"], raw_service(rospy, service))
         self._ros = ros
         self._errors = (rospy.ServiceException, rospy.ROSException, OSError)
@@ -23,7 +22,7 @@ class Caller:
         threading.Thread(target=self._run, daemon=True).start()
 
     def put(self, number: int, payload: bytes) -> None:
-        """Call the service after all calls before."""
+        """Call the service after all earlier calls."""
         self._calls.put((time.monotonic(), number, payload))
 
     def _run(self) -> None:

@@ -65,12 +65,12 @@ class Ros2(Ros):
         return managed_node(name, self._change, end)
 
     def _change(self, is_active: bool) -> None:
-        """Begin or cease to carry messages. Clients see that an inactive node has no services and no actions."""
+        """Begin or stop carrying messages. To clients, an inactive node has no services and no actions."""
         if is_active == self._is_active:
             return
         if is_active:
             self._serve()
-            # What ROS has replaced in its queues meanwhile is not lost.
+            # Messages that ROS replaced in its queues meanwhile do not count as lost.
             for gaps in self._gaps.values():
                 gaps.forget()
         else:
@@ -99,7 +99,7 @@ class Ros2(Ros):
         self._publishers[topic["number"]] = self._node.create_publisher(message, topic["name"], _quality(topic))
 
     def _service(self, number: int, service: dict[str, Any]) -> Any:
-        """Return a server whose requests are handed over, instead of being answered at once."""
+        """Return a server that passes requests on instead of answering them at once."""
 
         def kept(request: Any, _: Any) -> Any:
             return request
@@ -120,7 +120,7 @@ class Ros2(Ros):
         self.ask(service, serialize_message(request), header)
 
     def answer_asker(self, service: int, asker: Any, payload: bytes | None, reason: str) -> None:
-        """Send the response; a call that failed has none in ROS 2."""
+        """Send the response; in ROS 2, a failed call has no response."""
         from rclpy.serialization import deserialize_message
 
         # An inactive node has no clients.
@@ -177,7 +177,7 @@ class Ros2(Ros):
             self._handled += 1
             if self._is_active:
                 self.take(number, payload)
-            # The message need not wait for the look at the publishers.
+            # The message need not wait for the check of the publishers.
             missing = self._missing(number, info)
             if self._is_active:
                 self.lose(number, missing)
@@ -202,7 +202,7 @@ class Ros2(Ros):
             return create()
 
     def _missing(self, topic: int, info: dict[str, int]) -> int:
-        """Return how many messages are missing before one; rclpy does not tell which publisher has numbered it."""
+        """Return the number of messages missing before one; rclpy does not report the publisher of a number."""
         if not self._has_one_publisher(topic):
             self._gaps[topic].forget()
             return 0
@@ -264,7 +264,7 @@ class Ros2(Ros):
             self._publishers[topic].publish(payload)
 
     def stop(self) -> None:
-        """Make `spin` take the messages that have already arrived, and no further messages."""
+        """Make `spin` process the messages that have already arrived, but no further ones."""
         self._stops_at = time.monotonic() + FLUSH_SECONDS
         self._executor.wake()
 

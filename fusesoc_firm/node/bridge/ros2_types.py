@@ -40,7 +40,7 @@ def message_class(name: str, word: str = "message") -> Any:
 
 
 def service_class(service: dict[str, Any]) -> Any:
-    """Return the class of a service, whose definition must be that of the hardware if ROS 2 tells its hash."""
+    """Return the class of a service, whose definition must be that of the hardware if ROS 2 provides its hash."""
     found = message_class(service["type"], "service")
     known = _installed_hash(service["type"])
     if known and service["signature"] and known != service["signature"]:

@@ -183,20 +183,20 @@ class DmaTransport(Closing):
                         burst, self._burst = bytes(self._burst), bytearray()
                         return burst_of(burst)
                     continue
-                # Who has nothing left to send would not notice that a frame on its way was lost.
+                # A caller without further frames would not notice the loss of a frame in transit.
                 self._check(TO_SYSTEM)
                 self._check(FROM_SYSTEM)
                 rest = None if end is None else end - time.monotonic()
                 if rest is not None and rest <= 0:
                     break
-                # Acknowledge the interrupt before looking at the descriptors, so that no completion is missed.
+                # Acknowledge the interrupt before checking the descriptors, so that no completion is missed.
                 self._device.write(FROM_SYSTEM + STATUS, Status.INTERRUPTS)
                 if self._from_system.done(self._next_received) is None:
                     self._device.wait(_LOOK_SECONDS if rest is None else min(rest, _LOOK_SECONDS))
         return None
 
     def is_at_rest(self) -> None:
-        """Return None, because the engine cannot tell whether the hardware is working."""
+        """Return None, because the engine cannot determine whether the hardware is working."""
 
     def close(self) -> None:
         """Stop the engine, so that it does not write to memory that has been released. A second call does nothing."""

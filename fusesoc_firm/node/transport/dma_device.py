@@ -25,7 +25,7 @@ _WRITE_COMBINE = "2"
 
 
 class Registers(Protocol):
-    """Access to the engine's registers, the only one that the driver has. A test gives it a model of the engine."""
+    """The driver's only access to the engine's registers. In tests, it is a model of the engine."""
 
     def read(self, offset: int) -> int:
         """Return the value of the register at `offset` (in bytes)."""

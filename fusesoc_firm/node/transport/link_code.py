@@ -67,7 +67,7 @@ class LinkDecoder:
         return frames
 
     def _keep(self, begun: bytes) -> None:
-        """Append to the coded frame that has begun, but no more than shows that it is too long."""
+        """Append to the incomplete coded frame, up to the size that proves it too long."""
         self._begun += begun[: self._most + 1 - len(self._begun)]
 
     def _end_frame(self, frames: list[bytes | None]) -> None:
@@ -91,7 +91,7 @@ def _stuffed(data: bytes) -> bytes:
             coded.append(_FULL_BLOCK)
             coded += row[start : start + _BLOCK_BYTES]
         rest = row[full * _BLOCK_BYTES :]
-        # At the end of the data, a full block needs no other one after it.
+        # At the end of the data, no block need follow a full block.
         if rest or not full or place < len(rows) - 1:
             coded.append(len(rest) + 1)
             coded += rest

@@ -45,7 +45,7 @@ def open_transport(
 
 
 def device_of(address: str) -> str:
-    """Return the kind and the device of an address, such as `uart:/dev/ttyUSB1`, or nothing without a device.
+    """Return the kind and the device of an address, such as `uart:/dev/ttyUSB1`, or "" without a device.
 
     Two addresses of the same device have the same result.
     """

@@ -14,13 +14,11 @@ The simulator is a separate process. If it ends unexpectedly, its output is show
 
 from __future__ import annotations
 
-import fcntl
 import os
 import select
 import signal
 import struct
 import subprocess
-import tempfile
 import threading
 import time
 from collections import deque
@@ -32,37 +30,33 @@ from pathlib import Path
 from typing import NoReturn
 
 from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError, TransportResetError
+from fusesoc_firm.tools import piped
 
 MOST_CYCLES = 2**31 - 1
 """The maximum number of cycles in one run, and of bytes in a frame."""
 
-# Connect the pipes to the descriptors that a simulator expects. A shell cannot copy two-digit descriptors, but it can
-# open them by name.
-_SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
 PIPE_VERSION = 4
 """The version of requests and reports."""
 WAITS_SECONDS = 0.01
-"""The least time between two requests of waits, and before the end of their count."""
+"""The minimum time between two requests of waits, and until the end of their count."""
 
 _SHOWN_LINES = 20
 # A simulator normally ends immediately on request, or when its pipes close.
 _END_SECONDS = 10.0
 
 # The simulator runs for this time before new frames are checked for, within the limits on cycles; while beats move,
-# also for this share of the time since the last frame or event. Each run costs time, above all on a busy machine.
+# also for this share of the time since the last frame or event. Each run has an overhead, especially on a busy machine.
 _STEP_SECONDS = 0.001
 _STEP_SHARE = 1 / 8
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
 _PIECE_BYTES = 2**16
-# The most that Linux grants every user. In a small pipe, a large frame needs a change of processes for each 64 KiB.
-_PIPE_BYTES = 2**20
 # The longest wait of `poll`, in ms.
 _MOST_POLLED = 2**31 - 1
 
 
 @dataclass(frozen=True)
 class Taken:
-    """The event that the system took a frame: the cycles of the frame's first and last beat."""
+    """The event that the system accepted a frame: the cycles of the frame's first and last beat."""
 
     first_cycle: int
     last_cycle: int
@@ -93,7 +87,7 @@ Event = Taken | Burst | ErrorPulse | Waits
 
 
 class _Reports:
-    """The reading end of a pipe, which can tell whether anything has arrived."""
+    """The reading end of a pipe, which can be polled for data."""
 
     def __init__(self, descriptor: int) -> None:
         # A file, since it can be closed twice; a number may belong to another file by then.
@@ -118,16 +112,6 @@ class _Reports:
         self._file.close()
 
 
-def _pipe() -> tuple[int, int]:
-    """Return the reading and the writing end of a pipe."""
-    ends = os.pipe()
-    if hasattr(fcntl, "F_SETPIPE_SZ"):
-        # Linux limits the pages of all pipes of a user.
-        with suppress(OSError):
-            fcntl.fcntl(ends[0], fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
-    return ends
-
-
 class Simulator(Closing):
     """A simulator in lock-step, which runs only on request and may be used by only one thread at a time.
 
@@ -143,28 +127,13 @@ class Simulator(Closing):
         self._has_version = False
         self._is_counting = False
         self._counted_to: int | None = None  # by the last `Waits`
-        self._printed = tempfile.TemporaryFile()  # noqa: SIM115
-        from_us, to_simulator = _pipe()
-        from_simulator, to_us = _pipe()
-        self._requests = open(to_simulator, "wb")  # noqa: PTH123, SIM115
-        self._reports = _Reports(from_simulator)
         try:
-            self._process = subprocess.Popen(
-                ["/bin/sh", "-c", _SHELL, "sh", f"/dev/fd/{from_us}", f"/dev/fd/{to_us}", *command],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=self._printed,
-                stderr=subprocess.STDOUT,
-                pass_fds=(from_us, to_us),
-                # Ctrl-C reaches only this process; the simulator ends when the pipe of requests closes.
-                start_new_session=True,
-            )
+            self._process, requests, reports, self._printed = piped.start(command, folder)
         except OSError as error:
-            self._close_files()
             raise TransportError(f"the simulator cannot be started in {folder}: {error.strerror}") from None
-        finally:
-            os.close(from_us)
-            os.close(to_us)
+        # The simulator ends when this file closes.
+        self._requests = open(requests, "wb")  # noqa: PTH123, SIM115
+        self._reports = _Reports(reports)
 
     @property
     def pid(self) -> int:
@@ -172,9 +141,9 @@ class Simulator(Closing):
         return self._process.pid
 
     def request(self, frame: bytes, *, is_aborted: bool = False, hole: int | None = None) -> None:
-        """Append a frame to the frames that wait to be sent to the system. May raise `TransportError`.
+        """Append a frame to the frames that wait for the system. May raise `TransportError`.
 
-        If `is_aborted`, the last beat aborts the frame. Otherwise, the byte at the place `hole` is not kept.
+        If `is_aborted`, the last beat aborts the frame. Otherwise, `tkeep` is 0 for the byte at the place `hole`.
         """
         if not 1 <= len(frame) <= MOST_CYCLES:
             raise ValueError(f"the frame has {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
@@ -191,7 +160,7 @@ class Simulator(Closing):
         self._write(b"W")
 
     def end_waits(self) -> None:
-        """End the count of waits if there is one; it takes time in each cycle. May raise `TransportError`."""
+        """End the count of waits, if any; counting takes time in each cycle. May raise `TransportError`."""
         if self._is_counting:
             self._is_counting, self._counted_to = False, None
             self._write(b"N")
@@ -233,7 +202,7 @@ class Simulator(Closing):
     def kill(self) -> None:
         """Kill the simulator immediately, with all processes that it has started; any thread may call this method.
 
-        The thread that uses the simulator gets a `TransportError`.
+        In the thread that uses the simulator, a `TransportError` is raised.
         """
         if self._process.poll() is None:
             # It leads a session, so this number is also that of its group. It may have ended meanwhile.
@@ -244,9 +213,6 @@ class Simulator(Closing):
         """Kill the simulator if it still runs. A second call does nothing."""
         self.kill()
         self._process.wait()
-        self._close_files()
-
-    def _close_files(self) -> None:
         for file in (self._requests, self._reports, self._printed):
             try:
                 file.close()
@@ -340,7 +306,7 @@ class Simulator(Closing):
 class Pace:
     """The settings with which a `SimulatorTransport` runs its simulator.
 
-    `send` waits while `most_frames` earlier frames have not yet been taken by the system. The simulator rests after
+    `send` waits while the system has not yet accepted `most_frames` earlier frames. The simulator rests after
     `rest_cycles` without a beat. At rest, the simulator still runs briefly every `idle_seconds`, for accelerators that
     send spontaneously (None: never). Like hardware whose output is not read, the simulator stops while unreceived
     bursts contain `most_bytes`. If the simulator ends unexpectedly, another one is started, up to `restarts` times.
@@ -378,7 +344,7 @@ class SimulatorTransport(Closing):
         self._observe, self._wants_waits = observe, wants_waits
         self._changed = threading.Condition()
         self._sent: deque[bytes] = deque()
-        self._frames = 0  # not yet taken by the system, including those in `_sent`
+        self._frames = 0  # not yet accepted by the system, including those in `_sent`
         self._received: deque[Burst | TransportResetError] = deque()
         self._bytes = 0  # in `_received`
         self._error: TransportError | None = None
@@ -427,7 +393,7 @@ class SimulatorTransport(Closing):
             return item
 
     def is_at_rest(self) -> bool:
-        """Return whether the system has taken all frames and has had no beat for `rest_cycles` since then."""
+        """Return whether the system has accepted all frames, and then had no beat for `rest_cycles`."""
         with self._changed:
             is_busy = self._frames or self._received or self._simulator.begun
             return not is_busy and self._simulator.quiet >= self._pace.rest_cycles
@@ -489,7 +455,7 @@ class SimulatorTransport(Closing):
             self._changed.notify_all()
 
     def _begin(self) -> Sequence[Event]:
-        """Pass on the frames, and run until they are taken and the first of them is answered."""
+        """Pass on the frames, and run until they are accepted and the first of them is answered."""
         frames = 0
         while self._sent:
             self._simulator.request(self._sent.popleft())
@@ -504,7 +470,7 @@ class SimulatorTransport(Closing):
         self._passes_frames = frames > 0
         if frames:
             self._changed_at = self._began
-        # A run ends when a frame is taken. To wait for this process then would cost more time than the simulation.
+        # A run ends when a frame is accepted. Waiting for this process then would take longer than the simulation.
         self._simulator.begin(self._step if frames else self._quiet_step, frames + 1)
         return ()
 
@@ -521,7 +487,7 @@ class SimulatorTransport(Closing):
         if any(not isinstance(event, Waits) for event in events):
             self._changed_at = now
             self._step = self._short_step
-        # After a burst, those to whom it goes need the processor more than hardware that may do nothing.
+        # After a burst, its receivers need the processor more than possibly idle hardware.
         has_burst = any(isinstance(event, Burst) for event in events)
         self._quiet_step = _FEWEST_CYCLES if has_burst else min(2 * self._quiet_step, self._step)
         self._began = now

@@ -24,7 +24,7 @@ class TransportResetError(TransportError):
 
 
 class LostFrameError(TransportError):
-    """A frame from the hardware was broken on its way and is dropped; the transport continues otherwise."""
+    """A frame from the hardware was broken in transit and is dropped; the transport continues."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Burst:
     """The valid bytes (by `tkeep`) of the system's stream up to a `tlast`: a frame or a part of a frame.
 
     `tid` is the stream's `tid`, if the transport carries it. `is_aborted` if the burst aborts its frame. For simulated
-    hardware, the burst also contains the clk cycles in which the first and the last beat were taken.
+    hardware, the burst also contains the clk cycles in which the first and the last beat were accepted.
     """
 
     data: bytes
@@ -65,7 +65,7 @@ class Transport(Protocol):
         """Send a whole frame; return when the hardware, or a bounded buffer, has it. May raise `TransportError`."""
 
     def is_ready(self) -> bool:
-        """Return whether the hardware takes the next frame without a wait; False also if this is unknown."""
+        """Return whether the hardware accepts the next frame without a wait; False also if unknown."""
 
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next burst, or None after `timeout` seconds (None: no limit) or when the transport is closed.

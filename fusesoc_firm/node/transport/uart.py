@@ -6,8 +6,8 @@
         transport.counts.broken                         # frames from the board that were dropped
 
 `link_code` describes the frames on the line. A frame from the board that has a wrong checksum is dropped, counted and
-reported, and the next one is received. When it is opened, the transport sends a break, which ends a frame that an
-earlier host has begun.
+reported, and the next one is received. On opening, the transport sends a break, which ends an incomplete frame of an
+earlier host.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class UartTransport(Closing):
                 rest = rest[self._write(rest) :]
 
     def is_ready(self) -> bool:
-        """Return False, because a line takes its time for each frame."""
+        """Return False, because a line needs time for each frame."""
         return False
 
     def receive(self, timeout: float | None = None) -> Burst | None:
@@ -87,7 +87,7 @@ class UartTransport(Closing):
             return self._receive(timeout)
 
     def is_at_rest(self) -> None:
-        """Return None, because the line cannot tell whether the hardware is working."""
+        """Return None, because the line cannot determine whether the hardware is working."""
 
     def close(self) -> None:
         """Close the line. A second call does nothing."""

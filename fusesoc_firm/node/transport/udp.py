@@ -1,7 +1,7 @@
 """The status of a node in fabric, as a transport for the frames that access it: each is the payload of a datagram.
 
-A datagram may be lost, so a request is repeated until it is answered. An access that is repeated reads the same word,
-or a newer one of a counter; a word that was written is written again.
+A datagram may be lost, so a request is repeated until it is answered. A repeated access reads the same word, or a newer
+value of a counter; a write is repeated.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class UdpStatus(Closing):
     """A transport to the status of the node at an IPv4 address."""
 
     def __init__(self, address: str) -> None:
-        """Open a socket. Raise `TransportError` if the address is not one of a host."""
+        """Open a socket. Raise `TransportError` if the address is not a host's."""
         self._address = address
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._payload = b""
@@ -59,7 +59,7 @@ class UdpStatus(Closing):
                 self._ask()
                 continue
             except OSError as error:
-                # The host, or its port, is not there yet.
+                # The host or its port is not yet available.
                 self._fault = error
                 time.sleep(left)
                 self._ask()
@@ -88,11 +88,11 @@ class UdpStatus(Closing):
         try:
             self._socket.send(self._payload)
         except OSError as error:
-            # Repeated later, as a lost datagram.
+            # It is repeated later, like a lost datagram.
             self._fault = error
 
     def _empty(self) -> None:
-        """Drop what has arrived, since a late answer to an earlier request would be taken for one to the next."""
+        """Drop received datagrams, since a late answer would be assigned to the next request."""
         self._socket.settimeout(0.0)
         while True:
             try:

@@ -26,7 +26,7 @@ PACKAGE_TEMPLATE = "hls/package.tcl"
 # The width of a descriptor's length field in bits: the DMA engine's maximum (PG021).
 _LENGTH_BITS = 26
 _ADDRESS_BITS = 32
-# From the DMA engine's registers to those of the status; each have 64 KiB.
+# The offset of the status registers from the DMA engine's registers; each block has 64 KiB.
 STATUS_OFFSET = 0x10000
 _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
 _STREAM_FROM_MANAGER = (*_STREAM, "tuser", "tid")

@@ -59,13 +59,12 @@ _INNER_NAMES = (
     *("link_error", "network_error", "id_error", "frame_error"),
     *("debounce", "u_pll", "u_stable", "u_button", "start", "note_error", "u_phy_reset", "u_system"),
 )
-# Contacts bounce for up to some 10 ms, and PHYs need a reset of 10 ms; the cycles are at least those that firm_debounce
-# takes.
+# Contacts bounce for up to about 10 ms, and PHYs need a reset of 10 ms. firm_debounce has a minimum number of cycles.
 _DEBOUNCE_SECONDS = 0.01
 _SHORTEST_DEBOUNCE = 4
 # The optional keys of a board.
 _OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq", "spi_rst_n"}
-# The pins of each interconnect but ethernet, whose pins depend on the PHY.
+# The pins of each interconnect except ethernet, whose pins depend on the PHY.
 _PINS = {**{kind.value: pins for kind, pins in LINK_PINS.items()}, **dict.fromkeys(CHIPS, CHIP_PINS)}
 
 
@@ -191,7 +190,7 @@ def read_board(name: str, folder: Path = Path()) -> Board:
 
 
 def _pll(board: Board, faults: Diagnostics) -> Pll | None:
-    """Return the PLL that makes clk, or None if the board has none; note its faults."""
+    """Return the PLL that generates clk, or None if the board has no PLL; note its faults."""
     if board.oscillator is None:
         return None
     if board.flow not in PLL_TEMPLATES:
@@ -233,7 +232,7 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
 
 
 def _check_ports(board: Board, pins: Mapping[str, Text], faults: Diagnostics) -> None:
-    """Note missing pins, and those of ports that the board does not have; `pins` are the ports with a pin."""
+    """Note missing pins, and pins of ports that the board does not have; `pins` contains the ports with a pin."""
     for port, value, name in (_OSCILLATOR, board.oscillator, "oscillator"), (_PHY_RESET, board.phy, "phy"):
         if value is None and (unused := pins.get(port)):
             faults.error(f"the pin '{port}' needs the key '{name}'", unused.source)
@@ -368,7 +367,7 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
 
 
 def _line_clocks(board: Board) -> Mapping[str, int]:
-    """Return the clocks of the line that the PHY gives, in MHz."""
+    """Return the line clocks that the PHY provides, in MHz."""
     return PHY_CLOCKS[Phy(str(board.phy))] if board.phy else {}
 
 
@@ -382,7 +381,7 @@ def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
     names = top_level_pins(system)
     return [
         _Port(
-            # In lower case, as GHDL writes names.
+            # GHDL writes names in lower case.
             names[block.block, pin.name].lower(),
             str(pin.direction),
             pin.bits,

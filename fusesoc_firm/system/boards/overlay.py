@@ -1,8 +1,8 @@
 """Derived System -> the files that bring up a board under Linux: device-tree overlays and the script that loads them.
 
-The overlay of the logic (`<design>.dtso`) has the bitstream's name, the clocks, the DMA engine's registers and
-interrupt, and the memory that engine and processor share. Memory that Linux is to reserve must be known when it boots,
-so a second overlay (`<design>_memory.dtso`) is for the boot loader.
+The overlay of the logic (`<design>.dtso`) contains the bitstream's name, the clocks, the DMA engine's registers and
+interrupt, and the memory that engine and processor share. Linux reserves memory only when it boots, so the boot loader
+applies a second overlay (`<design>_memory.dtso`).
 
 Sources: interrupts, UG585 (table 7-4) and UG1085 (table 13-1); names of nodes and numbers of clocks, Linux's device
 trees and bindings for both processors; u-dma-buf, https://github.com/ikwzm/udmabuf.
@@ -24,9 +24,9 @@ from fusesoc_firm.text.render import Context, render
 # The names under which Linux lists the UIO devices of engine and status, and the shared memory.
 DMA_NAME, STATUS_NAME, BUFFER_NAME = "firm-dma", "firm-status", "firm-buffer"
 REGISTER_BYTES = 0x10000
-# Where Linux reserves memory: both processors have memory below, and the engine reaches it.
+# Linux reserves memory below this address, where both processors have memory that the engine reaches.
 _RESERVED_BELOW = 0x40000000
-# Linux reserves contiguous memory in such pieces.
+# Linux reserves contiguous memory in multiples of this size.
 _ALIGNMENT = 0x400000
 _MOST_MEBIBYTES = 512
 # The engine's interrupt for frames from the system, and that of the status, in the block design.
@@ -38,9 +38,9 @@ _LEVEL_HIGH = 4
 class _Linux:
     """A processor in Linux's device trees.
 
-    Addresses have `cells` numbers of 32 bits. `interrupts` is the label of the interrupt controller, and
-    `first_interrupt` the number of the logic's interrupt 0 among the shared ones. `clocks` is the label of the clock
-    controller, and `first_clock` its number of the logic's clock 0. `architecture` is bootgen's word.
+    An address consists of `cells` 32-bit numbers. `interrupts` is the label of the interrupt controller, and
+    `first_interrupt` is the number of the logic's interrupt 0 among the shared interrupts. `clocks` is the label of the
+    clock controller, and `first_clock` is its number for the logic's clock 0. `architecture` is bootgen's name.
     """
 
     cells: int
@@ -60,7 +60,7 @@ _LINUX = {
 def bring_up_files(
     system: DerivedSystem, board: Board, mebibytes: int, *, is_reserved: bool = False
 ) -> Mapping[str, str]:
-    """Return the files by name; the shared memory has `mebibytes`.
+    """Return the files by name; `mebibytes` is the size of the shared memory.
 
     If `is_reserved`, Linux reserves the memory when it boots; otherwise the memory comes from Linux's contiguous
     memory (CMA). Raise `InputError` if the board has no processor, or if the system does not fit on it.

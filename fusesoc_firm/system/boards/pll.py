@@ -1,4 +1,4 @@
-"""The PLL that makes a board's clock from its oscillator, with the cell of the FPGA's family."""
+"""The PLL that derives a board's clock from its oscillator, with the cell of the FPGA's family."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from fractions import Fraction
 from typing import Any
 
 PLL_TEMPLATES = {"trellis": "verilog/pll_ecp5.v"}
-"""The template of the cell by flow, for the flows whose cell is known."""
+"""The template of the cell for each supported flow."""
 
-# Of EHXPLLL, in Hz: the compared clocks, input and output, and the VCO (FPGA-DS-02012, sysCLOCK PLL timing).
+# The limits of EHXPLLL in Hz: phase detector, input and output, and VCO (FPGA-DS-02012, sysCLOCK PLL timing).
 _SLOWEST_COMPARED, _FASTEST = 10 * 10**6, 400 * 10**6
 _SLOWEST_VCO, _FASTEST_VCO = 400 * 10**6, 800 * 10**6
 _WANTED_VCO = (_SLOWEST_VCO + _FASTEST_VCO) // 2
@@ -18,7 +18,7 @@ _LARGEST_DIVISOR = 128
 
 @dataclass(frozen=True)
 class Pll:
-    """A PLL whose feedback is its output; `oscillator` and `clock` are in Hz, the others divisors."""
+    """A PLL with its output as feedback; `oscillator` and `clock` are in Hz, all other attributes are divisors."""
 
     oscillator: Fraction
     clock: Fraction
@@ -35,7 +35,7 @@ class Pll:
 def pll_of(oscillator: Fraction, clock: Fraction) -> Pll | None:
     """Return the PLL for exactly `clock` from `oscillator`, both in Hz, or None if its divisors do not allow it.
 
-    Of several, it is the one that compares most often, with the VCO nearest to the middle of its range.
+    Of several solutions, the one with the highest phase-detector frequency, then the VCO nearest to mid-range, is used.
     """
     ratio = clock / oscillator
     if max(ratio.numerator, ratio.denominator) > _LARGEST_DIVISOR:

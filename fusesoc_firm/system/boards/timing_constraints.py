@@ -59,8 +59,8 @@ class _Constraints:
     def crossing(self, crossing: Crossing) -> Context:
         """Return the constraints on a crossing between two clocks.
 
-        `levels` and `pointers` are paths into synchronisers, `held` are registers and RAM whose values are stable while
-        they are read, and `fields` are those of sources that hold the fields of their messages themselves.
+        `levels` and `pointers` are paths into synchronisers. `held` are registers and RAM with values that are stable
+        during a read. `fields` are source blocks that hold the fields of their messages themselves.
         """
         scopes = crossing.scopes
         streams = [(scope, stream) for scope in scopes for stream in scope.streams]
@@ -101,7 +101,7 @@ class _Constraints:
                 yield {"source": self.names.label(block), "sink": name, "period": _nanoseconds(cycle)}
 
     def _origins(self, block: str) -> list[str]:
-        """Return a block and all blocks before it."""
+        """Return a block and all its predecessors."""
         found = {block: None}
         for sink in (open_ := [block]):
             before = [

@@ -1,6 +1,6 @@
 """Actions: a server or client becomes four converters, one each for goals, cancellations, feedback and results.
 
-The messages are those of ROS with their ids and states, so that bags contain them, too.
+The messages are ROS's own, with goal ids and states, so bags can contain them.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def action_messages(name: MessageName, ros: Middleware) -> dict[str, MessageName
 
 
 def _topic(block: Block, end: str) -> str | None:
-    """Return the topic on which ROS sends one of the messages of an action, if it is not a call."""
+    """Return the topic on which ROS sends a message of an action, or None if the message is part of a call."""
     if block.middleware is None or not block.name:
         return None
     if MIDDLEWARES[block.middleware] is ROS1:

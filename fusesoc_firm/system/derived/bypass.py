@@ -1,4 +1,4 @@
-"""Accelerators for a part of a message, whose other fields pass by (`others: pass`).
+"""Accelerators for a part of a message; the other fields bypass them (`others: pass`).
 
 The accelerator has ports only for its fields, which have a fixed size, and the handshakes of a message of fixed size. A
 generated entity around it receives and sends the whole message: it passes strings, arrays and all other fields on.
@@ -85,7 +85,7 @@ def _variable_parts(type_: AcceleratorType) -> Iterator[tuple[Data | Loop, Sourc
 
 
 def passing_hint(type_: str) -> str:
-    """Return the way in which an accelerator keeps the fields of a message that it does not have."""
+    """Return a hint that describes how an accelerator passes on the fields that it does not have."""
     return f"the fields that '{type_}' should pass need the key 'others' in its output"
 
 
@@ -106,7 +106,7 @@ def whole_ports(side: MessageSide) -> dict[Path, str]:
 
 
 def _part(side: MessageSide) -> MessageSide:
-    """Return the side of the user's accelerator: the used fields, like a message of fixed size."""
+    """Return the side of the user's accelerator: the used fields as a message of fixed size."""
     fields = tuple(_leaves(side.frame))
     frame = side.frame if side.frame.is_fixed_size else replace(side.frame, nodes=(Fixed(0, fields),))
     return replace(side, frame=frame, length=None)

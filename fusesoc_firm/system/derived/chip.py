@@ -1,4 +1,4 @@
-"""What a node of ROS 1 in the sockets of a W5500 or W5200 can do: the limits of a system with this interconnect."""
+"""The limits of a system that is a ROS 1 node and uses the sockets of a W5500 or W5200."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from fusesoc_firm.system.derived.timing import seconds_of
 from fusesoc_firm.system.written.specification import SERVER, Block, Specification
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# Sockets of the chip for connections: of eight, one calls the master, and two remain for calls of others.
+# The chip's sockets for connections: of eight sockets, one calls the master, and two accept calls of other nodes.
 CONNECTIONS = 5
-# Payload bytes of the longest message: it is written to a buffer of the chip as a whole, after its length.
+# The longest payload in bytes: a buffer of the chip holds the length and the whole message.
 LONGEST = 2044
-# The numbers of registrations, and of types, which the node's program counts in a byte and in 6 bits.
+# The node's program counts registrations in a byte, and types in 6 bits.
 MOST_TOPICS, MOST_TYPES = 127, 62
-# Seconds in which a call is answered: 255 alarms of 8 s.
+# The longest time limit of a call in seconds: 255 alarms of 8 s.
 LONGEST_LIMIT = 2000
 
 
 def check_chip(
     written: Specification, subscribers: Sequence[Converter], publishers: Sequence[Converter], faults: Diagnostics
 ) -> None:
-    """Note what the node cannot do, and warn where all of its topics cannot be connected at the same time."""
+    """Note unsupported features, and warn if not all topics can be connected at the same time."""
     project, blocks = written.project, {str(block.name): block for block in written.blocks}
     message, source = f"interconnect '{project.interconnect}' ", project.interconnect.source
     if project.clock is None:
@@ -37,7 +37,7 @@ def check_chip(
     for item in subscribers:
         _check_size(item, blocks[item.block], LONGEST, faults)
     for item in publishers:
-        # A byte before a response tells whether the call has succeeded.
+        # A byte before a response reports success or failure of the call.
         _check_size(item, blocks[item.block], LONGEST - 1 if item.service else LONGEST, faults)
         _check_durability(item, blocks[item.block], message, faults)
     _check_counts(topics, services, blocks, message, faults)
@@ -62,7 +62,7 @@ def _check_services(services: Sequence[Block], message: str, faults: Diagnostics
 
 
 def _check_size(item: Converter, block: Block, most: int, faults: Diagnostics) -> None:
-    """Note a converter whose payloads, or the payloads that its block asks for, do not fit in the chip's buffer."""
+    """Note a converter if its actual or requested payload size exceeds the chip's buffer."""
     key = next((name for name in ("max_length", "buffer") if (getattr(block, name) or 0) > most), None)
     least = item.frame.payload_bytes if item.frame.is_fixed_size else length_of(item.frame).minimum
     if key:
@@ -96,7 +96,7 @@ def _check_counts(
     message: str,
     faults: Diagnostics,
 ) -> None:
-    """Note more topics than connections or numbers, and warn where each topic once is more than all connections.
+    """Note too many subscribers, topics or types, and warn if there are more topics and services than connections.
 
     `topics` are the subscribers and the publishers.
     """

@@ -15,7 +15,7 @@ from fusesoc_firm.text.naming import identifier
 def clocks_of(specification: Specification, own: Fraction | None, faults: Diagnostics) -> tuple[Clock, ...]:
     """Return all clocks except clk, in the order of the specification, and note their faults.
 
-    `own` is the frequency of clk in Hz, if it is known.
+    `own` is the frequency of clk in Hz, or None.
     """
     project = specification.project
     _check_names(specification, faults)
@@ -55,7 +55,7 @@ def _check_names(specification: Specification, faults: Diagnostics) -> None:
 
 
 def _pin_called(specification: Specification, port: str) -> str:
-    """Return the pin whose port at the top level has this name, or an empty string if there is no such pin."""
+    """Return the pin with this port name at the top level, or an empty string if the pin does not exist."""
     pins = {str(item.name): item.pins for item in specification.accelerators}
     for block in specification.blocks:
         for pin in pins.get(str(block.type), ()):

@@ -1,7 +1,6 @@
 """Find the ports and fields to which each `outgoing` refers, and report faults in the data flow.
 
-An impossible connection is reported as one fault. Messages that are missing only because of this fault are not
-reported.
+An impossible connection is reported as one fault; messages that are missing as a consequence are not reported.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from fusesoc_firm.text.yaml_text import Text
 Sides = Mapping[str, tuple[MessageSide, ...]]
 Pair = tuple[MessageSide, MessageSide]
 
-# Stands in for the fields of a message without fields.
+# A placeholder for the fields of a message without fields.
 _NO_FIELD: Names = ()
 
 
@@ -32,10 +31,9 @@ _NO_FIELD: Names = ()
 class Wiring:
     """The connections between named `blocks` whose message sides (`inputs`, `outputs`) are known.
 
-    The other attributes prevent follow-up errors in faulty specifications. `has_more_blocks` is set if the names of
-    some blocks could not be read, `has_more_messages` if the messages of some connections are unknown. `strays` are the
-    messages of connections that could not be read. `ambiguous` are names that several blocks share; the tables contain
-    the first such block.
+    The other attributes prevent follow-up errors in faulty specifications. `has_more_blocks` is set if some blocks have
+    unreadable names, `has_more_messages` if some connections have unknown messages. `strays` are the messages of
+    unreadable connections. `ambiguous` are names that several blocks share; the tables contain the first such block.
     """
 
     blocks: Mapping[str, Block]
@@ -249,7 +247,7 @@ def _messages(sides: Sequence[MessageSide]) -> str:
 
 
 def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
-    """Return the fault in an accelerator's interface without messages under `key`, or an empty string."""
+    """Return the fault if an accelerator's interface has no messages under `key`, otherwise an empty string."""
     return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
 
 

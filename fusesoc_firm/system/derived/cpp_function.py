@@ -58,7 +58,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Argument:
-    """A parameter of the C++ function: a value or, with a `count`, an array of so many values.
+    """A parameter of the C++ function: a value or, with a `count`, an array of `count` values.
 
     `port` is the parameter's name; `elements` are its values in the order of the array.
     """
@@ -106,7 +106,7 @@ class Parameter:
 
     @property
     def mode(self) -> str:
-        """The mode of the interface from which an HLS tool makes the kernel's ports."""
+        """The interface mode from which an HLS tool generates the kernel's ports."""
         if self.is_stream:
             return "ap_fifo"
         return "ap_vld" if self.is_output else "ap_none"

@@ -1,8 +1,8 @@
 """Accelerators written as C++ functions whose messages have variable size: each parameter is an `hls::stream`.
 
-The lengths and the later fields of such a message become valid one after the other, so the function reads all fields as
-from FIFOs, in wire order, and writes its results in the same way. A field of fixed size is a stream of one value, or of
-the elements of its array; a string or an array is a stream of its elements, with a stream of one value for its length.
+The lengths and later fields of such a message become valid one after the other. The function therefore reads all fields
+in wire order, as from FIFOs, and writes its results in the same way. A field of fixed size is a stream of one value, or
+of its array's elements. A string or an array is a stream of its elements, with a stream of one value for its length.
 
 The kernel has the ports that HLS tools generate for `mode=ap_fifo`: `<name>_dout`, `<name>_empty_n` and `<name>_read`
 for an input, `<name>_din`, `<name>_full_n` and `<name>_write` for an output.
@@ -54,7 +54,7 @@ class Channel:
 
 
 def is_streamed(accelerator: AcceleratorType) -> bool:
-    """Whether the function has streams, since one of its messages has no fixed size."""
+    """Whether the function has streams, since one of its messages has a variable size."""
     return any(not side.frame.is_fixed_size for side in (*accelerator.inputs, *accelerator.outputs))
 
 

@@ -271,7 +271,7 @@ class _Analysis:
     def _resolve_accelerator_block(self, block: Block) -> None:
         assert block.type is not None
         names = [accelerator.name for accelerator in self.specification.accelerators]
-        # The block's accelerator may be one that could not be read.
+        # The block's accelerator may be unreadable.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
             hint = nearest(block.type, names) or "add this accelerator to 'accelerators'"
@@ -291,7 +291,7 @@ class _Analysis:
     def _resolve_converter(self, block: Block) -> None:
         missing = [key for key in CONVERTER_KEYS if getattr(block, key) is None]
         if missing:
-            # The faults in a block that could not be read are already noted.
+            # The faults in an unreadable block are already noted.
             if block.is_sound:
                 words = ", ".join(f"'{key}'" for key in missing)
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)

@@ -1,4 +1,4 @@
-"""What a node of ROS 2 in fabric can do so far: the limits of a system with `interconnect: ethernet`."""
+"""The limits of a system that is a ROS 2 node in fabric, with `interconnect: ethernet`."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from fusesoc_firm.system.written.specification import Block, Project, Specificat
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 MOST_SUBSCRIBERS = MOST_PUBLISHERS = 8
-# Bytes of the longest payload: of a sample in one frame, of one in several, and of one that is sent by default.
+# The longest payload in bytes: in one frame, in several frames, and by default for a publisher.
 LONGEST_IN_FRAME, LONGEST, LONGEST_SENT_BY_DEFAULT = 1344, 65280, 1024
-# Bytes of the headers beside a payload in a packet of IPv4, with further submessages before it.
+# The headers in bytes of an IPv4 packet with a payload, including submessages before the payload.
 _HEADERS_BYTES = 256
-# Bytes of payloads that wait; a longer payload is in the memory of a sample in several packets.
+# The buffer for received payloads in bytes; a longer payload is in the memory for samples in several packets.
 WAITING_BYTES = 4096
 _LEAST_DISCOVERY, _MOST_DISCOVERY = 4096, 16384
-# What the generics of the hardware may be at least.
+# The minimum values of the hardware's generics.
 LEAST_REASSEMBLED, _LEAST_ASSEMBLED = 2048, 1024
-# Samples of a writer that others may ask for, and slots for the samples of all writers together.
+# The maximum number of samples that a writer keeps, and of slots for the samples of all writers.
 MOST_DEPTH, MOST_SLOTS = 127, 256
-# Bytes of all slots.
+# The maximum size of all slots in bytes.
 MOST_HISTORY_BYTES = 1 << 20
 _SHORTEST_SLOT = 2
-# The frequencies of clk in MHz that the line of each PHY needs, and the hint about them.
+# For each PHY, the lowest and highest frequency of clk in MHz, and a hint.
 _CLOCKS = {
     Phy.GMII: ((125, 125), "125 MHz, which is also the clock of the line"),
     Phy.MII: ((25, None), "25 MHz, the clock of the line at 100 Mbit/s, and more"),
@@ -36,7 +36,7 @@ _MEGAHERTZ = 10**6
 
 
 def check_ethernet(written: Specification, system: DerivedSystem, faults: Diagnostics) -> None:
-    """Note what the hardware of a node by Ethernet cannot do; other systems have no limits here."""
+    """Note the faults of an Ethernet node; other systems are not checked here."""
     if system.network is None or system.network.kind is not NetworkKind.ETHERNET:
         return
     project, blocks = written.project, {str(block.name): block for block in written.blocks}
@@ -61,55 +61,55 @@ def check_ethernet(written: Specification, system: DerivedSystem, faults: Diagno
 
 
 def slot_bytes(publishers: Iterable[Converter]) -> int:
-    """Return the bytes of a slot, a power of two: the longest payload that a node sends fits in."""
+    """Return the size of a slot in bytes, a power of two that holds the longest payload sent."""
     return max(_SHORTEST_SLOT, _power(max(map(_longest, publishers), default=1)))
 
 
 def reassembled_bytes(system: DerivedSystem) -> int:
-    """Return the bytes of the longest packet that is reassembled, a power of two; 0 if none needs to be."""
+    """Return the size in bytes of the longest reassembled packet, a power of two; 0 without reassembly."""
     longest, given = _longest_of_several(system), system.network.reassembly if system.network else 0
     needed = max(given, longest + _HEADERS_BYTES if longest else 0)
     return max(LEAST_REASSEMBLED, _power(needed)) if needed else 0
 
 
 def assembled_bytes(system: DerivedSystem) -> int:
-    """Return the bytes of the longest sample that is put together, a power of two; 0 if none is taken."""
+    """Return the size in bytes of the longest assembled sample, a power of two; 0 without assembly."""
     longest = _longest_of_several(system)
     return max(_LEAST_ASSEMBLED, _power(longest)) if longest else 0
 
 
 def discovery_bytes(system: DerivedSystem) -> int:
-    """Return the bytes of discovery that wait, a power of two.
+    """Return the size of the discovery buffer in bytes, a power of two.
 
-    Peers announce all their endpoints in one packet, with whose payloads the fields of its submessages wait. One that
-    finds no room is counted, and the node asks for these endpoints again, two at a time.
+    Peers announce all their endpoints in one packet. The buffer holds its payloads and the fields of its submessages.
+    If the buffer is full, the loss is counted, and the node requests these endpoints again, two at a time.
     """
     return min(_MOST_DISCOVERY, max(_LEAST_DISCOVERY, reassembled_bytes(system)))
 
 
 def slot_count(used: int) -> int:
-    """Return the slots of a history of which so many are used, a power of two."""
+    """Return the number of slots of a history with `used` slots, a power of two."""
     return max(2, _power(used))
 
 
 def kept_of(quality: Quality) -> int:
-    """Return the number of a writer's samples that others may ask for."""
+    """Return the number of samples that a writer keeps for requests of its readers."""
     return quality.depth if quality.is_reliable or quality.is_transient_local else 1
 
 
 def ring_slots(quality: Quality) -> int:
-    """Return the number of a writer's slots, a power of two: one of them is for the sample that comes."""
+    """Return the number of a writer's slots, a power of two; one slot is for the next sample."""
     return 1 << kept_of(quality).bit_length()
 
 
 def _longest_of_several(system: DerivedSystem) -> int:
-    """Return the bytes of the longest payload that a node takes, if it comes in several frames; otherwise 0."""
+    """Return the size in bytes of the longest received payload if it takes several frames, otherwise 0."""
     longest = max(map(_longest, system.subscribers), default=0)
     return longest if longest > LONGEST_IN_FRAME else 0
 
 
 def _power(size: int) -> int:
-    """Return the next power of two from a size on."""
+    """Return the least power of two that is not less than a size."""
     return 1 << (size - 1).bit_length()
 
 
@@ -120,9 +120,9 @@ def _longest(item: Converter) -> int:
 
 
 def _check_clock(project: Project, phy: Phy, clock: Fraction | None, faults: Diagnostics) -> None:
-    """Note a missing clock, and one that the PHY's line cannot have.
+    """Note a missing clock, and a frequency that the PHY does not support.
 
-    A clock that a generator call gives has no place in the specification: it is that of a simulated line.
+    A clock from a generator call has no place in the specification and is not checked: it belongs to a simulated line.
     """
     (least, most), hint = _CLOCKS[phy]
     if project.clock is None:
@@ -138,7 +138,7 @@ def _check_clock(project: Project, phy: Phy, clock: Fraction | None, faults: Dia
 def _check_slots(
     publishers: Iterable[Converter], blocks: Mapping[str, Block], message: str, faults: Diagnostics
 ) -> int:
-    """Return the number of slots; note a publisher with too many kept messages, or else the first one without slots."""
+    """Return the number of slots; note each publisher with too many kept messages, and the first one without slots."""
     used = 0
     for item in publishers:
         block, kept = blocks[item.block], kept_of(item.quality)
@@ -157,7 +157,7 @@ def _check_slots(
 def _check_history(
     publishers: Sequence[Converter], slots: int, blocks: Mapping[str, Block], message: str, faults: Diagnostics
 ) -> None:
-    """Note too many bytes of all slots."""
+    """Note a fault if all slots together are too large."""
     size = slots * slot_bytes(publishers)
     if size > MOST_HISTORY_BYTES:
         block = blocks[max(publishers, key=_longest).block]
@@ -167,14 +167,14 @@ def _check_history(
 
 
 def _place_of_depth(block: Block) -> SourceRef | None:
-    """Return where a block says how many messages are kept."""
+    """Return the place that sets the number of kept messages of a block."""
     if block.qos is None:
         return block.name.source
     return block.qos.place("profile" if block.qos.profile and block.qos.depth is None else "depth")
 
 
 def _check_size(item: Converter, block: Block, direction: str, faults: Diagnostics) -> None:
-    """Note a converter whose payloads, or those that its block asks for, are too long or longer than the default."""
+    """Note a converter whose payloads exceed the hardware's limit, or whose smallest payload exceeds the default."""
     reason = f"but the node can {direction} {LONGEST}"
     key = next((name for name in ("max_length", "buffer") if (getattr(block, name) or 0) > LONGEST), None)
     if key:

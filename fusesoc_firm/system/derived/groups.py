@@ -1,4 +1,4 @@
-"""Groups of publishers with a scheduler each: the combined schedulers of section 4.3.5."""
+"""Groups of publishers, each with a separate scheduler: the combined schedulers of section 4.3.5."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from fusesoc_firm.text.yaml_text import Text
 
 
 def groups_of(project: Project, publishers: Sequence[Converter], faults: Diagnostics) -> tuple[Group, ...]:
-    """Return the groups of a system with these publishers, which is none unless the specification has some.
+    """Return the groups of a system with these publishers; empty if the specification has no groups.
 
-    Note faults: each publisher must be in one group, and the groups in the order of the publishers' ids, since the
+    Note faults: each publisher must be in one group, and groups must follow the order of the publishers' ids, since the
     hardware divides consecutive ids.
     """
     if not project.groups or not all(group.is_sound for group in project.groups):
@@ -46,7 +46,7 @@ def _check_scheduler(project: Project, faults: Diagnostics) -> None:
 
 
 def _check_members(project: Project, publishers: Sequence[str], faults: Diagnostics) -> None:
-    """Note publishers that are unknown, in two groups, in none, or in another order than their ids."""
+    """Note publishers that are unknown, in two groups, in no group, or out of the order of their ids."""
     members = list[Text](chain.from_iterable(group.publishers for group in project.groups))
     seen = set[str]()
     before = len(faults.found)

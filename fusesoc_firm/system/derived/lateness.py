@@ -15,7 +15,7 @@ _MOST_BYTES = 1 << 16
 def with_lateness_buffers(system: DerivedSystem, project: Project, faults: Diagnostics) -> DerivedSystem:
     """Return the system with the `late_bytes` of each publisher, and warn if a FIFO would be too large.
 
-    Without all times of all publishers, or if a publisher may never be served, there is no bound and no FIFO.
+    If a time of any publisher is unknown, or a publisher may never be served, there is no bound and no FIFO.
     """
     if project.lateness_buffers == NOT_ADDED:
         return system

@@ -78,10 +78,10 @@ def _check_whole(
 
 
 def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
-    """Return the source of the length of a subscriber's output. The received length is that of the whole message.
+    """Return the source of the length of a subscriber's output.
 
-    If a forwarded message (`is_sent`) lacks some parts, its length differs from the received length. An accelerator can
-    always use the received length.
+    The received length is the length of the whole message. An accelerator can always use it. If a forwarded message
+    (`is_sent`) lacks some parts, its length differs.
     """
     unused = [node for node in all_nodes(frame.nodes) if isinstance(node, Data | Loop) and not node.is_used]
     if not unused or not is_sent:

@@ -26,7 +26,7 @@ def link_of(
 ) -> Link | None:
     """Return the link between the host and a system, or None if the streams are ports of the system; note faults.
 
-    `clock` is the frequency of clk in Hz, if it is given.
+    `clock` is the frequency of clk in Hz, or None.
     """
     if project.interconnect not in LINKS:
         return None

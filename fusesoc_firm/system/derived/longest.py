@@ -11,15 +11,15 @@ from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# The default with a link, which stores whole frames. With the header and the bytes that an adapter sends late, such a
-# frame fills a memory of 2,048 bytes.
+# The default with a link, which stores whole frames. With its header and the adapter's late bytes, such a frame fills a
+# memory of 2,048 bytes.
 _LINK_DEFAULT = 2000
 
 
 def with_longest_payloads(
     subscribers: tuple[Converter, ...], project: Project, blocks: Mapping[str, Block], faults: Diagnostics
 ) -> tuple[Converter, ...]:
-    """Return the subscribers, those of variable size with their longest payloads; note faults in `maxLength`."""
+    """Return the subscribers, with the longest payload of each that has variable size; note faults in `maxLength`."""
     _check_keys(blocks, subscribers, faults)
     return tuple(
         item if item.frame.is_fixed_size else _limited(item, blocks[item.block], _default(item, project), faults)
@@ -34,11 +34,11 @@ def with_longest_sent(
     blocks: Mapping[str, Block],
     faults: Diagnostics,
 ) -> tuple[Converter, ...]:
-    """Return the publishers, those whose frames may pause with their longest payloads; note faults in `maxLength`.
+    """Return the publishers, with the longest payload of each that may pause; note faults in `maxLength`.
 
     By default, a publisher sends at most as much as the system's subscribers accept from the host, since a response
-    often has the size of its cause. A node in the sockets of a chip sends no more than a link does, and one by Ethernet
-    no more than fits in a small memory.
+    often has the size of its cause. A node with a TCP/IP chip has the default of a link. An Ethernet node has a default
+    that fits in a small memory.
     """
     _check_keys(blocks, publishers, faults)
     least = _LINK_DEFAULT if project.interconnect in CHIPS else DEFAULT_LONGEST

@@ -65,7 +65,7 @@ class End:
 
 
 class Overflow(Enum):
-    """What a full queue does with a further frame; a frame that has begun to leave is never dropped."""
+    """The action of a full queue on a further frame; a frame that has begun to leave is never dropped."""
 
     BLOCK = "block"
     DROP_NEWEST = "drop_newest"
@@ -76,7 +76,7 @@ class Overflow(Enum):
 class Queue:
     """The queue of a subscriber: `frames` whole frames with payloads of at most `longest` bytes.
 
-    Without any frames, it is a watchdog: frames that the subscriber does not accept are dropped after `limit` cycles.
+    With 0 frames, it is a watchdog: a frame that the subscriber does not accept is dropped after `limit` cycles.
     """
 
     frames: int
@@ -90,8 +90,8 @@ class Converter(Topic):
     """An instance of a converter; `id` counts subscribers and publishers separately, from 0, in the blocks' order.
 
     With `has_default_length`, `max_length` is a default, since neither bounds nor the specification limit the payload.
-    A publisher's `late_bytes` are stored in a FIFO while its frames are late (section 6.3.2). If the converter carries
-    messages of a service or an action, `service` is the block of that.
+    A publisher's `late_bytes` are the capacity of the FIFO for late frames (section 6.3.2). If the converter carries
+    messages of a service or an action, `service` is the block of the service or action.
     """
 
     id: int
@@ -105,12 +105,12 @@ class Converter(Topic):
 
     @property
     def may_pause(self) -> bool:
-        """Whether the frames of this publisher may pause: one of fixed size or with a buffer has the whole frame."""
+        """Whether the frames of this publisher may pause; a publisher of fixed size or with a buffer never pauses."""
         return not self.frame.is_fixed_size and not self.buffer
 
 
 class ServiceEnd(Enum):
-    """The end of a service or an action that a system is: a server answers calls or pursues goals, a client asks."""
+    """The role of a system in a service or an action: a server serves calls or goals, a client sends them."""
 
     SERVER = "server"
     CLIENT = "client"
@@ -135,11 +135,11 @@ class Service:
 
 @dataclass(frozen=True)
 class Action:
-    """An action that a system serves, or to which it sends goals: `block` is its block in the specification.
+    """An action that a system serves or sends goals to: `block` is its block in the specification.
 
-    `type` is the action's name; `goal`, `cancel`, `feedback` and `result` are the blocks of the converters.
-    `time_limit` seconds after the side with a goal last sent something about it, the goal fails. After `accept_limit`
-    seconds, a goal in the hardware is accepted in any case.
+    `type` is the action's name; `goal`, `cancel`, `feedback` and `result` are the blocks of the converters. A goal
+    fails if the side that pursues it sends nothing about it for `time_limit` seconds. After `accept_limit` seconds, a
+    goal in the hardware is accepted in any case.
     """
 
     block: str
@@ -269,7 +269,7 @@ class PublisherTimes:
 
 @dataclass(frozen=True)
 class Group:
-    """Publishers with consecutive ids that have a scheduler of their own: their blocks and the scheduler's policy."""
+    """Publishers with consecutive ids and a separate scheduler: their blocks and the scheduler's policy."""
 
     policy: str
     blocks: tuple[str, ...]
@@ -322,7 +322,7 @@ class Link:
 
 
 class NetworkKind(Enum):
-    """The way of a system that is a node itself to its network."""
+    """The network connection of a system that is itself a node."""
 
     ETHERNET = "ethernet"
     W5500 = "w5500"
@@ -348,12 +348,12 @@ class Host:
 
 @dataclass(frozen=True)
 class Network:
-    """The place of a system that is a node itself: its MAC address (six bytes), IPv4 addresses and names.
+    """The network settings of a system that is itself a node: its MAC address (six bytes), IPv4 addresses and names.
 
-    `namespace` is absolute, such as `/` or `/arm`. A node of ROS 1 has a `master`, with address and port, and knows the
-    names of `hosts`. `reassemblies` are the packets of IPv4 in fragments that may arrive at the same time, and
-    `reassembly` the bytes of the longest one, if the topics need fewer; 0 means as the topics need. Without an
-    `address` (0.0.0.0), the node gets one by DHCP.
+    `namespace` is absolute, such as `/` or `/arm`. A ROS 1 node has a `master`, with address and port, and knows the
+    names of `hosts`. `reassemblies` is the maximum number of fragmented IPv4 packets that may arrive at the same time.
+    `reassembly` is the size in bytes of the longest such packet, unless the topics need more. Without an `address`
+    (0.0.0.0), the node requests one by DHCP.
     """
 
     mac: bytes
@@ -385,7 +385,7 @@ class StatusAccess(Enum):
 
 @dataclass(frozen=True)
 class Software:
-    """The host's part of a system: `blocks` in software, and all connections whose messages travel on the host.
+    """The host's part of a system: `blocks` in software, and all connections on the host.
 
     The source of a connection is one of the `subscribers`, a block, or the hardware's publisher that represents a
     block's input. The sinks of a connection are blocks, the `publishers`, or the hardware's subscribers that represent
@@ -428,13 +428,13 @@ class DerivedSystem:
 
     The messages of `services` and `actions` have converters, but no topics.
 
-    `clock` is the frequency of clk in Hz, if it is given. A publisher that stops in the middle of a frame is cut off
-    after `watchdog` cycles, if this is not 0.
+    `clock` is the frequency of clk in Hz, or None. If `watchdog` is not 0, a publisher that stops in the middle of a
+    frame is cut off after `watchdog` cycles.
 
     Without a `link` or a `network`, the streams are ports of the system. Converters, accelerators and connections in
     software are not included. `names` maps each accelerator's message sides to their names outside the accelerator:
     `<block>_in`, `<block>_out1` and so on. If ids have two bytes, `tree` is the Manager of Managers. `pipeline` is the
-    key's value, if it is given.
+    key's value, or None.
     """
 
     name: str
@@ -466,7 +466,7 @@ class DerivedSystem:
 
     @cached_property
     def places(self) -> Mapping[int, int]:
-        """The place of each publisher among the Manager's inputs, by id."""
+        """The index of each publisher's Manager input, by id."""
         order = chain.from_iterable(self.tree.groups) if self.tree else range(len(self.publishers))
         return {number: place for place, number in enumerate(order)}
 

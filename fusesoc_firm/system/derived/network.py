@@ -1,4 +1,4 @@
-"""The network of a system that is a node itself: the specification's `network`."""
+"""The network of a system that is itself a node: the specification's `network`."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.yaml_text import Text
 
-# The ports of higher domains overlap with those that Linux gives to clients by default.
+# The ports of higher domains overlap with Linux's default range of ephemeral ports.
 _LAST_DOMAIN = 101
-# The port of a master of ROS 1 that does not have another one.
+# The default port of a ROS 1 master.
 _MASTER_PORT = 11311
 _HIGHEST_PORT = 0xFFFF
-# The middleware of a node by its interconnect: the legal word, and the version.
+# The middleware of a node by interconnect: the legal word and the version.
 _VERSIONS = {ETHERNET: ("ROS2", 2), **dict.fromkeys(CHIPS, ("ROS", 1))}
 _MAC = re.compile(r"[0-9A-Fa-f]{2}(:[0-9A-Fa-f]{2}){5}")
 _GROUP_BIT = 1
-# Half of those of firm_ipv4_reassembly: as many may wait until they leave.
+# Half of the packets of firm_ipv4_reassembly; the other half may be complete and waiting.
 _MOST_REASSEMBLIES, _LONGEST_PACKET = 4, 65535
 # The limit of rmw (RMW_NODE_NAME_MAX_NAME_LENGTH).
 _LONGEST_NAME = 255
 _WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
 _NAME = re.compile(_WORD)
 _NAMESPACE = re.compile(rf"/|(/{_WORD})+")
-# Networks of one address or of two have no room for hosts beside their own addresses.
+# A longer prefix leaves no host addresses beside the network and broadcast addresses.
 _LONGEST_PREFIX = 30
 _UNUSED_ADDRESS = IPv4Address(0)
-# The letter tells a name from an address.
+# At least one letter distinguishes a name from an address.
 _HOST_NAME = re.compile(r"(?:[\w-]+\.)*[\w-]*[A-Za-z][\w-]*", re.ASCII)
-# The node's program counts names in a byte, with its topics.
+# The node's program counts host names and topics together in a byte.
 _MOST_HOSTS = 64
 
 
@@ -60,7 +60,7 @@ def network_of(
     converters: tuple[Sequence[Converter], Sequence[Converter]],
     faults: Diagnostics,
 ) -> Network | None:
-    """Return the network of a system that is a node itself, or None; note faults, also those of an unused `network`.
+    """Return the network of a system that is itself a node, or None; note faults, even in an unused `network`.
 
     The key is legal with each interconnect, since a board or a generator call may replace the interconnect.
     `converters` are the subscribers and the publishers.
@@ -95,7 +95,7 @@ def network_of(
 
 
 def _check_topics(items: Iterable[Converter], namespace: str, blocks: dict[str, Block], faults: Diagnostics) -> None:
-    """Note blocks of one direction with the same topic, since a node in fabric has an end for each topic."""
+    """Note blocks of one direction with the same topic, since a node in fabric has only one endpoint for each topic."""
     owners: dict[str, str] = {}
     for item in items:
         name = item.ros_name if item.ros_name.startswith("/") else f"{namespace.rstrip('/')}/{item.ros_name}"
@@ -107,7 +107,7 @@ def _check_topics(items: Iterable[Converter], namespace: str, blocks: dict[str, 
 
 
 def _check_system(written: Specification, scheduling: Scheduling, software: Software, faults: Diagnostics) -> None:
-    """Note what a node in fabric cannot do."""
+    """Note features that a node in fabric does not support."""
     project = written.project
     message, source = f"interconnect '{project.interconnect}' ", project.interconnect.source
     legal, version = _VERSIONS[project.interconnect]
@@ -172,7 +172,7 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
 
 
 def _hosts(section: NodeNetwork, faults: Diagnostics) -> tuple[Host, ...]:
-    """Return the hosts with legal names and addresses; note the others."""
+    """Return the hosts with legal names and addresses; note the other hosts."""
     hosts: dict[str, Host] = {}
     for item in section.hosts:
         before = len(faults.found)
@@ -191,7 +191,7 @@ def _hosts(section: NodeNetwork, faults: Diagnostics) -> tuple[Host, ...]:
 
 
 def _master(text: Text, hosts: Sequence[Host], faults: Diagnostics) -> tuple[IPv4Address, int] | None:
-    """Return address and port of a master; the form of ROS_MASTER_URI is legal, too, also with the name of a host."""
+    """Return address and port of a master; a ROS_MASTER_URI and the name of one of `hosts` are also legal."""
     name, colon, port = text.removeprefix("http://").removesuffix("/").partition(":")
     port = port if colon else str(_MASTER_PORT)
     address = next((str(host.address) for host in hosts if host.name == name), name)
@@ -237,7 +237,7 @@ def _mac(text: Text, faults: Diagnostics) -> bytes | None:
 def _addresses(
     section: NodeNetwork, project: Project, faults: Diagnostics
 ) -> tuple[IPv4Address, IPv4Address, IPv4Address | None] | None:
-    """Return address, mask and gateway, or None if one has a fault."""
+    """Return address, mask and gateway, or None after a fault."""
     other = f", or '{DHCP}'" if project.interconnect == ETHERNET else ""
     address, netmask = _address(section.address, faults, other), _netmask(section.netmask, faults)
     gateway = None if section.gateway is None else _address(section.gateway, faults)
@@ -256,7 +256,7 @@ def _addresses(
 def _no_addresses(
     section: NodeNetwork, project: Project, faults: Diagnostics
 ) -> tuple[IPv4Address, IPv4Address, None] | None:
-    """Return what stands for the addresses that a DHCP server gives; note keys that have no meaning then."""
+    """Return placeholders for the addresses from a DHCP server; note keys that are illegal with DHCP."""
     before = len(faults.found)
     if project.interconnect in CHIPS:
         hint = f"legal here: an IPv4 address; '{DHCP}' is for interconnect '{ETHERNET}'"

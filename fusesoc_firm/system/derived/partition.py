@@ -127,7 +127,7 @@ class Parting:
         block = self.blocks[name]
         return Topic(name, frame, given_name=str(block.topic or ""), quality=quality_of(block))
 
-    # --- where a message is ----------------------------------------------------------------------------------------
+    # --- locations of messages -------------------------------------------------------------------------------------
 
     @cached_property
     def _in_software(self) -> frozenset[str]:

@@ -13,7 +13,7 @@ _MOST_BYTES = 1 << 23
 def queue_of(block: Block, subscriber: Converter, project: Project, faults: Diagnostics) -> Queue | None:
     """Return the queue of a subscriber with its longest payload, or its watchdog, or None; note faults.
 
-    If the longest payload is a default, there is a warning about the memory.
+    If the longest payload is a default, warn about the memory.
     """
     overflow = Overflow(str(block.overflow or BLOCK))
     if block.queue is None:
@@ -33,7 +33,7 @@ def queue_of(block: Block, subscriber: Converter, project: Project, faults: Diag
 
 
 def _watchdog_of(block: Block, overflow: Overflow, project: Project, faults: Diagnostics) -> Queue | None:
-    """Return the watchdog of a subscriber that drops frames without a queue; there, no frame waits to be the oldest."""
+    """Return the watchdog of a subscriber that drops frames without a queue, and so can drop only the newest frame."""
     if overflow is Overflow.DROP_NEWEST and project.watchdog:
         return Queue(0, 0, overflow, project.watchdog)
     if overflow is not Overflow.BLOCK:

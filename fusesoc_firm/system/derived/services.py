@@ -1,6 +1,6 @@
 """Services: a server or client becomes two converters, one for its requests and one for its responses.
 
-The checks of keys and the converters serve the blocks of actions, too.
+The checks of keys and the converters are shared with actions.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def services_of(blocks: Mapping[str, Block], parts: Parts, faults: Diagnostics) 
 def interface_blocks(
     blocks: Mapping[str, Block], parts: Parts, kind: InterfaceKind, faults: Diagnostics
 ) -> Sequence[Block]:
-    """Return the blocks of services or actions; note each one that accelerators in software use."""
+    """Return the blocks of services or actions; note each block that accelerators in software use."""
     found = {}
     in_software = {topic.block for topic in (*parts.software.subscribers, *parts.software.publishers)}
     for name, made in blocks.items():
@@ -126,7 +126,7 @@ def limit_of(written: Text | None, default: Fraction = _DEFAULT_LIMIT) -> float:
 def converter(block: Block, name: str, mode: str, message: MessageName | None, topic: str | None = None) -> Block:
     """Return a converter of a server or client; `message` is None if it is unknown.
 
-    In bags, the messages have the `topic`, if there is one. The keys of `mode` are those of the block, whose
+    `topic` is the messages' topic in bags, if any. The converter copies the block's keys for `mode`. The block's
     `maxLength` limits the messages to the hardware.
     """
     keys: dict[str, Any] = {key: getattr(block, key) for key in keys_only_of(Block, mode)}

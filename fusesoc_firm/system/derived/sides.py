@@ -32,7 +32,7 @@ class SidePort:
 class Handshake:
     """A pair of `valid` and `ready`; `part` is the part to which the pair belongs, empty for the message itself.
 
-    If there is a `segment_valid`, it has `segments` bits, which go low together with `ready`.
+    If `segment_valid` is present, it has `segments` bits, which go low together with `ready`.
     """
 
     part: str
@@ -43,7 +43,7 @@ class Handshake:
 
 
 def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> list[SidePort]:
-    """Return the ports of a message side; `gives` tells whether the side's block is the source of the message.
+    """Return the ports of a message side; `gives` means that the side's block is the source of the message.
 
     With `has_valid`, the side of a message of fixed size includes `msg_valid`, which signals a complete message. The
     side of a message of variable size always includes `msg_valid`.

@@ -1,4 +1,4 @@
-"""How the status registers of a system are accessed: the keys `status` and `timeStamps` of the specification."""
+"""The access to the status registers of a system: the keys `status` and `timeStamps` of the specification."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from fusesoc_firm.system.derived.model import Link, StatusAccess
 from fusesoc_firm.system.written.specification import ADDED, NO_STATUS, STATUS_AXI_LITE, STATUS_FRAMES, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# Frames of the highest id carry accesses in both directions, so no converter has it.
+# Frames with the highest id carry accesses in both directions, so no converter has this id.
 STATUS_ID = 255
 TREE_CHANNELS = 4096
-"""The subscribers and publishers that the registers of a system with ids of two bytes have room for."""
+"""The maximum number of channels that the registers of a system with ids of two bytes cover."""
 
 
 def status_id(id_bytes: int) -> int:
@@ -21,9 +21,9 @@ def status_id(id_bytes: int) -> int:
 def status_of(
     project: Project, link: Link | None, subscribers: int, publishers: int, faults: Diagnostics
 ) -> StatusAccess | None:
-    """Return the access to the status, or None without one; note faults.
+    """Return the access to the status, or None without a status; note faults.
 
-    The numbers are those of the system's converters.
+    The numbers count the system's converters.
     """
     if project.status == NO_STATUS:
         return None

@@ -45,7 +45,7 @@ _LONGEST_RUN = 2**31 - 1
 _PERIOD = "add 'period: <cycles, time or rate>', such as 'period: 100 Hz'"
 _WCET = "add 'wcet: <cycles or time>', or 'buffer: <bytes of the longest payload>'"
 
-# With ids of two bytes, `tree` decides; a group's schedulers take turns.
+# With ids of two bytes, `tree` chooses the policies.
 _IN_GROUPS = "round_robin", ("publishers are in groups by period, so those with short periods have more turns",)
 
 Rounding = Callable[[Fraction], int]
@@ -66,7 +66,7 @@ def scheduling_of(
 ) -> Scheduling:
     """Return the scheduler of a system with these publishers, whose `blocks` define the times; note faults.
 
-    `clock` is the frequency of clk in Hz, if it is given.
+    `clock` is the frequency of clk in Hz, or None.
     """
     reader = _Reader(clock, faults)
     times = tuple(reader.times(blocks[item.block], item, project) for item in publishers)
@@ -197,7 +197,7 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
 
 @dataclass(frozen=True)
 class _Reader:
-    """A reader of times; `clock` is the frequency of clk in Hz, if it is given."""
+    """A reader of times; `clock` is the frequency of clk in Hz, or None."""
 
     clock: Fraction | None
     faults: Diagnostics

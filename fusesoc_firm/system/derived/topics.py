@@ -18,7 +18,7 @@ _LEGAL = "legal here: letters, digits and single '_', as in /arm/left, or in arm
 
 @dataclass(frozen=True)
 class TopicUse:
-    """The use of a topic: its name and type, whether the system publishes or subscribes, and the place in the file."""
+    """The use of a topic: its name and type, the direction (publish or subscribe), and the place in the file."""
 
     topic: Topic
     is_published: bool

@@ -1,7 +1,7 @@
 """The tree of a Manager of Managers: groups of publishers, and the policies of its schedulers.
 
-The groups follow from the publishers' periods: in a group of n among g groups, round robin lets at most n*g-1 frames of
-other publishers go first, so publishers with short periods are in small groups.
+The groups follow from the publishers' periods. In a group of n among g groups, round robin serves at most n*g-1 frames
+of other publishers first, so publishers with short periods are in small groups.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fusesoc_firm.system.derived.model import Link, PublisherTimes, Scheduling, 
 from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# The limit of the hardware: groups, and publishers of a group.
+# The hardware's maximum number of groups, and of publishers in a group.
 _MOST = 256
 _TURNS, _PRIORITY = "round_robin", "fixed_priority"
 
@@ -61,9 +61,9 @@ def _cut(order: Sequence[int], sizes: Sequence[int]) -> tuple[tuple[int, ...], .
 
 
 def _sizes(periods: Sequence[int], longest: int) -> list[int]:
-    """Return the sizes of the fewest groups whose turns come within the periods, or else of equal groups.
+    """Return the sizes of the fewest groups that meet all periods, or else of equal groups.
 
-    `periods` ascend, in cycles. A turn takes a frame of `longest` cycles from each group.
+    `periods` are in cycles, in ascending order. A turn serves a frame of `longest` cycles from each group.
     """
     side = isqrt(len(periods) - 1) + 1
     for groups in range(side, min(_MOST, len(periods)) + 1):

@@ -1,4 +1,4 @@
-"""The watchdog of the Manager: the specification's `watchdog`. Those before subscribers are in `queue`."""
+"""The watchdog of the Manager: the specification's `watchdog`. `queue` contains the watchdogs before subscribers."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def bypass_configuration(type_: AcceleratorType) -> Context:
 def _is_followed(source: MessageSide, segment: int) -> bool:
     """Whether a string or an array follows a segment.
 
-    It passes only after the answer, so the accelerator cannot wait until the message is complete and correct.
+    The part passes only after the response, so the accelerator cannot wait for a complete and correct message.
     """
     return not source.frame.is_fixed_size and segment in segments_of(source.frame).parts.values()
 
@@ -77,7 +77,7 @@ def _pins(type_: AcceleratorType) -> list[Context]:
 
 
 def _passed(type_: AcceleratorType, sink: MessageSide, part: MessageSide) -> list[Context]:
-    """Return the wires of everything that is neither a handshake of the message nor a result."""
+    """Return the wires of all ports except the message's handshakes and the accelerator's results."""
     own = {whole_ports(sink)[port.field.path] for port in field_ports(part.frame)}
     ports = side_ports(sink.frame, type_.width, gives=True, has_valid=False)
     return [_wire(port) for port in ports if port.name not in own and port.name not in _HANDSHAKE]

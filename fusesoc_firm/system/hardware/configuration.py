@@ -44,7 +44,7 @@ NODE_BENCH_TEMPLATE, PHY_BENCH_TEMPLATE = "vhdl/node_bench.vhd", "vhdl/phy_bench
 
 
 def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> Context:
-    """Return the configuration of the top level; if it is watched, an output shows the wires that wait."""
+    """Return the configuration of the top level; `is_watched` adds an output with the waiting wires."""
     names = Names(system)
     return {
         **dimensions(system),
@@ -76,7 +76,7 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
 def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
     """Return the name of the test bench that compares frames with files, or of the live test bench with a pipe.
 
-    The live test bench of a node in fabric is a board: the pipe carries the bytes of its chip, or its frames.
+    The live test bench of a node in fabric simulates a board: the pipe carries the bytes of its chip, or its frames.
     """
     if system.network:
         return f"{system.entity}_network"
@@ -140,7 +140,7 @@ def _clocks(system: DerivedSystem) -> list[Context]:
 def _resets(system: DerivedSystem) -> Context:
     """Return the resets of all domains.
 
-    clk is released on its own. The domains of crossings are reset in turn and released together.
+    The reset of clk is released separately. The domains of crossings are reset in turn and released together.
     """
     instances = [_reset("clk", "", OWN_RESET)]
     if system.clocks:

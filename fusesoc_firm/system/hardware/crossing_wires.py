@@ -15,8 +15,8 @@ from fusesoc_firm.system.hardware.names import AXIS, RELEASED, Names, reset_of
 class SourceSide:
     """The signals that a connection offers to one of its sinks.
 
-    `ports` maps each port of the message side to a signal. `begun` maps each part to the signal that tells whether a
-    message or an element is present.
+    `ports` maps each port of the message side to a signal. `begun` maps each part to the signal that marks a message or
+    an element as present.
     """
 
     ports: Mapping[str, str]

@@ -109,13 +109,13 @@ def word(part: str, name: str) -> str:
 
 
 def parts_of(scope: Scope, scopes: Sequence[Scope]) -> list[str]:
-    """Return the words for the signals that tell whether the streams and elements within a scope are idle."""
+    """Return the words for the idle signals of the streams and elements within a scope."""
     streams = [word(f"{stream}_axis", "idle") for stream in scope.streams]
     return streams + [word(item.handshake.part, "idle") for item in scopes if item.parent == scope.handshake]
 
 
 def crossings(system: DerivedSystem, connection: Connection) -> list[Crossing | None]:
-    """Return the crossing before each sink of a connection, or None if both ends are alike."""
+    """Return the crossing before each sink of a connection, or None if both ends have the same clock and width."""
     return [_crossing(system, connection, sink) for sink in connection.sinks]
 
 

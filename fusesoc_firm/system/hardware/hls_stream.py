@@ -58,7 +58,7 @@ def _connected(item: Channel) -> Context:
 
 
 def _output_side(number: int, side: MessageSide, outputs: Sequence[Channel]) -> Context:
-    """Return an output's handshake: each segment waits for its values and for those of the segments before it."""
+    """Return an output's handshake: each segment waits for its values and for the previous segments."""
     is_computed = side.length is not None and side.length.source is LengthSource.COMPUTED
     places = {
         # A length is computed from the lengths of all parts, before the first segment.

@@ -30,12 +30,12 @@ from fusesoc_firm.system.hardware.names import (
 from fusesoc_firm.system.written.specification import Pin
 
 ERROR_CODE_BITS = 4
-# Begins the names of ports of the top level inside it, where the status reads or changes them.
+# The prefix of internal signals that replace ports of the top level if the status reads or changes them.
 INNER = "inner_"
 
 
 def subscriber_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the instance of a subscriber, from the Manager to its message side, after its queue or its watchdog."""
+    """Return the instance of a subscriber, with its queue or watchdog between the Manager and the subscriber."""
     ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
     return {
         **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
@@ -67,11 +67,11 @@ def _queue(names: Names, converter: Converter, system: DerivedSystem) -> dict[st
 
 
 def _memory(queue: Queue, lanes: int) -> dict[str, Any]:
-    """Return the size of a queue; one beat more than the longest frame shows that a frame is longer."""
+    """Return the size of a queue; one beat more than the longest frame detects a longer frame."""
     beats = -(-(ID_BYTES + LENGTH_BYTES + queue.longest) // lanes)
     return {
         "frames": queue.frames,
-        # The Manager removes a beat with only the id.
+        # The Manager removes a beat that contains only the id.
         "beats": beats + (0 if lanes == ID_BYTES else 1),
         "drop": None if queue.overflow is Overflow.BLOCK else {"generic": queue.overflow.value.upper()},
     }
@@ -97,7 +97,7 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
 
 
 def _own_error(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the errors of a publisher beside those that the watchdog finds."""
+    """Return the signals of a publisher's own errors, without the errors that the watchdog detects."""
     return {
         "block": converter.block,
         **{word: names.frame(converter.block, word) for word in ERROR_WORDS},
@@ -107,7 +107,7 @@ def _own_error(names: Names, converter: Converter, system: DerivedSystem) -> dic
 
 
 def _beats(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the signals to which a publisher, or its buffer, sends frames: of its FIFO, or else of the Manager."""
+    """Return the sink signals for a publisher's frames: the FIFO for late frames if present, else the Manager."""
     if not converter.late_bytes:
         return _manager_beats(converter, system)
     return {**{word: names.late(converter.block, word) for word in LATE_WORDS}, "place": 0, "slice": None}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived.model import DerivedSystem, Link, LinkKind, NetworkKind, Phy
 
-# A link's pins at the top level, with their names in the link's core; a board may omit pins that have a default.
+# A link's pins at the top level, with the link core's names; a board may omit pins with a default.
 LINK_PINS = {
     LinkKind.UART: (
         ("uart_rxd", "in", "std_logic"),
@@ -25,7 +25,7 @@ LINK_PINS = {
     ),
 }
 
-# The chip's pins of a node in its sockets, at the top level and at the node.
+# The pins of a TCP/IP chip, at the top level and at the node.
 CHIP_PINS = (
     ("spi_sck", "out", "std_logic"),
     ("spi_cs_n", "out", "std_logic"),
@@ -33,7 +33,7 @@ CHIP_PINS = (
     ("spi_miso", "in", "std_logic"),
     ("spi_rst_n", "out", "std_logic"),
 )
-# The PHY's pins of a node by Ethernet, at the top level and at the core firm_<phy>, with their bits.
+# The PHY pins of an Ethernet node, at the top level and at the core firm_<phy>, with their widths.
 PHY_PINS: Mapping[Phy, tuple[tuple[str, str, int | None], ...]] = {
     Phy.GMII: (
         ("gmii_rx_clk", "in", None),
@@ -69,7 +69,9 @@ PHY_PINS: Mapping[Phy, tuple[tuple[str, str, int | None], ...]] = {
         ("rmii_txd", "out", 2),
     ),
 }
-# The bits of a byte that each PHY moves at an edge of the line's clock, and the clocks that it gives, in MHz.
+HOST_PINS: tuple[Sequence[tuple[str, str, object]], ...] = (*LINK_PINS.values(), CHIP_PINS, *PHY_PINS.values())
+"""The pins of every link, chip and PHY at the top level."""
+# For each PHY, the bits per edge of the line clock, and the clocks that the PHY provides, in MHz.
 _LINE_BITS = {Phy.GMII: 8, Phy.MII: 4, Phy.RGMII: 4, Phy.RMII: 2}
 PHY_CLOCKS: Mapping[Phy, Mapping[str, int]] = {
     Phy.GMII: {"gmii_rx_clk": 125},
@@ -77,13 +79,13 @@ PHY_CLOCKS: Mapping[Phy, Mapping[str, int]] = {
     Phy.RGMII: {"rgmii_rx_clk": 125},
     Phy.RMII: {},
 }
-# The signal at firm_sim_phy of each pin, by the pin's name without the PHY's; others are pins of errors, or open.
+# The firm_sim_phy signal for each pin, by the pin's name without the PHY prefix; other pins report errors or are open.
 _SIMULATED = {
     **dict.fromkeys(("rx_dv", "crs_dv", "rx_ctl"), "rx_dv"),
     **dict.fromkeys(("tx_en", "tx_ctl"), "tx_en"),
     **{name: name for name in ("rxd", "txd")},
 }
-# The bits of network_error of firm_net_link, by the names of their counters.
+# The bits of network_error of firm_net_link, lowest first, by counter name.
 NETWORK_FAULTS = {
     "broken_frames": "a frame on the line is broken or too long",
     "broken_datagrams": "a datagram for the board is broken",
@@ -100,7 +102,7 @@ NETWORK_FAULTS = {
     " or encoding",
 }
 ADDRESS_FAULT = 8
-"""The bit of an address that is taken."""
+"""The bit of network_error that reports an address conflict."""
 CHIP_NUMBERS = {NetworkKind.W5500: 5500, NetworkKind.W5200: 5200}
 
 # The default baud rate of firm_uart_link, which a netlist keeps.
@@ -108,7 +110,7 @@ _BAUD = 1_000_000
 
 
 def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """Return the streams as ports of the top level, or the link or node that they connect to."""
+    """Return the configuration of the host side: streams as ports, a link or a node."""
     nothing = {"has_streams": False, "link": None, "node": None, "ethernet": None}
     if system.network and system.network.kind is NetworkKind.ETHERNET:
         return {**nothing, "ethernet": _ethernet(system, system.network.phy)}
@@ -129,12 +131,12 @@ def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
 
 
 def rom_entity(system: DerivedSystem) -> str:
-    """Return the name of the ROM of a node in a chip's sockets."""
+    """Return the name of the ROM of a node with a TCP/IP chip."""
     return f"{system.entity}_rom"
 
 
 def node_entity(system: DerivedSystem) -> str:
-    """Return the name of the entity that is the node of a system by Ethernet."""
+    """Return the name of the entity of a system's Ethernet node."""
     return f"{system.entity}_node"
 
 
@@ -144,7 +146,7 @@ def phy_pins(phy: Phy) -> list[tuple[str, str, str]]:
 
 
 def _ethernet(system: DerivedSystem, phy: Phy) -> dict[str, Any]:
-    """Return a node by Ethernet, and the core of its PHY's pins."""
+    """Return an Ethernet node, with the core for its PHY's pins."""
     return {
         "entity": node_entity(system),
         "name": phy.value.upper(),
@@ -160,14 +162,14 @@ def _ethernet(system: DerivedSystem, phy: Phy) -> dict[str, Any]:
 
 
 def _in_simulation(phy: Phy, pin: Mapping[str, str]) -> dict[str, Any]:
-    """Return what the PHY of a simulated board, whose line has the system's clock, connects to a pin."""
+    """Return the connection of a pin to the PHY of a simulated board, whose line has the system's clock."""
     name, is_input = pin["name"], pin["direction"] == "in"
     signal = "clk" if name in PHY_CLOCKS[phy] else _SIMULATED.get(name.partition("_")[2], "")
     return {"signal": signal, "is_low": not signal and is_input, "is_open": not (signal or is_input)}
 
 
 def _node(system: DerivedSystem) -> dict[str, Any]:
-    """Return a node in a chip's sockets."""
+    """Return a node with a TCP/IP chip."""
     assert system.network is not None
     assert system.clock is not None
     return {
@@ -183,5 +185,5 @@ def _pins(pins: Iterable[tuple[str, str, str]]) -> list[dict[str, str]]:
 
 
 def _uart(link: Link) -> dict[str, Any]:
-    """Return the clock's frequency, and the cycles of a bit, as firm_uart_link rounds them."""
+    """Return the clock's frequency, and the cycles per bit with the rounding of firm_uart_link."""
     return {"clock_hz": link.clock_hz, "bit_cycles": (link.clock_hz + _BAUD // 2) // _BAUD}

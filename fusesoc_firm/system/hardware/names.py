@@ -25,40 +25,21 @@ from fusesoc_firm.system.derived.sides import (
     side_ports,
 )
 from fusesoc_firm.system.hardware.crossings import Crossing, all_crossings
+from fusesoc_firm.system.hardware.interconnect import HOST_PINS
 from fusesoc_firm.system.written.specification import Pin
 from fusesoc_firm.text.naming import distinct_identifiers
+from fusesoc_firm.text.reserved import reserved_names
 
-# Names that the top level and its test bench use, which signals of blocks and pins must not have.
-_TAKEN = """
-    system_rst_n u_system_rst
-    clk rst_n id_error frame_error frame_error_code waits rtl u_manager u_scheduler firm work ieee std_logic_1164
-    s_axis_tdata s_axis_tkeep s_axis_tuser s_axis_tvalid s_axis_tlast s_axis_tready
-    m_axis_tdata m_axis_tkeep m_axis_tuser m_axis_tid m_axis_tvalid m_axis_tlast m_axis_tready
-    to_tdata to_tkeep to_tuser to_tvalid to_tlast to_tready
-    from_tdata from_tkeep from_tuser from_tid from_tvalid from_tlast from_tready
-    burst_tdata burst_tkeep burst_tuser burst_tid burst_tvalid burst_tlast burst_tready
-    u_host u_system u_join u_environment
-    sub_axis_tdata sub_axis_tkeep sub_axis_tuser sub_axis_tlast sub_axis_tvalid sub_axis_tready
-    pub_axis_tdata pub_axis_tkeep pub_axis_tuser pub_axis_tvalid pub_axis_tlast pub_axis_tready pub_expired
-    sched_request sched_beat sched_last sched_grant_valid sched_grant_select
-    u_link u_adapter clock_hz baud link_error link_error_code
-    uart_rxd uart_txd uart_rts_n uart_cts_n spi_sclk spi_cs_n spi_mosi spi_miso spi_irq
-    periods deadlines transfer_times sizes policies firm_sched_pkg times_t policies_t policy_t
-    status_interrupt u_status_access u_status_registers u_status_counters
-    bus_valid bus_write bus_address bus_write_data bus_read_data bus_done
-    status_enable status_fault status_channel status_code status_lost status_address status_word status_clear
-    channel_error channel_error_code inner_id_error inner_link_error inner_frame_error inner_frame_error_code
-    inner_s_axis_tdata inner_s_axis_tkeep inner_s_axis_tuser inner_s_axis_tvalid inner_s_axis_tlast inner_s_axis_tready
-    inner_m_axis_tdata inner_m_axis_tkeep inner_m_axis_tuser inner_m_axis_tid inner_m_axis_tvalid inner_m_axis_tlast
-    inner_m_axis_tready
-    s_axi_awaddr s_axi_awprot s_axi_awvalid s_axi_awready s_axi_wdata s_axi_wstrb s_axi_wvalid s_axi_wready
-    s_axi_bresp s_axi_bvalid s_axi_bready s_axi_araddr s_axi_arprot s_axi_arvalid s_axi_arready
-    s_axi_rdata s_axi_rresp s_axi_rvalid s_axi_rready
-    std standard std_logic std_logic_vector
-""".split()
+_TEMPLATES = (
+    "vhdl/system.vhd",
+    "vhdl/test_bench.vhd",
+    *(f"partials/{name}" for name in ("status_port", "status_signals", "status")),
+)
 AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
 # The reset of clk's domain.
 OWN_RESET = "system_rst_n"
+# Names in the top level and its test bench that signals of blocks, pins and labels must not have.
+_TAKEN = reserved_names(*_TEMPLATES) | {pin for pins in HOST_PINS for pin, *_ in pins} | {OWN_RESET, "u_system_rst"}
 # Low until all clock domains have been reset.
 RELEASED = "domains_rst_n"
 # Between a publisher and its buffer, and between a subscriber and its queue or watchdog.
@@ -166,7 +147,7 @@ class Names:
 
 
 def queue_word(queue: Queue) -> str:
-    """Return the word for what is before a subscriber, also in its label."""
+    """Return the kind of a queue, `watchdog` or `queue`, which is also part of its label."""
     return "watchdog" if queue.limit else "queue"
 
 
@@ -215,7 +196,7 @@ def clock_names(system: DerivedSystem) -> list[str]:
 
 
 def resets(system: DerivedSystem) -> list[str]:
-    """Return the resets of all clocks, each the output of an instance; that of clk is first."""
+    """Return the resets of all clocks, each the output of an instance; the reset of clk is first."""
     if not system.clocks:
         return [OWN_RESET]
     return [OWN_RESET, RELEASED, *(name for clock in system.clocks for name in (seen_reset(clock), clock.reset))]

@@ -1,6 +1,6 @@
-"""SystemRDL -> registers as plain data: for the template of their VHDL, and for whoever reads and writes them.
+"""SystemRDL -> registers as plain data, for the VHDL template and for software that accesses the registers.
 
-`systemrdl-compiler` reads the description, so its rules hold here, too: overlapping fields are an error, for example.
+`systemrdl-compiler` reads the description, so its rules apply; overlapping fields are an error, for example.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ class Kind(Enum):
 
     CONSTANT = "constant"
     STORAGE = "storage"
-    STICKY = "sticky"  # hardware sets it, and a written one clears it
-    COUNTER = "counter"  # stops at its highest value
+    STICKY = "sticky"  # hardware sets it, writing 1 clears it
+    COUNTER = "counter"  # saturates at its highest value
     VALUE = "value"  # hardware drives it
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a register: `width` bits from bit `low`; `enable` is the path of an interrupt's enabling field."""
+    """A field of a register: `width` bits from bit `low`; `enable` is the path of an interrupt's enable field."""
 
     name: str
     low: int
@@ -48,7 +48,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Register:
-    """A register; `is_external` if it is not in the block of registers itself."""
+    """A register; `is_external` means that it is implemented outside the register block."""
 
     name: str
     address: int
@@ -126,10 +126,9 @@ def _kind(node: FieldNode) -> Kind:
 
 
 def registers_configuration(registers: RegisterMap, signatures: Sequence[str], address_bits: int = 16) -> Context:
-    """Return the configuration of the block of registers; `signatures` are the channels', in hexadecimal digits.
+    """Return the configuration of the register block; `signatures` are the channels', in hexadecimal digits.
 
-    External registers are not part of the block. With addresses of more than 16 bits, there are many signatures, which
-    are in a memory.
+    External registers are not part of the block. With addresses of more than 16 bits, a memory holds the signatures.
     """
     has_signature_memory = address_bits > 16
     signature_bits = index_bits(len(signatures))

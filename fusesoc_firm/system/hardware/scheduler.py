@@ -16,7 +16,7 @@ _COMBINED = "firm_sched_combined"
 def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
     """Return the scheduler's entity and generics, with the constants for publishers' times that the generics use.
 
-    If publishers are in groups, return the generics of the Manager of Managers, too, which contains the schedulers.
+    With ids of two bytes, also return the generics of the Manager of Managers, which contains the schedulers.
     """
     scheduling = system.scheduling
     policies = [scheduling.policy, *(group.policy for group in scheduling.groups)]

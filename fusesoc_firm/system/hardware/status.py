@@ -24,16 +24,16 @@ _NETWORK_ADDRESS = 0x40
 _CHANNELS_ADDRESS, _CHANNEL_BYTES = 0x8000, 0x40
 _WORD_DIGITS = 8
 
-# The bits of a register's address beside a Manager, and the channels that they reach.
+# The address width of the registers with a Manager, and the number of channels that it covers.
 ADDRESS_BITS, MOST_CHANNELS = 16, 512
-# Beside a Manager of Managers, which has at most TREE_CHANNELS.
+# The address width with a Manager of Managers, which has at most TREE_CHANNELS.
 _TREE_ADDRESS_BITS = 20
-# Of the address of a word within a channel.
+# The address bits of a word within a channel.
 _WORD_BITS = 4
 
 
 class Part(Flag):
-    """The parts that not every status has; the values are the bits of the register `features`."""
+    """The optional parts of a status; the values are the bits of the register `features`."""
 
     TIME_STAMPS = 1
     NETWORK = 2
@@ -44,9 +44,9 @@ NO_PART = Part(0)
 
 @dataclass(frozen=True)
 class Identity:
-    """What distinguishes the hardware of a system: `digest`, and the signatures of the channels' messages.
+    """The identity of a system's hardware: `digest`, and the signatures of the channels' messages.
 
-    All are hexadecimal digits. A host that expects another digest would misread the frames of the system.
+    All are in hexadecimal digits. A host that expects a different digest would misread the system's frames.
     """
 
     digest: str
@@ -54,10 +54,10 @@ class Identity:
 
 
 def identity_of(system: DerivedSystem, signatures: Sequence[str]) -> Identity:
-    """Return the identity of a system with the signatures of its messages: the subscribers' by id, then publishers'.
+    """Return the identity of a system; `signatures` are those of the subscribers by id, then of the publishers.
 
-    The digest covers what a host must know: the converters with their ids, topics and messages, and bursts. It does not
-    cover clocks, boards and accelerators, since frames are the same for them all.
+    The digest covers the facts that a host needs: the converters' ids, topics and messages, and preemption. It excludes
+    clocks, boards and accelerators, which do not affect frames.
     """
     described = [
         system.name,
@@ -120,7 +120,7 @@ def parts_of(system: DerivedSystem) -> Part:
 
 
 def network_words() -> dict[str, str]:
-    """Return the meanings of the counters of a network, by their registers' names."""
+    """Return the meaning of each network counter by register name."""
     return {_network_register(name): meaning for name, meaning in NETWORK_FAULTS.items()}
 
 
@@ -134,7 +134,7 @@ def status_entity(system: DerivedSystem) -> str:
 
 
 def status_configuration(system: DerivedSystem) -> Context:
-    """Return the connection of the status to the top level, and what it changes there."""
+    """Return the connection of the status to the top level, and the resulting changes there."""
     is_frames = system.status is StatusAccess.FRAMES
     return {
         "scope": INNER if system.status else "",
@@ -148,12 +148,12 @@ def status_configuration(system: DerivedSystem) -> Context:
 
 
 def address_bits(system: DerivedSystem) -> int:
-    """Return the bits of a register's address."""
+    """Return the width of a register's address."""
     return _TREE_ADDRESS_BITS if system.tree else ADDRESS_BITS
 
 
 def _has_inner_streams(system: DerivedSystem) -> bool:
-    """Return whether the Manager's streams are signals: the status is in between, or listens."""
+    """Return whether the Manager's streams are internal signals, since the status intercepts or monitors them."""
     return system.status is StatusAccess.FRAMES or bool(system.status and system.tree)
 
 

@@ -14,8 +14,8 @@ VERILOG_BENCH_TEMPLATE = "verilog/test_bench.v"
 VERILOG_NODE_BENCH_TEMPLATE, VERILOG_PHY_BENCH_TEMPLATE = "verilog/node_bench.v", "verilog/phy_bench.v"
 ENVIRONMENT_TEMPLATE = "vhdl/in_environment.vhd"
 
-# Cycles without a beat until a simulation with a link ends: the time of 300 bytes, which a link sends without a beat at
-# the host.
+# Cycles without a beat until a simulation with a link ends: the time of 300 bytes, in which a link may deliver no beat
+# to the host.
 _QUIET_BITS = 3000
 # Space for the user's own files next to the generated ones.
 _LEAST_FRAMES = 65536

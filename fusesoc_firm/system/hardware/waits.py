@@ -1,7 +1,7 @@
-"""The wires between the blocks of a system, and the handshakes that show whether a message waits on them.
+"""The wires between the blocks of a system, and the handshakes that reveal a waiting message.
 
-A live simulation counts the cycles in which they wait (docs/reference/transports.md). In VHDL, an entity like the top
-level has an output for each wire; in Verilog, the test bench reads the top level's signals.
+A live simulation counts the waiting cycles (docs/reference/transports.md). In VHDL, a variant of the top level has an
+output for each wire; in Verilog, the test bench reads the top level's signals.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HOST, FROM_HOST, TO_HOST = "the host", "from the host", "to the host"
 Wire = tuple[str, str]
 """The source and the sink of a wire: blocks, or ends that are not blocks."""
 HOST_WIRES: tuple[Wire, ...] = ((HOST, FROM_HOST), (TO_HOST, HOST))
-"""The wires on which the simulated host itself counts; they precede those within the system."""
+"""The wires whose waits the simulated host counts; they precede the wires within the system."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Level:
 
     @property
     def verilog(self) -> str:
-        """The level in GHDL's netlist, which has lower-case names, and no index in a vector of one bit."""
+        """The level in GHDL's netlist, which has lower-case names and one-bit vectors without an index."""
         name = self.signal.lower()
         return name if self.width in (None, 1) else f"{name}[{self.place}]"
 
@@ -54,7 +54,7 @@ def wires(system: DerivedSystem) -> list[Wire]:
 
 
 def watched_entity(system: DerivedSystem) -> str:
-    """Return the entity that is the top level with an output for each wire."""
+    """Return the name of the top level with an additional output for each wire."""
     return f"{system.entity}_watched"
 
 

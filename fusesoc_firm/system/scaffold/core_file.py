@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.request.core_reader import read_core
+from fusesoc_firm.core.core_reader import read_core
 from fusesoc_firm.system.boards.board import QUARTUS, VIVADO, Board, board_entity, boards, read_board
 from fusesoc_firm.system.derived.link import may_be_linked
 from fusesoc_firm.system.derived.model import DerivedSystem
@@ -39,11 +39,11 @@ FAMILIES = [
 _SYSTEM, _SIMULATION = "system", "simulation"
 # The core with the generator `far`, and the core that had this generator before version 0.2.0.
 _SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
-# The simulator of an emulated board's hardware, and the keys of the project that the emulation replaces. A bit on the
-# line takes ten cycles of this clock, and the emulated processor does not know how fast the line is.
+# The simulator of an emulated board's hardware, and the project keys that the emulation replaces. A bit on the line
+# takes ten cycles of this clock; the line's speed does not affect the emulated processor.
 EMULATING = "verilator"
 EMULATED = {"interconnect": "uart", "clock": "10 MHz"}
-# The target of a simulated board with a chip or a PHY, and its clock: the time of the node is about that of its peers.
+# The target of a simulated board with a chip or a PHY, and its clock: the node runs roughly at the pace of its peers.
 NETWORK = "network"
 NETWORK_HERTZ = {**dict.fromkeys(CHIPS, 1_000_000), ETHERNET: 250_000}
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
@@ -154,9 +154,9 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
 
 @dataclass(frozen=True)
 class _Kind:
-    """A kind of simulation: its name, its flag for simulators of Verilog, and the ending of its test bench.
+    """A kind of simulation: its name, its flag for Verilog simulators, and the suffix of its test bench.
 
-    `product` and `replaced` are further parameters of the generator, the latter for the system, too.
+    `product` and `replaced` are further parameters of the generator; `replaced` also applies to the system's generator.
     """
 
     name: str
@@ -172,7 +172,7 @@ class _Kind:
 
 
 def _kinds(system: DerivedSystem) -> list[_Kind]:
-    """Return the kinds of simulations. With a node in fabric, the frames of the first two are at the node's place."""
+    """Return the kinds of simulations; in the first two, streams replace a node in fabric."""
     streams = {"interconnect": AXI_STREAM} if system.network else {}
     kinds = [
         _Kind("sim", "verilog_host", "tb", replaced=streams),
@@ -219,7 +219,7 @@ def _simulations(system: DerivedSystem, unit: str, kind: _Kind) -> Iterator[dict
 
 
 def _emulation(system: DerivedSystem, unit: str) -> dict[str, object] | None:
-    """Return the target of `firm emulate`, or None for a system that cannot have a serial link there."""
+    """Return the target of `firm emulate`, or None for a system that cannot have a serial link."""
     simulator = SIMULATORS[EMULATING]
     has_netlist = not (system.clocks or system.kernels) and system.id_bytes == 1
     if not (has_netlist and may_be_linked(system)):
@@ -251,7 +251,7 @@ def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
 
 
 def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
-    """Return a board's target, or None if it lacks support for the HLS kernels of the system, or needs a node."""
+    """Return a board's target, or None if the board does not support the system's HLS kernels or network."""
     board = read_board(name)
     if (has_kernels and board.flow != VIVADO) or not _has_network_of(system, board):
         return None
@@ -281,7 +281,7 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
 
 
 def _has_network_of(system: DerivedSystem, board: Board) -> bool:
-    """Return whether a system is a node of the kind that a board's network needs."""
+    """Return whether a system is the kind of node that a board's interconnect requires."""
     kind = system.network.kind.value if system.network else ""
     return kind in CHIPS if board.interconnect in CHIPS else board.interconnect in (kind, *LINKS, AXI_STREAM)
 

@@ -7,12 +7,12 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
-from fusesoc_firm.request.core_reader import read_core
+from fusesoc_firm.core.core_reader import read_core
 from fusesoc_firm.system.scaffold.project import files_of, new_folder, write_surroundings
 from fusesoc_firm.text.diagnostics import closest, fail
 from fusesoc_firm.text.naming import identifier
 
-# The pages beside the demo systems have links that only a checkout has.
+# The demo systems' pages contain links that are valid only in a checkout.
 _LEFT_OUT = ("README.md", "__pycache__")
 
 
@@ -22,9 +22,9 @@ def examples(demos: Path) -> list[str]:
 
 
 def example_named(words: str, demos: Path) -> str:
-    """Return the only demo system whose name begins with the words, or else the only one whose description has them.
+    """Return the only demo system whose name begins with the words, or else whose description contains them.
 
-    Raise `InputError` if there is none or several.
+    Raise `InputError` unless exactly one matches.
     """
     known = {name: str(read_core(demos / name / f"{name}.core").data["description"]) for name in examples(demos)}
     named = [name for name in known if name.startswith(words)]
@@ -49,7 +49,7 @@ def copy_example(example: str, folder: Path, demos: Path, library: Path) -> list
 
 
 def _hint(words: str, known: Mapping[str, str]) -> str:
-    """Return the example that was probably meant, or all examples with what they do."""
+    """Return the example that was probably meant, or all examples with their descriptions."""
     if near := closest(words, known):
         return f"did you mean '{near}'?"
     return "legal here:\n" + "\n".join(f"        {name}: {text}" for name, text in known.items())

@@ -1,7 +1,7 @@
 """The stimuli of a new project: messages with different values in all fields.
 
-In one of them, strings and arrays are longer than a beat of the streams, since hardware that takes only the first beat
-of one, or mixes up its beats, may pass otherwise.
+In one message, strings and arrays are longer than a beat of the streams. This detects hardware that takes only the
+first beat, or mixes up beats.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fusesoc_firm.frame.values import put, put_leaf
 
 _IS_LONG = (False, True, False)
 _SHORT = 3
-# Bytes: a beat of 128 bits. Narrower streams have longer strings than they need.
+# The bytes of a 128-bit beat; strings are longer than necessary for narrower streams.
 _BEAT = 16
 _LETTERS = "_" + 2 * (string.ascii_letters + string.digits)
 
@@ -35,7 +35,7 @@ def first_stimuli(subscriber: str, frame: Frame, width: int) -> str:
 
 @dataclass
 class _Values:
-    """The values of message `number`, of which strings and arrays are longer than `beat` bytes."""
+    """The values of message `number`; strings and arrays are longer than `beat` bytes."""
 
     number: int
     beat: int
@@ -75,7 +75,7 @@ class _Values:
         return [self._part(texts[0]) if texts else self.message(loop.body, len(loop.path)) for _ in range(elements)]
 
     def _scalars(self, type_: str) -> Iterator[bool | int | float]:
-        """Return legal values for the elements of a field, of which only those of `bool` are soon repeated."""
+        """Return legal values for the elements of a field; only `bool` values repeat soon."""
         return (_scalar(type_, number) for number in count(next(self._numbers)))
 
 

@@ -119,14 +119,14 @@ def _forwarded(side: MessageSide, output: MessageSide) -> list[Data | Loop]:
     """Return the strings and arrays of an input that can be forwarded to the output, in wire order."""
     source = output.length.source if output.length else LengthSource.COMPUTED
     if source is LengthSource.GIVEN and not passes_whole(side, output):
-        # Only the length of the same message is known.
+        # A given length requires the same message.
         return []
     given = {node.path: (place, node) for place, node in enumerate(_parts(side.frame))}
     found: list[Data | Loop] = []
     before = -1
     for part in _parts(output.frame):
         place, node = given.get(part.path, (-1, part))
-        # A computed length needs the lengths of all parts at the beginning, and a second part's comes after the first.
+        # A computed length needs the lengths of all parts at the start, but a second part's length follows the first.
         if place <= before or not _is_equal(node, part) or (found and source is LengthSource.COMPUTED):
             continue
         if _is_in_order(side, output, [*found, part]):
@@ -150,7 +150,7 @@ def _is_equal(node: FrameField | Data | Loop, other: FrameField | Data | Loop) -
 
 
 def _is_in_order(side: MessageSide, output: MessageSide, parts: Sequence[Data | Loop]) -> bool:
-    """Whether the publisher needs, up to each part, only fields that the subscriber has before that part."""
+    """Whether all fields that the publisher needs before each part also precede that part at the subscriber."""
     given, needed = segments_of(side.frame), segments_of(output.frame)
     latest = _latest(side, output, parts)
     bounds = ((given.fields[path], latest[needed.fields[path]]) for path in _fields([side], output)[1])
@@ -158,7 +158,7 @@ def _is_in_order(side: MessageSide, output: MessageSide, parts: Sequence[Data | 
 
 
 def _latest(side: MessageSide, output: MessageSide, parts: Sequence[Data | Loop]) -> tuple[int | None, ...]:
-    """Return the last segment of the input that each segment of the output can wait for, or None for all of them.
+    """Return, for each segment of the output, the last input segment that it can wait for; None means all segments.
 
     The input's later segments become valid only after the output has taken the part.
     """

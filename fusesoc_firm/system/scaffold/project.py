@@ -1,4 +1,4 @@
-"""`firm init`: a new project in a folder of its own, which passes its simulation at once.
+"""`firm init`: a new project in a separate folder, which passes its simulation at once.
 
 The accelerator's first version copies the parts that both messages share; the model does the same.
 """
@@ -75,9 +75,9 @@ class RecordedStimuli:
 class Project:
     """The answers that determine a new project; `width` is in bits.
 
-    The topics are the names of the blocks if they are empty. Without `stimuli`, the project has examples of its own.
-    With `include`, the accelerator receives only these fields. If both messages are the same, it sends only these
-    fields, too, and the others pass.
+    An empty topic means the name of the block. Without `stimuli`, the project has generated examples. With `include`,
+    the accelerator receives only these fields. If both messages are the same, it also sends only these fields, and the
+    others pass.
     """
 
     name: str
@@ -110,10 +110,10 @@ def ask(
     widths: Sequence[str],
     topics: Mapping[str, str] | None = None,
 ) -> Project:
-    """Return a project from the known answers, and ask for the others.
+    """Return a project from the known answers, and ask for missing answers.
 
     `names` returns the messages of a ROS version. `topics` are the topics of a bag, with their messages: the input is
-    one of them, and the output a message or one of them. May raise `InputError`.
+    one of these topics; the output is a message or one of these topics. May raise `InputError`.
     """
     recorded = topics or {}
 
@@ -144,7 +144,7 @@ def ask(
 
 
 def _check_topics(taken: str, given: str, recorded: Mapping[str, str]) -> None:
-    """Raise `InputError` for a topic that is not in the bag, or that would be both input and output."""
+    """Raise `InputError` for a topic that is missing from the bag, or would be both input and output."""
     for topic in (taken, given):
         if topic not in recorded and (topic is taken or topic.startswith("/")):
             fail(f"the bag has no topic '{topic}'", hint=nearest(topic, recorded))
@@ -155,8 +155,8 @@ def _check_topics(taken: str, given: str, recorded: Mapping[str, str]) -> None:
 def create(project: Project, folder: Path, known: Libraries, library: Path, paths: Sequence[Path] = ()) -> list[Path]:
     """Write a new project, and return its files, relative to `folder`.
 
-    `library` is the folder of the generators, and `paths` are the places of further message definitions. May raise
-    `InputError`, before anything is written, also if the folder is not empty.
+    `library` is the folder of the generators, and `paths` are further sources of message definitions. May raise
+    `InputError`, such as for a folder that is not empty; nothing is written then.
     """
     if fault := name_fault(project.name):
         fail(fault)

@@ -71,7 +71,7 @@ def _size(path: Path) -> str:
 
 
 def _sources(type_: AcceleratorType, output: Frame) -> dict[Path, str]:
-    """Return the parameter with an equal part for each path of an output that has one, preferably the first."""
+    """Return, for each path of an output, the first parameter with an equal part, if any."""
     pairs = [*zip(parameter_names(type_), type_.inputs, strict=True)]
     return {path: name for name, side in reversed(pairs) for path in equal_paths(side.frame, output)}
 
@@ -87,7 +87,7 @@ def copied_fields(frame: Frame, sources: Mapping[Path, str]) -> list[Context]:
 
 
 def _copied(value: Any, names: tuple[str, ...], sources: Mapping[tuple[str, ...], str | None], place: str) -> str:
-    """Return a copy of `place` in the source of the field with these names, or the default where there is no source."""
+    """Return a copy of `place` in the source of the field with these names, or the default without a source."""
     below = {source for path, source in sources.items() if path[: len(names)] == names}
     if below == {None} or not below:
         return _literal(value)

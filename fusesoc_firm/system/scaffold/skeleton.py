@@ -141,7 +141,7 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
         "output_count": max(1, len(type_.outputs)),
         "gives": gives,
         "forwards": forwards,
-        # A single output that is not forwarded needs no memory of what has been sent.
+        # A single output that is not forwarded needs no record of sent outputs.
         "single": {"ready": gives[0]["ready"], "takes": takes} if len(gives) == 1 and not forwards else None,
         "has_several": len(gives) != 1 and not forwards,
         "counts": [count for given in gives for count in given["counts"]],

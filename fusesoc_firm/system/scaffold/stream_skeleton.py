@@ -1,7 +1,7 @@
 """A first version of a C++ function with streams: it copies the parts that its messages share.
 
-A function that passes a message on copies each part as soon as it has it. Another one stores its input, since an output
-begins with all its lengths.
+A function that passes on a whole message copies each part as soon as it arrives. Any other function stores its input,
+since an output begins with all its lengths.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def stream_function(type_: AcceleratorType) -> Context:
 
 
 def _passes(type_: AcceleratorType) -> bool:
-    """Whether the function passes its only input on: the whole message, with its length."""
+    """Whether the function passes on its only input: the whole message, with its length."""
     if len(type_.inputs) != 1 or len(type_.outputs) != 1:
         return False
     (side,), (output,) = type_.inputs, type_.outputs

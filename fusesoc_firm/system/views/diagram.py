@@ -75,7 +75,7 @@ THEMES = {
 
 
 def dark_style() -> str:
-    """Return the style sheet that gives an SVG in light colours the dark ones, if its reader's setting is dark."""
+    """Return the style sheet that switches an SVG to dark colours if the reader's setting is dark."""
     dark = THEMES["dark"]
     rules = [
         f"text {{ fill: {dark.ink}; }}",
@@ -193,7 +193,7 @@ class _Painter:
 
 
 def _has_chain(system: DerivedSystem) -> bool:
-    """Whether an accelerator sends a message to another one, which makes a picture from left to right too wide."""
+    """Whether an accelerator feeds another accelerator, which makes a picture from left to right too wide."""
     blocks = {block.block for block in (*system.accelerators, *system.software.blocks)}
     connections = (*system.connections, *system.software.connections)
     return bool(system.software.blocks) or any(

@@ -222,7 +222,7 @@ def _converter(converter: Converter, entity: str, system: DerivedSystem) -> dict
 
 
 def _host_end(converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the other end of a converter's messages: a block in software, a service, an action, or a topic."""
+    """Return the host end of a converter's messages: a block in software, a service, an action, or a topic."""
     if converter.software:
         return {"software": converter.software.block}
     if converter.service:

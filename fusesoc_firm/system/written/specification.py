@@ -38,7 +38,7 @@ MODES = (*TOPIC_MODES, *SERVICE_MODES)
 CONVERTER, ACCELERATOR = "converter", "accelerator"
 # The keys that make a block a converter.
 CONVERTER_KEYS = ("middleware", "mode", "message")
-# The keys of servers and clients, and those of the messages and topics of other converters.
+# The keys of servers and clients, and the keys for messages and topics of other converters.
 SERVICE_KEYS = frozenset({"service", "action", "timeLimit", "acceptLimit"})
 MESSAGE_KEYS = frozenset({"message", "qos", "include", "exclude"})
 # The keyword for the smallest scheduler that meets all deadlines.
@@ -46,17 +46,17 @@ AUTO_SCHEDULER = "auto"
 # The routes of frames between the host and the system: streams of the top level, or a byte link (cores/board).
 AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
-# The system is a node itself: of ROS 2, or of ROS 1 in the sockets of a chip with TCP/IP.
+# The system is itself a node: of ROS 2 by Ethernet, or of ROS 1 with a TCP/IP chip.
 ETHERNET = "ethernet"
 CHIPS = W5500, W5200 = ("w5500", "w5200")
 NETWORKS = (ETHERNET, *CHIPS)
 DHCP = "dhcp"
-# The interface of the PHY of a node by Ethernet.
+# The PHY interfaces of an Ethernet node.
 PHYS = ("gmii", "mii", "rgmii", "rmii")
 # The accesses to the registers of a system's status, if it has one.
 NO_STATUS = "none"
 STATUS_FRAMES, STATUS_AXI_LITE = STATUS = ("frames", "axi_lite")
-# What a subscriber's full queue does with a further frame.
+# The action of a subscriber's full queue on a further frame.
 BLOCK, DROP_NEWEST, DROP_OLDEST = OVERFLOWS = ("block", "drop_newest", "drop_oldest")
 RELIABLE, BEST_EFFORT = RELIABILITIES = ("reliable", "best_effort")
 VOLATILE, TRANSIENT_LOCAL = DURABILITIES = ("volatile", "transient_local")

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes the integral image of one in mono8: each pixel is the sum of all above it and to its left, itself included, in
--- 32SC1, modulo 2**32. That is 4 bytes for one, so WIDTH/32 pixels are taken a cycle, as many as the stream to the next
--- block carries sums; below 32 bits a sum takes several beats. The sums of the row before wait in block RAM.
+-- Computes the integral image of a mono8 image in 32SC1: each pixel is the sum of all pixels above it and to its left,
+-- itself included, modulo 2**32. A sum has 4 bytes, so the output limits the throughput to WIDTH/32 pixels per cycle;
+-- below 32 bits, a sum takes several beats. Block RAM stores the sums of the previous row.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -11,7 +11,7 @@ use firm.firm_axis_pkg.all;
 entity integral_image is
   generic (
     WIDTH       : integer := 8;
-    -- The widest image; a wider one becomes an empty one.
+    -- The widest image; the result of a wider one is empty.
     MAX_COLUMNS : integer := 2048
   );
   port (
@@ -111,15 +111,15 @@ architecture rtl of integral_image is
 
   signal advance  : std_logic;
   signal take     : std_logic;
-  signal settled  : std_logic;                      -- the group before is in the memory
+  signal settled  : std_logic;                      -- the previous group is in the memory
   signal group_r  : natural range 0 to GROUPS-1;    -- of the row
   signal is_top_r : std_logic;                      -- it is the first row
 
-  -- The sums of the row before: they are read and written group by group.
+  -- The sums of the previous row, read and written group by group.
   signal memory : row_t;
   signal above  : sums_t;
 
-  -- A group: its pixels' sums from its left end on, and of all the groups before it in the row.
+  -- A group: the prefix sums of its pixels, and the sum of all groups before it in the row.
   signal partial_r : partial_t;
   signal left_r    : unsigned(31 downto 0);
   signal index_r   : natural range 0 to GROUPS-1;
@@ -224,7 +224,7 @@ begin
 
   last_part <= '1' when part_r = PARTS-1 or sums_end_r = '1' else '0';
   advance   <= (result_ready and last_part) or not sums_valid_r;
-  -- Where a row is one group, the next one may not be read before this one is written.
+  -- If a row is one group, the next one must not be read before this one is written.
   settled     <= '0' when valid_r = '1' and end_r = '0' and index_r = group_r else '1';
   group_ready <= advance and settled;
   take        <= advance and settled and group_valid;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Converts an image in rgb8 to mono8: (77 R + 150 G + 29 B + 128) / 256, rounded down. These are the weights of
 -- ITU-R BT.601 in 1/256. Their sum is 256, so gray is unchanged, white is 255, and no limiter is needed.
--- A beat of bytes is taken every cycle, although pixels span beats: up to two bytes are kept for the next one.
+-- A beat is taken every cycle. Pixels span beats, so up to two bytes are kept for the next beat.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -116,9 +116,9 @@ architecture rtl of rgb_to_gray is
 
   signal advance : std_logic;
 
-  signal joined     : std_logic_vector(8*LANES+31 downto 0);  -- the group behind the two bytes before it
+  signal joined     : std_logic_vector(8*LANES+31 downto 0);  -- the group after the two bytes before it
   signal previous_r : std_logic_vector(15 downto 0);
-  signal carried_r  : natural range 0 to 2;                   -- so many of the two belong to the next pixel
+  signal carried_r  : natural range 0 to 2;                   -- how many of the two belong to the next pixel
 
   -- Pixels, their weighted parts, and the result.
   signal pixels_r : pixels_t;
@@ -222,7 +222,7 @@ begin
       if run = '0' then
         carried_r <= 0;
       elsif advance = '1' and group_valid = '1' then
-        -- A table, as sums and comparisons one behind the other are slower.
+        -- A table, as chained sums and comparisons are slower.
         for carried in 0 to 2 loop
           for bytes in 0 to LANES loop
             if carried_r = carried and unsigned(group_count) = bytes then

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes an image in mono8 smaller by taking the nearest pixel: of COLUMNS_IN columns COLUMNS_OUT stay, of ROWS_IN rows
--- ROWS_OUT. Pixel x of the result is pixel x*COLUMNS_IN/COLUMNS_OUT, rounded down, as in OpenCV's INTER_NEAREST, and a
--- begun part of a pixel counts as one. A beat is taken every cycle, whatever of it stays.
+-- Scales a mono8 image down: keeps the nearest pixels, COLUMNS_OUT of COLUMNS_IN columns and ROWS_OUT of ROWS_IN rows.
+-- Pixel x of the result is pixel x*COLUMNS_IN/COLUMNS_OUT, rounded down, as in OpenCV's INTER_NEAREST. Sizes are
+-- rounded up. A beat is taken every cycle, regardless of the number of kept pixels.
 --
--- A pixel i stays if a multiple of IN/OUT lies in [i, i+1). Its phase -i*OUT modulo IN tells: it is less than OUT then.
+-- Pixel i is kept if a multiple of IN/OUT lies in [i, i+1), that is, if its phase, -i*OUT modulo IN, is below OUT.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -98,7 +98,7 @@ architecture rtl of scale_down is
   type counts_t is array (natural range 2 to 3) of unsigned(COUNT_BITS-1 downto 0);
   type sums_t is array (natural range 0 to LANES-1) of unsigned(COUNT_BITS-1 downto 0);
 
-  -- The phase `steps` pixels further on.
+  -- The phase `steps` pixels later.
   function moved(phase, steps, size_out, size_in : natural) return natural is
     constant BACK : natural := (steps * (size_out mod size_in)) mod size_in;
   begin
@@ -108,7 +108,7 @@ architecture rtl of scale_down is
     return phase + (size_in - BACK);
   end function moved;
 
-  -- Yosys makes a carry chain of `+`, which is slower at so few bits.
+  -- Yosys maps `+` to a carry chain, which is slower for so few bits.
   function added(left, right : unsigned(COUNT_BITS-1 downto 0)) return unsigned is
     variable sum   : unsigned(COUNT_BITS-1 downto 0);
     variable carry : std_logic := '0';
@@ -120,7 +120,7 @@ architecture rtl of scale_down is
     return sum;
   end function added;
 
-  -- For each lane, the bits from the lowest one to its own that are set: sums over 2, 4, 8 ... lanes.
+  -- For each lane, the number of set bits from the lowest lane to this one: sums over 2, 4, 8 ... lanes.
   function sums_of(bits : std_logic_vector(LANES-1 downto 0)) return sums_t is
     variable sums : sums_t;
   begin
@@ -155,7 +155,7 @@ architecture rtl of scale_down is
   signal column_r : natural range 0 to COLUMNS_IN-1;  -- the phase of the group's first pixel
   signal row_r    : natural range 0 to ROWS_IN-1;     -- the row's phase
 
-  -- What came, which pixels of it stay; where to; the result.
+  -- The input and its kept pixels; their shifts; the result.
   signal data_r   : std_logic_vector(WIDTH-1 downto 0);
   signal stays_r  : std_logic_vector(LANES-1 downto 0);
   signal placed_r : std_logic_vector(WIDTH-1 downto 0);
@@ -276,7 +276,7 @@ begin
     end if;
   end process choose;
 
-  -- A pixel moves down by the number of those below it that go.
+  -- A pixel moves down by the number of dropped pixels below it.
   place : process (clk)
     variable gone : sums_t;
   begin
@@ -293,7 +293,7 @@ begin
     end if;
   end process place;
 
-  -- By powers of two, the lowest first: so no two pixels meet, and what they leave behind meets none of them either.
+  -- By powers of two, the lowest first, so that no pixel meets another one or the copy that it leaves.
   compact : process (clk)
     variable data   : std_logic_vector(WIDTH-1 downto 0);
     variable shifts : shifts_t;

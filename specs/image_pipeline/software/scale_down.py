@@ -8,7 +8,7 @@ import numpy as np
 
 Message = dict[str, Any]
 
-# So many out of so many stay.
+# (kept, total)
 COLUMNS = (1, 3)
 ROWS = (4, 9)
 FRAME_ID_BYTES = 256
@@ -35,6 +35,6 @@ def scale_down(message: Message) -> Message:
 
 
 def _kept(size: int, ratio: tuple[int, int]) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """The rows or columns that stay; a begun part counts as one."""
+    """The kept rows or columns; their number is rounded up."""
     out, of = ratio
     return np.arange((size * out + of - 1) // of) * of // out

@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- geometry_msgs/Twist to four motors with encoders, and the twist that is measured back: a skid-steer robot.
+-- Drives the four motors of a skid-steer robot by geometry_msgs/Twist, and returns the twist that encoders measure.
 --
 -- Once per control period, the encoders' counts and a waiting command are taken. The command becomes the speeds that
 -- the wheels of each side should have, each wheel's controller computes its duty, and the response is the
 -- twist of the period that just ended. Without a command for TIMEOUT periods, the robot stops. While a response is not
 -- taken, no command is taken either.
 --
--- A command waits for the end of a period, and the next one waits in the converter. Nothing is lost, and a host that
--- sends more often is stalled.
+-- A command waits for the end of a period, and the next one waits in the converter. Nothing is lost: back-pressure
+-- stalls a host that sends more often.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -16,7 +16,7 @@ use ieee.numeric_std.all;
 entity mobile_robot is
   generic (
     CLOCK_HZ        : positive := 100_000_000;
-    -- A period of the PWM, 20 kHz, and how many of them are one of control, 10 kHz.
+    -- Cycles of a PWM period, 20 kHz, and PWM periods of a control period, 10 kHz.
     PWM_CYCLES      : positive := 5_000;
     PWM_PERIODS     : positive := 2;
     -- Between the middles of the left and the right wheels; effective, as a skid-steer robot's wheels slip.
@@ -24,9 +24,9 @@ entity mobile_robot is
     WHEEL_RADIUS_UM : positive := 100_000;
     -- 512 lines, four edges each, with a gear of 100: 33 counts per period at 1 m/s.
     COUNTS_PER_TURN : positive := 204_800;
-    -- Counts a period that a wheel is asked for at most: 1.23 m/s.
+    -- The limit of a wheel's setpoint in counts per period: 1.23 m/s.
     SPEED_LIMIT     : positive := 40;
-    -- Cycles of duty for one count a period, in units of 2**-8. For a motor of 48 counts a period at full duty, K,
+    -- Cycles of duty for one count per period, in units of 2**-8. For a motor of 48 counts per period at full duty, K,
     -- and a time constant of ten periods, T: KP = T/(K (4 + 1.5)) for a loop of 4 periods and a delay of 1.5, KI =
     -- KP/T and a tenth more.
     KP              : natural  := 50_000;
@@ -69,12 +69,12 @@ end entity mobile_robot;
 architecture rtl of mobile_robot is
 
   constant WHEELS         : positive := 4;
-  -- From the tick on: more than a command takes to become speeds.
+  -- Cycles after the tick: more than the conversion of a command to speeds takes.
   constant COMMAND_CYCLES : positive := 12;
 
   signal position_r     : natural range 0 to PWM_CYCLES-1;
   signal position       : std_logic_vector(14 downto 0);
-  -- The last cycle of a period of the PWM, and of one of control.
+  -- The last cycle of a PWM period, and of a control period.
   signal pwm_last_r     : std_logic;
   signal tick_r         : std_logic;
   signal period_r       : natural range 0 to PWM_PERIODS-1;

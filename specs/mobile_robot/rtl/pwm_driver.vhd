@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A motor driver's inputs: a direction, and a PWM that is high for as many cycles of its period as the duty says.
+-- Generates a motor driver's inputs: a direction, and a PWM that is high for |duty| cycles of its period.
 --
--- Both take a new duty only where a period begins, so no period is torn, and the direction changes while the PWM is low
--- or begins anew.
+-- Both take a new duty only at the start of a period, so no period mixes two duties, and the direction changes only
+-- while the PWM is low or restarts.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The counts of a quadrature encoder between two samples: every edge of A and B is one.
+-- Counts the edges of A and B of a quadrature encoder between two samples.
 --
--- Both lines are synchronised, and a change counts only when FILTER samples in a row agree: shorter glitches are not
--- seen. A leads B when the wheel turns forward. If both change at once, the direction is not known: that is an error,
--- which is counted in place of a step. A step in the very cycle of a sample belongs to the next one, so none is lost.
+-- Both lines are synchronised, and a change counts only when FILTER samples in a row agree: shorter glitches are
+-- ignored. A leads B when the wheel turns forward. If both change at once, the direction is unknown, and an error is
+-- counted instead of a step. A step in the cycle of a sample belongs to the next sample, so no step is lost.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -11,7 +11,7 @@ use ieee.numeric_std.all;
 
 entity quadrature_decoder is
   generic (
-    -- Samples that must agree: 2 and more. A line must stay that many cycles for its change to count.
+    -- Samples that must agree, at least 2. A change counts only if the line is stable for that many cycles.
     FILTER     : positive := 4;
     COUNT_BITS : positive := 8
   );
@@ -23,31 +23,31 @@ entity quadrature_decoder is
     enc_a  : in  std_logic;
     enc_b  : in  std_logic;
 
-    -- One cycle: begin to count anew.
+    -- One cycle: restart the count.
     sample : in  std_logic;
-    -- Counts since then, positive forward. It stays at its ends.
+    -- Counts since then, positive forward; saturates.
     count  : out std_logic_vector(COUNT_BITS-1 downto 0);
-    -- Changes of both lines at once, since the reset; stays at 255.
+    -- Changes of both lines at once, since the reset; saturates at 255.
     errors : out std_logic_vector(7 downto 0)
   );
 end entity quadrature_decoder;
 
 architecture rtl of quadrature_decoder is
 
-  -- The lowest bit may be metastable, so it is not looked at.
+  -- The lowest bit may be metastable, so it is not used.
   signal a_r        : std_logic_vector(FILTER downto 0);
   signal b_r        : std_logic_vector(FILTER downto 0);
   signal a_stable_r : std_logic;
   signal b_stable_r : std_logic;
   signal a_before_r : std_logic;
   signal b_before_r : std_logic;
-  -- The filters have seen what the lines were at first.
+  -- Counts until the filters hold the initial state of the lines.
   signal settling_r : natural range 0 to FILTER + 2;
   signal settled_r  : std_logic;
   signal count_r    : signed(COUNT_BITS-1 downto 0);
   signal errors_r   : unsigned(7 downto 0);
 
-  -- The value that all samples but the first agree on, else what it was.
+  -- The value on which all samples but the first agree, else the previous value.
   function stable(samples : std_logic_vector; before : std_logic) return std_logic is
     variable ones  : std_logic := '1';
     variable zeros : std_logic := '1';
@@ -77,7 +77,7 @@ begin
       b_stable_r <= stable(b_r, b_stable_r);
       a_before_r <= a_stable_r;
       b_before_r <= b_stable_r;
-      -- Where a wheel stands after the reset is no step.
+      -- The position of a wheel after the reset is not a step.
       if settling_r = FILTER + 2 then
         settled_r <= '1';
       else

@@ -1,14 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The kinematics of a skid-steer robot: a twist to the speeds of its sides, and the counts of its wheels to a twist.
+-- Converts a twist to the speeds of a skid-steer robot's sides, and the counts of its wheels to a twist.
 --
 --   left = x - z TRACK_WIDTH/2,  right = x + z TRACK_WIDTH/2,  x = (left + right)/2,  z = (right - left)/TRACK_WIDTH
 --
--- Speeds of wheels are counts of an encoder a period. With X counts a period for 1 m/s and Z for 1 rad/s, both
--- constants:
+-- Speeds of wheels are encoder counts per period. With the constants X, counts per period at 1 m/s, and Z, at 1 rad/s:
 --   left = X x - Z z, right = X x + Z z,   x = (sum of the four wheels' counts)/(4 X), z = (right - left ones)/(4 Z)
 --
--- A side's speed ends at SPEED_LIMIT, each for itself: a command beyond it turns less than it asks for. One that is
--- not a number stops the robot.
+-- Each side's speed saturates separately at SPEED_LIMIT, so a command beyond it gives another turn than requested. NaN
+-- stops the robot.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -23,19 +22,19 @@ entity skid_steer is
     TRACK_WIDTH_UM  : positive;
     WHEEL_RADIUS_UM : positive;
     COUNTS_PER_TURN : positive;
-    -- In counts a period: 1 to 127.
+    -- In counts per period: 1 to 127.
     SPEED_LIMIT     : positive
   );
   port (
     clk           : in  std_logic;
     rst_n         : in  std_logic;
 
-    -- A command: x in the cycle of in_start, z in the one behind. The sides' speeds hold from in_done on.
+    -- A command: x in the cycle of in_start, z in the next one. The sides' speeds are stable from in_done on.
     in_start      : in  std_logic;
     in_x          : in  std_logic_vector(63 downto 0);
     in_z          : in  std_logic_vector(63 downto 0);
     in_done       : out std_logic;
-    -- In units of 2**-8 counts a period.
+    -- In units of 2**-8 counts per period.
     in_left       : out std_logic_vector(15 downto 0);
     in_right      : out std_logic_vector(15 downto 0);
 
@@ -52,7 +51,7 @@ end entity skid_steer;
 architecture rtl of skid_steer is
 
   constant PI             : real     := 3.14159265358979323846;
-  -- m/s or rad/s: up to 64 of them, in units of 2**-16.
+  -- Up to 64 m/s or rad/s, in units of 2**-16.
   constant TWIST_BITS     : positive := 23;
   constant TWIST_FRACTION : positive := 16;
   constant SPEED_FRACTION : positive := 8;
@@ -60,12 +59,12 @@ architecture rtl of skid_steer is
   constant GAIN_FRACTION  : positive := 16;
   constant BACK_FRACTION  : positive := 32;
 
-  -- Counts a period for 1 m/s and for 1 rad/s.
+  -- Counts per period at 1 m/s and at 1 rad/s.
   constant X : real := real(COUNTS_PER_TURN) * real(PERIOD_CYCLES) * 1.0e6
                        / (2.0 * PI * real(WHEEL_RADIUS_UM) * real(CLOCK_HZ));
   constant Z : real := X * real(TRACK_WIDTH_UM) / 2.0e6;
 
-  -- The largest that an integer holds, if it would be larger: the assert below tells of it.
+  -- Saturates at the largest integer, which the assert below reports.
   function scaled(number : real; fraction : natural) return integer is
     variable result : real := number;
   begin
@@ -99,7 +98,7 @@ architecture rtl of skid_steer is
   signal fixed           : std_logic_vector(TWIST_BITS-1 downto 0);
   signal undefined       : std_logic;
 
-  -- The number is z, and its constant; its product, first in parts; the sides follow.
+  -- Whether the number is z, and its constant; its product, first in parts; then the sides.
   signal is_z_r          : std_logic;
   signal gain_r          : signed(31 downto 0);
   signal low_r           : partial_t;
@@ -218,7 +217,7 @@ begin
         right   := resize(forward_r, right'length) + product_r;
         left_r  <= rounded(left);
         right_r <= rounded(right);
-        -- z, or the x before it.
+        -- z, or the preceding x.
         if lost_r(1) = '1' or lost_r(2) = '1' then
           left_r  <= (others => '0');
           right_r <= (others => '0');

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A PID controller for the speed of a wheel: once per period, it computes the duty from the setpoint of the speed.
+-- Controls the speed of a wheel (PID): computes the duty from the setpoint of the speed, once per period.
 --
 --   e = setpoint - speed,  duty = KP e + I + KD (speed before - speed),  I = I before + KI e
 --
@@ -14,10 +14,10 @@ use ieee.numeric_std.all;
 
 entity wheel_pid is
   generic (
-    -- Duty in cycles of the PWM, and periods at the limit without a count that mean a stalled wheel.
+    -- The maximum duty in cycles of the PWM, and the periods at it without a count until a stall is reported.
     LIMIT         : positive;
     STALL_PERIODS : positive;
-    -- Cycles of duty for one count a period, in units of 2**-8: 0 to 131071.
+    -- Cycles of duty for one count per period, in units of 2**-8: 0 to 131071.
     KP            : natural;
     KI            : natural;
     KD            : natural
@@ -26,9 +26,9 @@ entity wheel_pid is
     clk      : in  std_logic;
     rst_n    : in  std_logic;
 
-    -- One cycle; the speeds must stay for eight. The next start may come after that.
+    -- One cycle; the speeds must be stable for eight, then the next start may follow.
     start    : in  std_logic;
-    -- In counts a period: in units of 2**-8, and whole ones.
+    -- The setpoint in units of 2**-8 counts per period, the speed in counts per period.
     setpoint : in  std_logic_vector(15 downto 0);
     speed    : in  std_logic_vector(7 downto 0);
 
@@ -59,7 +59,7 @@ architecture rtl of wheel_pid is
   signal factor_r    : error_t;
   signal gain_r      : signed(GAIN_BITS-1 downto 0);
   signal product_r   : product_t;
-  -- P and D, and then all.
+  -- P, then P + I, then the sum of all three.
   signal sum_r       : sum_t;
   signal integral_r  : sum_t;
   signal increased_r : sum_t;

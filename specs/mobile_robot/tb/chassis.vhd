@@ -21,7 +21,7 @@ end entity chassis;
 
 architecture behaviour of chassis is
 
-  -- 45 to 51 counts a period of control at full duty, as model.py has them.
+  -- 45 to 51 counts per control period at full duty, as in model.py.
   type speeds_t is array (0 to 3) of positive;
   constant FULL_SPEEDS : speeds_t := (80_000, 75_000, 85_000, 80_000);
 

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The accelerator with four motors in a closed loop; each line of a file is a control period.
+-- Simulates the accelerator with four motors in a closed loop; each line of a file is a control period.
 --
 -- A line of SCENARIO is V x z H: whether a command waits at the end of the period, the command as binary digits, and
 -- the shafts that are held from the beginning of the period on, wheel 3 first. A line of RESULTS is V x z S E: whether
@@ -30,7 +30,7 @@ entity mobile_robot_tb is
     FULL_SPEED_2  : positive := 1_550_000;
     FULL_SPEED_3  : positive := 1_200_000;
     TIME_CONSTANT : positive := 50;
-    -- Cycles that an answer waits.
+    -- Cycles until a response is accepted.
     ANSWER_WAITS  : natural  := 0
   );
 end entity mobile_robot_tb;
@@ -38,10 +38,10 @@ end entity mobile_robot_tb;
 architecture test of mobile_robot_tb is
 
   constant PERIOD        : time     := 10 ns;
-  -- Inputs change behind the edge, as a netlist sees its clock some delta cycles late.
+  -- Inputs change after the edge, as a netlist sees its clock some delta cycles late.
   constant DELAY         : time     := 1 ns;
   constant PERIOD_CYCLES : positive := PWM_CYCLES * PWM_PERIODS;
-  -- Cycles behind a tick after which its answer is there.
+  -- Cycles after a tick in which its response is expected.
   constant SETTLED       : positive := 40;
   type speeds_t is array (0 to 3) of positive;
   constant FULL_SPEEDS   : speeds_t := (FULL_SPEED_0, FULL_SPEED_1, FULL_SPEED_2, FULL_SPEED_3);
@@ -169,7 +169,7 @@ begin
   begin
     cycles(4);
     rst_n <= '1' after DELAY;
-    -- Ticks are the edges PERIOD_CYCLES, 2*PERIOD_CYCLES, ... without reset. The motors' periods begin behind edge 1.
+    -- Ticks are the edges PERIOD_CYCLES, 2*PERIOD_CYCLES, ... without reset. The motors' periods begin after edge 1.
     cycles(1);
     while not endfile(scenario_file) loop
       readline(scenario_file, vector);
@@ -178,7 +178,7 @@ begin
       read(vector, z);
       read(vector, shafts);
       held <= to_stdlogicvector(shafts);
-      -- A command is read for two cycles behind its tick.
+      -- A command is read for two cycles after its tick.
       cycles(2);
       in_msg_valid <= to_stdulogic(is_command) after DELAY;
       in_x         <= to_stdlogicvector(x) after DELAY;

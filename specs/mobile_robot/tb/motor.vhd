@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A DC motor with a quadrature encoder, for simulation: what a PWM and a direction make of its shaft.
+-- Simulates a DC motor with a quadrature encoder, driven by a PWM and a direction.
 --
--- Without inductance and load torque, J d(speed)/dt = k (voltage - k speed)/R: the speed follows the voltage's mean
--- with one time constant, and its back-EMF is what ends it. Whole numbers are counted, so that a model in another
--- language can say what each cycle brings; the mean is that of a period of the PWM. A held shaft stands still.
+-- Without inductance and load torque, J d(speed)/dt = k (voltage - k speed)/R: the speed follows the mean voltage with
+-- one time constant, and the back-EMF limits it. The mean is that of a PWM period. All values are whole numbers, so
+-- that a model in another language is exact in each cycle. A held shaft does not turn.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -42,7 +42,7 @@ begin
   turn : process (clk)
     variable is_running : boolean := false;
     variable position   : natural := 0;
-    -- Cycles of this period in which the motor is driven forward, less those backward.
+    -- Cycles of this period in which the motor is driven forward, minus those backward.
     variable driven     : integer := 0;
     variable speed      : integer := 0;
     variable change     : integer := 0;
@@ -70,7 +70,7 @@ begin
         position := position + 1;
         if position = PWM_CYCLES then
           change   := driven * (FULL_SPEED / PWM_CYCLES) - speed;
-          -- Rounded away from zero, or the last of a speed would stay.
+          -- Rounded away from zero; otherwise, a speed would never decay to zero.
           if change > 0 then
             speed := speed + (change + TIME_CONSTANT - 1) / TIME_CONSTANT;
           else
@@ -83,7 +83,7 @@ begin
           end if;
         end if;
       end if;
-      -- Behind the edge, as a netlist sees its clock some delta cycles late.
+      -- After the edge, as a netlist sees its clock some delta cycles late.
       enc_a <= '0' after DELAY;
       if angle >= COUNT_STEPS and angle < 3 * COUNT_STEPS then
         enc_a <= '1' after DELAY;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The decoder behind lines that a file tells: a line of VECTORS is A B N, for N cycles; RESULTS has the sum of all
--- counts and the number of errors. The lines change between clock edges, and samples are taken all the time.
+-- Drives the decoder's lines from a file: a line of VECTORS is A B N, for N cycles. RESULTS has the sum of all counts
+-- and the number of errors. The lines change between clock edges, and samples are taken periodically.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -110,7 +110,7 @@ begin
     for k in 1 to FILTER + 6 loop
       cycle;
     end loop;
-    -- What came since the last sample, which may have been in the last cycle.
+    -- The counts since the last sample, which may have been in the last cycle.
     wait until falling_edge(clk);
     write(result, total + to_integer(signed(count)));
     write(result, ' ');

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Passes a sensor_msgs/LaserScan through. Nothing is stored: every field and beat goes on in the cycle in which it
--- comes. ROS 1 has seq and nsec, ROS 2 has nanosec: a system connects those of its message.
+-- Forwards a sensor_msgs/LaserScan unchanged. Nothing is stored: each field and beat leaves in the cycle in which it
+-- arrives. ROS 1 has seq and nsec, ROS 2 has nanosec: a system connects those of its message.
 library ieee;
 use ieee.std_logic_1164.all;
 

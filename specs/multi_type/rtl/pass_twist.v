@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Passes a geometry_msgs/TwistStamped through. Nothing is stored: every field and beat goes on in the cycle in which it
-// comes. ROS 1 has seq and nsec, ROS 2 has nanosec: a system connects those of its message.
+// Forwards a geometry_msgs/TwistStamped unchanged. Nothing is stored: each field and beat leaves in the cycle in which
+// it arrives. ROS 1 has seq and nsec, ROS 2 has nanosec: a system connects those of its message.
 module pass_twist #(
   parameter WIDTH = 8
 ) (

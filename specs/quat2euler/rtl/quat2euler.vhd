@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- geometry_msgs/Quaternion to geometry_msgs/Point: roll (x), pitch (y) and yaw (z) in rad.
+-- Converts geometry_msgs/Quaternion to geometry_msgs/Point: roll (x), pitch (y) and yaw (z) in rad.
 --
 -- With P = w + y, Q = w - y, R = x + z and S = z - x, the half angles come without a product:
 --   alpha = atan2(R, Q), beta = atan2(S, P): roll = alpha - beta, yaw = alpha + beta
 --   pitch = 2 * atan2(|P + iS|, |Q + iR|) - pi/2
 -- after Bernardes and Viollet, "Quaternion to Euler angles conversion" (2022). Lengths cancel, so the
--- quaternion need not be a unit, and nothing is ill-conditioned but what has no answer at the gimbal lock.
--- Two CORDIC units turn (Q, R) and (P, S); a third makes the pitch of their lengths while they work on the
--- next message. 92 cycles from taking a message to its result, a new message every 37.
+-- quaternion need not be a unit, and only angles that are undefined at the gimbal lock are ill-conditioned.
+-- Two CORDIC units turn (Q, R) and (P, S); a third computes the pitch from their lengths while they process
+-- the next message. The latency is 92 cycles, and a message is taken every 37.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -21,7 +21,7 @@ entity quat2euler is
     clk               : in  std_logic;
     rst_n             : in  std_logic;
 
-    -- float64, any length but zero; README.md tells the results of zero, infinity and NaN.
+    -- float64, any length but zero; README.md lists the results of zero, infinity and NaN.
     in_x              : in  std_logic_vector(63 downto 0);
     in_y              : in  std_logic_vector(63 downto 0);
     in_z              : in  std_logic_vector(63 downto 0);
@@ -55,7 +55,7 @@ architecture rtl of quat2euler is
 
   constant FIRST_ANGLE : word_t := resize(signed('0' & arctangent(0, FRACTION)), WIDTH);
 
-  -- What a message has besides numbers; it travels beside them from stage to stage.
+  -- The special cases of a message, which accompany its numbers from stage to stage.
   type kind_t is record
     undefined : std_logic;
     zero      : std_logic;
@@ -232,8 +232,8 @@ begin
       out_angle     => beta
     );
 
-  -- The lengths and the angles part here. A pitch leaves its unit after its roll and yaw left `angles`, so
-  -- when that unit has room, `angles` has.
+  -- Here, lengths and angles take separate paths. A pitch leaves its unit after its roll and yaw left
+  -- `angles`, so if that unit is free, `angles` is free, too.
   half_out_valid <= alpha_out_valid and beta_out_valid;
   half_out_ready <= half_out_valid and pitch_in_ready;
 

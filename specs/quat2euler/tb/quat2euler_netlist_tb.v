@@ -1,12 +1,12 @@
 // Feeds the Verilog netlist of quat2euler from +vectors=FILE and prints its results, all in hexadecimal.
-// Whatever quat2euler_tb.vhd checks is not checked again: this is for what a translation may break.
+// It finds faults of the translation and does not repeat the checks of quat2euler_tb.vhd.
 
 `timescale 1ns / 1ps
 
 module quat2euler_netlist_tb;
 
   parameter MESSAGES = 1;
-  // Cycles without an end after which the netlist counts as hung.
+  // Cycles after which an unfinished netlist counts as hung.
   parameter PATIENCE = 200 * (MESSAGES + 1);
 
   reg [255:0] vectors [0:MESSAGES-1];

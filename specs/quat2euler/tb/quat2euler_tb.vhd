@@ -3,8 +3,8 @@
 --
 -- A line of VECTORS is x, y, z, w; a line of RESULTS is roll, pitch, yaw: 16 hexadecimal digits each, no
 -- blanks. Latency counts from the cycle that takes a message to the first one that offers its result, the
--- interval from taking a message to taking the next. The values are judged by who reads RESULTS; stable
--- outputs, latency, interval and the watchdog are judged here.
+-- interval from taking a message to taking the next. The reader of RESULTS checks the values; stable
+-- outputs, latency, interval and the watchdog are checked here.
 
 library ieee;
 use ieee.std_logic_1164.all;

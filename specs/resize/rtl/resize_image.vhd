@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Makes an image twice as wide and twice as high, by bilinear interpolation between the centers of the pixels, as
 -- OpenCV's INTER_LINEAR does. A pixel of the result lies a quarter of the way from one pixel of the image to the next,
--- so it has 3/4 of the one and 1/4 of the other, in both directions. Outside the image, its border continues.
+-- so it has 3/4 of the one and 1/4 of the other, in both directions. Outside the image, its border is repeated.
 --
--- Two rows of the result lie between two rows of the image. The first is made while the lower one of the image comes,
--- the second of the memory, which has the two pixels of each column. In the same way, two pixels of the result lie
--- between two columns. They are made in the same cycle.
+-- Two rows of the result lie between two rows of the image. The first is computed while the lower row of the image
+-- arrives, the second from the memory, which holds the two pixels of each column. Likewise, two pixels of the result
+-- lie between two columns. They are computed in the same cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -98,12 +98,11 @@ architecture rtl of resize_image is
   -- A pixel's channels, times four.
   type fourfold_t is array (natural range 0 to BYTES-1) of unsigned(9 downto 0);
 
-  -- A row of the image comes; the second row of the result is made of it; the last row of the result is made; its last
-  -- pixel leaves; the end is told.
+  -- A row of the image arrives; the second row of the result is computed; the last row of the result is computed; its
+  -- last pixel leaves; the end is sent.
   type phase_t is (COMING, SECOND, LAST, LAST_PIXEL, TELL_END, OVER);
 
-  -- What a stage holds: a column of the result, which may be the first one of the image or a row; the last pixel; the
-  -- end.
+  -- The content of a stage: a column of the result, maybe the first of the image or a row; the last pixel; the end.
   type step_t is record
     valid    : std_logic;
     gives    : std_logic;
@@ -159,15 +158,15 @@ architecture rtl of resize_image is
 
   signal advance : std_logic;
   signal settled : std_logic;  -- the column that is read next is in the memory
-  signal offered : std_logic;  -- a step, of the row that comes or of the memory
+  signal offered : std_logic;  -- a step, of the arriving row or of the memory
   signal take    : std_logic;
   signal is_last : std_logic;  -- the column is its row's last one
 
   signal phase_r       : phase_t;
   signal column_r      : natural range 0 to MAX_COLUMNS-1;
   signal last_column_r : natural range 0 to MAX_COLUMNS-1;
-  signal is_top_r      : std_logic;  -- no row of the image has come
-  signal is_begun_r    : std_logic;  -- a pixel of the result has been made
+  signal is_top_r      : std_logic;  -- no row of the image has arrived
+  signal is_begun_r    : std_logic;  -- a pixel of the result was computed
 
   -- The upper pixel of a column is high.
   signal memory : memory_t;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The matrices K and P and the region of interest of the larger image, in a sensor_msgs/CameraInfo. The first two rows
--- of the matrices are in pixels, so they double, as in image_proc; the third row has no unit.
+-- Doubles the matrices K and P and the region of interest in a sensor_msgs/CameraInfo. Of the matrices, only the first
+-- two rows are in pixels and double, as in image_proc; the third row has no unit.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -38,7 +38,7 @@ architecture rtl of resize_matrices is
   constant INFINITE : std_logic_vector(10 downto 0) := (others => '1');
 
   -- Twice a float64, exactly: its exponent grows by one. A subnormal number shifts, if need be into a normal one. The
-  -- largest numbers become infinite; infinite ones and NaN stay.
+  -- largest numbers become infinite; infinity and NaN are unchanged.
   function doubled(number : std_logic_vector(63 downto 0)) return std_logic_vector is
     variable exponent : unsigned(10 downto 0);
     variable result   : std_logic_vector(63 downto 0);

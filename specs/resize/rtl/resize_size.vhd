@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The size of the larger image, in a sensor_msgs/CameraInfo: it is combinational, since it only shifts.
+-- Doubles the image size in a sensor_msgs/CameraInfo. It is combinational, since it only shifts.
 library ieee;
 use ieee.std_logic_1164.all;
 

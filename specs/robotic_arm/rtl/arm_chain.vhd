@@ -1,15 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The poses of seven joints from their angles, and how far the pose of the end effector is from a given one.
+-- Computes the poses of seven joints from their angles, and the error of a given pose of the end effector.
 --
--- One multiplier serves all. A joint's angle becomes cosine and sine by CORDIC while the joint before it is worked
--- on. Turned by its ALPHA, a multiple of a quarter turn, the columns y and z of a pose are each other's with a sign, s:
+-- One multiplier computes all products. CORDIC computes cosine and sine of a joint's angle while the previous joint is
+-- processed. A turn by ALPHA, a multiple of a quarter turn, exchanges the columns y and z of a pose, with a sign, s:
 --   x' = x cos + s z sin, y' = s z cos - x sin, z' = -s y, p' = p + A x - D s y       where ALPHA is s quarter turns
---   x' = x cos + y sin,   y' = y cos - x sin,   z' = z,    p' = p + A x + D z         where it is none
--- That is six products a row, in six slots. While a row is in work, the four numbers of the row before leave as
--- float64. Behind the hand, the eighth step, the multiplier squares the differences of the two poses.
+--   x' = x cos + y sin,   y' = y cos - x sin,   z' = z,    p' = p + A x + D z         where ALPHA is 0
+-- These are six products per row, in six slots. While a row is processed, the four numbers of the previous row leave
+-- as float64. After the hand, the eighth step, the multiplier squares the differences of the two poses.
 --
--- An angle that is no number, or of 16 rad and more, makes all poses from its joint on, and the error, not a number;
--- a pose given with such an element, or one of 4 and more, makes the error so.
+-- If an angle is NaN, or of 16 rad and more, all poses from its joint on and the error are NaN. If an element of the
+-- given pose is NaN, or of 4 and more, the error is NaN.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -25,13 +25,13 @@ entity arm_chain is
     clk       : in  std_logic;
     rst_n     : in  std_logic;
 
-    -- float64, joint 0 and element 0 lowest; must stay until in_ready, one cycle at the end of the work.
+    -- float64, joint 0 and element 0 lowest; must be stable until in_ready, one cycle at the end.
     in_valid  : in  std_logic;
     in_ready  : out std_logic;
     in_angles : in  std_logic_vector(JOINTS*64-1 downto 0);
     in_pose   : in  std_logic_vector(16*64-1 downto 0);
 
-    -- They stay until out_ready.
+    -- They are stable until out_ready.
     out_valid : out std_logic;
     out_ready : in  std_logic;
     out_poses : out std_logic_vector(JOINTS*16*64-1 downto 0);
@@ -45,28 +45,28 @@ architecture rtl of arm_chain is
   constant ITERATIONS : positive := FRACTION;
   -- Six products a row.
   constant LAST_SLOT  : natural  := 5;
-  -- Three rows, and one to see the last one off.
+  -- Three rows, and one in which the last one leaves.
   constant LAST_ROW   : natural  := 3;
-  -- Cycles between the number that is asked for and its fixed-point form: one to choose it, three to convert it.
+  -- Cycles from the request of a number to its fixed-point form: one to choose it, three to convert it.
   constant CONVERSION : positive := 4;
   -- Sixteen elements through conversion, difference, product in two steps, and sum.
   constant LAST_TURN  : natural  := 15 + CONVERSION + 4;
   -- Cycles of firm_fixed_to_float64.
   constant TO_FLOAT   : positive := 5;
-  -- Bits of a product that the sum of squares goes without.
+  -- Lower bits of a product that the sum of squares drops.
   constant SQUARE_CUT : positive := 8;
-  -- A number as firm_fixed_to_float64 takes it: three bits more before the point, and zeros behind, as a mean of
-  -- squares has room for then. So those of a pose have no more than 43 bits that are not always zero.
+  -- Zeros after the last bit of a pose's number in firm_fixed_to_float64, whose format also has three more bits before
+  -- the point, so that a mean of squares fits. The float64 of a pose therefore has only 43 bits that may be nonzero.
   constant ZEROS      : positive := 64 - FRACTION - 6;
   constant ENTRY      : positive := 43;
-  -- What leaves for the poses: four numbers a row, three rows a joint.
+  -- The computed numbers of the poses: four per row, three rows per joint.
   constant ENTRIES    : positive := JOINTS*12;
 
   -- A fixed-point number of the input, up to 16, and a difference of two, up to 8.
   subtype wide_t is signed(FRACTION+4 downto 0);
   subtype operand_t is signed(FRACTION+3 downto 0);
   subtype product_t is signed(2*FRACTION+7 downto 0);
-  -- An operand times the lower bits of the other one, or the rest of these.
+  -- An operand is multiplied by the lower bits of the other one, and by its remaining bits.
   constant LOWER : positive := 17;
   subtype partial_t is signed(FRACTION+4+LOWER downto 0);
   subtype column_index_t is natural range 0 to 2;
@@ -76,7 +76,7 @@ architecture rtl of arm_chain is
 
   constant ONE : integer := 2**FRACTION;
 
-  -- An element of a column, which dynamic indices would pay twice for.
+  -- An element of a column, smaller than a dynamic index.
   function row_of(column : column_t; row : natural) return number_t is
   begin
     if row = 0 then
@@ -143,13 +143,13 @@ architecture rtl of arm_chain is
   signal p_r              : column_t;
   signal cos_r            : number_t;
   signal sin_r            : number_t;
-  -- This pose, or the given one, has no numbers.
+  -- This pose, or the given one, is invalid.
   signal unfit_r          : std_logic;
   signal given_unfit_r    : std_logic;
 
-  -- The own element, whose difference to the given one is squared.
+  -- The computed element, whose difference to the given one is squared.
   signal own_r            : number_t;
-  -- Two operands, their product, and what becomes of it: the slot and row that it was asked for in.
+  -- Two operands and their product, each with the slot and row of the request.
   signal left_r           : operand_t;
   signal right_r          : operand_t;
   signal operands_valid_r : std_logic;
@@ -175,12 +175,12 @@ architecture rtl of arm_chain is
   signal emit             : std_logic;
   signal emitted          : number_t;
   signal emit_r           : std_logic;
-  signal emitted_r        : number_t;  -- zero where nothing leaves
+  signal emitted_r        : number_t;  -- zero if nothing leaves
   signal float_in_valid   : std_logic;
   signal float_in         : std_logic_vector(63 downto 0);
   signal float_valid      : std_logic;
   signal float            : std_logic_vector(63 downto 0);
-  -- Whether what is on its way to float64 is a number.
+  -- Whether a number in conversion to float64 is invalid.
   signal float_unfit_r    : std_logic_vector(TO_FLOAT-1 downto 0);
 
   -- In the order in which they leave: joint, row, column.
@@ -250,7 +250,7 @@ begin
         row_r <= row_r + 1;
       end if;
 
-      -- Once more in CONVERT: there it says that the sum was handed on.
+      -- One more count in CONVERT, where it marks the sum as sent.
       if phase_r /= COMPARE and phase_r /= CONVERT then
         turn_r <= 0;
       elsif phase_r = COMPARE and turn_r /= LAST_TURN then
@@ -405,7 +405,7 @@ begin
 
   -- Products --------------------------------------------------------------------------------------------------------
 
-  -- The element that was asked for CONVERSION cycles ago, in the next cycle.
+  -- The element that was requested CONVERSION cycles ago, in the next cycle.
   hold_own : process (clk)
     variable element : natural range 0 to 15;
   begin
@@ -438,7 +438,7 @@ begin
       x := row_of(x_r, row_r);
       y := row_of(y_r, row_r);
       z := row_of(z_r, row_r);
-      -- The column that the step turns with x, and the one it goes along, but for their signs.
+      -- The column that the step turns with x, and the one along which it moves, without their signs.
       along := z;
       if TURNS(step_r) /= 0 then
         along := y;
@@ -571,7 +571,7 @@ begin
     end if;
   end process sum;
 
-  -- An angle's fault stays for all joints behind it.
+  -- The fault of an angle affects all joints after it.
   faults : process (clk)
   begin
     if rising_edge(clk) then
@@ -591,7 +591,7 @@ begin
 
   -- To float64 ------------------------------------------------------------------------------------------------------
 
-  -- A row leaves while the next one is in work; each result is there before its slot.
+  -- A row leaves while the next one is processed; each result is ready before its slot.
   emit <= '1' when phase_r = TURN and row_r /= 0 and slot_r >= 2 and step_r /= STEPS-1 else '0';
 
   select_number : process (x_r, y_r, z_r, p_r, row_r, slot_r)

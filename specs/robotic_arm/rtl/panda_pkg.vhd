@@ -1,8 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The arm: Franka Emika's Panda with its hand, in Denavit and Hartenberg's parameters after Craig.
 --
--- Joint i turns by its angle about z, behind a step by A along x, a turn by ALPHA about x, and before a step by D
--- along z:
+-- Joint i is a turn by ALPHA about x, a step by A along x, a turn by its angle about z, and a step by D along z:
 --   T(i) = T(i-1) * Rx(ALPHA) * Tx(A) * Rz(angle) * Tz(D)
 -- The hand at the flange is an eighth joint that does not move. Another arm of seven joints needs other numbers here.
 

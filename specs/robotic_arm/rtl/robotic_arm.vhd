@@ -1,10 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- robotic_arm/ArmState, or franka_msgs/FrankaState, to robotic_arm/ArmPoses: the poses of an arm's seven joints,
--- measured and desired, and how far those of its end effector are from what the state says.
+-- Converts robotic_arm/ArmState, or franka_msgs/FrankaState, to robotic_arm/ArmPoses: the poses of an arm's seven
+-- joints, measured and desired, and the errors of the end effector's poses in the state.
 --
--- Two chains do the same at the same time, with the measured angles and with the desired ones; the handshakes of the
--- first stand for both. A message is taken when its result is there, and the next one is begun when that has been
--- sent.
+-- Two chains work in lockstep on the measured and the desired angles, so the handshakes of the first apply to both. A
+-- message is taken when its result is ready; the next one starts when the result has been sent.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -14,7 +13,7 @@ entity robotic_arm is
     clk                : in  std_logic;
     rst_n              : in  std_logic;
 
-    -- float64 in rad and m, element 0 lowest; README.md tells what becomes of infinity and NaN.
+    -- float64 in rad and m, element 0 lowest; README.md lists the results of infinity and NaN.
     in_q               : in  std_logic_vector(447 downto 0);
     in_q_d             : in  std_logic_vector(447 downto 0);
     in_o_t_ee          : in  std_logic_vector(1023 downto 0);

@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The Sobel filter of an image in mono8: |Gx| + |Gy|, 255 at most, with Gx and Gy those of 3 x 3 pixels. Beyond the
--- image its outermost pixels go on, so a border shows no edge that is not there. A beat of pixels is taken every cycle;
--- the two rows before wait in block RAM, and a row leaves while the next one comes.
+-- Applies the Sobel filter to a mono8 image: |Gx| + |Gy|, 255 at most, with Gx and Gy of 3 x 3 pixels. Outside the
+-- image, its outermost pixels are repeated, so the border has no artificial edge. A beat of pixels is taken every
+-- cycle; block RAM stores the two previous rows, and a row leaves while the next one arrives.
 --
 -- Each column of three pixels counts twice: s = a + 2 b + c for Gx = s(x+1) - s(x-1), d = c - a for
 -- Gy = d(x-1) + 2 d(x) + d(x+1). A group of pixels needs a column of the groups on both sides of it, so it waits for
--- the next one. Behind the last row the one before is read once more, and then one group comes that is none.
+-- the next one. After the last row, the memory is read once more, followed by an empty group.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -15,7 +15,7 @@ use firm.firm_axis_pkg.all;
 entity sobel is
   generic (
     WIDTH       : integer := 8;
-    -- The widest image; a wider one becomes an empty one.
+    -- The widest image; the result of a wider one is empty.
     MAX_COLUMNS : integer := 2048
   );
   port (
@@ -98,10 +98,10 @@ architecture rtl of sobel is
   subtype smooth_t is signed(11 downto 0);
   type smooths_t is array (natural range 0 to LANES-1) of smooth_t;
 
-  -- How far an image is: its rows come; the last one is made; the last group leaves; its end is told.
+  -- The progress of an image: its rows arrive; the last row is computed; the last group leaves; the end is sent.
   type phase_t is (ROWS, LAST_ROW, LAST_GROUP, TELL_END);
 
-  -- What is known of a group: whether it gives a result, and of which pixels.
+  -- The attributes of a group: whether it gives a result, and its pixels.
   type group_t is record
     gives : std_logic;
     first : std_logic;
@@ -142,8 +142,8 @@ architecture rtl of sobel is
   signal result_ready : std_logic;
 
   signal advance : std_logic;
-  signal settled : std_logic;  -- the group before is in the memory
-  signal offered : std_logic;  -- a group, of those that come or of the last row
+  signal settled : std_logic;  -- the previous group is in the memory
+  signal offered : std_logic;  -- a group, arriving or of the last row
   signal take    : std_logic;
 
   signal phase_r      : phase_t;
@@ -151,18 +151,18 @@ architecture rtl of sobel is
   signal last_index_r : natural range 0 to GROUPS-1;            -- of a row's last one
   signal last_count_r : std_logic_vector(COUNT_BITS-1 downto 0);
   signal is_last      : std_logic;
-  signal rows_r       : natural range 0 to 2;                   -- rows that came, as far as it matters
+  signal rows_r       : natural range 0 to 2;                   -- rows received, at most two
 
-  -- The two rows before, the later one low.
+  -- The two previous rows, the later one low.
   signal memory  : rows_t;
   signal earlier : std_logic_vector(2*WIDTH-1 downto 0);
 
-  -- A group of the row that comes.
+  -- A group of the arriving row.
   signal data_r    : pixels_t;
   signal address_r : natural range 0 to GROUPS-1;
   signal group_r   : group_t;
-  signal second_r  : std_logic;  -- there is one row before
-  signal lowest_r  : std_logic;  -- no row comes any more
+  signal second_r  : std_logic;  -- exactly one row was received
+  signal lowest_r  : std_logic;  -- all rows were received
   signal valid_r   : std_logic;
 
   -- The same with the pixels above it, and its columns.
@@ -174,7 +174,7 @@ architecture rtl of sobel is
   signal ahead_s       : smooths_t;
   signal ahead_d       : smooths_t;
 
-  -- The group before it, whose row is the one before, and the column before that.
+  -- The group before it, whose result is computed, and the column before that group.
   signal here_r   : group_t;
   signal here_s   : smooths_t;
   signal here_d   : smooths_t;
@@ -272,7 +272,7 @@ begin
     );
 
   advance <= result_ready or not out_r;
-  -- Where a row is one group, the next one may not be read before this one is written.
+  -- If a row is one group, the next one must not be read before this one is written.
   settled <= '0' when valid_r = '1' and address_r = index_r else '1';
   is_last <= group_last when phase_r = ROWS else
              '1' when index_r = last_index_r else
@@ -371,7 +371,7 @@ begin
     end if;
   end process take_group;
 
-  -- A register behind the memory, whose output is late in its cycle.
+  -- A register after the memory, whose output is late in its cycle.
   align_rows : process (clk)
   begin
     if rising_edge(clk) then

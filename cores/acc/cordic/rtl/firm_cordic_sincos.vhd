@@ -3,8 +3,7 @@
 --
 -- The unit vector is shortened by the factor by which the rotations lengthen it. It is turned by atan(2**-i), i = 0, 1,
 -- ..., towards the angle. All rotations together reach 1.74, so angles of 13/8 and more, or below -13/8, are first
--- folded by half a turn, which negates the vector. A few bits decide about that, since the fold follows in the same
--- cycle.
+-- folded by half a turn, which negates the vector. A few bits determine the fold, since it follows in the same cycle.
 -- All numbers have a few bits more than the result, so that truncation in every rotation leaves the result accurate to
 -- about a unit. An angle takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
 
@@ -91,7 +90,7 @@ architecture rtl of firm_cordic_sincos is
   -- Signals, set bit by bit: ghdl 2.0 translates a constant of more than 32 bits to a Verilog string.
   signal quarter_pi : angle_t;
   signal pi         : angle_t;
-  signal eighths    : signed(5 downto 0);  -- of the angle that comes, rounded down
+  signal eighths    : signed(5 downto 0);  -- of the arriving angle, rounded down
   signal start      : number_t;
 
   signal count_r    : unsigned(COUNT_WIDTH-1 downto 0);

@@ -4,7 +4,8 @@
 -- ieee.math_real has 53 bits, too few for a fraction of 60, and does not synthesise everywhere. The angles are
 -- therefore literals. Each is round(atan(2**-i) * 2**96), from the series
 -- x - x**3/3 + x**5/5 - ... summed in exact fractions; i = 0 by Machin's 4*atan(1/5) - atan(1/239).
--- tests/applications/test_quat2euler.py recomputes them. The inverse of the gain of all rotations is here, too.
+-- tests/applications/test_quat2euler.py recomputes them. This file also contains the inverse of the gain of all
+-- rotations.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -48,7 +48,7 @@ architecture rtl of firm_cordic_vectoring is
 
   -- The table has 64 rotations, and an angle of 64 fraction bits cannot use more.
   constant COUNT_WIDTH  : positive := 6;
-  -- So many rotations have a coarse shift in common, of 2*FINE_STEPS places each; and how many such shifts there are.
+  -- The number of rotations with a common coarse shift, of 2*FINE_STEPS places each, and the number of such shifts.
   constant FINE_WIDTH   : positive := 3;
   constant FINE_STEPS   : positive := 2**FINE_WIDTH;
   constant LAST_COARSE  : natural  := (ITERATIONS-1) / FINE_STEPS;
@@ -199,7 +199,7 @@ begin
         scaled_r     <= resize(absolute(in_y), WIDTH+1);
         angle_r      <= (others => '0');
       elsif folding_r = '1' then
-        -- A cycle of its own, since the input may come late and is compared with 0 then.
+        -- A separate cycle, since the input may arrive late and is compared with 0 here.
         aligned_r <= scaled_r;
         if x_negative_r = '1' then
           angle_r <= pi;

@@ -50,7 +50,7 @@ architecture rtl of firm_fixed_divide is
     return b;
   end function larger;
 
-  -- The quotient of the magnitudes as integers has one fraction bit more than the result if a has so many more bits.
+  -- If a has this number of further bits, the integer quotient has one fraction bit more than the result.
   constant PLACES   : integer  := OUT_FRACTION + B_FRACTION - A_FRACTION + 1;
   constant DIGITS   : positive := A_WIDTH + larger(PLACES, 0);
   constant DIVISOR  : positive := B_WIDTH + larger(-PLACES, 0);
@@ -65,7 +65,7 @@ architecture rtl of firm_fixed_divide is
   signal is_by_zero_r : std_logic;
   signal undefined_r  : std_logic;
 
-  -- Digits of a that are left, and below them those of the quotient.
+  -- Remaining digits of a, and below them those of the quotient.
   signal digits_r     : unsigned(DIGITS-1 downto 0);
   signal divisor_r    : unsigned(DIVISOR-1 downto 0);
   signal remainder_r  : unsigned(DIVISOR-1 downto 0);

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes a fixed-point number of another size: rounded to nearest, ties to even, and saturated.
+-- Converts a fixed-point number to another size: rounded to nearest, ties to even, and saturated.
 --
 -- Numbers are in two's complement. A pipeline: one result in every cycle.
 
@@ -42,7 +42,7 @@ architecture rtl of firm_fixed_resize is
     return b;
   end function larger;
 
-  -- Fraction bits that the result does not have, and those that the number does not have.
+  -- Fraction bits that the result lacks, and those that the number lacks.
   constant LOST          : natural  := larger(IN_FRACTION - OUT_FRACTION, 0);
   constant ADDED         : natural  := larger(OUT_FRACTION - IN_FRACTION, 0);
   constant EXACT_WIDTH   : positive := larger(IN_WIDTH, LOST + 1) + ADDED;

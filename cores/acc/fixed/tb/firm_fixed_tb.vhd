@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- An operation on fixed-point numbers, fed by firm_sim_operation. The first operand is in the highest bits of a line; a
--- result is followed by overflow and whether it is undefined.
+-- Tests an operation on fixed-point numbers, fed by firm_sim_operation. The first operand is in the highest bits of a
+-- line; the flags overflow and undefined follow a result.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -50,7 +50,7 @@ architecture rtl of firm_float_divide is
   -- The result is zero, infinite or undefined.
   signal is_known_r  : std_logic;
   signal exponent_r  : signed(RANGE_BITS-1 downto 0);
-  -- What remains of the dividend: below twice the divisor.
+  -- The remainder: below twice the divisor.
   signal remainder_r : unsigned(MANTISSA_BITS+1 downto 0);
   signal divisor_r   : unsigned(MANTISSA_BITS downto 0);
   signal quotient_r  : unsigned(DIGITS-1 downto 0);

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A low-pass filter of first order: y = y before + weight * (x - y before).
+-- A low-pass filter of first order: y = previous y + weight * (x - previous y).
 --
 -- The first result after a reset or a restart is the sample itself. One multiply-add serves both steps, each rounded
 -- once; one sample is computed at a time.
@@ -25,7 +25,7 @@ entity firm_float_low_pass is
     in_number  : in  std_logic_vector(EXPONENT_BITS+MANTISSA_BITS downto 0);
     -- From 0 to 1: T / (T + tau) for the time constant tau and samples every T.
     in_weight  : in  std_logic_vector(EXPONENT_BITS+MANTISSA_BITS downto 0);
-    -- Forget all former samples.
+    -- Restart without earlier samples.
     in_restart : in  std_logic := '0';
 
     out_valid  : out std_logic;

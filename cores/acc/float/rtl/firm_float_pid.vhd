@@ -3,10 +3,10 @@
 --
 --   e = setpoint - measured,  i = i before + ki * e,  output = kp * e + i + kd * (measured before - measured)
 --
--- The output stays between `low` and `high`. If it would not, and i has moved it further, i keeps its value, which
--- prevents wind-up. The derivative is that of the measured value, so a new setpoint gives no kick. The periods between
--- two samples are part of ki and kd. One multiply-add serves all steps, each rounded once; one sample is computed at a
--- time.
+-- The output stays between `low` and `high`. If it would exceed a limit, and i has increased the excess, i keeps its
+-- value, which prevents wind-up. The derivative is that of the measured value, so a new setpoint gives no kick. The
+-- periods between two samples are part of ki and kd. One multiply-add serves all steps, each rounded once; one sample
+-- is computed at a time.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -34,7 +34,7 @@ entity firm_float_pid is
     in_kd       : in  std_logic_vector(EXPONENT_BITS+MANTISSA_BITS downto 0);
     in_low      : in  std_logic_vector(EXPONENT_BITS+MANTISSA_BITS downto 0);
     in_high     : in  std_logic_vector(EXPONENT_BITS+MANTISSA_BITS downto 0);
-    -- Begin with i = 0, and without a value measured before.
+    -- Restart with i = 0, and without an earlier measured value.
     in_restart  : in  std_logic := '0';
 
     out_valid   : out std_logic;
@@ -61,7 +61,7 @@ architecture rtl of firm_float_pid is
   signal low_r        : number_t;
   signal high_r       : number_t;
 
-  -- Of the sample before.
+  -- Of the previous sample.
   signal integral_r   : number_t;
   signal before_r     : number_t;
 

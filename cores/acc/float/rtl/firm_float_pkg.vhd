@@ -41,7 +41,7 @@ package firm_float_pkg is
   -- `number` as an unsigned number of `width` bits: 0 if it is negative, all ones if it is too large.
   function limited(number : signed; width : positive) return unsigned;
 
-  -- Pipeline registers of a shifter with so many bits of distance: one for two bits.
+  -- Pipeline registers of a shifter with this number of distance bits: one for two bits.
   function stages_for(levels : positive) return positive;
 
   -- Moved to the right; the lowest bit keeps whether a one has moved out.

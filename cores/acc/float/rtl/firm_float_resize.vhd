@@ -33,7 +33,7 @@ end entity firm_float_resize;
 
 architecture rtl of firm_float_resize is
 
-  -- A larger exponent makes a subnormal number a normal one.
+  -- With a larger exponent, a subnormal number becomes normal.
   function max_left return natural is
   begin
     if OUT_EXPONENT_BITS > IN_EXPONENT_BITS then

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes a floating-point number of an exponent and a magnitude: rounded to nearest, ties to even.
+-- Converts an exponent and a magnitude to a floating-point number: rounded to nearest, ties to even.
 --
 -- The last stages of every operation. A result below the normal numbers is subnormal; beyond the largest number, it is
 -- infinite. NaN is always the positive quiet one with no other bit.

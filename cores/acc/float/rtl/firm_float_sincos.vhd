@@ -2,7 +2,8 @@
 -- Sine and cosine of a floating-point angle in rad.
 --
 -- The angle becomes a fixed-point number and is folded to half a turn: for each k from ANGLE_BITS-2 to 0, an angle
--- beyond pi * 2**k comes closer by twice of this. CORDIC computes both results. One angle is computed at a time.
+-- beyond pi * 2**k is moved towards 0 by twice this value. CORDIC computes both results. One angle is computed at a
+-- time.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -63,7 +64,7 @@ architecture rtl of firm_float_sincos is
   type state_t is (IDLE, CONVERT, MEASURE, FOLD, ROUND, ROTATE, FINISH);
 
   signal state_r      : state_t;
-  -- Folds that are left.
+  -- Remaining folds.
   signal count_r      : natural range 0 to ANGLE_BITS;
   signal illegal_r    : std_logic;
 

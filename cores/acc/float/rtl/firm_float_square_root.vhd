@@ -113,7 +113,7 @@ begin
 
       else
         number := number_r;
-        -- The first two digits of a number from 1 to 2 are 01; those of twice of it, 10 or 11.
+        -- The first two digits of a number from 1 to 2 are 01; those of twice this number, 10 or 11.
         if count_r = DIGITS-1 and not is_even then
           number := shift_left(number, 1);
         end if;
@@ -139,7 +139,7 @@ begin
     end if;
   end process extract;
 
-  -- Only in sizes of few exponents, a root is below the normal numbers.
+  -- A root is below the normal numbers only in sizes with few exponents.
   u_round : entity firm.firm_float_round
     generic map (
       EXPONENT_BITS => EXPONENT_BITS,

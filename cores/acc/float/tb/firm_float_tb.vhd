@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- An operation on floating-point numbers, fed by firm_sim_operation. The first operand is in the highest bits of a
--- line; a result is followed by its flags, if there are any.
+-- Tests an operation on floating-point numbers, fed by firm_sim_operation. The first operand is in the highest bits of
+-- a line; flags, if any, follow a result.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -3,9 +3,9 @@
 --
 -- The numbers are in a ring. It first turns past one comparator, which finds the largest exponent, and then past one
 -- shifter, which aligns each number to it: 2*COUNT + 2 cycles from input to output. The comparator begins with the
--- first number as it arrives, so that the ring need not turn past it, and how far a number is shifted is known a cycle
--- before. The largest number is exact; the others are rounded to the nearest unit, ties away from zero.
--- A denormal number beside a normal one has its exact value.
+-- first number as it arrives, so that the ring need not turn past it, and the shift of a number is known a cycle
+-- earlier. The largest number is exact; the others are rounded to the nearest unit, ties away from zero.
+-- In a block with a normal number, denormal numbers are aligned and rounded like the others.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -66,7 +66,7 @@ architecture rtl of firm_float64_to_block is
   signal largest_r   : exponent_t := (others => '0');
   signal undefined_r : std_logic;
   signal zero_r      : std_logic;
-  -- The places that the number in the ring's first slot moves, and whether it moves beyond all.
+  -- The shift of the number in the ring's first slot in places, and whether it shifts out all bits.
   signal distance_r  : unsigned(SHIFT_WIDTH-1 downto 0);
   signal vanishes_r  : std_logic;
   -- The number between shifting and rounding.
@@ -150,7 +150,7 @@ begin
     end if;
   end process find;
 
-  -- The first number is measured at rest; each other one as it comes into the first slot.
+  -- The first number is measured at rest; each other one as it enters the first slot.
   gauge : process (clk)
     variable exponent : exponent_t;
     variable distance : exponent_t;
@@ -200,7 +200,7 @@ begin
   begin
     if rising_edge(clk) then
       if step_r = IDLE and in_valid = '1' then
-        -- Number 0 comes last: it is found already.
+        -- Number 0 comes last: it has already been measured.
         for k in ring_r'range loop
           ring_r((k + COUNT-1) mod COUNT) <= in_numbers(64*k+63 downto 64*k);
         end loop;

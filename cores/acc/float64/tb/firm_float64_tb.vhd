@@ -3,7 +3,7 @@
 --
 -- As binary digits: a line of BLOCK_VECTORS is in_numbers, of BLOCK_RESULTS out_numbers out_exponent
 -- out_undefined out_zero; a line of FIXED_VECTORS is in_number, of FIXED_RESULTS out_number. The fixed-point
--- numbers follow each other without a gap but every fifth.
+-- numbers follow each other without a gap, except every fifth.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -2,7 +2,7 @@
 -- Feeds firm_float64_to_fixed from a file and writes its results.
 --
 -- As binary digits: a line of VECTORS is in_number, of RESULTS out_number out_overflow out_undefined. The numbers
--- follow each other without a gap but every fifth.
+-- follow each other without a gap, except every fifth.
 
 library ieee;
 use ieee.std_logic_1164.all;

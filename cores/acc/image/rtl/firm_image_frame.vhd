@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- All parts of an accelerator for sensor_msgs/Image except the pixel processing: it takes and sends the message, gives
--- the pixels as groups, and takes the results as bytes. No image is stored; only the beats in the window and in the
--- packer wait, so pixels leave at the rate at which they arrive.
+-- All parts of an accelerator for sensor_msgs/Image except the pixel processing: it receives and sends the message,
+-- outputs the pixels as groups, and receives the results as bytes. No image is stored; only the beats in the window and
+-- in the packer wait, so pixels leave at the rate at which they arrive.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -87,7 +87,7 @@ entity firm_image_frame is
     group_valid : out std_logic;
     group_ready : in  std_logic;
 
-    -- The processed pixels, as at firm_axis_pack; `result_last` follows `group_end`, without bytes. It may also come
+    -- The processed pixels, as at firm_axis_pack; `result_last` follows `group_end`, without bytes. It may also arrive
     -- with the image's last bytes, which then do not wait for it.
     result_data  : in  std_logic_vector(WIDTH-1 downto 0);
     result_count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);

@@ -73,7 +73,7 @@ entity firm_image_header is
 
     -- The pixels are processed: low between images; all values below are valid while it is high.
     run       : out std_logic;
-    is_empty  : out std_logic;                      -- there is no byte of data, and no beat
+    is_empty  : out std_logic;                      -- neither a byte of data nor a beat is available
     has_none  : out std_logic;                      -- the result has no pixels
     row_bytes : out std_logic_vector(17 downto 0);
     padding   : out std_logic_vector(31 downto 0);  -- bytes after each row
@@ -113,7 +113,7 @@ architecture rtl of firm_image_header is
     return result;
   end function beat_of;
 
-  -- The most columns or rows of which no more than 65,535 can result.
+  -- The maximum number of columns or rows that result in at most 65,535.
   function most(size_in, size_out : integer) return positive is
   begin
     if size_out > size_in then
@@ -135,7 +135,7 @@ architecture rtl of firm_image_header is
 
   -- One dimension of the image, times OUT/IN, from the highest bit on.
   type scaled_t is record
-    left      : unsigned(SIZE_BITS-1 downto 0);  -- the bits to come
+    left      : unsigned(SIZE_BITS-1 downto 0);  -- remaining bits
     quotient  : unsigned(SIZE_BITS-1 downto 0);
     remainder : unsigned(SIZE_BITS downto 0);
   end record scaled_t;
@@ -174,7 +174,7 @@ architecture rtl of firm_image_header is
   end function rounded_up;
 
   signal state_r    : state_t;
-  signal is_there   : std_logic;  -- a message that was not withdrawn
+  signal is_there   : std_logic;  -- a valid message that was not withdrawn
   signal matches_r  : std_logic;  -- the encoding is the supported one
   signal beat_r     : natural range 0 to max(IN_BEATS, OUT_BEATS);
   signal bit_r      : natural range 0 to SIZE_BITS-1;
@@ -407,7 +407,7 @@ begin
 
   encoding_last <= '1' when beat_r = OUT_BEATS-1 else '0';
 
-  -- Lane by lane, because GHDL 2.0 writes constants of more than 32 bits into Verilog as a text.
+  -- Lane by lane, because GHDL 2.0 writes constants of more than 32 bits to Verilog as strings.
   show_encoding : for lane in 0 to LANES-1 generate
     show_lane : process (beat_r)
     begin

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Cuts the data of an image into rows, and these into groups of pixels from lane 0 up. Padding and all bytes after the
 -- last row are dropped. A full group leaves every cycle, wherever rows begin in the stream, and comes from a register.
--- How many bytes are taken next, and whether they are the last ones of the row or its padding, is known a cycle before.
+-- The number of bytes taken next, and whether they end the row or its padding, is known a cycle earlier.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -60,13 +60,13 @@ architecture rtl of firm_image_rows is
 
   signal section_r : section_t;
   signal wanted_r  : count_t := (others => '0');               -- bytes that are taken next
-  signal behind_r  : size_t := (others => '0');                -- the section's bytes after them
-  signal closes_r  : std_logic;                                -- there are none
-  signal rows_r    : unsigned(15 downto 0) := (others => '0'); -- rows to come, this one included
+  signal behind_r  : size_t := (others => '0');                -- the section's remaining bytes after them
+  signal closes_r  : std_logic;                                -- none remain
+  signal rows_r    : unsigned(15 downto 0) := (others => '0'); -- remaining rows, including this one
   signal first_r   : std_logic;
-  signal short_r   : std_logic;                                -- the stream ends before all that are wanted
+  signal short_r   : std_logic;                                -- the stream ends before all these bytes
   signal over_r    : std_logic;                                -- the stream is over
-  signal told_r    : std_logic;                                -- and the end was reported
+  signal told_r    : std_logic;                                -- and its end was reported
 
   signal is_final   : std_logic;                               -- no row follows
   signal take_group : std_logic;
@@ -134,7 +134,7 @@ begin
     end if;
   end process note_end;
 
-  -- What is taken next: of this section, or of the one that follows it.
+  -- The bytes taken next: of this section, or of the following one.
   plan : process (clk)
     variable section : section_t;
     variable size    : size_t;

@@ -22,7 +22,7 @@
 
 #define SPURIOUS 1023u
 #define LOWEST_ENABLED 0xFFu
-/* Below the highest priority from which FreeRTOS may be called, and the lowest there is. */
+/* Below the highest priority from which FreeRTOS may be called, and the lowest priority. */
 #define DEVICE_PRIORITY (24u << 3)
 #define TICK_PRIORITY (30u << 3)
 
@@ -107,7 +107,7 @@ static void answer(uint32_t acknowledged) {
 void firm_board_answer_interrupt(void) { answer(firm_read(GIC_ACKNOWLEDGE)); }
 
 #ifdef FIRM_FREERTOS
-/* Handlers may compute with floating-point numbers: the port's default saves these registers first. */
+/* Handlers may use floating-point numbers: the port's default saves these registers first. */
 void vApplicationFPUSafeIRQHandler(uint32_t acknowledged);
 void vApplicationFPUSafeIRQHandler(uint32_t acknowledged) { answer(acknowledged); }
 #endif

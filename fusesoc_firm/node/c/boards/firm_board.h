@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a program without an operating system, or FreeRTOS, needs of a Zynq: memory, interrupts, a tick of one
+/* The parts of a Zynq for a program without an operating system, or with FreeRTOS: memory, interrupts, a tick of one
  * millisecond and a console. The processor's folder has the addresses (firm_processor.h), start.S, which starts the
  * program, and the linker script. */
 #ifndef FIRM_BOARD_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Joins the bursts of a preemptive Manager into frames (docs/reference/manager.md, "Bursts"), as
- * fusesoc_firm/node/bursts.py does, with a buffer for each publisher. Both are tested with the same bursts. */
+ * fusesoc_firm/node/engine/bursts.py does, with a buffer for each publisher. Both are tested with the same bursts. */
 #ifndef FIRM_BURSTS_H
 #define FIRM_BURSTS_H
 

@@ -11,7 +11,7 @@
 #define STATUS 0x04u
 #define FIRST_DESCRIPTOR 0x08u
 #define LAST_DESCRIPTOR 0x10u
-/* From a register for an address to that for its upper half, which exists only in an engine with longer addresses. */
+/* The offset to the register of an address's upper half, which exists only in an engine with longer addresses. */
 #define UPPER 0x04u
 
 #define RUN (1u << 0)
@@ -48,7 +48,7 @@ static void make_ring(volatile firm_descriptor_t *ring, uint8_t buffers[][FIRM_D
     firm_cache_flush(ring, FIRM_DMA_BUFFERS * sizeof *ring);
 }
 
-/* Write the address of a descriptor, the upper half last, as PG021 has it. */
+/* Write the address of a descriptor, the upper half last, as PG021 requires. */
 static void point_to(uintptr_t address, const volatile firm_descriptor_t *descriptor) {
     const uint64_t place = firm_bus_address(descriptor);
     firm_write(address, (uint32_t)place);
@@ -198,7 +198,7 @@ firm_dma_status_t firm_dma_receive(firm_dma_t *dma, uint8_t *burst, size_t room,
         }
         status = status_of(&dma->memory->from_system[dma->receiving]);
     }
-    /* Who has nothing left to send would not notice that a frame on its way was lost. */
+    /* A sender without further frames would not notice the loss of a frame in transfer. */
     return (firm_dma_fault(dma, 0) | firm_dma_fault(dma, 1)) != 0 ? FIRM_DMA_ERROR : FIRM_DMA_NOTHING;
 }
 

@@ -54,7 +54,7 @@ firm_dma_status_t firm_dma_send(firm_dma_t *dma, const uint8_t *frame, size_t si
  * with its length in `size`; the next call begins another. One task only, which need not be the sending one. */
 firm_dma_status_t firm_dma_receive(firm_dma_t *dma, uint8_t *burst, size_t room, size_t *size);
 
-/* Return the bits of DMASR that tell why the channel (of `to_system` or the other direction) has stopped: 4 DMAIntErr,
+/* Return the bits of DMASR with the reason for the stop of the channel (`to_system` or the other one): 4 DMAIntErr,
  * 5 DMASlvErr, 6 DMADecErr, 8 SGIntErr, 9 SGSlvErr, 10 SGDecErr, 0 halted. Returns 0 if the channel runs. */
 uint32_t firm_dma_fault(const firm_dma_t *dma, int to_system);
 

@@ -3,7 +3,7 @@
 
 #include "firm_port.h"
 
-/* No processor that firm_port.h was written for accesses a device's register in less than 50 ns. */
+/* No supported processor accesses a device's register in less than 50 ns. */
 #define POLLS_A_MILLISECOND 20000u
 
 firm_limit_t firm_limit_of(uint32_t milliseconds) {

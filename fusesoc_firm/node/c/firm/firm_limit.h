@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A time limit for waiting for a device. It ends even if the clock stands still, because the loop or the scheduler that
- * counts the ticks does not run yet: then the polls of the device's registers are counted instead. */
+/* A time limit for waiting for a device. If the clock does not run, because the loop or the scheduler that counts the
+ * ticks has not started, the polls of the device's registers are counted instead. */
 #ifndef FIRM_LIMIT_H
 #define FIRM_LIMIT_H
 

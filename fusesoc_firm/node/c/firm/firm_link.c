@@ -4,13 +4,13 @@
 #include <string.h>
 
 #define CHECKSUM_BYTES 4u
-/* The code of a block that holds as many bytes as it can, and after which there is no zero. */
+/* The code of a full block, which no zero follows. */
 #define FULL_BLOCK 255u
 /* The CRC of a frame with its checksum. */
 #define RESIDUE 0x2144DF1Cu
 
 uint32_t firm_crc32(uint32_t crc, const uint8_t *bytes, size_t size) {
-    /* Of the 16 values of four bits, which keeps the table small. */
+    /* For the 16 values of four bits, which keeps the table small. */
     static const uint32_t table[16] = {0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u,
                                        0x4DB26158u, 0x5005713Cu, 0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu,
                                        0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu};
@@ -47,7 +47,7 @@ void firm_link_encode(const uint8_t *frame, size_t size, void (*put)(void *conte
             put(context, byte_at(frame, size, checksum, place));
         }
         is_over = place == end;
-        /* A block that is not full stands for the zero after it, too. */
+        /* A block that is not full includes the zero after it. */
         start = count == FULL_BLOCK - 1u ? place : place + 1u;
     }
     put(context, 0);
@@ -71,7 +71,7 @@ static void keep(firm_link_decoder_t *decoder, uint8_t byte) {
     }
 }
 
-/* Return what a frame is that ends now, as far as its bytes tell. */
+/* Return the status of a frame that ends now, from its bytes. */
 static firm_link_status_t judged(const firm_link_decoder_t *decoder) {
     uint32_t length;
     if (decoder->left != 0 || decoder->size < FIRM_HEADER_BYTES + CHECKSUM_BYTES || decoder->crc != RESIDUE) {
@@ -95,7 +95,7 @@ static firm_link_status_t end_frame(firm_link_decoder_t *decoder) {
     decoder->good += status == FIRM_LINK_FRAME;
     decoder->broken += status == FIRM_LINK_BROKEN;
     decoder->refused += status == FIRM_LINK_REFUSED;
-    /* The first bytes of the checksum may be there, too. */
+    /* The buffer may also hold the first bytes of the checksum. */
     if (status == FIRM_LINK_FRAME) {
         decoder->filled = decoder->size - CHECKSUM_BYTES;
     }

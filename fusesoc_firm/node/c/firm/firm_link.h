@@ -10,7 +10,7 @@
 
 #include "firm_frame.h"
 
-/* Of a row of bytes: start with crc 0, and pass the result on. */
+/* The CRC-32 of bytes: start with crc 0, and pass the result to the next call. */
 uint32_t firm_crc32(uint32_t crc, const uint8_t *bytes, size_t size);
 
 /* Send a frame: `put` is called with `context` and each byte. */
@@ -20,7 +20,7 @@ typedef enum {
     FIRM_LINK_MORE,    /* no complete frame yet */
     FIRM_LINK_FRAME,   /* a complete frame */
     FIRM_LINK_BROKEN,  /* a frame whose code, length or checksum is wrong is dropped */
-    FIRM_LINK_REFUSED  /* a frame that is right, but is from an unknown publisher or longer than the buffer, is dropped */
+    FIRM_LINK_REFUSED  /* a correct frame from an unknown publisher, or longer than the buffer, is dropped */
 } firm_link_status_t;
 
 /* Finds frames in received bytes. `buffer` holds the current frame. */
@@ -32,7 +32,7 @@ typedef struct {
     uint32_t crc;
     size_t size;          /* bytes of the frame and its checksum so far */
     unsigned left;        /* bytes of the block still to come; at zero, the code of the next one comes */
-    int is_zero_due;      /* a zero is between this block and the next one */
+    int is_zero_due;      /* a zero follows this block */
     int has_begun;
     int is_synchronised;  /* a zero byte was received */
     uint32_t good;        /* counts of frames */

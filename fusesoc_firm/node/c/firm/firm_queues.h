@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Frames to the hardware: a queue for each subscriber; the least recently used queue is served next (the dissertation's
- * section 6.3.3; docs/reference/host-queues.md), like the default of fusesoc_firm/node/queues.py; here the memory is
+ * section 6.3.3; docs/reference/host-queues.md), like the default of fusesoc_firm/node/engine/queues.py; here the memory is
  * static.
  *
  * A payload is copied once, outside the lock, into a slot that belongs to its frame until the frame is sent. */

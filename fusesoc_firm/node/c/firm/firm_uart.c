@@ -34,12 +34,12 @@
 
 /* Longer than a byte at 9600 baud. */
 #define BREAK_MS 3u
-/* For the 64 bytes that the UART may still have to send, at 9600 baud. */
+/* The time of the 64 bytes that the UART may still have to send, at 9600 baud. */
 #define EMPTY_MS 100u
 /* Received bytes at which the interrupt comes, and at which RTS rises. An adapter may send 16 bytes more. */
 #define TRIGGER_BYTES 16u
 #define FLOW_BYTES 40u
-/* In units of four bits: the interrupt comes for fewer bytes when the line has been silent for this time. */
+/* In units of four bits: after this time of silence, fewer bytes also interrupt. */
 #define SILENT_TIME 10u
 
 static int has(const firm_uart_t *uart, uint32_t bit) { return (firm_read(uart->base + STATUS) & bit) != 0; }
@@ -62,8 +62,7 @@ static int drain(firm_uart_t *uart) {
     return 1;
 }
 
-/* Wait for a status, but no longer than this time. A pause of the platform may be longer than the UART holds what it
- * receives. */
+/* Wait for a status, but no longer than this time. A pause of the platform may be so long that the UART overflows. */
 static void wait_for(firm_uart_t *uart, uint32_t status, uint32_t milliseconds) {
     firm_limit_t limit = firm_limit_of(milliseconds);
     while (!has(uart, status) && !firm_limit_is_over(&limit)) {
@@ -107,7 +106,7 @@ void firm_uart_use_interrupt(firm_uart_t *uart) {
 }
 
 void firm_uart_answer_interrupt(firm_uart_t *uart) {
-    /* Before the bytes are read, so that a byte behind them interrupts again. */
+    /* Before the bytes are read, so that a later byte interrupts again. */
     firm_write(uart->base + INTERRUPT_STATUS, RX_INTERRUPTS);
     if (!drain(uart)) {
         firm_write(uart->base + INTERRUPT_DISABLE, RX_INTERRUPTS);
@@ -116,7 +115,7 @@ void firm_uart_answer_interrupt(firm_uart_t *uart) {
     firm_write(uart->base + CONTROL, ENABLED | CONTROL_RESTART_TIMEOUT);
 }
 
-/* What waits for one byte of a frame to be sent. */
+/* The frame that is being sent byte by byte. */
 typedef struct {
     firm_uart_t *uart;
     int is_lost;
@@ -131,7 +130,7 @@ static void put(void *context, uint8_t byte) {
         return;
     }
     limit = firm_limit_of(FIRM_UART_PATIENCE_MS);
-    /* Without a pause: within one, more bytes may arrive than the UART holds, or than the store does. */
+    /* Without a pause, in which more bytes could arrive than the UART or the store holds. */
     do {
         if (!uart->has_interrupt) {
             (void)drain(uart);

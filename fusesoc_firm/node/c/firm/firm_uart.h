@@ -3,7 +3,7 @@
  * code sets the baud rate.
  *
  * The UART holds 64 received bytes, 640 us at 1 Mbaud. They are moved to a store in memory whenever a function of this
- * file runs, also while it sends. A program that is away for longer than that lets an interrupt move them. */
+ * file runs, also while it sends. A program that calls them less often lets an interrupt move the bytes. */
 #ifndef FIRM_UART_H
 #define FIRM_UART_H
 
@@ -18,7 +18,7 @@ typedef struct {
     volatile size_t first, end;
     int has_interrupt;
     volatile int is_held;        /* the store was full, and the interrupt is disabled */
-    volatile uint32_t overruns;  /* times at which the UART lost bytes, because nobody read them */
+    volatile uint32_t overruns;  /* times at which the UART lost bytes that were not read in time */
 } firm_uart_t;
 
 /* Open the line with a break; `buffer` holds a frame from the board. The clock need not run. */
@@ -32,7 +32,7 @@ void firm_uart_use_interrupt(firm_uart_t *uart);
 void firm_uart_answer_interrupt(firm_uart_t *uart);
 
 /* Send a frame; wait while the line is busy. Returns 0 if the line took no byte for FIRM_UART_PATIENCE_MS; then this
- * frame is lost. Receive after each frame: the store holds what arrives during one. */
+ * frame is lost. Receive after each frame: the store has room for the bytes that arrive during one. */
 int firm_uart_send(firm_uart_t *uart, const uint8_t *frame, size_t size);
 
 /* Read received bytes. Returns FIRM_LINK_FRAME (with decoder.filled bytes in decoder.buffer), FIRM_LINK_BROKEN or

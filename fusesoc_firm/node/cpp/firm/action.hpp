@@ -19,7 +19,7 @@ namespace firm {
 // messages, its topics and services. In ROS 1, the topics to a server are goals and cancellations; those to its clients
 // are states, feedback and, in ROS 1, results. The services of ROS 2 are those of goals, cancellations and results. If
 // the side with a goal sends nothing about it for `limit`, the goal fails; a server accepts it after `accept_limit`.
-// `no_result` is the payload of a result without contents.
+// `no_result` is the payload of an empty result.
 struct Action {
   std::string block;
   bool is_server;
@@ -35,7 +35,7 @@ struct Action {
   std::chrono::milliseconds accept_limit;
   Bytes no_result;
 
-  // The places of topics and services above.
+  // The indices of the topics and services above.
   static constexpr std::size_t kGoal = 0, kCancel = 1;
   static constexpr std::size_t kStates = 0, kFeedback = 1, kResult = 2;
   static constexpr std::size_t kSendGoal = 0, kCancelGoal = 1, kGetResult = 2;

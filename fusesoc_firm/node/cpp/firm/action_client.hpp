@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Actions of other nodes, to which the hardware sends goals: the server has one of them at a time, in their order. Each
-// goal of the hardware ends with one result, whatever becomes of it. The node gives each goal an id of its own, which no
-// other client has, and what the hardware receives has the id that the hardware has given. C++17, no dependencies.
+// Sends goals of the hardware to actions of other nodes: the server has one goal at a time, in their order. Each goal
+// ends with exactly one result. The node gives each goal a new unique id for the server, and replaces it by the
+// hardware's own id in messages to the hardware. C++17, no dependencies.
 //
-// The behaviour equals that of fusesoc_firm/node/action_client.py.
+// The behaviour equals that of fusesoc_firm/node/actions/action_client.py.
 #pragma once
 
 #include <chrono>
@@ -27,9 +27,9 @@
 
 namespace firm {
 
-// The goals of the hardware for one action; any thread may call the functions. A goal is sent until the server tells of
-// it, in ROS 1 not before the server has published states. It is lost if the server is silent about it for the time limit,
-// and then canceled, since the server may still pursue it.
+// The goals of the hardware for one action; any thread may call the functions. A goal is sent until the server reports
+// it, in ROS 1 not before the server has published states. It is lost if the server does not report it for the time
+// limit, and then canceled, since the server may still pursue it.
 class ActionClient {
  public:
   // `is_first`: the action is one of ROS 1.
@@ -82,7 +82,7 @@ class ActionClient {
     }
   }
 
-  // The hardware was restarted: it does not know its goals any more, and receives no results.
+  // The hardware was restarted: its earlier goals are unknown to it, and it receives no results.
   void forget() {
     const Lock lock(mutex_);
     for (const auto& [key, goal] : goals_) goal->is_forgotten = true;
@@ -117,7 +117,7 @@ class ActionClient {
 
   // --- times ---
 
-  // Send again what the server has not received; to be called several times a second.
+  // Repeat messages that the server has not received; to be called several times a second.
   void tick() {
     const Lock lock(mutex_);
     if (current_) repeat(current_);
@@ -154,7 +154,7 @@ class ActionClient {
   using Time = std::chrono::steady_clock::time_point;
 
   static constexpr std::chrono::milliseconds kAgain{500};
-  // A server of actionlib that has published no states for so long is not there.
+  // A server of actionlib that has published no states for this time is missing.
   static constexpr std::chrono::seconds kHeard{2};
   static constexpr unsigned kMostReports = 20;
 
@@ -165,8 +165,8 @@ class ActionClient {
     std::optional<Time> again{};
   };
 
-  // A goal: the number of its call in the line, the id that the hardware has given, and that for the server. A server that
-  // `is_known` has told of the goal. `fault` is the reason for the last attempt that failed.
+  // A goal: the number of its call in the line, the id of the hardware, and the id for the server. If `is_known`, the
+  // server has reported the goal. `fault` is the reason for the last attempt that failed.
   struct Goal {
     std::uint64_t number = 0;
     GoalReference own;
@@ -183,7 +183,7 @@ class ActionClient {
     std::string fault;
     std::map<std::size_t, Request> requests;
 
-    // As cancellations of the hardware mean it; without a time of its own, that of its arrival counts.
+    // The goal in cancellations of the hardware; without a time, that of its arrival counts.
     GoalReference named() const { return {own.id, own.stamp.is_zero() ? sent.stamp : own.stamp}; }
   };
   using GoalPointer = std::shared_ptr<Goal>;
@@ -233,7 +233,7 @@ class ActionClient {
     return current_;
   }
 
-  // Take note that the server has told of a goal.
+  // Record that the server has reported a goal.
   void told(Goal& goal) {
     goal.is_known = true;
     goal.fault.clear();
@@ -246,7 +246,7 @@ class ActionClient {
   // Let a goal end with a state, unless it has ended; without a payload, the node makes the result.
   void settle(Goal& goal, GoalState state, const Bytes& payload = {}) {
     const Lock lock(mutex_);
-    // The line hands the goal back when the mutex is free.
+    // The line returns the goal when the mutex is free.
     if (!goal.has_ended && line_.settle({payload}, goal.number)) goal.state = state;
   }
 
@@ -294,7 +294,7 @@ class ActionClient {
       if (goal->is_canceled || !wanted.means(goal->named())) continue;
       goal->is_canceled = true;
       if (goal != current_) continue;
-      // The server has not been silent about a cancellation that it does not have yet.
+      // The time limit restarts: the server does not have the cancellation yet.
       line_.extend();
       cancel_current(goal);
     }
@@ -315,7 +315,7 @@ class ActionClient {
       }
     } else if (!goal->is_known) {
       if (now - goal->tried < kAgain || now - heard_ > kHeard) return;
-      // Servers ignore a goal that they have.
+      // Servers ignore a goal that they already have.
       goal->tried = now;
       publish(Action::kGoal, goal->payload);
     } else if (goal->is_canceled && !goal->cancel_was_sent) {
@@ -328,7 +328,7 @@ class ActionClient {
     if (is_first_ ? goal->is_known : goal->requests.count(Action::kGetResult) > 0) give_up(goal);
   }
 
-  // Return whether an answer has to come before the goal can be canceled.
+  // Return whether the goal can be canceled only after an answer.
   static bool is_being_sent(const Goal& goal) {
     const auto send = goal.requests.find(Action::kSendGoal);
     return send != goal.requests.end() && !send->second.again && goal.requests.count(Action::kGetResult) == 0;
@@ -336,7 +336,7 @@ class ActionClient {
 
   void give_up(const GoalPointer& goal) {
     goal->cancel_was_sent = true;
-    // Without a time, which would mean all goals before.
+    // Without a time, which would cancel all earlier goals.
     const Bytes payload = messages().cancel({goal->sent.id});
     if (is_first_) {
       publish(Action::kCancel, payload);
@@ -420,7 +420,7 @@ class ActionClient {
   std::vector<CallHandler> services_;
   std::uint64_t last_key_ = 0;
   std::uint64_t last_request_ = 0;
-  std::map<std::uint64_t, GoalPointer> goals_;  // those that have not ended, in their order
+  std::map<std::uint64_t, GoalPointer> goals_;  // not ended, in their order
   GoalPointer current_;                         // the one that the server has
   bool is_ending_ = false;
   Time heard_{};  // the last states

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The messages of actions as bytes, in both versions of ROS: ids, states, and what surrounds feedback and results. C++17,
-// no dependencies.
+// The messages of actions as bytes, in both versions of ROS: ids, states, and the fields around feedback and results.
+// C++17, no dependencies.
 //
-// The behaviour equals that of fusesoc_firm/node/action_messages.py.
+// The behaviour equals that of fusesoc_firm/node/actions/action_messages.py.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +20,8 @@
 
 namespace firm {
 
-// The state of a goal: waiting for the hardware, or after its end. kLost: the server of a goal that the hardware has sent
-// does not tell its end.
+// The state of a goal: waiting for the hardware, or after its end. kLost: the server of a goal of the hardware does
+// not report its end.
 enum class GoalState { kWaiting, kExecuting, kCanceling, kSucceeded, kCanceled, kAborted, kRejected, kLost };
 
 inline bool has_ended(GoalState state) {
@@ -59,7 +59,7 @@ struct GoalReference {
   }
 };
 
-// The state of a goal for all clients; `was_taken` tells whether the hardware has ever had the goal.
+// The state of a goal for all clients; `was_taken`: the hardware has received the goal.
 struct GoalStatus {
   GoalReference goal;
   GoalState state;
@@ -73,7 +73,7 @@ class MessageError : public std::runtime_error {
   MessageError() : std::runtime_error("the message is too short") {}
 };
 
-// Reads a message from its begin. Functions throw MessageError.
+// Reads a message from its beginning. Functions throw MessageError.
 class MessageReader {
  public:
   explicit MessageReader(const Bytes& bytes, std::size_t place = 0) : bytes_(bytes), place_(place) {}
@@ -394,7 +394,7 @@ class Ros2ActionMessages : public ActionMessages {
   // Return the id of the goal whose result a client requests.
   static std::string id_of(const Bytes& payload) { return MessageReader(payload, kIdPlace).text(kIdBytes); }
 
-  // Return a result without contents, with the state of an unknown goal.
+  // Return an empty result, with the state of an unknown goal.
   static Bytes unknown(const Bytes& no_result) {
     Bytes bytes = no_result;
     bytes.at(kStatePlace) = 0;

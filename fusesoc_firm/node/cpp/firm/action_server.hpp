@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Actions that the hardware serves: it has one goal of an action at a time, further goals wait in their order. Clients
-// send goals, cancel them and ask for results; the hardware only ever sees its goal. C++17, no dependencies.
+// send goals, cancel them and ask for results; the hardware sees only its current goal. C++17, no dependencies.
 //
-// The behaviour equals that of fusesoc_firm/node/action_server.py.
+// The behaviour equals that of fusesoc_firm/node/actions/action_server.py.
 #pragma once
 
 #include <algorithm>
@@ -33,9 +33,9 @@ class ActionServer {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  // The goals of an action that have ended, with their results (ROS 2) or only their states (ROS 1), and the clients that
-  // wait for the result of one goal. A client of actionlib gives up a goal that it has not seen end, so in ROS 1 as
-  // many are kept as may wait.
+  // The maximum number of ended goals of an action, with their results (ROS 2) or only their states (ROS 1), and of
+  // clients that wait for the result of one goal. A client of actionlib gives up a goal whose end it has not seen, so
+  // in ROS 1 the number of ended goals equals the number that may wait.
   static constexpr std::size_t kMostKept = 100;
   static constexpr std::size_t kMostKeptRos1 = 1000;
   static constexpr std::size_t kMostAskers = 100;
@@ -52,7 +52,7 @@ class ActionServer {
   ActionServer(const ActionServer&) = delete;
   ActionServer& operator=(const ActionServer&) = delete;
 
-  // Begin to tell clients of goals; no goal may come earlier.
+  // Begin to publish goals to clients; no goal may arrive earlier.
   void start(std::vector<PublishBytes> publishers) {
     const Lock lock(mutex_);
     publishers_ = std::move(publishers);
@@ -138,7 +138,7 @@ class ActionServer {
     if (!current_) return take_unasked("feedback");
     line_.extend();
     accept(current_);
-    // A client of actionlib gives up a goal that it cancels before it knows its state.
+    // A client of actionlib gives up a goal that it cancels before it receives its state.
     if (has_news_) publish_states();
     try {
       publish(Action::kFeedback, messages().feedback(current_->status(), payload));
@@ -189,7 +189,7 @@ class ActionServer {
   using Lock = std::lock_guard<std::recursive_mutex>;
 
   static constexpr std::chrono::milliseconds kStatesInterval{200};
-  // In ROS 1, changes that follow sooner are published together, since each message has all goals.
+  // In ROS 1, changes within this time are published together, since each message has all goals.
   static constexpr std::chrono::milliseconds kTogether{20};
   static constexpr std::chrono::seconds kKeptRos1{5};  // actionlib's own
   static constexpr std::chrono::seconds kKeptRos2{60};
@@ -273,7 +273,7 @@ class ActionServer {
         } else if (goal->state != GoalState::kCanceling) {
           accept(goal);
           goal->state = GoalState::kCanceling;
-          // The hardware has not been silent about a cancellation that it does not have yet.
+          // The time limit restarts: the hardware does not have the cancellation yet.
           line_.extend();
           begun.push_back(goal->reference);
         }
@@ -443,7 +443,7 @@ class ActionServer {
   Ros2ActionMessages ros2_;
   std::vector<PublishBytes> publishers_;
   std::uint64_t number_ = 0;
-  std::list<std::shared_ptr<Goal>> goals_;                   // all that clients may know, in their order
+  std::list<std::shared_ptr<Goal>> goals_;                   // all that clients may use, in their order
   std::map<std::uint64_t, std::shared_ptr<Goal>> waiting_;   // those in the line
   std::shared_ptr<Goal> current_;
   std::list<std::string> early_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The actions of a node, which the hardware serves or to which it sends goals. C++17, no dependencies.
 //
-// The behaviour equals that of fusesoc_firm/node/actions.py.
+// The behaviour equals that of fusesoc_firm/node/actions/actions.py.
 #pragma once
 
 #include <algorithm>
@@ -85,14 +85,14 @@ class NodeActions {
     }
   }
 
-  // The hardware ended a frame of this publisher in its middle.
+  // The hardware ended a frame of this publisher in the middle.
   void refuse_result(unsigned publisher) {
     for (const auto& server : servers_) {
       if (server->action().result == publisher) server->refuse("the hardware aborted the result", true);
     }
   }
 
-  // The hardware was restarted, and has forgotten its goals.
+  // The hardware was restarted, and has lost its goals.
   void forget() {
     for (const auto& server : servers_) server->refuse("the hardware was restarted", true);
     for (const auto& client : clients_) client->forget();
@@ -183,7 +183,7 @@ class NodeActions {
       subscribe(ros, topics.at(Action::kResult), [&client](const Bytes& result) { client.take_result(result); });
     }
     subscribe(ros, topics.at(Action::kStates), [&ros, &client, &topics](const Bytes& states) {
-      // States let goals be sent. What is published before the other topics are connected would be lost.
+      // States enable goals. A goal that is published before the other topics are connected would be lost.
       if constexpr (Ros::kVersion == 1) {
         for (const std::size_t other : {Action::kFeedback, Action::kResult}) {
           if (!ros.has_publisher(topics.at(other))) return;
@@ -196,7 +196,7 @@ class NodeActions {
     });
   }
 
-  // Messages are not checked before.
+  // Messages were not checked earlier.
   static MessageHandler guarded(const std::function<void(const Bytes&)>& take) {
     return [take](const std::uint8_t* data, std::size_t size) {
       try {

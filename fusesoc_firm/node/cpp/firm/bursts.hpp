@@ -8,7 +8,7 @@
 //     joiner.close();
 //
 // An uninterrupted frame is one burst, so the class also serves a Manager without preemption. It does the same as
-// fusesoc_firm/node/bursts.py, with the same messages; both are tested with the same bursts. C++17, no dependencies.
+// fusesoc_firm/node/engine/bursts.py, with the same messages; both are tested with the same bursts. C++17, no dependencies.
 #pragma once
 
 #include <cstddef>

@@ -70,7 +70,7 @@ class ChildProcess {
     }
     posix_spawn_file_actions_adddup2(&actions, child_reads.get(), input);
     posix_spawn_file_actions_adddup2(&actions, child_writes.get(), output);
-    // A process group of its own: the shell's children end with it, and this process handles Ctrl-C.
+    // A separate process group: the shell's children end with it, and this process handles Ctrl-C.
     posix_spawnattr_setpgroup(&attributes, 0);
     sigset_t none;
     sigemptyset(&none);

@@ -20,8 +20,7 @@
 
 namespace firm {
 
-// The state of a part of the system, by its name: the counts, the number of troubles among them, and whether it has
-// grown.
+// The state of a part of the system, by its name: the counts, their faults, and whether these have increased.
 struct Report {
   std::string name;
   std::vector<std::pair<std::string, std::uint64_t>> counts{};
@@ -113,7 +112,7 @@ inline void add_counts(Report& report, const std::string& block, const GoalStati
   report.troubles += counted.aborted + counted.rejected + counted.unasked + counted.lost;
 }
 
-// Publishes reports each second, with a warning if a count of trouble has grown.
+// Publishes reports each second, with a warning if a count of faults has increased.
 class Diagnosis {
  public:
   // A node without the message's package runs without this topic.

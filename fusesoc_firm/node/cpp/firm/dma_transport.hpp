@@ -121,7 +121,7 @@ class DmaRing {
 };
 
 class DmaTransport : public Transport {
-  // The interrupt comes at the end of a frame. For one that is longer than all buffers, they must be emptied before.
+  // The interrupt comes at the end of a frame. If it is longer than all buffers, they must be emptied earlier.
   static constexpr std::chrono::milliseconds kLook{10};
 
  public:
@@ -172,7 +172,7 @@ class DmaTransport : public Transport {
         if (take(*status)) return without_record(std::exchange(burst_, {}));
         continue;
       }
-      // Who has nothing left to send would not notice that a frame on its way was lost.
+      // A sender without further frames would not notice the loss of a frame in transfer.
       check(dma::kMm2s, "MM2S");
       check(dma::kS2mm, "S2MM");
       if (is_closed_ || deadline.is_over()) break;
@@ -183,8 +183,7 @@ class DmaTransport : public Transport {
     return std::nullopt;
   }
 
-  // Stop the engine, so that it does not write to memory that has been released; nobody may hand over descriptors during
-  // its reset.
+  // Stop the engine, so that it does not write to released memory; no descriptor may be handed over during its reset.
   void close() override {
     if (is_closed_.exchange(true)) return;
     device_->end();

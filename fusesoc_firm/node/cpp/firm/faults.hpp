@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The faults of frames: the codes that converters, the Manager and links report in frame_error_code. 0 is not a fault.
+// `make constants` writes the codes and texts from fusesoc_firm/frame/faults.py.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A byte stream without markers, as from a UART or a process: the announced lengths tell where frames end.
+// A byte stream without markers, as from a UART or a process: the announced lengths determine the ends of frames.
 #pragma once
 
 #include <algorithm>

@@ -41,7 +41,7 @@ class Crc32 {
 };
 
 constexpr std::size_t kChecksumBytes = 4;
-// The code of a block that holds as many bytes as it can, and after which there is no zero.
+// The code of a full block, which no zero follows.
 constexpr std::uint8_t kFullBlock = 0xFF;
 
 // Return a frame as it is sent, with its checksum and the zero byte at its end.
@@ -78,12 +78,12 @@ inline Bytes link_encoded(const std::uint8_t* frame, std::size_t size) {
 enum class LinkEvent { kNothing, kFrame, kBroken };
 
 // Finds the frames in received bytes. A frame whose code, length or checksum is wrong, or whose payload is longer than
-// `longest` bytes, is dropped. Bytes before the first zero byte may be the rest of a frame; they are not told.
+// `longest` bytes, is dropped. Bytes before the first zero byte may be the rest of a frame; they are not reported.
 class LinkDecoder {
  public:
   explicit LinkDecoder(std::size_t longest) : most_(kFrameHeaderBytes + longest + kChecksumBytes) {}
 
-  // Take one byte. After kFrame, `pop` returns a frame; kBroken tells of a frame that was dropped.
+  // Take one byte. After kFrame, `pop` returns a frame; kBroken reports a dropped frame.
   LinkEvent push(std::uint8_t byte) {
     if (byte == 0) return end();
     has_begun_ = true;
@@ -126,11 +126,11 @@ class LinkDecoder {
   }
 
   std::size_t most_;  // bytes of a frame with its checksum
-  Bytes frame_;       // no more of it than shows that it is too long
+  Bytes frame_;       // only as much as shows that it is too long
   Bytes whole_;
   Crc32 crc_;
   unsigned left_ = 0;         // bytes of the block still to come; at zero, the code of the next one comes
-  bool is_zero_due_ = false;  // a zero is between this block and the next one
+  bool is_zero_due_ = false;  // a zero follows this block
   bool has_begun_ = false;
   bool is_synchronised_ = false;
 };

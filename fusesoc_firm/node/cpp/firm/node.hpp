@@ -43,19 +43,19 @@ struct NodeConfiguration {
   unsigned publishers = 1;
   std::size_t longest_payload = 1 << 26;    // bytes, in either direction
   std::size_t queue_depth = 100;            // frames, for each subscriber
-  // Frames, for subscribers whose queues differ; kUnlimitedDepth: none is dropped.
+  // Frames, for subscribers with another depth; kUnlimitedDepth: no frame is dropped.
   std::map<unsigned, std::size_t> queue_depths{};
-  // The subscribers whose frames wait in the queue of another one, so that they are sent in the order of both.
+  // Subscribers whose frames wait in the queue of another one, so that both are sent in their order.
   std::map<unsigned, unsigned> shared_queues{};
   Overflow overflow = Overflow::kDropOldest;
   std::function<std::unique_ptr<Policy>()> policy = nullptr;  // default: least recently used
   unsigned restarts = 0;                    // the number of times that a failed transport is reopened
   std::chrono::nanoseconds restart_delay = std::chrono::milliseconds(500);
-  // Hardware that cannot report that it is at rest counts as at rest after this time without output.
+  // Hardware without a report of rest counts as at rest after this time without output.
   std::chrono::nanoseconds settling_time = std::chrono::milliseconds(200);
   bool has_status = false;  // the hardware has a status that is accessed by frames
-  // The hardware rejected a frame of a subscriber, or ended one of a publisher in its middle; it was restarted; it has no
-  // work. Called by threads of the node and of the transport.
+  // The hardware rejected a frame of a subscriber, or ended one of a publisher in the middle; it was restarted; it has
+  // no work. Called by threads of the node and of the transport.
   std::function<void(unsigned subscriber)> on_rejected = nullptr;
   std::function<void(unsigned publisher)> on_aborted = nullptr;
   std::function<void()> on_restart = nullptr;
@@ -139,7 +139,7 @@ class Node {
       wait_before_restart();
       fault = session();
     }
-    // The queues have no reader any more, so wake all threads that wait for space.
+    // The queues have lost their reader, so wake all threads that wait for space.
     queues_.close();
     const std::lock_guard<std::mutex> lock(mutex_);
     if (is_abandoned_) fault = "the time limit for stopping expired before all frames were sent and received";
@@ -197,7 +197,7 @@ class Node {
   };
   // The maximum time until the sender notices that the receiver has failed.
   static constexpr std::chrono::milliseconds kGlance{50};
-  // How often a receiver without bursts looks whether the hardware is at rest.
+  // The interval at which a receiver without bursts checks whether the hardware is at rest.
   static constexpr std::chrono::milliseconds kRestInterval{100};
 
   static NodeConfiguration checked(NodeConfiguration configuration) {
@@ -367,7 +367,7 @@ class Node {
 
   // --- faults ---------------------------------------------------------------------------------------------------------
 
-  // Close the transport as well, because hardware whose output nobody takes may never have room for the sender.
+  // Close the transport as well, because hardware whose output is not taken may never have room for the sender.
   void fail_receiver(Transport& transport, const std::string& reason, bool is_publishing) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

@@ -27,7 +27,7 @@ struct PipeOptions {
   std::size_t bytes_waiting = 1 << 24;    // of bursts that are waiting for receive()
   // The duration of a run by the wall clock. A frame that arrives during a run waits for its end.
   std::chrono::nanoseconds run_time = std::chrono::milliseconds(1);
-  std::uint32_t cycles_to_rest = 100000;  // the system is considered at rest after so many cycles without a beat
+  std::uint32_t cycles_to_rest = 100000;  // the system counts as at rest after these cycles without a beat
   Timeout idle_run = std::nullopt;        // how often a system at rest runs, for accelerators that send spontaneously
   std::chrono::nanoseconds patience = std::chrono::seconds(2);  // longest wait for the simulator to end
 };
@@ -96,7 +96,7 @@ class PipeTransport : public Transport {
   static constexpr int kReports = 4;
   static constexpr std::size_t kBufferBytes = 1 << 16;
   static constexpr unsigned kVersion = 4;  // of requests and reports
-  // How often a simulator at rest is looked at, which may have ended.
+  // The interval at which a simulator at rest is checked, since it may have ended.
   static constexpr std::chrono::nanoseconds kLook = std::chrono::milliseconds(250);
 
   void throw_if_over() const {
@@ -235,7 +235,7 @@ class PipeTransport : public Transport {
     burst.is_aborted = number(1) != 0;
     burst.cycles = cycles();
     const std::uint64_t size = number(4);
-    // A resumed burst has one beat more than its part of the frame.
+    // A resumed burst has one more beat than its part of the frame.
     if (size == 0 || size > options_.longest_payload + kFrameHeaderBytes + kWidestBeat) {
       throw TransportError("the simulator reports a burst of " + std::to_string(size) + " bytes; legal: 1 to " +
                            std::to_string(options_.longest_payload + kFrameHeaderBytes + kWidestBeat));
@@ -269,7 +269,7 @@ class PipeTransport : public Transport {
     }
     cycle_ = cycle;
     const std::lock_guard<std::mutex> lock(mutex_);
-    // A frame that the system has not taken for so long does not keep the simulation running.
+    // A frame that the system has not taken for this time does not keep the simulation running.
     is_at_rest_ = std::min(quiet, cycle - busy_) >= pipe_.cycles_to_rest && waiting_.empty();
     changed_.notify_all();
   }

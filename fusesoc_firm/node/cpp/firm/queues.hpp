@@ -6,7 +6,7 @@
 //     queues.put(subscriber, frame);                       // any thread, such as a callback of the middleware
 //     while (auto next = queues.get()) send(next->item);   // the thread that owns the DMA, until close()
 //
-// The behaviour equals that of fusesoc_firm/node/queues.py; both are tested with the same histories. C++17, no
+// The behaviour equals that of fusesoc_firm/node/engine/queues.py; both are tested with the same histories. C++17, no
 // dependencies.
 #pragma once
 

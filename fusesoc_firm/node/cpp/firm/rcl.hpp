@@ -70,7 +70,7 @@ inline const rosidl_message_type_support_t* message_support(const TypeName& type
       symbol(type, "__rosidl_typesupport_c.so", "rosidl_typesupport_c__get_message_type_support_handle__", ""))();
 }
 
-// Throw MiddlewareError if the hash of the installed type differs from `signature`; an empty one is not known.
+// Throw MiddlewareError if the hash of the installed type differs from `signature`; an empty one is unknown.
 template <typename Support>
 void check_hash(const Support& support, const TypeName& type, const std::string& signature) {
 #ifdef FIRM_HAS_TYPE_HASH

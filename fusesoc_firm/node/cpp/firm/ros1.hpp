@@ -90,7 +90,7 @@ class Ros1 {
   ~Ros1() {
     subscribers_.clear();
     servers_.clear();
-    // It ends calls of servers that do not answer.
+    // This ends calls of servers that do not answer.
     ros::shutdown();
     clients_.clear();
   }
@@ -189,7 +189,7 @@ class Ros1 {
   // Handle messages during `drain`, which waits until all calls are answered.
   void spin_during(const std::function<void()>& drain) { drain(); }
 
-  // Serve no more, and give no more answers: their handlers may end.
+  // Stop serving and answering calls, since the handlers may end.
   void stop_calls() {
     servers_.clear();
     for (const auto& client : clients_) client->stop();
@@ -202,10 +202,10 @@ class Ros1 {
     return ros::ok();
   }
 
-  // Return how many messages are missing between those that arrived, by the numbers in their headers.
+  // Return the number of missing messages, by the numbers in the headers of the received ones.
   std::uint64_t lost() const { return lost_; }
 
-  // Take no more messages.
+  // Stop taking messages.
   void unsubscribe() { subscribers_.clear(); }
 
   // Give published messages time to leave: roscpp sends them in its own thread and does not report completion.

@@ -23,7 +23,7 @@
 
 namespace firm {
 
-// Return the bytes before which roscpp writes their number, with `before` at their front.
+// Return the bytes, after `before`, in the form that roscpp sends: their number first.
 inline ros::SerializedMessage counted_bytes(const void* data, std::size_t size, std::optional<std::uint8_t> before) {
   constexpr std::size_t kCount = 4;
   const std::size_t front = before ? 1 : 0;
@@ -39,7 +39,7 @@ inline ros::SerializedMessage counted_bytes(const void* data, std::size_t size, 
   return made;
 }
 
-// The handler that roscpp calls for a request. It waits for the answer, which contains the reason of a failure.
+// The handler that roscpp calls for a request. It waits for the answer, which contains the reason for a failure.
 class RawServiceCallback : public ros::ServiceCallbackHelper {
  public:
   explicit RawServiceCallback(CallHandler handler) : handler_(std::move(handler)) {}
@@ -60,7 +60,7 @@ class RawServiceCallback : public ros::ServiceCallbackHelper {
   CallHandler handler_;
 };
 
-// A server with a queue and a thread of its own, since roscpp answers a request when its callback returns.
+// A server with its own queue and thread, since roscpp answers a request when its callback returns.
 class RawServer {
  public:
   RawServer(ros::NodeHandle& node, const Service& service, CallHandler handler) : spinner_(1, &callbacks_) {
@@ -90,7 +90,7 @@ class RawServer {
   ros::ServiceServer server_;
 };
 
-// A client with a thread of its own, which a server that does not answer may block until ROS ends.
+// A client with its own thread, which a server that does not answer may block until ROS ends.
 class RawClient {
  public:
   RawClient(ros::NodeHandle& node, const Service& service)
@@ -107,7 +107,7 @@ class RawClient {
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
 
-  // Give no more answers; the thread may still wait for a server.
+  // Stop giving answers; the thread may still wait for a server.
   void stop() {
     const std::lock_guard<std::mutex> lock(mutex_);
     is_over_ = true;

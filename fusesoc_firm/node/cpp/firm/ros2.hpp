@@ -116,8 +116,8 @@ class Ros2 {
     return found;
   }
 
-  // Become a node with lifecycle states: only while it is active does it carry the messages and calls of what is created
-  // after this call. Throws MiddlewareError.
+  // Become a node with lifecycle states: topics and services that are created after this call are used only while the
+  // node is active. Throws MiddlewareError.
   void manage() {
     is_active_ = false;
     lifecycle_ = std::make_unique<Lifecycle>(node_, [this](bool is_active) { change(is_active); });
@@ -161,7 +161,7 @@ class Ros2 {
     draining.join();
   }
 
-  // Serve no more, and give no more answers: their handlers may end.
+  // Stop serving and answering calls, since the handlers may end.
   void stop_calls() {
     is_serving_ = false;
     for (const auto& client : clients_) client->stop();
@@ -180,7 +180,7 @@ class Ros2 {
                const std::uint8_t* data, std::size_t size) {
       if (is_managed && !is_active_) return;
       rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
-      // It is only read; the structure serves both directions.
+      // The buffer is only read; the structure serves both directions.
       message.buffer = const_cast<std::uint8_t*>(data);
       message.buffer_length = message.buffer_capacity = size;
       check_rcl(rcl_publish_serialized_message(publisher, &message, nullptr), "publish on " + name);
@@ -228,14 +228,14 @@ class Ros2 {
     return rcl_context_is_valid(&context_) && !(lifecycle_ && lifecycle_->is_finalized());
   }
 
-  // Return how many messages are missing between those that arrived, by the numbers of each publisher.
+  // Return the number of missing messages, by each publisher's numbers of the received ones.
   std::uint64_t lost() const {
     std::uint64_t sum = lost_;
     for (const auto& subscription : subscriptions_) sum += subscription->lost;
     return sum;
   }
 
-  // Take no more messages.
+  // Stop taking messages.
   void unsubscribe() {
     for (const auto& subscription : subscriptions_) lost_ += subscription->lost;
     for (auto& subscription : subscriptions_) ignore(rcl_subscription_fini(&subscription->rcl, &node_));
@@ -249,7 +249,7 @@ class Ros2 {
   }
 
  private:
-  // Begin or cease to carry messages. Clients see that an inactive node has no services and no actions. Throws
+  // Start or stop carrying messages. For clients, an inactive node has no services and actions. Throws
   // MiddlewareError.
   void change(bool is_active) {
     is_active_ = false;
@@ -261,7 +261,7 @@ class Ros2 {
       for (const auto& server : servers_) server->close();
       throw;
     }
-    // What ROS has replaced in its queues meanwhile is not lost.
+    // Messages that ROS has replaced in its queues meanwhile do not count as lost.
     for (const auto& subscription : subscriptions_) subscription->gaps = Gaps();
     is_active_ = true;
   }
@@ -277,7 +277,7 @@ class Ros2 {
     return found;
   }
 
-  // Return whether a name in a parameter file means this node: `*` stands for a part of a name, `**` for any parts.
+  // Return whether a name in a parameter file means this node: `*` matches a part of a name, `**` any parts.
   bool is_meant(std::string pattern) const {
     if (pattern.empty() || pattern[0] != '/') pattern = "/" + pattern;
     std::string expression;
@@ -330,8 +330,8 @@ class Ros2 {
     Subscription(const Subscription&) = delete;
     Subscription& operator=(const Subscription&) = delete;
 
-    // Take no more than its queue holds, so that a peer that never stops does not starve others. A node that is not
-    // active ignores the messages.
+    // Take at most the capacity of its queue, so that a peer that never stops does not starve others. An inactive node
+    // ignores the messages.
     void take_all(bool is_active) {
       for (std::size_t number = 0; number < depth; ++number) {
         rmw_message_info_t info = rmw_get_zero_initialized_message_info();
@@ -345,7 +345,7 @@ class Ros2 {
       }
     }
 
-    // Return how many messages are missing before one.
+    // Return the number of missing messages before this one.
     std::uint64_t count_missing(const rmw_message_info_t& info) {
       if (info.publication_sequence_number == RMW_MESSAGE_INFO_SEQUENCE_NUMBER_UNSUPPORTED) return 0;
       const auto* bytes = reinterpret_cast<const char*>(info.publisher_gid.data);
@@ -412,7 +412,7 @@ class Ros2 {
     ignore(rmw_topic_endpoint_info_array_fini(&ends, &allocator));
   }
 
-  // Return whether an end of a topic is to be reported: once, and not before its node's name may be known.
+  // Return whether an end of a topic is to be reported: once, and not before its node's name is available.
   bool is_due(const rmw_topic_endpoint_info_t& end) {
     const std::string gid(reinterpret_cast<const char*>(end.endpoint_gid), sizeof end.endpoint_gid);
     const bool is_nameless = std::string(end.node_name) == "_NODE_NAME_UNKNOWN_";

@@ -101,12 +101,12 @@ class Lifecycle {
                           check_rcl(result, "take a request to the lifecycle");
                           respond(*static_cast<const Request*>(request.structure()),
                                   *static_cast<Response*>(response.structure()));
-                          // It fails if the client has gone.
+                          // It fails if the client has ended.
                           ignore(rcl_send_response(&service, &header, response.structure()));
                         }});
   }
 
-  // Do a transition, by its label if there is one; return whether the node has done it.
+  // Do a transition, by its label if it has one; return whether the node has done it.
   bool is_changed(std::uint8_t id, const std::string& label) {
     const auto* wanted = label.empty() ? rcl_lifecycle_get_transition_by_id(machine_.current_state, id)
                                        : rcl_lifecycle_get_transition_by_label(machine_.current_state, label.c_str());

@@ -69,7 +69,7 @@ class TypedMessage {
   // Throws MiddlewareError.
   void deserialise(const Bytes& bytes) {
     rmw_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
-    // It is only read; the structure serves both directions.
+    // The buffer is only read; the structure serves both directions.
     message.buffer = const_cast<std::uint8_t*>(bytes.data());
     message.buffer_length = message.buffer_capacity = bytes.size();
     const auto deserialize = middleware_function<decltype(rmw_deserialize)>("rmw_deserialize");
@@ -112,7 +112,7 @@ class RawServer {
     ++opening_;
   }
 
-  // Calls without an answer get none.
+  // Open calls get no answer.
   void close() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (std::exchange(is_open_, false)) ignore(rcl_service_fini(&rcl_, &node_));
@@ -137,7 +137,7 @@ class RawServer {
   }
 
  private:
-  // ROS 2 has no answer for a call that fails. A call of an earlier opening gets none either.
+  // ROS 2 has no answer for a call that fails. A call from before the last opening gets no answer either.
   void respond(rmw_request_id_t header, unsigned opening, const Answer& answer) {
     if (!answer.payload) return;
     try {
@@ -147,7 +147,7 @@ class RawServer {
       if (!is_open_ || opening != opening_) return;
       check_rcl(rcl_send_response(&rcl_, &header, response.structure()), "respond to a call of " + service_.name);
     } catch (const MiddlewareError& error) {
-      // The client has gone, or the response is malformed.
+      // The client has ended, or the response is malformed.
       std::cerr << error.what() << std::endl;
     }
   }
@@ -162,7 +162,8 @@ class RawServer {
   rcl_service_t rcl_ = rcl_get_zero_initialized_service();
 };
 
-// A client of the hardware, with the latest calls: goals may be accepted late. take() is called by the thread that spins.
+// A client of the hardware, which keeps the latest calls, since goals may be accepted late. take() is called by the
+// thread that spins.
 class RawClient {
  public:
   // The calls that may be answered late.
@@ -202,7 +203,7 @@ class RawClient {
     }
   }
 
-  // Give no more answers.
+  // Stop giving answers.
   void stop() {
     const std::lock_guard<std::mutex> lock(mutex_);
     answers_.clear();

@@ -80,7 +80,7 @@ class UsageError : public std::runtime_error {
 
 struct NodeArguments {
   std::string transport;
-  std::string status;  // the address of the status' registers; empty: those that the overlay names
+  std::string status;  // the address of the status' registers; empty: those named by the overlay
   std::string software;
   std::optional<std::size_t> depth;    // of all topics; nothing: each topic's own
   std::optional<bool> is_reliable;     // all topics; nothing: each topic's own
@@ -126,7 +126,7 @@ inline const std::vector<std::string>& parameter_names() {
   return names;
 }
 
-// Return the options that parameters stand for. Throws UsageError.
+// Convert parameters to options. Throws UsageError.
 inline std::vector<std::string> options_of(const std::map<std::string, std::string>& parameters) {
   std::vector<std::string> words;
   for (const auto& [name, text] : parameters) {
@@ -274,8 +274,8 @@ class RunningNode {
 // An engine for the hardware and, if the system has software, one for it, with the paths between them and the topics.
 class Engines {
  public:
-  // `publish` maps the names of the system's topics to their publishers. With ROS 1 (`is_first`), a call that fails has an
-  // answer with the reason. Throws std::invalid_argument.
+  // `publish` maps the names of the system's topics to their publishers. With ROS 1 (`is_first`), a failed call is
+  // answered with the reason. Throws std::invalid_argument.
   Engines(const System& system, const NodeArguments& arguments, std::map<std::string, MessageHandler> publish,
           std::ostream* trace, bool is_first)
       : system_(system),
@@ -292,7 +292,7 @@ class Engines {
       if (topic.id) configuration.queue_depths[*topic.id] = arguments.quality_of(topic).depth;
     }
     for (const auto& action : system.actions) {
-      // A result must not overtake feedback, nor a cancellation its goal.
+      // A result must not overtake feedback, and a cancellation must not overtake its goal.
       const auto [first, second] = action.is_server ? std::pair(action.goal, action.cancel)
                                                     : std::pair(action.feedback, action.result);
       configuration.shared_queues[second] = first;
@@ -372,7 +372,7 @@ class Engines {
     actions_.connect(ros);
   }
 
-  // Take no more calls and goals, and wait until all are answered, or for `longest`; then let the others fail.
+  // Stop taking calls and goals, and wait until all are answered, or for `longest`; then let the others fail.
   void drain(std::chrono::nanoseconds longest) {
     calls_.drain(longest);
     actions_.drain(longest);
@@ -413,7 +413,7 @@ class Engines {
  private:
   static constexpr std::chrono::seconds kSilence{1};
 
-  // Tell the services and actions what happens in the hardware.
+  // Report events of the hardware to the services and actions.
   void watch_calls(NodeConfiguration& configuration) {
     configuration.on_rejected = [this](unsigned subscriber) {
       calls_.refuse_request(subscriber);
@@ -439,7 +439,7 @@ class Engines {
     };
   }
 
-  // Return a function that notes an error of a thread, and reports it.
+  // Return a function that records and reports an error of a thread.
   FaultHandler fault_taker() {
     return [this](const std::string& reason) {
       std::cerr << reason << std::endl;
@@ -531,7 +531,7 @@ class ConnectedCalls {
   Ros& ros_;
 };
 
-// Run the node, which ROS knows, until a signal, ROS, or the hardware ends it. Return the exit status.
+// Run the started node until a signal, ROS, or the hardware ends it. Return the exit status.
 template <typename Ros>
 int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   std::ofstream trace;

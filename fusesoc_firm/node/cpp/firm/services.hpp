@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The calls of services: each service has one call under way, and further calls wait in the order of their arrival. A
-// frame does not tell who asked. With one call of a service in the hardware, its response, its errors and its time-out
-// belong to that call. The same holds for the calls that hardware makes. C++17, no dependencies.
+// The calls of services: each service processes one call, and further calls wait in the order of their arrival. A
+// frame does not contain its caller. With one call of a service in the hardware, its response, its errors and its
+// time-out belong to that call. The same holds for the calls of the hardware. C++17, no dependencies.
 //
-// The behaviour equals that of fusesoc_firm/node/calls.py.
+// The behaviour equals that of fusesoc_firm/node/engine/calls.py.
 #pragma once
 
 #include <algorithm>
@@ -59,14 +59,14 @@ using CallHandler = std::function<void(Bytes payload, AnswerHandler answer)>;
 // Takes an unexpected error of a thread, after which the node has to end; any thread may call it.
 using FaultHandler = std::function<void(const std::string& reason)>;
 
-// The calls of one service. Any thread may call the functions; a thread of the line's own hands calls over.
+// The calls of one service. Any thread may call the functions; the line's own thread hands calls over.
 //
-// An answer that does not tell its call and comes late would be taken for that of the next call. Therefore, if a call is
-// not answered in time, or if more may follow its answer, the next call waits until something follows or until rest(),
-// but for another `limit` at most, or for `kLeastWait` if this is longer.
+// A late answer that does not identify its call would be assigned to the next call. Therefore, if a call is not
+// answered in time, or if more may follow its answer, the next call waits until more output or rest(), but for at most
+// another `limit`, or `kLeastWait` if this is longer.
 //
-// The hardware receives the answers to its calls in their order, and from the line's thread: the thread that receives calls
-// from the hardware must not wait until the hardware takes an answer.
+// The hardware receives the answers to its calls in their order, and from the line's thread: the thread that receives
+// calls from the hardware must not wait until the hardware takes an answer.
 class CallLine {
  public:
   using HandOver = std::function<void(const Bytes& payload, std::uint64_t number)>;
@@ -74,8 +74,8 @@ class CallLine {
   static constexpr std::size_t kMostWaiting = 1000;
   static constexpr std::chrono::seconds kLeastWait{2};
 
-  // Calls of the hardware (`from_hardware`) have answers that tell their call. An exception in the line's thread is passed
-  // to `on_fault`.
+  // Answers to calls of the hardware (`from_hardware`) identify their call. An exception in the line's thread is
+  // passed to `on_fault`.
   CallLine(std::chrono::nanoseconds limit, bool from_hardware, HandOver hand_over, FaultHandler on_fault)
       : limit_(limit),
         from_hardware_(from_hardware),
@@ -107,8 +107,8 @@ class CallLine {
     answer(refusal);
   }
 
-  // Answer the call that is under way, if it has this number; return whether there is such a call. Unless `is_final`,
-  // more may follow from the hardware for this call.
+  // Answer the current call, if it has this number; return whether it has. Unless `is_final`, more may follow from the
+  // hardware for this call.
   bool settle(Answer answer, std::optional<std::uint64_t> number = std::nullopt, bool is_final = true) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_held_ || answer_ || (number && *number != number_)) return false;
@@ -118,14 +118,14 @@ class CallLine {
     return true;
   }
 
-  // Give the call that is under way another `limit` from now on.
+  // Restart the `limit` of the current call.
   void extend() {
     const std::lock_guard<std::mutex> lock(mutex_);
     is_extended_ = true;
     changed_.notify_all();
   }
 
-  // Take note that nothing more follows from the hardware for a call that was given up.
+  // Record that nothing more follows from the hardware for an abandoned call.
   void rest() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!is_late_) return;
@@ -133,14 +133,14 @@ class CallLine {
     changed_.notify_all();
   }
 
-  // Take no more calls, and wait until all are answered, or until this time.
+  // Stop taking calls, and wait until all are answered, or until this time.
   void drain(std::chrono::steady_clock::time_point latest) {
     std::unique_lock<std::mutex> lock(mutex_);
     is_ending_ = true;
     changed_.wait_until(lock, latest, [this] { return !is_held_ && waiting_.empty(); });
   }
 
-  // Let all calls fail that are not answered yet.
+  // Let all open calls fail.
   void close() {
     const std::lock_guard<std::mutex> lock(mutex_);
     is_ending_ = is_closed_ = true;
@@ -159,7 +159,7 @@ class CallLine {
       run();
     } catch (const std::exception& error) {
       {
-        // Nobody waits for this thread any more.
+        // No thread waits for this thread any more.
         const std::lock_guard<std::mutex> lock(mutex_);
         is_ending_ = is_closed_ = has_ended_ = true;
         is_held_ = false;
@@ -202,7 +202,7 @@ class CallLine {
     return call;
   }
 
-  // Return the answer to the call under way, or nothing if it does not come in time or the line is closed.
+  // Return the answer to the current call, or nothing if it does not arrive in time or the line is closed.
   std::optional<Answer> wait() {
     std::unique_lock<std::mutex> lock(mutex_);
     is_extended_ = true;
@@ -213,7 +213,7 @@ class CallLine {
     return answer_;
   }
 
-  // Wait for what may follow from the hardware for the call under way.
+  // Wait for late output of the hardware for the current call.
   void wait_for_late() {
     std::unique_lock<std::mutex> lock(mutex_);
     if (from_hardware_ || (answer_ && is_final_)) return;
@@ -241,7 +241,7 @@ class CallLine {
   std::condition_variable changed_;
   std::deque<Call> waiting_;
   bool is_held_ = false;
-  std::uint64_t number_ = 0;  // of the call that is held; written by the line's thread only
+  std::uint64_t number_ = 0;  // of the current call; written by the line's thread only
   std::optional<Answer> answer_;
   bool is_final_ = false;
   bool is_late_ = false;
@@ -256,7 +256,7 @@ struct CallStatistics {
   std::uint64_t called = 0;
   std::uint64_t answered = 0;
   std::uint64_t failed = 0;
-  std::uint64_t unasked = 0;  // responses of the hardware to no call
+  std::uint64_t unasked = 0;  // responses of the hardware without a call
 };
 
 // The calls of all services of a node, between the middleware and the hardware. Any thread may call the functions.
@@ -322,13 +322,13 @@ class NodeCalls {
     }
   }
 
-  // The hardware ended a frame of this publisher in its middle.
+  // The hardware ended a frame of this publisher in the middle.
   void refuse_response(unsigned publisher) {
     const auto found = responses_.find(publisher);
     if (found != responses_.end()) lines_[found->second]->settle({std::nullopt, "the hardware aborted the response"});
   }
 
-  // The hardware was restarted, and has forgotten its calls.
+  // The hardware was restarted, and has lost its calls.
   void forget() {
     for (const auto& [publisher, index] : responses_) {
       lines_[index]->settle({std::nullopt, "the hardware was restarted"});
@@ -340,7 +340,7 @@ class NodeCalls {
     for (const auto& line : lines_) line->rest();
   }
 
-  // Take no more calls, and wait until all are answered, or for `longest`; then let the others fail.
+  // Stop taking calls, and wait until all are answered, or for `longest`; then let the others fail.
   void drain(std::chrono::nanoseconds longest) {
     const auto latest = std::chrono::steady_clock::now() + longest;
     for (const auto& line : lines_) line->drain(latest);
@@ -380,7 +380,7 @@ class NodeCalls {
     }
   }
 
-  // Return the answer that a client receives: ROS 2 has none for a call that fails.
+  // Return the answer that a client receives: ROS 2 has no answer for a call that fails.
   Answer to_client(std::size_t index, const Answer& answer) {
     if (!counted(index, answer) || tells_failures_ || services_[index].failure.empty()) return answer;
     return {services_[index].failure};

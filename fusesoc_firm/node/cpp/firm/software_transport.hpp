@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks in software behind the interface of hardware: a child process that reads frames from its standard input and
+// Blocks in software with the interface of hardware: a child process that reads frames from its standard input and
 // writes frames to its standard output, with its own ids (docs/reference/node-library.md, "Blocks in software").
 //
 // `python3 -m fusesoc_firm.node.software_process SPEC` is one; any program can serve.

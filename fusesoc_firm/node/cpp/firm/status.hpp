@@ -5,8 +5,9 @@
 //     const firm::Status status = firm::read_status(*transport);
 //     status.channels[0].faults[1];                 // frames of subscriber 0 that ended early (firm/faults.hpp)
 //
-// The hardware tells its dimensions, so no specification is needed. While a node uses the transport, nothing else may
-// read it, and Node::access_status takes its place. The counterpart in Python is fusesoc_firm/node/status.py. C++17, no dependencies except POSIX.
+// The hardware reports its dimensions, so no specification is needed. While a node uses the transport, only this node
+// may read it: use Node::access_status instead. The counterpart in Python is fusesoc_firm/node/status/status.py.
+// C++17, no dependencies except POSIX.
 #pragma once
 
 #include <array>
@@ -25,7 +26,7 @@ namespace firm {
 // The highest code of a fault; `ChannelStatus::faults` begins with the unused code 0.
 constexpr std::size_t kFaultCodes = 12;
 
-// The registers that are alike in all systems.
+// The registers that are equal in all systems.
 namespace status_register {
 constexpr std::uint32_t kMagic = 0x00, kShape = 0x04, kControl = 0x08, kInterrupt = 0x0C, kInterruptEnable = 0x10;
 constexpr std::uint32_t kLastFault = 0x14, kIdErrors = 0x18, kLinkErrors = 0x1C, kLost = 0x20, kDigest = 0x30;
@@ -34,8 +35,9 @@ constexpr std::uint32_t kChannels = 0x8000, kChannelBytes = 0x40;
 constexpr std::uint32_t kSignature = 0x00, kFrames = 0x34, kLongestWait = 0x38, kStamp = 0x3C;
 }  // namespace status_register
 
-// What is counted of a subscriber or publisher; `longest_wait` is in cycles. `stamp` is the cycle after the first beat of
-// a subscriber's newest frame, or after the last beat of a publisher's. The difference of two stamps is a time in cycles.
+// The counts of a subscriber or publisher; `longest_wait` is in cycles. `stamp` is the cycle after the first beat of a
+// subscriber's newest frame, or after the last beat of a publisher's. The difference of two stamps is a time in
+// cycles.
 struct ChannelStatus {
   std::uint32_t signature = 0;
   std::array<std::uint32_t, kFaultCodes + 1> faults{};
@@ -65,7 +67,7 @@ struct Status {
 // A simulator may have to start first, on a busy machine.
 constexpr std::chrono::seconds kStatusPatience(20);
 
-// Accesses registers one after the other.
+// Accesses registers one at a time.
 class StatusAccess {
  public:
   // Ids have one byte, or two with `idBytes: 2`.
@@ -112,7 +114,7 @@ std::string read_digest(Access& access) {
   return digest;
 }
 
-// Throws TransportError if the hardware is not that of a system, whose digest is `expected`.
+// Throws TransportError if the hardware is not that of the system with the digest `expected`.
 template <typename Access>
 void check_digest(Access& access, const std::string& expected, const std::string& system) {
   const std::string found = read_digest(access);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Accesses to the status of hardware whose transport a node uses, beside the node's messages: the node's sender sends
 // the requests, and its receiver passes on the answers. The counterpart in Python is
-// fusesoc_firm/node/status_exchange.py. C++17.
+// fusesoc_firm/node/status/status_exchange.py. C++17.
 #pragma once
 
 #include <chrono>
@@ -64,7 +64,7 @@ class StatusExchange {
   // `send` passes a request to the node's sender; it may throw TransportError.
   explicit StatusExchange(std::function<void(const Bytes&)> send) : send_(std::move(send)) {}
 
-  // Return the answer to a request. Throws TransportError if there is none in time.
+  // Return the answer to a request. Throws TransportError if it does not arrive in time.
   Bytes access(const Bytes& request, std::chrono::nanoseconds patience) {
     const auto address = status_address(request);
     if (!address) throw TransportError("the frame is not a request of the status");

@@ -27,7 +27,7 @@ class StatusRegisters {
   explicit StatusRegisters(const std::string& address, const std::string& root = "")
       : registers_(root + device(address, root), checked_size(device(address, root), root)) {}
 
-  // Return the word of the register at an address. Throws TransportError if there is none.
+  // Return the word of the register at an address. Throws TransportError if the address is invalid.
   std::uint32_t read(std::uint32_t address) { return registers_.read(offset(address)); }
 
   // Return the answer to a request of the status. Any thread may call this function. Throws TransportError.

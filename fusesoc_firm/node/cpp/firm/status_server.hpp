@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Serves the status of hardware that a node uses to other processes on the same computer, such as `firm status`. The
-// sockets are described in fusesoc_firm/node/status_socket.py. C++17, Linux.
+// sockets are described in fusesoc_firm/node/status/status_socket.py. C++17, Linux.
 #pragma once
 
 #include <sys/socket.h>
@@ -69,14 +69,14 @@ class StatusServer {
   static constexpr std::size_t kLongestName = 90;
   static constexpr std::size_t kLongestPacket = 1000;
   static constexpr int kWaitingPeers = 8;
-  // A peer that asks nothing for this time must connect again.
+  // A peer without a request for this time must connect again.
   static constexpr std::chrono::seconds kSilence{5};
 
   // Return no descriptor, with errno, if the name cannot be used.
   static Descriptor listen(const std::string& name) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
-    // The zero in front makes the name an abstract one.
+    // The leading zero makes the name abstract.
     const std::string path = std::string(1, '\0') + kPrefix + name;
     if (name.size() > kLongestName || path.size() > sizeof address.sun_path) {
       errno = ENAMETOOLONG;
@@ -113,7 +113,7 @@ class StatusServer {
       const auto size = ::recv(peer, packet.data(), packet.size(), 0);
       if (size <= 0) return;
       const Bytes reply = reply_to(Bytes(packet.data(), packet.data() + size));
-      // A peer that does not read its replies is not waited for.
+      // A peer that does not read its replies causes no stall.
       if (::send(peer, reply.data(), reply.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) return;
     }
   }

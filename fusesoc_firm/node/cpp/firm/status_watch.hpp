@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads the status of hardware each second for a limited time, so that a slow link stays free for messages. The
-// counterpart in Python is `StatusWatch` of fusesoc_firm/node/status.py. C++17.
+// counterpart in Python is `StatusWatch` of fusesoc_firm/node/status/status.py. C++17.
 #pragma once
 
 #include <chrono>
@@ -42,7 +42,7 @@ class StatusWatch {
   StatusWatch(const StatusWatch&) = delete;
   StatusWatch& operator=(const StatusWatch&) = delete;
 
-  // Return what was read so far; faults that are zero are left out.
+  // Return the values read so far, without faults that are zero.
   Report report(const std::string& name) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     Report report{name};

@@ -37,7 +37,7 @@ struct Topic {
 // The numbers of a topic's messages, of which each publisher counts its own.
 class Gaps {
  public:
-  // Return how many messages are missing before the message with this number; a restart is not a gap.
+  // Return the number of missing messages before the message with this number; a restart is not a gap.
   std::uint64_t missing(const std::string& publisher, std::uint64_t number) {
     const auto [last, is_first] = last_.try_emplace(publisher, number);
     const std::uint64_t gap = !is_first && number > last->second ? number - last->second - 1 : 0;
@@ -52,7 +52,7 @@ class Gaps {
 // A function that handles a serialised message, from the middleware or to publish. The caller owns the bytes.
 using MessageHandler = std::function<void(const std::uint8_t* data, std::size_t size)>;
 
-// The middleware is missing, or does not know a requested item.
+// The middleware is missing, or a requested item is unknown to it.
 class MiddlewareError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A board's serial link (cores/board/README.md): 8 bits, no parity, frames as firm/link_code.hpp has them.
+// A board's serial link (cores/board/README.md): 8 bits, no parity, frames as in firm/link_code.hpp.
 //
 // A frame from the board that has a wrong checksum is dropped and reported, and the next one is received. When it is
 // opened, the transport sends a break, which ends a frame that an earlier host has begun.
@@ -40,7 +40,7 @@ class UartTransport : public Transport {
         decoder_(options_.longest_payload) {
     if (line_.get() < 0) fail_with_errno(device_);
     configure();
-    // Bytes that wait to be sent or read are those of an earlier host.
+    // Waiting bytes in both directions are those of an earlier host.
     if (::tcflush(line_.get(), TCIOFLUSH) != 0) fail_with_errno(device_);
     if (uart_.send_break(line_.get()) != 0) fail_with_errno("a break at " + device_);
   }

@@ -3,7 +3,7 @@
 /** A wire: its source and its sink, which are blocks, sides of the Manager, or the host. */
 export type Way = [string, string];
 
-/** The cycles in which each wire waited, of those that were counted; see fusesoc_firm/node/watch.py. */
+/** The cycles in which each wire waited, of those that were counted; see fusesoc_firm/node/engine/watch.py. */
 export interface Waits {
   first: number;
   end: number;

@@ -26,7 +26,7 @@ void firm_processor_map_memory(void) {
     }
     __asm__ volatile("mcr p15, 0, %0, c2, c0, 0" ::"r"(table));   /* the table */
     __asm__ volatile("mcr p15, 0, %0, c3, c0, 0" ::"r"(1u));      /* domain 0 is checked */
-    __asm__ volatile("mcr p15, 0, %0, c8, c7, 0" ::"r"(0u));      /* forget older translations */
+    __asm__ volatile("mcr p15, 0, %0, c8, c7, 0" ::"r"(0u));      /* invalidate the TLB */
     __asm__ volatile("dsb\n isb\n mrc p15, 0, %0, c1, c0, 0" : "=r"(control));
     __asm__ volatile("mcr p15, 0, %0, c1, c0, 0\n isb" ::"r"(control | 1u));
 }

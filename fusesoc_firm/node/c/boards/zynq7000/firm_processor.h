@@ -20,7 +20,7 @@
 #define FIRM_PROCESSOR_GIC_DISTRIBUTOR 0xF8F01000u
 #define FIRM_PROCESSOR_TICK_INTERRUPT 29u
 
-/* Map all memory: RAM is not cached, so no transfer of a DMA engine needs the caches' maintenance. start.S calls it. */
+/* Map all memory: RAM is not cached, so DMA transfers need no cache maintenance. start.S calls it. */
 void firm_processor_map_memory(void);
 
 void firm_processor_start_tick(void);

@@ -17,7 +17,7 @@ void firm_processor_start_tick(void) {
     __asm__ volatile("msr cntp_ctl_el0, %0\n isb" ::"r"((uint64_t)TIMER_ON));
 }
 
-/* The next tick is a period after this one, however late this one is answered. */
+/* The next tick is a period after this one, even if this one is handled late. */
 void firm_processor_clear_tick(void) {
     uint64_t tick;
     __asm__ volatile("mrs %0, cntp_cval_el0" : "=r"(tick));

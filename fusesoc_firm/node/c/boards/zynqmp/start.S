@@ -39,8 +39,7 @@ _start:
     at_level "bl route_to_3", "msr hcr_el2, x2", "nop"
     isb
 
-    /* Gigabytes 0 and 1 are RAM that is not cached, so no transfer of a DMA engine needs the caches' maintenance. The
-     * others are devices. */
+    /* Gigabytes 0 and 1 are uncached RAM, so DMA transfers need no cache maintenance. The others are devices. */
     ldr x0, =table
     ldr x1, =0x4400             /* attribute 0 is device memory, 1 is memory that is not cached */
     ldr x2, =0x80803020         /* levels 2 and 3: 4 GiB, pages of 4 KiB, tables not cached */

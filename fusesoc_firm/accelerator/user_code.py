@@ -1,0 +1,88 @@
+"""Load a function from a user's Python file, and report exceptions at the lines of this file."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fusesoc_firm.text.diagnostics import SourceRef, fail
+
+_MODULE = "_user_code"
+
+
+@dataclass(frozen=True)
+class UserFunction:
+    """A function and its file; messages to the user call the function `what`, such as "the model"."""
+
+    path: Path
+    what: str
+    call: Callable[..., Any]
+
+    @contextmanager
+    def guarded(self, when: str) -> Iterator[None]:
+        """Convert exceptions of the function within this context to `InputError`; `when` names the occasion."""
+        try:
+            yield
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
+            _fail_in(self.path, self.what, error, f" for {when}", self._line())
+
+    def fail(self, message: str, hint: str = "") -> NoReturn:
+        """Raise `InputError` for a fault in the function's result, at the function's line."""
+        fail(message, _place(self.path, self._line()), hint)
+
+    def _line(self) -> int:
+        """Return the line of the function, or 1 if the file does not define the function."""
+        code = getattr(self.call, "__code__", None)
+        return code.co_firstlineno if code is not None and code.co_filename == str(self.path) else 1
+
+
+def load_function(path: Path, name: str, what: str, parameters: str, hint: str) -> UserFunction:
+    """Load the function `name` of a file. May raise `InputError`; `parameters` and `hint` describe the correct form."""
+    spec = importlib.util.spec_from_file_location(_MODULE, path)
+    if spec is None or spec.loader is None or not path.is_file():
+        fail(
+            f"there is no {what.removeprefix('the ')} at {path}",
+            hint=f"write a Python file (.py) with a function '{name}({parameters})'; {hint}",
+        )
+    module = importlib.util.module_from_spec(spec)
+    # The module must be registered, since dataclasses, for example, look up their module.
+    sys.modules[_MODULE] = module
+    # Write no __pycache__ beside the user's file.
+    writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
+        _fail_in(path, what, error, "")
+    finally:
+        sys.dont_write_bytecode = writes
+    function = getattr(module, name, None)
+    if not callable(function):
+        fail(f"{path} has no function '{name}({parameters})'", hint=hint)
+    return UserFunction(path, what, function)
+
+
+def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: int = 1) -> NoReturn:
+    """Raise `InputError` at the line of the file that caused an exception, or at line `otherwise` if unknown."""
+    text = f": {error}" if str(error) else ""
+    message = f"{what} raised {type(error).__name__}{when}{text}"
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        line, column = error.lineno or 1, error.offset or 1
+        fail(
+            f"{what} is not valid Python: {error.msg}",
+            SourceRef(str(path), line, column, (error.text or "").rstrip("\n")),
+        )
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    if not frames:
+        fail(message, _place(path, otherwise))
+    fail(message, _place(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1))
+
+
+def _place(path: Path, line: int, column: int = 1) -> SourceRef:
+    lines = path.read_text(encoding="utf-8").split("\n")
+    return SourceRef(str(path), line, column, lines[line - 1] if line <= len(lines) else "")

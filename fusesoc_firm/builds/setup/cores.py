@@ -1,0 +1,250 @@
+"""The cores in FuseSoC's libraries: the parts of each core, and the cores that an edit affects.
+
+A core is read for all targets and flags together, so that the result includes everything that any build uses.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from fusesoc_firm.builds.setup.outcome import configuration
+from fusesoc_firm.core.core_reader import CoreFile, read_core
+from fusesoc_firm.core.request import GeneratorCall
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.render import render
+
+GRAPH_TEMPLATE = "dot/cores.dot"
+
+
+@dataclass(frozen=True)
+class ProjectCore:
+    """A core: the name, the files with the `.core` file first, the dependencies, and the generator calls.
+
+    `names` are the names by which other cores can depend on this core, and `depends` are the names of its dependencies.
+    Each name consists of vendor, library and name.
+    """
+
+    vlnv: str
+    names: frozenset[str]
+    files: tuple[Path, ...]
+    depends: frozenset[str]
+    calls: tuple[GeneratorCall, ...]
+
+
+def project_cores() -> list[ProjectCore]:
+    """Return all cores that `fusesoc` finds from the current folder, sorted by name."""
+    from fusesoc.fusesoc import Fusesoc
+
+    found = Fusesoc(configuration()).get_cores()
+    return [_core(name, Path(found[name].core_file)) for name in sorted(found)]
+
+
+def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
+    """Return a core and all cores that any of its targets depends on, sorted by name.
+
+    Raise `InputError` if the core or one of its dependencies is missing.
+    """
+    fusesoc, top = _found(core)
+    needed: dict[str, Path] = {}
+    for target in top.get_data({}).targets:
+        needed |= {str(item.name): Path(item.core_file) for item, _ in solved(fusesoc, top, target)}
+    needed.pop(str(top.name), None)
+    return _core(str(top.name), Path(top.core_file)), [_core(name, needed[name]) for name in sorted(needed)]
+
+
+def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
+    """Return the names of the cores that are touched or depend on a touched core, each with the reason.
+
+    The result is in the order of `cores`. `touches` returns the touched part of a core, or None.
+    """
+    cores = list(cores)
+    reasons = {core.vlnv: reason for core in cores if (reason := touches(core))}
+    new = set(reasons)
+    while new:
+        by_name = {name: core.vlnv for core in cores if core.vlnv in new for name in core.names}
+        new = set()
+        for core in cores:
+            if core.vlnv not in reasons and (through := sorted(core.depends & by_name.keys())):
+                reasons[core.vlnv] = f"by {by_name[through[0]]}"
+                new.add(core.vlnv)
+    return {core.vlnv: reasons[core.vlnv] for core in cores if core.vlnv in reasons}
+
+
+def changed_files(revision: str, folder: Path) -> list[Path]:
+    """Return the absolute paths of the files that differ from a revision, including new and removed files.
+
+    The files are those in the repository that contains `folder`. Raise `InputError` if the repository or the revision
+    is missing.
+    """
+    root = Path(_git(folder, "rev-parse", "--show-toplevel").rstrip("\n"))
+    # The revision is resolved to a commit, so that a leading dash is not read as an option.
+    commit = _git(folder, "rev-parse", "--verify", "--end-of-options", f"{revision}^{{commit}}").strip()
+    listed = _git(root, "diff", "--name-only", "--no-renames", "-z", commit)
+    listed += _git(root, "ls-files", "--others", "--exclude-standard", "-z")
+    return sorted({root / name for name in listed.split("\0") if name})
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    try:
+        done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        fail("the program 'git' is not installed", hint="on Debian and Ubuntu: apt install git")
+    if done.returncode:
+        fail(f"git {arguments[0]}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list[str]]) -> str:
+    """Return the dependencies of a core's target in Graphviz's language: cores, generated cores and inputs.
+
+    Raise `InputError` if the core, the target or a dependency is missing.
+    """
+    fusesoc, top = _found(core)
+    cores = solved(fusesoc, top, target)
+    names = {name: str(item.name) for item, _ in cores for name in _names(read_core(Path(item.core_file)))}
+    edges: list[tuple[str, str]] = []
+    generated: dict[str, str] = {}
+    sources: dict[str, None] = {}
+    for item, flags in cores:
+        needed = [names.get(_short(str(depend)), "") for depend in item.get_depends(flags)]
+        edges += [(str(item.name), name) for name in needed if name]
+        for made in calls_of(item, flags):
+            generated[made.vlnv] = made.generator
+            edges.append((str(item.name), made.vlnv))
+            for source in inputs_of(made):
+                sources[source] = None
+                edges.append((made.vlnv, source))
+    return render(
+        GRAPH_TEMPLATE,
+        {
+            "cores": [{"name": str(item.name)} for item, _ in cores],
+            "generated": [{"name": name, "generator": generator} for name, generator in generated.items()],
+            "sources": [{"name": name} for name in sources],
+            "edges": [{"from": start, "to": end} for start, end in edges],
+        },
+    )
+
+
+def target_calls(core: str, target: str) -> list[tuple[str, GeneratorCall]]:
+    """Return the generator calls of a core's target, each with the requesting core. May raise `InputError`."""
+    fusesoc, top = _found(core)
+    cores = solved(fusesoc, top, target)
+    return [(str(item.name), call) for item, flags in cores for call in calls_of(item, flags)]
+
+
+def solved(
+    fusesoc: Any, top: Any, target: str, further: Mapping[str, Any] = MappingProxyType({})
+) -> list[tuple[Any, Mapping[str, Any]]]:
+    """Return all cores of a target with their flags, each after its dependencies, so that the core itself is last.
+
+    `further` flags are added to those of the target.
+
+    Raise `InputError` if the target or a dependency is missing.
+    """
+    from fusesoc.coremanager import DependencyError
+
+    try:
+        flags = {**top.get_flags(target), "target": target, **further}
+        cores = fusesoc.cm.get_depends(top.name, {**flags, "is_toplevel": True})
+    except DependencyError as error:
+        fail(f"{top.name} has an unknown dependency: {error.value}")
+    except RuntimeError as error:
+        fail(str(error))
+    return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
+
+
+def _found(core: str) -> tuple[Any, Any]:
+    """Return a FuseSoC instance, and the core with this name. May raise `InputError`."""
+    from fusesoc.coremanager import DependencyError
+    from fusesoc.fusesoc import Fusesoc
+
+    fusesoc = Fusesoc(configuration())
+    try:
+        return fusesoc, fusesoc.get_core(core)
+    except (DependencyError, SyntaxError):
+        fail(f"unknown core '{core}'", hint="'fusesoc core list' lists all cores")
+
+
+def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
+    """Yield the generator calls that a FuseSoC core makes with these flags."""
+    for call in core.get_ttptttg(dict(flags)):
+        yield _call(str(core.name), call["name"], call["generator"], core.files_root, call["config"])
+
+
+def _core(vlnv: str, path: Path) -> ProjectCore:
+    core = read_core(path)
+    filesets = core.section("filesets").values()
+    files = [word for fileset in filesets for item in _listed(fileset, "files") for word in _words(_file(item))]
+    files += [str(item["command"]) for item in core.section("generators").values() if "command" in item]
+    depends = {_short(word) for fileset in filesets for item in _listed(fileset, "depend") for word in _words(item)}
+    return ProjectCore(
+        vlnv,
+        frozenset(_names(core)),
+        (path.resolve(), *((path.parent / file).resolve() for file in dict.fromkeys(files))),
+        frozenset(depends),
+        tuple(_calls(vlnv, core)),
+    )
+
+
+def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
+    """Yield the call of each generator instance, and another call for each target that changes its parameters."""
+    known = core.section("generate")
+    changes: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
+    for target in core.section("targets").values():
+        for item in _listed(target, "generate"):
+            changes += item.items() if isinstance(item, dict) else ()
+    for name, changed in changes:
+        generator = str(known.get(name, {}).get("generator"))
+        yield _call(vlnv, name, generator, core.path.parent, {**core.parameters(name), **(changed or {})})
+
+
+def _call(vlnv: str, instance: str, generator: str, folder: Path | str, parameters: Mapping[str, Any]) -> GeneratorCall:
+    vendor, library, name, version = vlnv.split(":")
+    return GeneratorCall(
+        generator, f"{vendor}:{library}:{name}-{instance}:{version}", str(Path(folder).absolute()), parameters
+    )
+
+
+def _names(core: CoreFile) -> list[str]:
+    """Return the core's own name and the virtual names that it provides."""
+    return [_short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
+
+
+def _listed(section: Mapping[str, Any], key: str) -> list[Any]:
+    """Return the list under a key of a section, including additions to an inherited list."""
+    return [item for name in (key, f"{key}_append") for item in section.get(name) or ()]
+
+
+def _file(item: object) -> str:
+    """Return the name in a file's entry, which may have attributes."""
+    return str(next(iter(item)) if isinstance(item, dict) else item)
+
+
+def _words(item: object) -> list[str]:
+    """Return the words of a text under all flags, such as x for `target_sim ? (x)`; rejected text is unchanged."""
+    from fusesoc.capi2.exprs import parse
+
+    def words(tree: Iterable[Any]) -> Iterator[str]:
+        for part in tree:
+            yield from part.split() if isinstance(part, str) else words(part[2])
+
+    try:
+        return [*words(parse(str(item)))]
+    except ValueError:
+        return [str(item)]
+
+
+def _short(name: str) -> str:
+    """Return a core's vendor, library and name, without the version; a name that FuseSoC rejects is unchanged."""
+    from fusesoc.vlnv import Vlnv
+
+    try:
+        core = Vlnv(name)
+    except SyntaxError:
+        return name
+    return f"{core.vendor}:{core.library}:{core.name}"

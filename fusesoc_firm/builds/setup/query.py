@@ -1,0 +1,145 @@
+"""Questions about the cores in FuseSoC's libraries: dependencies, dependents, paths, targets and their kinds.
+
+An answer is a table, with edges for a picture. Dependencies include those of all targets and flags.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+
+from fusesoc_firm.builds.setup.cores import GRAPH_TEMPLATE, ProjectCore
+from fusesoc_firm.builds.setup.outcome import configuration
+from fusesoc_firm.builds.setup.selection import matching
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.render import render
+
+Edge = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer to a question: the columns' names, rows of texts, and the edges between names."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    edges: tuple[Edge, ...] = ()
+
+    def lines(self) -> str:
+        """Return a line for each row, with blanks between the columns."""
+        widths = [max((len(row[place]) for row in self.rows), default=0) for place in range(len(self.columns))]
+        return "\n".join(
+            "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in self.rows
+        )
+
+    def json(self) -> str:
+        """Return the rows as objects, and the edges, as JSON."""
+        rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+        return json.dumps({"rows": rows, "edges": [list(edge) for edge in self.edges]}, indent=2)
+
+    def dot(self) -> str:
+        """Return the first column and the edges in Graphviz's language."""
+        names = dict.fromkeys([row[0] for row in self.rows] + [name for edge in self.edges for name in edge])
+        edges = [{"from": start, "to": end} for start, end in self.edges]
+        data = {"cores": [{"name": name} for name in names], "generated": [], "sources": [], "edges": edges}
+        return render(GRAPH_TEMPLATE, data).rstrip("\n")
+
+
+@dataclass(frozen=True)
+class Cores:
+    """All cores by their full names, with the cores on which each depends directly."""
+
+    needs: Mapping[str, tuple[str, ...]]
+
+    def deps(self, patterns: Sequence[str]) -> Answer:
+        """Return the selected cores and all cores on which they depend. May raise `InputError`."""
+        return self._answer(_reached(self._named(patterns), self.needs))
+
+    def rdeps(self, patterns: Sequence[str]) -> Answer:
+        """Return the selected cores and all cores that depend on them. May raise `InputError`."""
+        return self._answer(_reached(self._named(patterns), self._needed_by()))
+
+    def allpaths(self, start: str, end: str) -> Answer:
+        """Return the cores on all paths of dependencies between two selections. May raise `InputError`."""
+        below = _reached(self._named([start]), self.needs)
+        return self._answer(below & _reached(self._named([end]), self._needed_by()))
+
+    def _named(self, patterns: Iterable[str]) -> list[str]:
+        return [name for pattern in patterns for name in named(self.needs, pattern)]
+
+    def _needed_by(self) -> dict[str, tuple[str, ...]]:
+        return {name: tuple(other for other, needs in self.needs.items() if name in needs) for name in self.needs}
+
+    def _answer(self, names: Iterable[str]) -> Answer:
+        found = sorted(names)
+        edges = ((name, other) for name in found for other in self.needs[name] if other in found)
+        return Answer(("core",), tuple((name,) for name in found), tuple(edges))
+
+
+def core_dependencies(cores: Sequence[ProjectCore]) -> Cores:
+    """Return the dependencies between cores; several versions of a core count as one dependency each."""
+    by_name: dict[str, list[str]] = {}
+    for core in cores:
+        for name in core.names:
+            by_name.setdefault(name, []).append(core.vlnv)
+    return Cores(
+        {
+            core.vlnv: tuple(dict.fromkeys(other for name in sorted(core.depends) for other in by_name.get(name, ())))
+            for core in cores
+        }
+    )
+
+
+def targets(patterns: Sequence[str], kind: str = "*") -> Answer:
+    """Return the targets of the selected cores, each with its kind; `kind` is a pattern. May raise `InputError`.
+
+    The kind is the flow or tool in Edalize, as in `sim/ghdl`, or `-` for a target without both.
+    """
+    found = [row for row in _targets(patterns) if fnmatchcase(row[2], kind) or fnmatchcase(row[2].split("/")[0], kind)]
+    edges = ((core, f"{core} {target}") for core, target, _ in found)
+    return Answer(("core", "target", "kind"), tuple(found), tuple(edges))
+
+
+def kinds(patterns: Sequence[str]) -> Answer:
+    """Return the kinds of the selected cores' targets, each with its number of targets. May raise `InputError`."""
+    counts = Counter(kind for _, _, kind in _targets(patterns))
+    return Answer(("kind", "targets"), tuple((kind, str(counts[kind])) for kind in sorted(counts)))
+
+
+def named(names: Iterable[str], pattern: str) -> list[str]:
+    """Return the names that match a pattern. Raise `InputError` without a match."""
+    if not (found := matching(names, pattern)):
+        fail(f"no core matches '{pattern}'", hint="'fusesoc core list' lists all cores")
+    return found
+
+
+def _targets(patterns: Sequence[str]) -> list[tuple[str, str, str]]:
+    from fusesoc.fusesoc import Fusesoc
+
+    cores = Fusesoc(configuration()).get_cores()
+    chosen = dict.fromkeys(name for pattern in patterns for name in named(sorted(cores), pattern))
+    return [
+        (name, target, _kind(section))
+        for name in chosen
+        for target, section in sorted(cores[name].get_data({}).targets.items())
+    ]
+
+
+def _kind(target: Any) -> str:
+    options = target.flow_options or {}
+    parts = [target.flow, options.get("tool") if isinstance(options, dict) else None]
+    return "/".join(filter(None, parts)) if target.flow else str(target.default_tool or "-")
+
+
+def _reached(names: Iterable[str], edges: Mapping[str, Sequence[str]]) -> set[str]:
+    found = set(names)
+    waiting = list(found)
+    while waiting:
+        new = [name for name in edges[waiting.pop()] if name not in found]
+        found.update(new)
+        waiting += new
+    return found

@@ -1,0 +1,1 @@
+"""The cache of generated cores, keyed by everything that determines their content."""

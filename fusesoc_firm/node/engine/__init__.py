@@ -1,0 +1,1 @@
+"""Frames between ROS and a transport: queues, calls, traces and records."""

@@ -1,0 +1,1 @@
+"""The ends of a node in ROS, its options and its diagnostics."""

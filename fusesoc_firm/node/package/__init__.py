@@ -1,0 +1,1 @@
+"""ROS packages of generated nodes."""

@@ -1,0 +1,1 @@
+"""The status of the hardware, and its exchange with other programs."""

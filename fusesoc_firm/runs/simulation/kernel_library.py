@@ -1,0 +1,109 @@
+"""Compile the C++ of an HLS accelerator to the shared library that the simulation calls."""
+
+from __future__ import annotations
+
+import platform
+import re
+import subprocess
+import tempfile
+from pathlib import Path
+
+from fusesoc_firm.core.request import GeneratedFile
+from fusesoc_firm.system.derived.cpp_function import kernel_entity, library_name, prototype
+from fusesoc_firm.system.derived.model import AcceleratorType
+from fusesoc_firm.system.hardware.hls import kernel, shim
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.render import Rendering, render
+
+_COMPILER = "g++"
+# HLS tools provide their own header of this name.
+_STREAM_HEADER = "hls_stream.h"
+# Results must not depend on the processor (no contraction to fused operations), and the file must not depend on the
+# build (no build id, no symbols that name temporary files).
+_FLAGS = (
+    "-std=c++17",
+    "-O2",
+    "-ffp-contract=off",
+    "-fPIC",
+    "-shared",
+    "-s",
+    "-Wl,--build-id=none",
+    # Find undefined functions when linking, not when the simulator loads the library.
+    "-Wl,-z,defs",
+    # List the included files, except system headers.
+    "-MMD",
+    "-Wno-unknown-pragmas",
+)
+# A file name in a rule of make, with its escapes.
+_WORD = re.compile(r"(?:\\ |\S)+")
+_ESCAPED = re.compile(r"\\([ #])|\$(?=\$)")
+_CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
+
+
+def toolchain() -> dict[str, str]:
+    """Return the versions of the compiler and the C library, since other versions may be unable to load the library."""
+    try:
+        shown = subprocess.run([_COMPILER, "--version"], capture_output=True, text=True, check=False).stdout
+    except FileNotFoundError:
+        shown = ""
+    return {_COMPILER: shown.partition("\n")[0], "libc": " ".join(platform.libc_ver())}
+
+
+def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:
+    """Return the simulated kernel, and the library that the kernel loads from the work folder.
+
+    May raise `InputError`.
+    """
+    library = library_name(accelerator)
+    return {
+        f"{kernel_entity(accelerator)}.vhd": GeneratedFile(_text(kernel(accelerator)), "vhdlSource-93"),
+        library: GeneratedFile(_compile(accelerator, folder, _text(shim(accelerator))), "user", copyto=library),
+    }
+
+
+def _text(rendering: Rendering) -> str:
+    return render(rendering.template, rendering.context)
+
+
+def _compile(accelerator: AcceleratorType, folder: Path, program: str) -> bytes:
+    """Return the library's bytes, which do not depend on the folder of the sources."""
+    first, *others = accelerator.accelerator.sources
+    name = accelerator.accelerator.name
+    units = [str((folder / source).resolve()) for source in others if Path(source).suffix in _CPP_SUFFIXES]
+    above = (folder / first).resolve().parent
+    with tempfile.TemporaryDirectory() as temporary:
+        place = Path(temporary)
+        (place / "kernel.cpp").write_text(program, encoding="utf-8")
+        (place / _STREAM_HEADER).write_text(render(f"hls/{_STREAM_HEADER}", {}), encoding="utf-8")
+        # Without a relative path, `assert` would add the folder's name to the library.
+        options = ["-I", str(above), "-I", ".", f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
+        command = [_COMPILER, *_FLAGS, "kernel.cpp", *units, *options]
+        try:
+            result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
+        except FileNotFoundError:
+            fail(f"'{_COMPILER}' is required to simulate '{name}', but is not installed")
+        if result.returncode:
+            fail(
+                f"the C++ of '{name}' does not compile:\n{result.stderr.rstrip()}",
+                first.source,
+                f"expected: {prototype(accelerator)}",
+            )
+        _check_included(accelerator, folder, place)
+        return (place / "kernel.so").read_bytes()
+
+
+def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> None:
+    """Check that every included file is a source, since changes to other files would go unnoticed."""
+    sources = {(folder / source).resolve() for source in accelerator.accelerator.sources}
+    included = {
+        (place / _ESCAPED.sub(r"\1", word)).resolve()
+        for rules in place.glob("*.d")
+        for word in _WORD.findall(rules.read_text(encoding="utf-8").replace("\\\n", " "))[1:]
+    }
+    missing = sorted(str(path) for path in included - sources if not path.is_relative_to(place.resolve()))
+    if missing:
+        fail(
+            f"'{accelerator.accelerator.name}' includes files that are not sources: {', '.join(missing)}",
+            accelerator.accelerator.sources[0].source,
+            "list all included files in 'sources', so that changes to these files are noticed",
+        )

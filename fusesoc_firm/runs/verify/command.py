@@ -1,0 +1,115 @@
+"""`firm message verify`: run a campaign with a progress bar, a summary, and the files of failed messages."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+
+from tqdm import tqdm
+
+from fusesoc_firm.converter.stream import WIDTHS
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.runs.verify.campaign import Entry, Settings, run, select
+from fusesoc_firm.runs.verify.report import Report, as_data, make_report, write_report
+from fusesoc_firm.runs.verify.simulation import ghdl
+from fusesoc_firm.runs.verify.task import Verdict
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.outputs import check_output, make_folder
+from fusesoc_firm.tools.workers import Workers, cluster_workers, local_workers
+
+_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class Places:
+    """The places for work and results; `command` is the beginning of a command that verifies one message again.
+
+    The report is printed as a summary, or as JSON if `is_json` is set.
+    """
+
+    jobs: int | None = None
+    cluster: str | None = None
+    report: Path | None = None
+    keep: Path | None = None
+    command: Sequence[str] = ()
+    is_json: bool = False
+
+
+def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: Settings, places: Places) -> None:
+    """Verify messages and print the results.
+
+    Raise `InputError` if a message fails, or if no message could be verified.
+    """
+    if settings.width not in WIDTHS:
+        legal = ", ".join(map(str, WIDTHS))
+        fail(f"converters do not support {settings.width}-bit streams", hint=f"legal here: {legal}")
+    if places.report:
+        check_output(places.report, (".json",))
+    if places.keep:
+        make_folder(places.keep)
+    if not places.cluster:
+        ghdl()
+    names = select(library, patterns)
+    started = time.monotonic()
+    entries: list[Entry] = []
+    bar = tqdm(total=len(names), unit="msg", disable=None, file=sys.stderr)
+    with _workers(places) as workers, bar:
+        failed = 0
+        for entry in run(library, names, settings, workers):
+            entries.append(entry)
+            failed += entry.result.verdict is Verdict.FAIL
+            _keep(entry, places.keep)
+            bar.set_postfix_str(f"{entry.name}, {failed} failed", refresh=False)
+            bar.update()
+    report = make_report(entries, settings, time.monotonic() - started)
+    beside = write_report(report, places.report) if places.report else None
+    if places.is_json:
+        print(json.dumps(as_data(report), indent=2, ensure_ascii=False))
+    else:
+        _print_summary(report, places)
+        if beside:
+            print(f"{places.report}, {beside}")
+    totals = report.totals
+    if totals[Verdict.FAIL]:
+        fail(f"{totals[Verdict.FAIL]} of {len(entries)} messages failed")
+    if not totals[Verdict.PASS]:
+        fail("no message could be verified")
+
+
+def _workers(places: Places) -> AbstractContextManager[Workers]:
+    return cluster_workers(places.cluster) if places.cluster else local_workers(places.jobs)
+
+
+def _keep(entry: Entry, folder: Path | None) -> None:
+    """Write the contents of the work folder of a failed message below `folder`."""
+    if folder is None or not entry.result.files:
+        return
+    below = folder / f"ros{entry.ros.number}_{entry.name.package}_{entry.name.name}"
+    below.mkdir(parents=True, exist_ok=True)
+    for name, text in entry.result.files.items():
+        (below / name).write_text(text, encoding="utf-8")
+
+
+def _print_summary(report: Report, places: Places) -> None:
+    alone = [entry for entry in report.failures if entry.same_as is None]
+    for entry in alone[:_SHOWN]:
+        print(f"{entry.name}: {entry.result.detail}\n  to repeat: {shlex.join([*places.command, str(entry.name)])}")
+    if len(alone) > _SHOWN:
+        print(f"and {len(alone) - _SHOWN} more failed layouts")
+    for verdict in (Verdict.NO_JUDGE, Verdict.REFUSED):
+        found = [entry for entry in report.entries if entry.result.verdict is verdict]
+        for entry in found[:_SHOWN]:
+            print(f"{verdict}: {entry.name}: {entry.result.detail}")
+        if len(found) > _SHOWN:
+            print(f"and {len(found) - _SHOWN} more: {verdict}")
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in report.totals.items() if count)
+    judges = Counter(entry.result.judge for entry in report.entries if entry.result.judge)
+    judged = "; ".join(f"{count} by {judge}" for judge, count in sorted(judges.items()))
+    print(f"{len(report.entries)} messages in {report.seconds:g} s: {counts}\njudged: {judged or 'none'}")

@@ -1,1 +1,0 @@
-"""The cache of generated cores, keyed by everything that decides their content."""
