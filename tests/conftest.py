@@ -16,6 +16,7 @@ import time
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from zlib import crc32
 
@@ -24,12 +25,15 @@ import pytest
 from hypothesis import settings
 
 from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.tools.digests import default_root
 from fusesoc_firm.tools.interrupts import accept_interrupts
+from tests.recall import FRESH, STORE, store
+from tests.seeds import ROUND
 from tests.shared import SHARED
 
-pytest_plugins = ["tests.time_report"]
+pytest_plugins = ["tests.reads", "tests.reached", "tests.sharing", "tests.time_report"]
 
-settings.register_profile("untimed", deadline=None)
+settings.register_profile("untimed", deadline=None, derandomize=not os.environ.get(ROUND), database=None)
 settings.load_profile("untimed")
 
 # The part of a processor that polling takes, or clusters at rest. Work gets more, however busy a machine is.
@@ -47,11 +51,12 @@ _LOOKS = 10
 # Of a parameter with so many values, none is left to `thorough`.
 _FEW = 8
 # Rooms whose tests may leave no file or socket open: what is collected as garbage while it is open is a fault.
-_CLOSED = tuple(Path(__file__).parent / room for room in ("bags", "node", "simulation"))
+_CLOSED = tuple(Path(__file__).parent / room for room in ("runs/bags", "node", "runs/simulation"))
 _OPEN = ("error::ResourceWarning", "error::pytest.PytestUnraisableExceptionWarning")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--fresh", action="store_true", help="recall no result of a tool")
     parser.addini("waiting_limit", "seconds that a test may wait without doing anything", default="60")
 
 
@@ -62,11 +67,18 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         folder = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
         config.add_cleanup(folder.cleanup)
+        os.environ.setdefault(STORE, f"{default_root()}_tests")
+        if config.getoption("--fresh"):
+            os.environ |= {FRESH: "1", "CCACHE_RECACHE": "1"}
+        if results := store():
+            config.add_cleanup(results.shrink_if_needed)
         os.environ["FUSESOC_FIRM_CACHE"] = f"{folder.name}/store"
         os.environ[SHARED] = f"{folder.name}/shared"
         # Verilator compiles its library again for every program.
         if shutil.which("ccache"):
-            os.environ |= {"OBJCACHE": "ccache", "CCACHE_DIR": f"{folder.name}/ccache"}
+            os.environ |= {"OBJCACHE": "ccache", "CCACHE_DIR": f"{os.environ[STORE]}/ccache"}
+            # Steps of builds whose use of files is observed would find it missing, then there.
+            Path(os.environ["CCACHE_DIR"]).mkdir(parents=True, exist_ok=True)
         # FuseSoC looks up a generator's interpreter there.
         os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
@@ -81,6 +93,15 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     return len(os.sched_getaffinity(0)) + 1
 
 
+@pytest.fixture(autouse=True)
+def _environment() -> Iterator[None]:
+    """What a test does to the environment, as `firm sim` does to FuseSoC's libraries, ends with it."""
+    former = dict(os.environ)
+    yield
+    os.environ.clear()
+    os.environ.update(former)
+
+
 def pytest_make_parametrize_id(val: object) -> str | None:
     """A middleware is called by its number in the names of tests."""
     return str(val.number) if isinstance(val, Middleware) else None
@@ -91,13 +112,18 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 def pytest_collection_modifyitems(items: Iterable[pytest.Item]) -> None:
     cases: defaultdict[tuple[object, str], list[pytest.Item]] = defaultdict(list)
     for item in items:
-        if any(room in item.path.parents for room in _CLOSED):
+        if _is_closed(item.path):
             for rule in _OPEN:
                 item.add_marker(pytest.mark.filterwarnings(rule))
         if item.get_closest_marker("one_in"):
             cases[item.parent, item.name.partition("[")[0]].append(item)
     for test in cases.values():
         _share_out(test)
+
+
+@cache
+def _is_closed(path: Path) -> bool:
+    return any(room in path.parents for room in _CLOSED)
 
 
 def _share_out(cases: Sequence[pytest.Item]) -> None:

@@ -8,7 +8,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1] / "fusesoc_firm"
-ROOMS = ("converter", "system/hardware", "system/boards", "system/scaffold", "verify", "simulation", "netlist")
+ROOMS = (
+    "converter",
+    "system/hardware",
+    "system/boards",
+    "system/scaffold",
+    "runs/verify",
+    "runs/simulation",
+    "netlist",
+)
 MOST_LINES = 10
 
 # Signs and words of both languages that no message to a user holds.
@@ -36,7 +44,7 @@ REASONS = {
     "converter/payload_length.py": {"_unsigned": _OPERAND},
     "converter/storing.py": {"is_beat": _CONDITION, "_is_used": _CONDITION},
     "converter/variable_publisher.py": {"_count": _OPERAND},
-    "verify/loop.py": dict.fromkeys(("_element_gates", "_message_gate", "_segment_gate", "_gate_of"), _CONDITION),
+    "runs/verify/loop.py": dict.fromkeys(("_element_gates", "_message_gate", "_segment_gate", "_gate_of"), _CONDITION),
     "netlist/padding.py": {"text": "a statement on one line, whose length is taken off the columns of messages"},
     "netlist/probed_source.py": {"types": _OPERAND},
     "netlist/verilog.py": {

@@ -5,11 +5,12 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-from tests.rooms import NAME, PACKAGE, arrows, imported_rooms, modules, reduced, room_of
+from tools.rooms import NAME, PACKAGE, arrows, imported_rooms, modules, reduced, room_of
 
 TABLE = PACKAGE.parent / "docs" / "architecture.md"
 PICTURE = PACKAGE.parent / "docs" / "pictures" / "house.svg"
@@ -17,36 +18,28 @@ PICTURE = PACKAGE.parent / "docs" / "pictures" / "house.svg"
 # Each room, from the ground up, and the rooms below it that it may import from.
 ALLOWED: dict[str, str] = {
     "text": "",
-    "store": "text",
-    "message": "store text",
-    "request": "message store text",
+    "tools": "text",
+    "message": "text tools",
+    "core": "message text tools",
     "frame": "message text",
-    "tools": "store text",
-    "converter": "frame message request store text",
+    "converter": "core frame message text tools",
     "netlist": "text tools",
     "scheduling": "text tools",
-    "action": "store text tools",
-    "building": "action request store text tools",
-    "system": "converter frame message request scheduling store text tools",
-    "fabric": "message system text",
-    "accelerator": "converter system text tools",
-    "verify": "converter frame message request text tools",
-    "bags": "frame message system text",
-    "simulation": "bags converter frame message request store system text tools",
-    "node": "frame message request simulation system text tools",
-    "plugin": "building converter fabric message node request simulation store system text tools",
-    "emulation": "frame message node request simulation system text",
-    "replay": "bags frame message node simulation system text",
-    "studio": "converter frame message node plugin request scheduling simulation store system text tools",
-    "cli": (
-        "accelerator action building converter emulation fabric message node plugin replay scheduling simulation store"
-        " studio system text tools verify"
-    ),
+    "system": "converter core frame message scheduling text tools",
+    "fabric": "message system text tools",
+    "accelerator": "converter frame system text tools",
+    "node": "accelerator core frame message system text tools",
+    "runs": "accelerator converter core frame message node system text tools",
+    "builds": "converter core fabric message node runs system text tools",
+    "studio": "accelerator builds converter core frame message node runs scheduling system text tools",
+    "cli": "accelerator builds converter fabric message node runs scheduling studio system text tools",
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
 STOREYS = {
     "system": ("written", "derived", "hardware", "boards", ".", "views", "scaffold"),
     "scheduling": (".", "models", "evaluation"),
+    "runs": ("bags", "simulation", "replay", "emulation", "verify", "."),
+    "builds": ("store", "step", "setup", "call", "."),
 }
 
 
@@ -79,6 +72,31 @@ def steps_down(package: Path, room: str, storeys: tuple[str, ...]) -> Iterator[s
                     yield f"{path}:{node.lineno}: '{'.'.join(parts)}' is in a higher storey"
 
 
+def imported_modules(path: Path, package: Path) -> Iterator[Path]:
+    """The modules of the package that a module names in its imports, wherever these stand in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            named = [package.parent.joinpath(*alias.name.split(".")) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            folder = path.parents[node.level - 1] if node.level else package.parent
+            named = [folder.joinpath(*(node.module or "").split("."), alias.name) for alias in node.names]
+        else:
+            continue
+        for name in named:
+            # The last part may name a value in the module before it.
+            files = (file for module in (name, name.parent) for file in (f"{module}.py", module / "__init__.py"))
+            yield from [Path(file) for file in files if Path(file).exists()][:1]
+
+
+def circle(package: Path) -> list[str]:
+    """The modules of a circle of imports, or nothing."""
+    try:
+        TopologicalSorter({path: set(imported_modules(path, package)) for path in modules(package)}).prepare()
+    except CycleError as error:
+        return [str(path.relative_to(package)) for path in error.args[1]]
+    return []
+
+
 def test_a_room_stands_on_lower_ones() -> None:
     rooms = list(ALLOWED)
     for number, room in enumerate(rooms):
@@ -96,6 +114,13 @@ def test_modules_lie_in_rooms() -> None:
     assert [path.name for path in PACKAGE.glob("*.py")] == ["__init__.py"]
 
 
+def test_no_folder_has_a_name_that_tools_skip() -> None:
+    """pytest, ruff, uv and many ignore files skip these, without a message."""
+    skipped = {"build", "dist", "CVS", "venv", "site-packages"}
+    for folder in (PACKAGE, PACKAGE.parent / "tests", PACKAGE.parent / "tools"):
+        assert not [path for path in folder.rglob("*.py") if skipped & {*path.relative_to(folder).parts}]
+
+
 def test_a_room_imports_what_it_may() -> None:
     """A right that nobody uses goes."""
     assert {room: set(may.split()) for room, may in ALLOWED.items()} == arrows()
@@ -103,7 +128,7 @@ def test_a_room_imports_what_it_may() -> None:
 
 def test_the_picture_is_that_of_the_imports() -> None:
     drawn = re.findall(r"<title>(\w+)&#45;&gt;(\w+)</title>", PICTURE.read_text(encoding="utf-8"))
-    command = "; draw it again: python -m tests.rooms docs/pictures/house.svg"
+    command = "; draw it again: python -m tools.rooms -o docs/pictures/house.svg"
     assert sorted(drawn) == sorted((room, other) for room, rooms in reduced(arrows()).items() for other in rooms), (
         command
     )
@@ -113,11 +138,42 @@ def test_the_table_of_changes_names_files_that_exist() -> None:
     rows = re.findall(r"^\| .* \| `([\w/.]+)` \| (.*) \|$", TABLE.read_text(encoding="utf-8"), re.MULTILINE)
     assert len(rows) >= 30
     for room, files in rows:
-        places = [PACKAGE / room, PACKAGE, PACKAGE.parent]
+        places = [PACKAGE / room, PACKAGE, PACKAGE.parent, PACKAGE.parent / room]
         for name in re.findall(r"`([\w/.]+\.\w+)`", files):
             # A core's files are named by their endings.
             assert name.startswith(".") or any((place / name).exists() for place in places), (room, name)
         assert any((place / room).is_dir() for place in places), room
+
+
+def test_the_package_needs_neither_tests_nor_tools() -> None:
+    for path in modules(PACKAGE):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and not node.level:
+                names = [node.module or ""]
+            assert not {name.partition(".")[0] for name in names} & {"tests", "tools"}, f"{path}:{node}"
+
+
+def test_modules_import_without_circles() -> None:
+    assert not circle(PACKAGE)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from fusesoc_firm.message.parser import parse",
+        "from fusesoc_firm.message import library, parser",
+        "import fusesoc_firm.message.parser",
+        "if TYPE_CHECKING:\n    from .parser import parse",
+        "def f():\n    from . import parser",
+    ],
+)
+def test_circles_are_found(tmp_path: Path, statement: str) -> None:
+    room = tmp_path / "fusesoc_firm" / "message"
+    room.mkdir(parents=True)
+    (room / "model.py").write_text(statement)
+    (room / "parser.py").write_text("from fusesoc_firm.message.model import Field")
+    assert set(circle(tmp_path / "fusesoc_firm")) == {"message/model.py", "message/parser.py"}
 
 
 def test_imports_go_one_way() -> None:

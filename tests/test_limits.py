@@ -53,6 +53,7 @@ def test_thorough():
 """
 
 
+@pytest.mark.check
 def test_a_run_that_inherits_an_ignored_interrupt(tmp_path: Path) -> None:
     (tmp_path / "test_waiting.py").write_text(WAITING)
     (tmp_path / "pytest.ini").write_text("[pytest]\nwaiting_limit = 2\nmarkers = thorough\n")

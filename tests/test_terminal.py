@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.terminal import main
+from tools.terminal import main
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 
@@ -16,5 +16,5 @@ def test_the_pictures_are_those_of_this_version(tmp_path: Path) -> None:
     main(tmp_path)
     for name in ("terminal.svg", "waves.svg"):
         text = (tmp_path / name).read_text(encoding="utf-8")
-        assert text == (PICTURES / name).read_text(encoding="utf-8"), "run: python -m tests.terminal docs/pictures"
+        assert text == (PICTURES / name).read_text(encoding="utf-8"), "run: python -m tools.terminal docs/pictures"
         assert "/home" not in text and "/tmp" not in text

@@ -1,8 +1,8 @@
 """Where the time of a test run goes: the seconds of each room of tests and of its slowest tests, the longest first.
 
 A test has the seconds of the processor that its process and the ended processes below it take, which say the same on
-a busy machine as on an idle one, and those of the clock. The last line shows idle time: of processes without a
-test, and of processors.
+a busy machine as on an idle one, and those of the clock. The last lines show how many runs of tools were recalled
+(tests/recall.py), and idle time: of processes without a test, and of processors.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from pathlib import PurePosixPath
 
 import pytest
 from _pytest.terminal import TerminalReporter
+
+from tests.recall import COUNTS
 
 _SLOWEST = 10
 _BEGUN = time.monotonic()
@@ -62,22 +64,26 @@ def pytest_runtest_setup() -> Iterator[None]:
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """A report of a stage takes its seconds along, from one process of a run to the other."""
     report = yield
-    vars(report)["processor"] = _METER.read()
+    vars(report).update(processor=_METER.read(), recalled=COUNTS.recalled, run=COUNTS.run)
+    COUNTS.recalled = COUNTS.run = 0
     return report
 
 
 def pytest_terminal_summary(terminalreporter: TerminalReporter, config: pytest.Config) -> None:
     rooms: dict[str, Seconds] = defaultdict(Seconds)
     tests: dict[str, Seconds] = defaultdict(Seconds)
-    total = Seconds()
+    total, recalled, run = Seconds(), 0, 0
     for reports in terminalreporter.stats.values():
         for report in reports:
             if isinstance(report, pytest.TestReport):
                 for seconds in (rooms[room_of(report.nodeid)], tests[report.nodeid], total):
                     seconds.processor += getattr(report, "processor", 0.0)
                     seconds.clock += report.duration
+                recalled += getattr(report, "recalled", 0)
+                run += getattr(report, "run", 0)
     _write(terminalreporter, f"the {_SLOWEST} slowest tests", dict(_longest(tests)[:_SLOWEST]))
     _write(terminalreporter, "the rooms", {**dict(_longest(rooms)), "in all": total})
+    terminalreporter.line(f"runs of tools: {recalled:,} were recalled, {run:,} ran")
     terminalreporter.line(_run(total, getattr(config.option, "numprocesses", None) or 1))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.request.request import Plain
+from fusesoc_firm.core.request import Plain
 from tests.hdl.ghdl import REPOSITORY
 from tests.system.simulated.systems import GeneratedSystem, build, call
 

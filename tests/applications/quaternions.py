@@ -7,7 +7,7 @@ import random
 from pathlib import Path
 from typing import Any
 
-from tests.replay.replays import payload, read, store_of, write
+from tests.runs.replay.replays import payload, read, store_of, write
 
 QUATERNION, POINT = "geometry_msgs/msg/Quaternion", "geometry_msgs/msg/Point"
 TOPIC = "/imu/orientation"

@@ -13,9 +13,10 @@ import pytest
 import yaml
 
 from tests.applications.images import SPECS, broken_images, image, load_model
+from tests.seeds import seeded
 
 PIPELINE, SOBEL = load_model("image_pipeline"), load_model("sobel")
-SEED = 20240701
+SEED = seeded(20240701)
 Pixels = npt.NDArray[np.uint8]
 
 

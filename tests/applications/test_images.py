@@ -29,9 +29,10 @@ from tests.applications.images import (
     replace_by_netlists,
 )
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem
 
-SEED = 20240701
+SEED = seeded(20240701)
 # Each system with the bytes of a pixel that it takes, its accelerators, and its widest image.
 CHANNELS = {"image_pipeline": 3, "sobel": 1}
 ENTITIES = {"image_pipeline": ("rgb_to_gray", "scale_down", "integral_image"), "sobel": ("sobel",)}

@@ -13,10 +13,11 @@ from fusesoc_firm.cli import main
 from tests.applications.applications import SPECS
 from tests.applications.images import break_frames, broken_images, copied, fed, image, odd_images, random_images
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 from tests.system.simulated.systems import build, call
 
 DATA = Path(__file__).parent / "data"
-SEED = 20240902
+SEED = seeded(20240902)
 # Of the applications for images: the accelerator in C++ and its file.
 IN_CPP = {"sobel": ("sobel", "Sobel.cpp"), "image_pipeline": ("rgb_to_gray", "RgbToGray.cpp")}
 STATE = {"q": (7, 4.0), "q_d": (7, 16.5), "o_t_ee": (16, 1.5), "o_t_ee_d": (16, 4.02)}
@@ -93,6 +94,7 @@ def with_streams(folder: Path, name: str, width: int) -> Path:
     return copy
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("name", "width"), [("sobel", 8), ("sobel", 64), ("image_pipeline", 32)])
 def test_images_in_cpp(tmp_path: Path, name: str, width: int) -> None:
     """Gray scale and the Sobel filter, with images of all kinds and messages that are not valid images."""
@@ -106,6 +108,7 @@ def test_images_in_cpp(tmp_path: Path, name: str, width: int) -> None:
     assert made.passes(SEED=SEED, STALL_PERCENT=40)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("name", "width"), [("sobel", 8), ("image_pipeline", 64)])
 def test_an_image_that_breaks_off_restarts_the_function(tmp_path: Path, name: str, width: int) -> None:
     print(f"seed {SEED + width}")
@@ -118,6 +121,7 @@ def test_an_image_that_breaks_off_restarts_the_function(tmp_path: Path, name: st
         assert made.passes(SEED=SEED, STALL_PERCENT=stalls)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("taken", "given", "width"),
     [

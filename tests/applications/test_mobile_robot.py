@@ -17,11 +17,12 @@ import yaml
 
 from tests.applications.applications import SPECS, for_ros2, simulation
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
 ROBOT = SPECS / "mobile_robot"
 CORES = ("acc/float64/float64",)
 SOURCES = ("quadrature_decoder", "wheel_pid", "pwm_driver", "skid_steer", "mobile_robot")
-SEED = 20240707
+SEED = seeded(20240707)
 NAN, INF = float("nan"), float("inf")
 
 # What the bench's generics make of a control period, and its motors: the last one is too weak for SPEED_LIMIT.
@@ -291,6 +292,7 @@ def test_the_decoder_stops_counting_errors_at_its_end(work: Library, tmp_path: P
     assert decoded(work, tmp_path, steps, 4) == (0, 255)
 
 
+@pytest.mark.check
 def test_the_system_with_stalls(tmp_path: Path) -> None:
     """The motors turn at their own time, so stalls of the host change no answer; one encoder has glitches."""
     system = simulation(ROBOT, tmp_path, *CORES)

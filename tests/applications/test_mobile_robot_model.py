@@ -11,8 +11,10 @@ from types import ModuleType
 
 import pytest
 
+from tests.seeds import seeded
+
 SPEC = Path(__file__).parents[2] / "specs" / "mobile_robot"
-SEED = 20240505
+SEED = seeded(20240505)
 # The robot of the default parameters, in SI units.
 TRACK_WIDTH, WHEEL_RADIUS, COUNTS_PER_TURN, PERIOD = 0.4, 0.1, 204_800, 1e-4
 

@@ -17,6 +17,7 @@ from types import ModuleType
 import pytest
 
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
 ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "specs" / "quat2euler"
@@ -25,7 +26,7 @@ TABLE = FIRM_SOURCES[0]
 TOP = SPEC / "rtl" / "quat2euler.vhd"
 BENCH = SPEC / "tb" / "quat2euler_tb.vhd"
 VERILOG_BENCH = SPEC / "tb" / "quat2euler_netlist_tb.v"
-SEED = 4711
+SEED = seeded(4711)
 # A frame of a Quaternion in ROS 1: id, length and 32 bytes.
 FRAME_BYTES = 37
 

@@ -16,8 +16,10 @@ from types import ModuleType
 
 import pytest
 
+from tests.seeds import seeded
+
 SPEC = Path(__file__).parents[2] / "specs" / "quat2euler"
-SEED = 20240607
+SEED = seeded(20240607)
 VECTORS = 10_000
 QUIET_NAN = bytes.fromhex("7ff8000000000000")
 SMALLEST_NORMAL = 2.0**-1022

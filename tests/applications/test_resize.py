@@ -24,9 +24,10 @@ from tests.applications.images import (
     random_images,
     replace_by_netlists,
 )
+from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem
 
-SEED = 20261126
+SEED = seeded(20261126)
 MODEL = load_model("resize")
 ENTITIES = ("resize_image", "resize_size", "resize_matrices")
 WATCHDOG = 3000

@@ -10,17 +10,18 @@ from typing import Any
 import pytest
 import yaml
 
+from fusesoc_firm.core.request import Plain
 from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.request.request import Plain
-from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
+from fusesoc_firm.runs.verify.stimuli import TYPICAL, Stimuli
 from tests.applications.applications import SPECS, for_ros2, simulation
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
 ARM = SPECS / "robotic_arm"
 CORES = ("acc/cordic/cordic", "acc/float64/float64")
-SEED = 20240901
+SEED = seeded(20240901)
 LATENCY = 305
 # Fields, their elements, and how far from zero these are: some desired ones have no result.
 FIELDS = (("q", 7, 4.0), ("q_d", 7, 16.5), ("o_t_ee", 16, 1.5), ("o_t_ee_d", 16, 4.02))

@@ -19,9 +19,10 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import md5
 from tests import corpus
+from tests.seeds import seeded
 
 SPEC = Path(__file__).parents[2] / "specs" / "robotic_arm"
-SEED = 20240817
+SEED = seeded(20240817)
 STATE = MessageName("franka_msgs", "FrankaState")
 # The sum that ROS 1 has for franka_msgs/FrankaState of franka_ros 0.10.
 STATE_MD5 = "431567d5df6caf4e4dd7385f25cb71ee"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.building.build import Build, Outcome
+from fusesoc_firm.builds.setup.outcome import Build, Outcome
 from fusesoc_firm.cli.build_report import Outputs, Report, Words
 from fusesoc_firm.text.diagnostics import InputError
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.action.results import FOLDER_NAME, Record, default_results
+from fusesoc_firm.builds.step.results import FOLDER_NAME, Record, default_results
+from fusesoc_firm.builds.store import layout
+from fusesoc_firm.builds.store.store import Key, default_store, served_store
 from fusesoc_firm.cli import main
-from fusesoc_firm.store import layout
-from fusesoc_firm.store.store import Key, default_store, served_store
 
 Captured = pytest.CaptureFixture[str]
 NO_RESULTS = ["results  0", "size     0 bytes of 10.0 GiB"]

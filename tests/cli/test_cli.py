@@ -392,6 +392,35 @@ def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, mo
     assert "generated for each line written" in out(capsys, "system", "report", str(spec))
 
 
+def test_init_extends_a_system(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = tmp_path / "robot.yaml"
+    ends = "middleware: ROS, message: geometry_msgs/Point"
+    blocks = f"- {{name: sub, mode: subscriber, {ends}, topic: a, outgoing: [{{name: pub}}]}}\n"
+    blocks += f"- {{name: pub, mode: publisher, {ends}, topic: b}}\n"
+    spec.write_text(f"# Mine\nproject: {{name: robot}}\nblocks:\n{blocks}", encoding="utf-8")
+    # No accelerator; a block without further outputs; no more blocks; then another sink of `sub`.
+    answers = ["no", "yes", "more", "", "ROS", "publisher", "geometry_msgs/Point", *[""] * 7, "no", "no"]
+    answers += ["sub", "yes", "more", "", "", "no", ""]
+    monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
+    assert "1 subscriber, 0 accelerators, 2 publishers\n" in out(capsys, "init", "--extend", str(spec))
+    assert spec.read_text(encoding="utf-8").startswith("# Mine\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (["turn", "--extend", "x.yaml"], "--extend asks for all parts, so NAME has no meaning"),
+        (["--extend", "x.yaml", "--in", "std_msgs/Bool"], "--extend asks for all parts, so --in has no meaning"),
+        (["--extend", "x.yaml"], "x.yaml does not exist"),
+    ],
+)
+def test_init_extends_only_a_specification(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], fault: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert error(capsys, "init", *words).startswith(f"error: {fault}\n")
+
+
 def test_what_is_doubtful_is_told_and_goes_on(capsys: Captured, tmp_path: Path) -> None:
     """`warning` goes to the standard error, so that the standard output is unchanged."""
     spec = tmp_path / "robot.yaml"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.building.simulation import Message
+from fusesoc_firm.builds.setup.simulation import Message
 from fusesoc_firm.cli.message_table import row, with_answers
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.defaults import completed
@@ -14,7 +14,7 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.simulation.answers import Answer, Payload
+from fusesoc_firm.runs.simulation.answers import Answer, Payload
 from fusesoc_firm.system.derived.model import Topic
 
 LIBRARY = MessageLibrary(ROS2)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.building.build import Build
-from fusesoc_firm.building.simulation import Simulation
+from fusesoc_firm.builds.setup.outcome import Build
+from fusesoc_firm.builds.setup.simulation import Simulation
 from fusesoc_firm.cli import main
 from fusesoc_firm.cli.common import coloured
 from fusesoc_firm.cli.sim import _print_errors

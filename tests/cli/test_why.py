@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 from fusesoc_firm import __version__
+from fusesoc_firm.builds.call.calls import make_request
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.calls import make_request
-from fusesoc_firm.request.request import GeneratorCall, as_files
+from fusesoc_firm.core.request import GeneratorCall, as_files
 from fusesoc_firm.text.render import TEMPLATES, Rendering, recorded, render, traced_lines
 
 SPECS = Path(__file__).resolve().parents[2] / "specs"

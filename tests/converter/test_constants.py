@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.converter.converter_core import constants_files, load
+from fusesoc_firm.core.request import Plain, Request
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.request.request import Plain, Request
 from tests.expected import check_expected
 from tests.frame.oracle import parsed
 

@@ -11,8 +11,8 @@ import yaml
 from fusesoc_firm.converter.converter_core import load
 from fusesoc_firm.converter.interfaces import interface_configuration
 from fusesoc_firm.converter.order import order_of_config
+from fusesoc_firm.core.request import GeneratedCore, Plain, Request
 from fusesoc_firm.message.library import libraries
-from fusesoc_firm.request.request import GeneratedCore, Plain, Request
 from fusesoc_firm.text.diagnostics import InputError
 from tests.expected import check_expected
 

@@ -33,12 +33,13 @@ from fusesoc_firm.frame.values import leaf_of, part_of, units_of
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import KINDS, Stimuli
+from fusesoc_firm.runs.verify.stimuli import KINDS, Stimuli
 from tests.frame.oracle import Oracle
 from tests.frame.test_layout import layout
 from tests.frame.variable_samples import PACKAGE, VARIABLE
+from tests.seeds import seeded
 
-SEED = 20240609
+SEED = seeded(20240609)
 
 
 class Walk:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.plugin.answer import main
+from fusesoc_firm.builds.call.answer import main
 
 CORE = """\
 CAPI=2:

@@ -53,6 +53,7 @@ LONG = 65536  # the same, if it sends samples in fragments
 ASSEMBLED = 4096  # bytes of the longest one that it puts together, if it does
 WAITING = 4096  # bytes of payloads that wait
 IDLE = -1  # an event that waits until the node has nothing to do
+RUSHED = 15  # milliseconds that may come at once
 _GAP = 12  # cycles between two packets, at least
 _ETHERNET, _UDP = 14, 42  # bytes before the header of IPv4, and before the payload of UDP
 _RTPS_HEADER = 20  # bytes
@@ -81,7 +82,7 @@ class Kind(IntEnum):
     TICKS = 2
     FRAME = 3
     ABORTED_FRAME = 4
-    RUSHED = 5  # milliseconds, one in each cycle; up to 15
+    RUSHED = 5  # milliseconds, one in each cycle; up to `RUSHED`
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,11 @@ class Event:
         """The row for the bench."""
         numbers = self.kind, self.before, self.count or len(self.data), *self.data
         return " ".join(map(str, numbers)) + "\n"
+
+
+def rushed(count: int) -> list[Event]:
+    """Milliseconds as fast as the node can take them."""
+    return [Event(Kind.RUSHED, count=min(RUSHED, count - done)) for done in range(0, count, RUSHED)]
 
 
 @dataclass
@@ -593,7 +599,9 @@ class Peers:
             elif way == 1:
                 self._send(peer, self._destination(), self._told_of(items[0]))
             elif way == 2:
-                self.events.append(Event(Kind.TICKS, count=chance.choice([1, 20, 1000])))
+                # Each is many cycles of work.
+                few = [[Event(Kind.TICKS, count=count)] for count in (1, 20)]
+                self.events += chance.choice([*few, rushed(1000)])
             elif way == 3 and others:
                 self._send(other, self._destination(), others.pop(0))
             for _ in range({4: 0, 5: 2}.get(way, 1)):

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests import yowasp
+from tests.recall import ran_or_recalled
 
 _FF = re.compile(r"\$_(S?DFFE?|DFFSR|A?DFFE?)\w*_")
 _ASYNCHRONOUS = re.compile(r"\$_DFFE?_[PN]{2}[01]\w*_")
@@ -62,10 +62,8 @@ def crossing_paths(verilog: str, top: str, folder: Path, domains: Domains) -> se
 
 def _netlist(verilog: str, top: str, folder: Path, domains: Domains) -> _Netlist:
     (folder / "netlist.v").write_text(verilog, encoding="utf-8")
-    yosys = yowasp.Yosys()
-    yosys.prepare()
-    done = yosys.run(["-q", "-p", _SCRIPT.format(top=top)], folder)
-    assert done.returncode == 0, done.stderr
+    done = ran_or_recalled(["yosys", "-q", "-p", _SCRIPT.format(top=top)], folder)
+    assert done.exit_code == 0, done.output
     module = json.loads((folder / "out.json").read_text(encoding="utf-8"))["modules"][top]
     return _Netlist(module, domains)
 

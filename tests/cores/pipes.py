@@ -60,6 +60,7 @@ def _analyse(folder: Path) -> None:
     library = Library("firm", folder)
     library.analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/pipe"))
     library.analyse(core_files("sim/pipe", fileset="tb"))
+    library.make()
 
 
 def _sources() -> list[Path]:
@@ -67,7 +68,7 @@ def _sources() -> list[Path]:
 
 
 def _icarus(folder: Path, width: int) -> None:
-    compile_verilog(_BENCH, _sources(), folder, {"WIDTH": width})
+    compile_verilog(_BENCH, _sources(), folder, {"WIDTH": width}).make().rename(folder / f"{_BENCH}.vvp")
 
 
 def _verilator(folder: Path, width: int) -> None:

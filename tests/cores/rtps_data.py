@@ -1,16 +1,13 @@
 """The files of `firm_rtps_node_tb`: memories of a node, and events.
 
-    python -m tests.cores.rtps_data
-
-writes those of the core's target `sim_node`; what the node does then is in `node_results.txt`, of which the bench makes
-a new one, `results.txt`.
+tools/rtps_data.py writes those of the core's target `sim_node`.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from fusesoc_firm.fabric.control import generics_of, main_of, words_of
+from fusesoc_firm.fabric.control import generics_of, words_of
 from fusesoc_firm.fabric.names import names
 from fusesoc_firm.fabric.packets import programs_of
 from tests.cores.announcements import ROOM, Peers, a_node
@@ -46,8 +43,3 @@ def write_data(folder: Path) -> None:
     peers.succession()
     events = peers.run(TURNS)
     (folder / "node_events.txt").write_text("".join(event.row for event in events), encoding="ascii")
-
-
-if __name__ == "__main__":
-    write_data(DATA)
-    print(f"the program's loop is at {main_of(NODE)}")

@@ -12,7 +12,7 @@
 #include "Vrtps_world.h"
 #include "bench.h"
 
-static const unsigned LOOP_CYCLES = 24, IDLE_LOOPS = 50;
+static const unsigned LOOP_CYCLES = 24, IDLE_LOOPS = 10;
 // Until the node takes a byte, or comes to rest: ten times what the longest messages of the tests take.
 static const uint64_t MOST_CYCLES = 3000000;
 enum Kind { PACKET, ABORTED_PACKET, TICKS, FRAME, ABORTED_FRAME, RUSHED };

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from fusesoc_firm.fabric.control import Sizes, main_of
 from fusesoc_firm.fabric.node import Node
 from fusesoc_firm.fabric.packets import programs_of
-from tests.bench.model import compiled
 from tests.cores.announcements import ROOM, SAMPLE, WAITING, Event, Kind, Results, a_node, sent
 from tests.fabric.memories import generics, memories
 from tests.hdl.ghdl import core_files
+from tests.hdl.verilator import compiled
 from tests.hdl.verilog import netlist
+from tests.recall import Conversation
 from tests.shared import made_once
 
 HERE = Path(__file__).parent
@@ -57,28 +58,24 @@ class World:
     ) -> None:
         own = node or a_node()
         words = [str(program(own, sizes, assembled, sample, waiting)), str(main_of(own)), str(stall)]
-        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._program = Conversation(words, "done\n")
         self.pulses: Counter[str] = Counter()
         self.entries = [0, 0, 0]  # peers, and their writers and readers that match
         self.cycles = 0  # of the last event, until the node had nothing to do
         self.latency = 0  # cycles of the last event, from a frame's end to the first byte of a packet; 0 without both
 
     def __enter__(self) -> World:
+        self._program.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.communicate()
+    def __exit__(self, *raised: Any) -> None:
+        self._program.__exit__(*raised)
 
     def do(self, event: Event) -> Results:
         """What an event causes, if the node had nothing to do before."""
-        assert self._process.stdin and self._process.stdout
         self.latency = 0
-        self._process.stdin.write(event.row)
-        self._process.stdin.flush()
         found = Results()
-        while (row := self._process.stdout.readline()) != "done\n":
-            assert row, "the node ended"
+        for row in self._program.ask(event.row):
             kind, *texts = row.split()
             numbers = [int(text) for text in texts]
             if kind == "entries":

@@ -9,10 +9,11 @@ from fusesoc_firm.scheduling.models import Combined, Scheduler, make_model
 from fusesoc_firm.scheduling.policies import POLICIES
 from tests.cores.sched_trace import Trace, read_trace
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
 BENCH = "firm_sched_trace_tb"
 POLICY_CORES = ("queue", "engine", *dict.fromkeys(policy.core_file for policy in POLICIES.values()))
-SEED = 20240503
+SEED = seeded(20240503)
 
 _WITHOUT_POLICIES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sched/package")
 

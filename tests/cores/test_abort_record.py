@@ -12,9 +12,10 @@ from fusesoc_firm.node.transport.abort_record import aborted_id
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.transport.transport import Burst
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
 HERE = Path(__file__).parent
-SEED = 20261123
+SEED = seeded(20261123)
 ENTITY = "firm_axis_abort_record"
 
 
@@ -27,6 +28,7 @@ def _library(directory: Path) -> Library:
     library = Library("firm", directory)
     library.analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "sim/pipe"))
     library.analyse([HERE / "abort_record_bench.vhd"])
+    library.make()
     return library
 
 
@@ -74,6 +76,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, width: int) -> None:
     library = _library(tmp_path)
     library.replace_by_netlist(ENTITY, {"WIDTH": width})
     library.analyse([HERE / "abort_record_bench.vhd"])
+    library.make()
     frames = _frames(width // 8)
     assert _bursts(library, width, 30, frames) == _expected(frames, width // 8)
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
+from tests.seeds import seeded
 
-SEED = 1618
+SEED = seeded(1618)
 PI = Fraction("3.14159265358979323846264338327950288")
 
 

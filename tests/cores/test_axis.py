@@ -9,9 +9,10 @@ import pytest
 from fusesoc_firm.netlist import ghdl2
 from tests.hdl.frames import random_frames, traffic, write_expected, write_stimulus
 from tests.hdl.ghdl import Generic, GhdlError, Library, core_files
+from tests.seeds import seeded
 
 WIDTHS = [8, 64, 512]
-SEED = 20240501
+SEED = seeded(20240501)
 
 # Cycles that the first beat needs through the part.
 LATENCY = {"register_slice": 1, "fifo": 2}

@@ -9,12 +9,13 @@ import pytest
 
 from tests.cores.queue_model import DROPPED, Cycle, QueueModel, read_trace
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
 BENCH = "firm_axis_queue_tb"
 PART = "firm_axis_queue"
 WIDTHS = [8, 16, 32, 64, 128, 256, 512]
 OVERFLOWS = ["block", "drop_newest", "drop_oldest"]
-SEED = 20250117
+SEED = seeded(20250117)
 # Cycles from the last beat of a frame in to its first beat out.
 LATENCY = 2
 

@@ -12,11 +12,12 @@ import pytest
 from fusesoc_firm.frame.faults import Fault
 from tests.cores.queue_model import Cycle, read_trace
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
 BENCH = "firm_axis_queue_tb"
 PART = "firm_axis_sink_watchdog"
 WIDTHS = [8, 16, 32, 64, 128, 256, 512]
-SEED = 20250301
+SEED = seeded(20250301)
 COUNT = 200
 # Stops of the sink last 50 cycles on average.
 STOPPING: dict[str, Generic] = {"STOP_PERCENT": 2, "GO_PERCENT": 2}

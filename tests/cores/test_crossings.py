@@ -13,9 +13,11 @@ from pathlib import Path
 import pytest
 
 from tests.cores.crossing_paths import Domains, unsynchronised
-from tests.hdl.ghdl import CORES, Generic, Library, RunResult, core_files
+from tests.hdl.ghdl import CORES, Generic, Library, core_files
+from tests.recall import RunResult
+from tests.seeds import seeded
 
-SEED = 20240922
+SEED = seeded(20240922)
 STREAM, MESSAGE = "firm_cdc_stream_tb", "firm_cdc_message_tb"
 WIDTHS = [(8, 8), (8, 64), (64, 8), (512, 128)]
 # Cycles of one clock in one of the other.

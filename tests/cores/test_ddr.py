@@ -22,6 +22,7 @@ CELLS = {
 }
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("family", CELLS)
 def test_each_pin_of_an_rgmii_has_a_cell_of_its_family(tmp_path: Path, family: str) -> None:
     """Yosys knows the ports of each family's cells, and refuses others."""

@@ -29,8 +29,9 @@ from tests.cores.dhcp import (
 )
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/package", "net/dhcp")
 TICK_CYCLES = 2
 NEXT, TAKEN, DUE = "2\n", "3\n", "4\n"
@@ -250,6 +251,7 @@ def test_the_next_address_waits_until_the_last_one_rests(library: Library, tmp_p
 ENDLESS = (1 << 32) - 1
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("seconds", "times", "what"),
     [
@@ -370,6 +372,7 @@ def _concerns(library: Library, folder: Path, seed: int, trials: int, slow: int)
     assert 0.2 * trials < leases < 0.8 * trials
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("seed", "slow"), [(SEED, 0), (SEED + 1, 30)])
 def test_messages_of_all_kinds_do_what_the_model_says(library: Library, tmp_path: Path, seed: int, slow: int) -> None:
     _concerns(library, tmp_path, seed, 60, slow)

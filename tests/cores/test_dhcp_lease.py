@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/package", "net/dhcp")
 ENDLESS = (1 << 32) - 1
 

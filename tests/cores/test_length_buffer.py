@@ -11,10 +11,11 @@ import pytest
 
 from tests.hdl.frames import Frame, traffic, write_expected, write_stimulus
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
 BENCH = "firm_axis_length_buffer_tb"
 WIDTHS = [8, 16, 32, 64, 128, 512]
-SEED = 20240610
+SEED = seeded(20240610)
 # Cycles from a frame's last beat in to its first beat out.
 LATENCY = 4
 

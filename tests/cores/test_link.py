@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pytest
 
-from tests.hdl.frames import random_frames, traffic, write_expected, write_stimulus
+from tests.hdl.frames import Frame, random_frames, traffic, write_expected, write_stimulus
 from tests.hdl.ghdl import Generic, GhdlError, Library, core_files
 from tests.links import coded, decoded, faulty_row
+from tests.seeds import seeded
 
-SEED = 20261121
+SEED = seeded(20261121)
 LINKS = ("uart", "spi")
 WIDTHS = [8, 16, 64]
 # Cycles of the bench: per bit, and per byte on the line.
@@ -39,7 +40,10 @@ def _library(directory: Path) -> Library:
 
 def _write_files(directory: Path, number: int, longest: int, seed: int = SEED) -> int:
     """Frames with payloads of 0 to `longest` bytes; all their bytes on the link."""
-    frames = random_frames(range(256), number, longest, seed)
+    return _write_frames(directory, random_frames(range(256), number, longest, seed))
+
+
+def _write_frames(directory: Path, frames: Sequence[Frame]) -> int:
     write_stimulus(directory / "stimulus.txt", (frame.to_bytes() for frame in frames))
     write_expected(directory / "expected.txt", ((n, frame.to_bytes()) for n, frame in enumerate(frames)))
     return sum(len(coded(frame.to_bytes())) for frame in frames)
@@ -55,6 +59,18 @@ def test_frames_come_back_as_they_were(library: Library, tmp_path: Path, link: s
     result = library.run("firm_link_tb", generics, directory=tmp_path)
     assert result.exit_code == 0, result.output
     assert result.output.splitlines()[-1] == "PASS 15/15"
+
+
+def test_blocks_of_full_length_come_back(library: Library, tmp_path: Path) -> None:
+    """A block of COBS has at most 254 bytes without a zero; here frames have 253, 254 and more of them."""
+    sizes = (249, 250, 251, 504, 505)
+    frames = [Frame(7, bytes([size % 255 + 1]) * size) for size in sizes]
+    codes = [len(coded(frame.to_bytes())) - size for frame, size in zip(frames, sizes, strict=True)]
+    assert codes == [11, 11, 12, 12, 13]
+    _write_frames(tmp_path, frames)
+    result = library.run("firm_link_tb", {"LINK": "spi", "LONGEST": max(sizes)}, directory=tmp_path)
+    assert result.exit_code == 0, result.output
+    assert result.output.splitlines()[-1] == f"PASS {len(frames)}/{len(frames)}"
 
 
 def test_uart_wastes_no_bit(library: Library, tmp_path: Path) -> None:

@@ -12,15 +12,16 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.text.render import render
-from tests.bench.model import compiled
 from tests.hdl.ghdl import core_files
+from tests.hdl.verilator import compiled
 from tests.hdl.verilog import netlist
 from tests.links import decoded, faulty_row, right_row
 from tests.node.drivers import HEADERS
+from tests.seeds import seeded
 from tests.shared import made_once
 
 pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
-SEED = 20261123
+SEED = seeded(20261123)
 BIT_CYCLES = 4  # the fewest that the UART allows
 LONGEST = 16
 # All in all 100,000 faults for each link and direction.

@@ -24,8 +24,9 @@ from tests.cores.ethernet import (
     write_capture,
 )
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
-SEED = 20261124
+SEED = seeded(20261124)
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac")
 PARTS = ("firm_mac_receiver", "firm_mac_store", "firm_mac_transmitter")
 

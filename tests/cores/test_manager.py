@@ -9,10 +9,11 @@ import pytest
 from tests.cores.managers import manager_library
 from tests.hdl.frames import Frame, random_frames, traffic, write_expected, write_stimulus
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
 WIDTHS = [8, 64, 512]
 CHANNELS = [1, 2, 3, 5, 16]
-SEED = 20240502
+SEED = seeded(20240502)
 
 BENCH = "firm_manager_tb"
 

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.node.bursts import BurstJoiner
+from fusesoc_firm.node.engine.bursts import BurstJoiner
 from tests.cores.managers import manager_library
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
+from tests.seeds import seeded
 
 BENCH = "firm_manager_burst_tb"
 WIDTHS = [8, 64, 512]
-SEED = 20240611
+SEED = seeded(20240611)
 
 # Publishers, and the frames that each of them sends.
 FRAMES = {1: 20, 2: 40, 5: 20, 16: 8, 256: 2}

@@ -10,8 +10,9 @@ import pytest
 from tests.cores.schedulers import POLICY_CORES
 from tests.hdl.frames import Frame, random_frames, traffic, write_expected, write_stimulus
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
-SEED = 20261123
+SEED = seeded(20261123)
 BENCH = "firm_manager_tree_tb"
 ID_BYTES = 2
 WIDTHS = (8, 16, 32, 64, 512)

@@ -10,8 +10,9 @@ import pytest
 
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts")
 # All of the node but its user.
 NODE = (

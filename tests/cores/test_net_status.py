@@ -13,8 +13,9 @@ from tests.cores.datagrams import MAC, PEER_MAC, Packet
 from tests.cores.ethernet import checksum
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 PORT = 7399
 HEADERS_BYTES = 14 + 20 + 8
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/status")

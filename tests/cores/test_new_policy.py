@@ -8,8 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.cores.policies import files
 from tests.hdl.ghdl import CORES, REPOSITORY
+from tools.policies.lists import files
 
 ROW = '    Policy("last_first", "LF", "Last first"),\n'
 MODEL = '''"""The highest index first."""
@@ -76,7 +76,7 @@ TESTS = (
 
 
 def test_a_row_a_model_and_an_entity_are_a_policy(tmp_path: Path) -> None:
-    for name in ("fusesoc_firm", "cores", "tests/cores", "tests/hdl", "tests/system"):
+    for name in ("fusesoc_firm", "cores", "tests/cores", "tests/hdl", "tests/system", "tools/policies"):
         shutil.copytree(REPOSITORY / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     for path in (REPOSITORY / "pyproject.toml", *REPOSITORY.glob("tests/*.py")):
         shutil.copy(path, tmp_path / path.relative_to(REPOSITORY))
@@ -85,7 +85,7 @@ def test_a_row_a_model_and_an_entity_are_a_policy(tmp_path: Path) -> None:
     (table.parent / "models" / "last_first.py").write_text(MODEL, encoding="utf-8")
     (tmp_path / "cores/sched/rtl/firm_sched_last_first.vhd").write_text(ENTITY, encoding="ascii")
 
-    python(tmp_path, "-m", "tests.cores.policies")
+    python(tmp_path, "-m", "tools.policies")
     python(tmp_path, "-m", "pytest", "-n0", "-q", *TESTS)
 
 

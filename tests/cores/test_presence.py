@@ -16,8 +16,9 @@ from tests.cores.ethernet import fcs, is_set, padded, write_capture
 from tests.cores.presence import is_conflict, is_probe, is_query, query, random_frame
 from tests.cores.requests import ADDRESS, MAC
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 TICK_CYCLES = 8
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/package", "net/presence")
 # The lower bits of the MAC address tell the delay of an answer.

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.bench.model import compiled
 from tests.cores.requests import (
     BROADCAST,
     arp_reply,
@@ -22,9 +21,11 @@ from tests.cores.requests import (
     reply,
 )
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.hdl.verilator import compiled
 from tests.hdl.verilog import loops, netlist
+from tests.seeds import seeded
 
-SEED = 20261125
+SEED = seeded(20261125)
 HERE = Path(__file__).parent
 HARDWARE = core_files("axis/package", "axis/axis", "net/mac", "net/package", "net/responder")
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/package", "net/responder")

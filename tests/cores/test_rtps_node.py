@@ -24,6 +24,7 @@ from tests.cores.announcements import (
     Results,
     a_node,
     expected,
+    rushed,
     sent,
     without_counts,
 )
@@ -36,8 +37,9 @@ from tests.fabric.messages import AckNack, Data, DataFrag, Gap, Heartbeat, InfoD
 from tests.fabric.participant import DISCOVERY_REQUEST
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/builder", "net/rtps")
 NODE = a_node()
 # Peers, stall and seed of a case in which all happens, and the events of such a case.
@@ -46,7 +48,8 @@ EVENTS = 2000
 # Bytes of payloads that wait, of which there are fewer than in the longest samples.
 SHORT = 1024
 # The same of cases in which samples are sent in fragments, also of the longest ones.
-LONG_CASES = [(2, 0, SEED + 3), (5, 30, SEED + 1), (1, 10, SEED + 6)]
+LONG_FULL = (2, 0, SEED + 3)
+LONG_CASES = [LONG_FULL, (5, 30, SEED + 1), pytest.param(1, 10, SEED + 6, marks=pytest.mark.thorough)]
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +82,7 @@ def _results(library: Library, folder: Path, events: list[Event], **generics: Ge
 
 
 def test_the_data_of_the_core_are_those_of_the_program(tmp_path: Path) -> None:
-    """`python -m tests.cores.rtps_data` writes them again."""
+    """`python -m tools.rtps_data` writes them again."""
     write_data(tmp_path)
     for path in tmp_path.iterdir():
         assert path.read_bytes() == (DATA / path.name).read_bytes(), path.name
@@ -117,7 +120,8 @@ def test_the_sources_do_what_the_reference_does(library: Library, tmp_path: Path
     _check(_results(library, tmp_path, events, SEED=seed), wanted)
 
 
-def test_frames_that_come_with_the_first_cycle_are_kept(library: Library, tmp_path: Path) -> None:
+@pytest.mark.check
+def test_frames_that_come_with_the_first_cycle_are_kept() -> None:
     """They wait until the program has written where they belong; readers ask for them later."""
     # With this seed, some of them are sent again.
     seed = 20261428
@@ -128,32 +132,30 @@ def test_frames_that_come_with_the_first_cycle_are_kept(library: Library, tmp_pa
     events = [*first, *Peers(2, seed).run(60)]
     wanted = expected(events)
     assert any(bytes(range(8)) in packet for _, packet in wanted.sent)
-    _check(_results(library, tmp_path, events, SEED=seed), wanted)
+    with World() as world:
+        _check(world.all(events), wanted)
 
 
-def test_milliseconds_that_the_program_cannot_take_at_once_are_taken_together(library: Library, tmp_path: Path) -> None:
+def test_milliseconds_that_the_program_cannot_take_at_once_are_taken_together() -> None:
     print(f"seed {SEED}")
     events = [
         part
         for event in Peers(2, SEED).run(40)
-        for part in (_rushed(event.count) if event.kind is Kind.TICKS else [event])
+        for part in (rushed(event.count) if event.kind is Kind.TICKS else [event])
     ]
-    _check(_results(library, tmp_path, events, SEED=SEED), expected(events))
+    with World() as world:
+        _check(world.all(events), expected(events))
 
 
-def _rushed(count: int) -> list[Event]:
-    """Up to 15 at once."""
-    return [Event(Kind.RUSHED, count=min(15, count - done)) for done in range(0, count, 15)]
-
-
-def test_an_early_sample_of_a_writer_is_not_counted_for_its_successor(library: Library, tmp_path: Path) -> None:
+def test_an_early_sample_of_a_writer_is_not_counted_for_its_successor() -> None:
     print(f"seed {SEED}")
     events = Peers(1, SEED).succession()
     wanted = expected(events)
     messages = [message for _, packet in wanted.sent if (message := parse(packet))]
     items = [item for message in messages for item in message.submessages]
     assert (1, 2) in [tuple(item.missing) for item in items if isinstance(item, AckNack)]
-    _check(_results(library, tmp_path, events), wanted)
+    with World() as world:
+        _check(world.all(events), wanted)
 
 
 @pytest.mark.check
@@ -175,7 +177,7 @@ def test_the_netlist_does_what_the_reference_does(peers: int, stall: int, seed: 
 @pytest.mark.parametrize("sample", [SAMPLE, LONG])
 def test_tshark_reads_the_same_in_all_packets_of_the_node(tmp_path: Path, sample: int) -> None:
     """They are those of the netlist in other tests of this file."""
-    peers, _, seed = FULL if sample == SAMPLE else LONG_CASES[0]
+    peers, _, seed = FULL if sample == SAMPLE else LONG_FULL
     print(f"seed {seed}")
     packets = [packet for _, packet in expected(Peers(peers, seed, sample=sample).run(EVENTS), sample=sample).sent]
     frames = [udp_frame(packet) for packet in packets]
@@ -187,7 +189,10 @@ def test_tshark_reads_the_same_in_all_packets_of_the_node(tmp_path: Path, sample
 
 
 @pytest.mark.check
-@pytest.mark.parametrize(("peers", "stall", "seed"), [(2, 0, SEED), (4, 30, SEED + 1), (1, 10, SEED + 2)])
+@pytest.mark.parametrize(
+    ("peers", "stall", "seed"),
+    [(2, 0, SEED), (4, 30, SEED + 1), pytest.param(1, 10, SEED + 2, marks=pytest.mark.thorough)],
+)
 def test_samples_in_fragments_are_put_together(peers: int, stall: int, seed: int) -> None:
     print(f"seed {seed}")
     events = Peers(peers, seed, is_long=True).run(3000)
@@ -202,7 +207,10 @@ def test_samples_in_fragments_are_put_together(peers: int, stall: int, seed: int
 
 
 @pytest.mark.check
-@pytest.mark.parametrize(("peers", "stall", "seed"), [(2, 0, SEED), (4, 30, SEED + 1), (1, 10, SEED + 2)])
+@pytest.mark.parametrize(
+    ("peers", "stall", "seed"),
+    [pytest.param(2, 0, SEED, marks=pytest.mark.thorough), (4, 30, SEED + 1), (1, 10, SEED + 2)],
+)
 def test_samples_that_find_no_room_are_put_together(peers: int, stall: int, seed: int) -> None:
     """Samples of all sizes in one submessage each, between fragments; what finds no room at all is counted."""
     print(f"seed {seed}")

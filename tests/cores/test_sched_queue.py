@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
+from tests.seeds import seeded
 
 ITEMS = [1, 2, 3, 5, 8, 32, 100, 256]
 KEY_BITS = 10
-SEED = 20240611
+SEED = seeded(20240611)
 BENCH = "firm_sched_queue_tb"
 ENTITIES = {False: "firm_sched_heap", True: "firm_sched_sorted_queue"}
 # Percents of inserts and pops: about even, filling up, running empty, and as fast as it goes.

@@ -8,9 +8,11 @@ import pytest
 
 from tests.hdl.benches import SIMULATORS, Bench, bench
 from tests.hdl.frames import random_frames, traffic, write_expected, write_stimulus
-from tests.hdl.ghdl import Generic, RunResult
+from tests.hdl.ghdl import Generic
+from tests.recall import RunResult
+from tests.seeds import seeded
 
-SEED = 20240504
+SEED = seeded(20240504)
 
 STIMULUS = """\
 # A comment, and a label without text.

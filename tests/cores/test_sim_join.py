@@ -10,8 +10,9 @@ import pytest
 
 from tests.hdl.benches import SIMULATORS, Bench, bench
 from tests.hdl.frames import Frame, random_frames, write_expected, write_stimulus
+from tests.seeds import seeded
 
-SEED = 20240719
+SEED = seeded(20240719)
 
 
 @pytest.fixture(scope="module", params=SIMULATORS)

@@ -67,6 +67,7 @@ ANSWERS = {
 def _vhdl(folder: Path, bits: int, *, is_ddr: bool = False) -> Sequence[str]:
     library = Library("firm", folder)
     library.analyse(core_files("sim/phy"))
+    library.make()
     (folder / "bench.vhd").write_text(_BENCH, encoding="ascii")
     options = ["--std=93", f"-P{folder}", f"--workdir={folder}"]
     subprocess.run(["ghdl", "-a", *options, "bench.vhd"], cwd=folder, check=True)

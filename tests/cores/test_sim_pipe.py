@@ -17,8 +17,9 @@ from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Simulator, 
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from tests.cores.pipes import TOOLS, PipeBench, pipe_bench
 from tests.hdl.frames import random_frames
+from tests.seeds import seeded
 
-SEED = 20240611
+SEED = seeded(20240611)
 EVERY_BYTE = bytes(range(256))
 VERSION = b"V\4"
 FRAME = b"\x07\x04\x00\x00\x00\x00\x0a\xff\x0d"

@@ -10,7 +10,8 @@ import pytest
 from fusesoc_firm.system.hardware.registers import Kind, Register, registers_configuration
 from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, Part, status_map
 from fusesoc_firm.text.render import render
-from tests.hdl.ghdl import Library, RunResult, core_files
+from tests.hdl.ghdl import Library, core_files
+from tests.recall import RunResult
 
 BENCH = "status_bench"
 DIGEST = "0123456789abcdef" * 2

@@ -10,9 +10,10 @@ import pytest
 
 from tests.hdl.frames import write_stimulus
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.seeds import seeded
 
 WIDTHS = [8, 16, 32, 64, 128, 512]
-SEED = 20240608
+SEED = seeded(20240608)
 HEADER_BYTES = 5
 STALLS = [(0, 0), (40, 0), (0, 60), (30, 30)]
 

@@ -11,8 +11,9 @@ from tests.cores.walks import masked, mixed_packets, walked
 from tests.fabric.test_messages import random_packets
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import loops
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 CORES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "net/mac", "net/builder", "net/rtps")
 
 

@@ -22,9 +22,10 @@ from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import nearest
 from fusesoc_firm.text.yaml_sections import Section, keys_of
 from tests.errors.key_sites import KeySite, key_sites, misspellings, spellings_of
+from tests.seeds import seeded
 
 SPECS = Path(__file__).resolve().parents[2] / "specs"
-SEED = 20241103
+SEED = seeded(20241103)
 _PLACE = re.compile(r"(?P<file>.*):(?P<line>\d+):(?P<column>\d+): error: (?P<message>.*)")
 _EXCERPT = re.compile(r" *(?P<line>\d+) \| (?P<text>.*)")
 

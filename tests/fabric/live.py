@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +16,33 @@ import pytest
 from tests.fabric.hosts import Host, found, switched
 from tests.fabric.test_peers import HERE, Peer, Sample, _why_not
 from tests.ros.cpp_nodes import ros2
+from tests.shared import made_once
 
+# The longest payload of a text, 65,280 bytes, and what it has besides the text: an encoding, a length and a zero.
+LONGEST, BESIDES = 65280, 9
+_LONG_BOARD = """\
+project:
+  name: board
+  clock: 125 MHz
+  interconnect: ethernet
+  network: {mac: "02:00:00:00:00:09", address: 192.0.2.9, phy: rgmii, reassembly: 65507, reassemblies: 2}
+accelerators:
+  - name: digest
+    type: VHDL
+    sources: digest.vhd
+    interface:
+      input: [{middleware: ROS2, message: std_msgs/String}]
+      output: [{middleware: ROS2, message: std_msgs/UInt32}]
+blocks:
+  - {name: text, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /text_in, maxLength: LONGEST,
+     outgoing: [{name: said}]}
+  - {name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /text_out, maxLength: LONGEST,
+     qos: {depth: 3}}
+  - {name: summed, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /summed_in, maxLength: LONGEST,
+     outgoing: [{name: digest}]}
+  - {name: digest, type: digest, outgoing: [{name: sum}]}
+  - {name: sum, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /sum_out, qos: {depth: 6}}
+""".replace("LONGEST", str(LONGEST))
 # Without a sample for so long, no further one is expected of a round.
 _PATIENCE = 10.0
 _BOARD = "/board is at 192.0.2.9, at tap0, in domain 0; Ctrl-C ends it\n"
@@ -30,6 +57,16 @@ def skip_without_peers(*programs: str) -> None:
             pytest.skip(f"{program} is not installed")
     if not Path("/dev/net/tun").exists():
         pytest.skip("there is no /dev/net/tun")
+
+
+def long_board() -> Path:
+    """The specification of a board that sends texts back, or answers with a number: its simulator is built once."""
+
+    def make(folder: Path) -> None:
+        shutil.copy(HERE / "digest.vhd", folder)
+        (folder / "board.yaml").write_text(_LONG_BOARD, encoding="utf-8")
+
+    return made_once("long_board", make) / "board.yaml"
 
 
 class Lab:

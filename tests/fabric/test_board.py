@@ -15,12 +15,12 @@ import pytest
 
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.control import Sizes
-from tests.bench.model import compiled
 from tests.fabric.echo_node import node_in
 from tests.fabric.hosts import Host, switched
 from tests.fabric.memories import generics, memories
 from tests.fabric.test_peers import HERE, Peer, Process, _why_not
 from tests.hdl.ghdl import REPOSITORY, core_files
+from tests.hdl.verilator import compiled
 from tests.hdl.verilog import netlist
 from tests.ros.cpp_nodes import ros2
 

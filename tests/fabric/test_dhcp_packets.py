@@ -19,8 +19,9 @@ from tests.cores.ethernet import fcs, is_set, padded, write_capture
 from tests.cores.requests import MAC
 from tests.fabric.programs import random_fields, run
 from tests.fabric.test_node import node
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 ADDRESS, SERVER = (bytes([192, 0, 2, last]) for last in (57, 1))
 SERVER_MAC, NUMBER = bytes.fromhex("020000000001"), bytes.fromhex("12345678")
 FIXED = replace(node(), network=replace(node().network, address=IPv4Address(ADDRESS), mac=MAC))

@@ -12,19 +12,20 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.rtps import Parameter, Reliability, octets, parameter, parameter_list, string
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.request import Request
-from tests.bench.network import LONGEST as LONGEST_GENERICS
 from tests.cores.fragments import HOSTS, Host, fragments
 from tests.cores.test_net_link import NODE
 from tests.fabric.messages import Data, InfoDestination, Submessage, Writer
 from tests.fabric.participant_tables import DISCOVERY
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
+from tools.bench.network import LONGEST as LONGEST_GENERICS
 
-SEED = 20261127
+SEED = seeded(20261127)
 HERE = Path(__file__).parent
 PARTS = ("control", "packets", "names", "node")
 PREAMBLE, FCS_BYTES = b"\x55" * 7 + b"\xd5", 4
@@ -151,6 +152,7 @@ def _bursts(hosts: Sequence[Host], frames: Iterable[bytes]) -> list[tuple[int, b
     return [*known, (SLOW_CYCLES, sent[0][1]), *sent[1:]]
 
 
+@pytest.mark.check
 def test_messages_of_all_sizes_arrive_whole(tmp_path: Path) -> None:
     """Of the last three, each waits until the one before is out, in twice the time in which it comes."""
     print(f"seed {SEED}")
@@ -196,6 +198,7 @@ def test_a_message_that_lacks_a_fragment_is_dropped(tmp_path: Path) -> None:
     assert taken == [_as_frame(payloads[0]), _as_frame(payloads[2])]
 
 
+@pytest.mark.check
 def test_announcements_may_come_in_fragments(tmp_path: Path) -> None:
     """Fast DDS announces all endpoints of a participant in one packet to those who ask."""
     host, chance = HOSTS[0], random.Random(SEED)
@@ -219,7 +222,7 @@ def test_its_memory_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 def test_the_memories_for_the_longest_messages_fit_an_ecp5_85(tmp_path: Path) -> None:
-    """tests/bench/network.py places them."""
+    """tools/bench/network.py places them."""
     text = SPECIFICATION.replace("qos: {{profile: sensor_data}}}}", "maxLength: {longest}, qos: {{depth: 1}}}}")
     _generated(tmp_path, text.format(reassemblies=1, longest=65280))
     generics, wanted = _generics(tmp_path), {name: str(value) for name, value in LONGEST_GENERICS.items()}

@@ -10,7 +10,7 @@ import pytest
 
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.node import Endpoint, Node
-from fusesoc_firm.node.status import read_status
+from fusesoc_firm.node.status.status import read_status
 from fusesoc_firm.system.derived.model import Network, NetworkKind
 from fusesoc_firm.system.scaffold.core_file import NETWORK_HERTZ
 from tests.cores.datagrams import Packet
@@ -20,8 +20,9 @@ from tests.fabric.fuzzed import Fuzz
 from tests.fabric.messages import Address
 from tests.fabric.participant import Participant
 from tests.fabric.test_network_status import LONG_SPECIFICATION, QUESTIONS, Board, _board, line
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 SPECIFICATION = LONG_SPECIFICATION.replace("qos: {profile: sensor_data}", "qos: {depth: 20}", 2)
 # Bad lines for each good message, and messages that have not come back at most.
 RATE, WAITING = 6, 10

@@ -5,9 +5,9 @@ from __future__ import annotations
 import zlib
 from pathlib import Path
 
+from fusesoc_firm.builds.call.generators import GENERATORS
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.fabric import rtps
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.request import Request
 from tests.cores.test_net_link import NODE
 from tests.fabric.messages import Data, parse
 from tests.hdl.ghdl import Library, core_files

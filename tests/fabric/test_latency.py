@@ -66,6 +66,7 @@ def _frames(node: Node) -> list[bytes]:
     return [*(run(programs, name, fields) for name in announced), run(programs, "sample", fields, QUATERNION)]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("phase", [1, 7])
 def test_a_sample_comes_and_leaves_in_time(tmp_path: Path, phase: int) -> None:
     """The page tells both figures, which do not depend on the phase of the PHY's clock by more than a cycle."""

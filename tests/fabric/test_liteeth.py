@@ -15,17 +15,18 @@ import pytest
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.control import Sizes
 from fusesoc_firm.fabric.node import Endpoint
-from tests.bench.model import compiled
 from tests.fabric.echo_node import node_in
 from tests.fabric.memories import generics, memories
 from tests.fabric.messages import Address
 from tests.fabric.participant import Participant
 from tests.fabric.test_board import CORES, HARDWARE, sample
 from tests.fabric.test_board import SPECIFICATION as BOARD_SPECIFICATION
+from tests.hdl.verilator import compiled
 from tests.hdl.verilog import netlist
+from tests.seeds import seeded
 
 HERE = Path(__file__).parent
-SEED = 20261127
+SEED = seeded(20261127)
 BOARD = "192.0.2.9"
 # Bytes of an id and a length; of the longest payload that the hardware sends.
 HEAD, LONGEST = 5, 256

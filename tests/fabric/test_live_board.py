@@ -16,9 +16,10 @@ import pytest
 
 from tests.fabric.live import Lab, Round, exchange, settled, skip_without_peers
 from tests.fabric.test_peers import HERE, Peer, is_in, of
+from tests.seeds import seeded
 
 SYSTEM = HERE.parents[1] / "specs" / "quat2euler"
-SEED = 20261127
+SEED = seeded(20261127)
 CORES = ("robot:acc:firm_cordic:0.2.0", "robot:acc:firm_float64:0.2.0")
 CLOCKS = {"rmii": "50 MHz", "rgmii": "125 MHz"}
 # Quaternions and points that each peer sends before both wait for all results.

@@ -16,49 +16,28 @@ from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.packets import FRAGMENT_BYTES
 from tests.fabric.dissection import read_alike
 from tests.fabric.hosts import captured
-from tests.fabric.live import Lab, exchange, settled, skip_without_peers
+from tests.fabric.live import BESIDES, LONGEST, Lab, exchange, long_board, settled, skip_without_peers
 from tests.fabric.messages import DataFrag, InfoDestination, NackFrag
 from tests.fabric.test_peers import Peer
+from tests.seeds import seeded
 
-SEED = 20261127
-LONGEST = 65280
-# A payload has an encoding, a length and a zero besides the text. From 1,345 bytes on, it needs fragments.
-BESIDES = 9
+SEED = seeded(20261127)
+# A payload needs fragments from 1,345 bytes on.
 SIZES = (1, 2, 3, 1335, 1336, 1337, 2679, 2680, 5001, 20_000, LONGEST - BESIDES)
 # Rounds of which one comes to all.
 SETTLING = 20
 LOSS = 3  # percent of the frames each way
 TYPES = {"text": "String"}
 BOARD = rtps.VENDOR + bytes.fromhex("020000000009") + bytes(4)
-SPECIFICATION = f"""\
-project:
-  name: board
-  clock: 125 MHz
-  interconnect: ethernet
-  network: {{mac: "02:00:00:00:00:09", address: 192.0.2.9, reassembly: 65507, reassemblies: 2}}
-blocks:
-  - {{name: heard, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /text_in, maxLength: {LONGEST},
-     outgoing: [{{name: said}}]}}
-  - {{name: said, middleware: ROS2, mode: publisher, message: std_msgs/String, topic: /text_out, maxLength: {LONGEST},
-     qos: {{depth: 3}}}}
-"""
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
 
-@pytest.fixture(scope="module")
-def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A board that sends texts back; its simulator is built beside it, once."""
-    path = tmp_path_factory.mktemp("board") / "board.yaml"
-    path.write_text(SPECIFICATION, encoding="utf-8")
-    return path
-
-
 @pytest.fixture
-def lab(specification: Path, tmp_path: Path) -> Iterator[Lab]:
+def lab(tmp_path: Path) -> Iterator[Lab]:
     skip_without_peers("dumpcap", "tshark")
     with ExitStack() as stack:
-        yield Lab(specification, tmp_path, stack)
+        yield Lab(long_board(), tmp_path, stack)
 
 
 def _text(chance: random.Random, size: int) -> str:

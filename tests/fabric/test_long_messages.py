@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import shutil
 import string
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -14,56 +13,26 @@ import pytest
 
 from tests.fabric.dissection import read_alike
 from tests.fabric.hosts import captured
-from tests.fabric.live import Lab, skip_without_peers
+from tests.fabric.live import BESIDES, Lab, long_board, skip_without_peers
 from tests.fabric.messages import DataFrag
-from tests.fabric.test_peers import HERE, Peer
+from tests.fabric.test_peers import Peer
+from tests.seeds import seeded
 
-SEED = 20261127
-LONGEST = 16000
-# A payload has an encoding, a length and a zero besides the text.
-BESIDES = 9
-SIZES = (1, 1335, 1336, 1337, 4000, 5376, LONGEST - BESIDES)
+SEED = seeded(20261127)
+SIZES = (1, 1335, 1336, 1337, 4000, 5376, 16000 - BESIDES)
 # Texts of which one is answered, at one in five seconds at most.
 SETTLING = 60
 # Without MaxMessageSize, Cyclone DDS puts samples of up to 14,720 bytes into one packet.
 CYCLONE = "<CycloneDDS><Domain><General><MaxMessageSize>{size}</MaxMessageSize></General></Domain></CycloneDDS>"
-SPECIFICATION = """\
-project:
-  name: board
-  clock: 125 MHz
-  interconnect: ethernet
-  network: {mac: "02:00:00:00:00:09", address: 192.0.2.9, phy: rgmii, reassembly: 65507}
-accelerators:
-  - name: digest
-    type: VHDL
-    sources: digest.vhd
-    interface:
-      input: [{middleware: ROS2, message: std_msgs/String}]
-      output: [{middleware: ROS2, message: std_msgs/UInt32}]
-blocks:
-  - {name: text, middleware: ROS2, mode: subscriber, message: std_msgs/String, topic: /text_in, maxLength: 65280,
-     outgoing: [{name: digest}]}
-  - {name: digest, type: digest, outgoing: [{name: sum}]}
-  - {name: sum, middleware: ROS2, mode: publisher, message: std_msgs/UInt32, topic: /sum_out}
-"""
 
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("fabric")]
 
 
-@pytest.fixture(scope="module")
-def specification(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A board that answers each text with a number; its simulator is built beside it, once."""
-    folder = tmp_path_factory.mktemp("board")
-    shutil.copy(HERE / "digest.vhd", folder)
-    (folder / "board.yaml").write_text(SPECIFICATION, encoding="utf-8")
-    return folder / "board.yaml"
-
-
 @pytest.fixture
-def lab(specification: Path, tmp_path: Path) -> Iterator[Lab]:
+def lab(tmp_path: Path) -> Iterator[Lab]:
     skip_without_peers("dumpcap", "tshark")
     with ExitStack() as stack:
-        yield Lab(specification, tmp_path, stack)
+        yield Lab(long_board(), tmp_path, stack)
 
 
 def _digest(text: str) -> int:
@@ -77,7 +46,7 @@ def _text(chance: random.Random, size: int) -> str:
 
 def _answered(peer: Peer, texts: Sequence[str]) -> None:
     """Each text is answered once, and in order."""
-    peer.send([("text", [text]) for text in texts])
+    peer.send([("summed", [text]) for text in texts])
     assert peer.take(len(texts)) == [("sum", [_digest(text)]) for text in texts]
 
 
@@ -85,7 +54,7 @@ def _settle(peer: Peer) -> None:
     """Wait until a text is answered: a peer does not know whether the board has matched its reader."""
     print(peer.wait_until_matched())
     for number in range(SETTLING):
-        peer.send([("text", [str(number)])])
+        peer.send([("summed", [str(number)])])
         while sample := peer.next_sample(5):
             if sample == ("sum", [_digest(str(number))]):
                 return
@@ -102,7 +71,7 @@ def test_cyclone_sends_long_messages_in_fragments_of_rtps(
     chance, capture = random.Random(SEED), tmp_path / "capture.pcapng"
     with captured(lab.switch, capture):
         lab.board()
-        peer = lab.cyclone({"sum": "UInt32"}, {"text": "String"})
+        peer = lab.cyclone({"sum": "UInt32"}, {"summed": "String"})
         _settle(peer)
         for length in SIZES:
             _answered(peer, [_text(chance, length)])
@@ -117,7 +86,7 @@ def test_bursts_of_messages_of_65000_bytes_are_answered(lab: Lab, kind: str) -> 
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     lab.board()
-    peer: Peer = getattr(lab, kind)({"sum": "UInt32"}, {"text": "String"})
+    peer: Peer = getattr(lab, kind)({"sum": "UInt32"}, {"summed": "String"})
     _settle(peer)
     for length in (65000, 30_000, 65280):
         _answered(peer, [_text(chance, size - BESIDES) for size in (length, length, 100, length, 2000, length)])
@@ -128,14 +97,14 @@ def test_what_fast_dds_sent_while_the_cable_was_out_is_asked_for(lab: Lab) -> No
     print(f"seed {SEED}")
     chance = random.Random(SEED)
     lab.board()
-    peer = lab.rclpy({"sum": "UInt32"}, {"text": "String"})
+    peer = lab.rclpy({"sum": "UInt32"}, {"summed": "String"})
     _settle(peer)
     for length in SIZES:
         _answered(peer, [_text(chance, length)])
     texts = [_text(chance, 4000) for _ in range(12)]
     lab.switch.run("ip", "link", "set", "port1", "down")
-    peer.send([("text", [text]) for text in texts[:-1]])
+    peer.send([("summed", [text]) for text in texts[:-1]])
     assert peer.next_sample(2) is None
     lab.switch.run("ip", "link", "set", "port1", "up")
-    peer.send([("text", [texts[-1]])])
+    peer.send([("summed", [texts[-1]])])
     assert peer.take(len(texts)) == [("sum", [_digest(text)]) for text in texts]

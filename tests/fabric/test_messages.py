@@ -28,8 +28,9 @@ from tests.fabric.messages import (
     Writer,
     parse,
 )
+from tests.seeds import seeded
 
-SEED = 20261126
+SEED = seeded(20261126)
 LARGEST = 1 << 40
 
 

@@ -14,9 +14,9 @@ import pytest
 from fusesoc_firm.fabric import rtps
 from fusesoc_firm.fabric.rtps import Parameter, Reliability, octets, parameter, parameter_list, string
 from fusesoc_firm.fabric.simulated_board import SimulatedBoard
-from fusesoc_firm.node.status import Status, read_status, status_text
+from fusesoc_firm.node.status.status import Status, read_status, status_text
+from fusesoc_firm.node.transport.built_simulator import build_simulator
 from fusesoc_firm.node.transport.transport import Burst
-from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.system.hardware.status import network_words
 from fusesoc_firm.system.scaffold.core_file import NETWORK
 from fusesoc_firm.system.status_frames import answered, status_answer

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.request import Request
+from fusesoc_firm.builds.call.generators import GENERATORS
+from fusesoc_firm.core.request import Request
 from tests.cores.test_net_link import NODE
 from tests.fabric.test_generated_node import PARTS
 from tests.hdl.ghdl import REPOSITORY, Library, core_files

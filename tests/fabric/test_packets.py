@@ -29,8 +29,9 @@ from tests.fabric.messages import (
 from tests.fabric.programs import PEER, PORT, Fields, random_fields, run
 from tests.fabric.test_node import node
 from tests.hdl.ghdl import REPOSITORY
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 NODE = node()
 PROGRAMS = programs_of(NODE)
 

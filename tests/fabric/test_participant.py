@@ -17,8 +17,9 @@ from tests.fabric.messages import AckNack, Address, Data, Heartbeat, Message, pa
 from tests.fabric.participant import FRAGMENT_BYTES, Participant
 from tests.fabric.participant_tables import Limits, Source
 from tests.fabric.test_messages import random_packets
+from tests.seeds import seeded
 
-SEED = 20261126
+SEED = seeded(20261126)
 TYPE, HASH = "std_msgs::msg::dds_::String_", "RIHS01_" + "0" * 64
 RELIABLE, BEST_EFFORT = Quality(depth=1000), Quality(is_reliable=False, depth=1000)
 LATCHED = Quality(is_transient_local=True, depth=3)

@@ -21,9 +21,10 @@ from tests.fabric.dissection import read_alike
 from tests.fabric.hosts import Host, captured, missing, switched
 from tests.fabric.messages import AckNack, Data, DataFrag, Heartbeat, InfoDestination, NackFrag, Other
 from tests.ros.cpp_nodes import missing_ros, ros2
+from tests.seeds import seeded
 
 HERE = Path(__file__).parent
-SEED = 20261126
+SEED = seeded(20261126)
 TYPES = {"turn": "Quaternion", "text": "String"}
 ECHO = """\
 project:

@@ -14,15 +14,8 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from fusesoc_firm.message.model import (
-    ArrayType,
-    FieldType,
-    MessageDefinition,
-    MessageName,
-    MessageType,
-    PrimitiveType,
-    SequenceType,
-)
+from fusesoc_firm.message.middleware import MessageDefinition
+from fusesoc_firm.message.model import ArrayType, FieldType, MessageName, MessageType, PrimitiveType, SequenceType
 from tests.frame.oracle import plain_text
 
 _DEBIAN = "/usr/lib/python3/dist-packages"

@@ -25,8 +25,8 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import MessageDefinition, MessageName
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.typestores import typestore

@@ -11,8 +11,9 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from tests.frame.oracle import Oracle, is_same
 from tests.frame.samples import AWKWARD
+from tests.seeds import seeded
 
-SEED = 20240601
+SEED = seeded(20240601)
 VALUES_EACH = 12
 
 ORACLES = {ros: Oracle(ros, AWKWARD[ros]) for ros in (ROS1, ROS2)}

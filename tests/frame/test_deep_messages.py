@@ -12,8 +12,8 @@ from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify import rosbags_judge
-from fusesoc_firm.verify.stimuli import KINDS, Stimuli
+from fusesoc_firm.runs.verify import rosbags_judge
+from fusesoc_firm.runs.verify.stimuli import KINDS, Stimuli
 from tests.frame.oracle import parsed
 from tests.frame.random_messages import PACKAGE, deep_texts
 

@@ -22,11 +22,11 @@ from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import ArrayType, FieldType, MessageDefinition, MessageName, SequenceType, StringType
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
+from fusesoc_firm.message.model import ArrayType, FieldType, MessageName, SequenceType, StringType
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.runs.verify.stimuli import EMPTY, KINDS, Stimuli
 from fusesoc_firm.text.diagnostics import InputError
-from fusesoc_firm.verify.stimuli import EMPTY, KINDS, Stimuli
 from tests.frame.genpy_oracle import GenpyOracle, has_genpy
 from tests.frame.oracle import DefinitionsOracle, Oracle, is_same
 from tests.frame.random_messages import random_texts

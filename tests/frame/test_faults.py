@@ -1,4 +1,4 @@
-"""The codes and texts of faults are the same in all languages."""
+"""The codes and texts of faults are those of Python in templates and on the page."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.frame.faults import Fault
+from fusesoc_firm.text.render import TEMPLATES
 from tests.hdl.ghdl import REPOSITORY
-
-TEXTS = [fault.text for fault in Fault]
-NODE = REPOSITORY / "fusesoc_firm" / "node"
 
 
 def found(path: Path, pattern: str) -> list[Any]:
@@ -21,25 +19,15 @@ def test_codes_are_1_to_12_and_fit_four_bits() -> None:
     assert [fault.value for fault in Fault] == list(range(1, 13))
 
 
-def test_c_has_the_codes_and_texts() -> None:
-    header = NODE / "c" / "firm" / "firm_faults.h"
-    assert found(header, r"FIRM_FAULT_(\w+) = (\d+)") == [(fault.name, str(fault.value)) for fault in Fault]
-    assert found(header, r'^ +"(.*)",$') == ["no fault", *TEXTS]
-
-
-def test_cpp_has_the_codes_and_texts() -> None:
-    header = NODE / "cpp" / "firm" / "faults.hpp"
-    names = ["k" + fault.name.title().replace("_", "") for fault in Fault]
-    assert found(header, r"(k\w+) = (\d+)") == [
-        (name, str(fault.value)) for name, fault in zip(names, Fault, strict=True)
+def test_templates_have_the_codes() -> None:
+    codes = [
+        (Fault[name], int(code, 2))
+        for template in sorted(TEMPLATES.glob("vhdl/*.mustache"))
+        for name, code in found(template, r'constant (\w+) +: .* := "([01]+)";')
+        if name in Fault.__members__
     ]
-    assert found(header, r'^ +"(.*)",$') == ["no fault", *TEXTS]
-
-
-def test_vhdl_has_the_codes_and_texts() -> None:
-    package = REPOSITORY / "cores" / "axis" / "rtl" / "firm_fault_pkg.vhd"
-    pattern = r'^  -- (.*)\n  constant (\w+) *: fault_t := "(\d+)"'
-    assert found(package, pattern) == [(fault.text, fault.name, f"{fault.value:04b}") for fault in Fault]
+    assert {fault for fault, _ in codes} >= {Fault.BAD_LENGTH, Fault.BAD_COUNT, Fault.BROKEN_BEAT}
+    assert all(fault == code for fault, code in codes), codes
 
 
 def test_the_page_has_the_codes_and_texts() -> None:

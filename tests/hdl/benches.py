@@ -10,8 +10,9 @@ from typing import Protocol
 
 import pytest
 
-from tests.hdl.ghdl import Generic, Library, RunResult, core_files
+from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import Icarus, compile_verilog
+from tests.recall import RunResult
 
 SIMULATORS = ("ghdl", "icarus")
 # Which parameters of a bench in Verilog are no options of a run.

@@ -12,8 +12,10 @@ Several libraries may share a directory; GHDL finds one beside the other.
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,7 +23,9 @@ from typing import Any
 
 import yaml
 
+from tests.hdl.analyses import Source, analyses_in, as_they_were
 from tests.processes import limited
+from tests.recall import RunResult, identity, ran, recalled
 
 # GHDL 2.0 writes some constants of more than 32 bits to Verilog as in VHDL, where they would be texts of ASCII.
 _LONG_CONSTANT = re.compile(r'"([01xzXZ]{33,})"')
@@ -32,6 +36,9 @@ CORES = REPOSITORY / "cores"
 # GHDL sets generics of these types from the command line; a real one would make no netlist.
 Generic = int | str | bool
 
+# Folders whose files a simulation does not read, such as that of `/dev/null`.
+_OF_ALL = (Path("/"), Path("/dev"), Path(tempfile.gettempdir()))
+
 _CASE = re.compile(r"\bcase\b.*?\bendcase\b", re.DOTALL)
 _DEFAULT = re.compile(r"\bdefault\s*:")
 _CHOICE = re.compile(r"^\s*(\d+)'b[01]+\s*:", re.MULTILINE)
@@ -39,14 +46,6 @@ _CHOICE = re.compile(r"^\s*(\d+)'b[01]+\s*:", re.MULTILINE)
 
 class GhdlError(Exception):
     """GHDL refused the input; the text is what it printed."""
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """A finished simulation: `output` is what it printed on both streams, in lines."""
-
-    exit_code: int
-    output: str
 
 
 @dataclass(frozen=True)
@@ -64,15 +63,41 @@ class Library:
         return subprocess.run([self.program, "--version"], capture_output=True, text=True, check=True).stdout
 
     def analyse(self, files: Iterable[Path], *options: str) -> None:
-        """Analyse files in this order, strictly as the standard says; raise `GhdlError` on a fault."""
-        self._ghdl("-a", *options, *(str(file) for file in files))
+        """Analyse files in this order, strictly as the standard says; raise `GhdlError` on a fault.
+
+        What GHDL is known to accept is analysed only when GHDL needs it.
+        """
+        analyses = analyses_in(self.directory)
+        needed = analyses.add(self.name, list(files), [self.program, *self._options(), *options])
+        try:
+            self._recalled(needed, ["-a"], lambda: self._accept(needed))
+        except GhdlError:
+            analyses.forget()
+            raise
+
+    def make(self) -> None:
+        """Analyse the files that are still waiting, for a test that starts GHDL itself in the directory."""
+        analyses_in(self.directory).make_all(_analyse)
+
+    def copy_to(self, folder: Path) -> None:
+        """Let GHDL find what was analysed in another directory, too."""
+        self.make()
+        for file in self.directory.glob("*.cf"):
+            shutil.copy(file, folder)
+        analyses_in(folder).take(analyses_in(self.directory))
 
     def elaborate(self, entity: str) -> None:
         """Bind and elaborate `entity` and all below it, without a simulation; raise `GhdlError` on a fault.
 
         Files that it opens are in the library's directory.
         """
-        self._ghdl("--elab-run", entity, "--no-run", directory=self.directory)
+        needed = analyses_in(self.directory).sources(self.name.lower(), [entity])
+
+        def run() -> RunResult:
+            self._make(needed)
+            return RunResult(0, self._ghdl("--elab-run", entity, "--no-run", directory=self.directory))
+
+        self._recalled(needed, ["--elab-run", entity], run)
 
     def run(
         self,
@@ -83,29 +108,22 @@ class Library:
         options: Sequence[str] = (),
         seconds: float = 120,
     ) -> RunResult:
-        """Simulate `entity`, which may take so many seconds of a processor.
+        """Simulate `entity`, which may take so many seconds of a processor, or recall what that did.
 
         Its files are relative to `directory` (default: the library's).
         """
-        command = [
-            *limited(seconds),
-            self.program,
-            "-r",
-            *self._options(),
-            entity,
-            *_generic_options(generics),
-            *options,
-        ]
-        process = subprocess.run(
-            command,
-            cwd=directory or self.directory,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            check=False,
-        )
-        return RunResult(process.returncode, process.stdout)
+        words = [entity, *_generic_options(generics), *options]
+        needed = analyses_in(self.directory).sources(self.name.lower(), [entity])
+
+        def run() -> RunResult:
+            self._make(needed)
+            command = [*limited(seconds), self.program, "-r", *self._options(), *words]
+            return ran(command, directory or self.directory)
+
+        # Generics and options may name files elsewhere.
+        named = [Path(word.partition("=")[2]).parent for word in words if "=/" in word]
+        folders = [directory or self.directory, *(place for place in named if place.is_dir() and place not in _OF_ALL)]
+        return self._recalled(needed, ["-r", *words], run, folders)
 
     def synthesise(self, entity: str, generics: Mapping[str, Generic] | None = None, language: str = "vhdl") -> str:
         """The netlist of `entity` as `vhdl` or `verilog`; raise `GhdlError` on a fault, a latch GHDL sees included."""
@@ -114,7 +132,14 @@ class Library:
 
     def netlist_of_ghdl(self, entity: str, generics: Mapping[str, Generic] | None, language: str) -> str:
         """The same netlist, with the faults of GHDL's text."""
-        return self._ghdl("--synth", f"--out={language}", *_generic_options(generics), entity)
+        words = [f"--out={language}", *_generic_options(generics), entity]
+        needed = analyses_in(self.directory).sources(self.name.lower(), [entity])
+
+        def run() -> RunResult:
+            self._make(needed)
+            return RunResult(0, self._ghdl("--synth", *words))
+
+        return self._recalled(needed, ["--synth", *words], run).output
 
     def latches(self, entity: str, generics: Mapping[str, Generic] | None = None) -> list[str]:
         """What would become a latch in `entity`, empty if all is well.
@@ -149,18 +174,50 @@ class Library:
     def _options(self) -> list[str]:
         return [f"--std={self.standard}", f"--work={self.name}", f"--workdir={self.directory}", f"-P{self.directory}"]
 
+    def _recalled(
+        self,
+        needed: Sequence[Source],
+        words: Sequence[str],
+        run: Callable[[], RunResult],
+        folders: Sequence[Path] = (),
+    ) -> RunResult:
+        """Do what `run` does in these folders, or recall it; `needed` and the words of the command decide it."""
+        parts = {
+            "ghdl": identity(self.program),
+            "options": self._options(),
+            "sources": [(str(source.path), source.options, source.digest) for source in needed],
+            "words": words,
+        }
+        places = [source.path.parent for source in needed]
+        return recalled(parts, list(dict.fromkeys(folders)), run, [self.directory, *places], _is_no_input)
+
+    def _accept(self, needed: Sequence[Source]) -> RunResult:
+        self._make(needed)
+        return RunResult(0, "")
+
+    def _make(self, needed: Sequence[Source]) -> None:
+        analyses_in(self.directory).make(needed, _analyse)
+
     def _ghdl(self, command: str, *arguments: str, directory: Path | None = None) -> str:
-        process = subprocess.run(
-            [self.program, command, *self._options(), *arguments],
-            cwd=directory,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            check=False,
-        )
-        if process.returncode != 0:
-            raise GhdlError(process.stdout + process.stderr)
-        return process.stdout
+        return _ghdl([self.program, command, *self._options(), *arguments], directory)
+
+
+def _analyse(sources: Sequence[Source]) -> None:
+    program, *options = sources[0].options
+    with as_they_were(sources):
+        _ghdl([program, "-a", *options, *(str(source.path) for source in sources)])
+
+
+def _ghdl(command: Sequence[str], directory: Path | None = None) -> str:
+    process = subprocess.run(command, cwd=directory, capture_output=True, text=True, errors="replace", check=False)
+    if process.returncode != 0:
+        raise GhdlError(process.stdout + process.stderr)
+    return process.stdout
+
+
+def _is_no_input(path: str) -> bool:
+    """Whether a file is not read by a simulation: sources, which are inputs as such, and GHDL's own."""
+    return path.endswith((".vhd", ".cf"))
 
 
 def _in_order(netlist: str) -> str:

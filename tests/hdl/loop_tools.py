@@ -7,14 +7,15 @@ its inputs, so Yosys may find more than there is, and misses nothing. Verilator 
 from __future__ import annotations
 
 import re
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 from fusesoc_firm.netlist.model import NetlistError
+from tests.recall import digest_of_source, identity, ran, recalled
 
 # What a memory shows depends on its address.
-_CELLS = f"proc; flatten; techmap -map {Path(__file__).with_name('read_port.v')}; select -assert-none t:$memrd*"
+_READ_PORT = Path(__file__).with_name("read_port.v")
+_CELLS = f"proc; flatten; techmap -map {_READ_PORT}; select -assert-none t:$memrd*"
 _LOOPS = re.compile(r"ERROR: (Found \d+ SCCs) but expected 0")
 _WAIVER = "// verilator lint_off UNOPTFLAT"
 _UNOPTFLAT = re.compile(r"^%Warning-UNOPTFLAT: \S+ (.*)", re.MULTILINE)
@@ -30,7 +31,7 @@ def found_by_others(top: str, netlist: Path) -> list[str]:
 
 def _in_yosys(top: str, netlist: Path) -> list[str]:
     script = f"read_verilog {netlist.name}; hierarchy -check -top {top}; {_CELLS}; scc -expect 0"
-    status, said = _run(["yosys", "-q", "-p", script], netlist.parent)
+    status, said = _run(["yosys", "-q", "-p", script], netlist)
     found = _LOOPS.search(said)
     if status and not found:
         raise NetlistError(said)
@@ -43,14 +44,18 @@ def _in_verilator(top: str, netlist: Path) -> list[str]:
     unwaived = netlist.with_name(f"{netlist.stem}_unwaived.v")
     unwaived.write_text(text.replace(_WAIVER, ""), encoding="utf-8")
     options = ["--lint-only", "-Wno-lint", "-Wno-style", "-Wno-fatal", "-Wwarn-UNOPTFLAT", "--top-module", top]
-    status, said = _run(["verilator", *options, unwaived.name], netlist.parent)
+    status, said = _run(["verilator", *options, unwaived.name], unwaived)
     if status:
         raise NetlistError(said)
     return [f"Verilator: {sentence}" for sentence in _UNOPTFLAT.findall(said)]
 
 
-def _run(command: Sequence[str], folder: Path) -> tuple[int, str]:
-    done = subprocess.run(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False
-    )
-    return done.returncode, done.stdout
+def _run(command: Sequence[str], source: Path) -> tuple[int, str]:
+    """The exit code and the output of a program that reads `source`, in its folder."""
+    parts = {
+        "tool": identity(command[0]),
+        "command": list(command),
+        "sources": [*map(digest_of_source, (source, _READ_PORT))],
+    }
+    done = recalled(parts, [], lambda: ran(command, source.parent), [source.parent])
+    return done.exit_code, done.output

@@ -2,62 +2,108 @@
 
 from __future__ import annotations
 
-import subprocess
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.netlist.translation import Translation, find_loops, translate
-from fusesoc_firm.request.request import Request
-from fusesoc_firm.simulation import simulation_core
+from fusesoc_firm.runs.simulation import simulation_core
 from fusesoc_firm.system import system_core
-from tests.hdl.ghdl import CORES, Generic, RunResult, core_files
+from fusesoc_firm.tools.digests import digest_of
+from tests.hdl.ghdl import CORES, Generic, core_files
 from tests.processes import limited
+from tests.recall import RunResult, digest_of_source, identity, ran, recalled
 from tests.system.simulated.systems import HARDWARE
 
 _HOST = ("firm_sim_host", "firm_sim_join", "firm_axis_checker", "firm_sim_link", "firm_sim_uart", "firm_sim_spi")
+_INCLUDE = re.compile(r'`include\s+"([^"]+)"')
 HOST = tuple(CORES / "sim" / "rtl" / f"{name}.v" for name in _HOST)
 
 
 @dataclass(frozen=True)
 class Icarus:
-    """A simulation that is compiled."""
+    """A simulation of the module `top`, which is compiled in `folder` with these options.
 
-    program: Path
+    `digests` are those of the files, and of what they include, when it was described.
+    """
+
+    top: str
+    folder: Path
+    files: tuple[Path, ...]
+    options: tuple[str, ...]
+    digests: tuple[tuple[str, str], ...]
+
+    @property
+    def program(self) -> Path:
+        """What `vvp` runs, which `make` writes."""
+        return self.folder / f"{self.top}_{digest_of([self.options, self.digests])[:8]}.vvp"
+
+    def make(self) -> Path:
+        """Compile it, unless that was done, and return the program."""
+        if not self.program.exists():
+            assert self.digests == _digests(self.files), "a source was changed before it was compiled"
+            words = ["iverilog", "-s", self.top, *self.options, "-o", str(self.program), *map(str, self.files)]
+            done = ran(words, None)
+            assert done.exit_code == 0, done.output
+        return self.program
 
     def run(self, directory: Path, /, **options: Generic) -> RunResult:
-        """Simulate in `directory`; options are those of the host, which the report repeats."""
+        """Simulate in `directory`, or recall what that did; options are those of the host, which the report repeats."""
         plusargs = [f"+{name}={value}" for name, value in options.items()]
-        done = subprocess.run(
-            [*limited(120), "vvp", "-n", str(self.program), *plusargs],
-            cwd=directory,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            check=False,
-        )
-        return RunResult(done.returncode, done.stdout)
+
+        def run() -> RunResult:
+            return ran([*limited(120), "vvp", "-n", str(self.make()), *plusargs], directory)
+
+        return recalled({**self._parts(), "plusargs": plusargs}, [directory], run, self._places(), _is_no_input)
+
+    def check(self) -> None:
+        """Compile it, unless it is known that this works."""
+        recalled(self._parts(), [], lambda: RunResult(0, str(self.make())[:0]), self._places())
+
+    def _parts(self) -> dict[str, object]:
+        return {"icarus": identity("iverilog"), "top": self.top, "options": self.options, "sources": self.digests}
+
+    def _places(self) -> list[Path]:
+        return [path.parent for path in self.files]
 
 
 def compile_verilog(
     top: str, files: Sequence[Path], folder: Path, parameters: Mapping[str, Generic] | None = None
 ) -> Icarus:
     """Compile for the module `top`, with its `parameters`."""
-    program = folder / f"{top}.vvp"
     options = [f"-P{top}.{name}={value}" for name, value in (parameters or {}).items()]
     options += ["-g2012"] if any(path.suffix == ".sv" for path in files) else []
-    command = ["iverilog", "-s", top, *options, "-o", program, *(f"-I{path.parent}" for path in files), *files]
-    done = subprocess.run(
-        [str(word) for word in dict.fromkeys(command)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout
-    return Icarus(program)
+    options += [f"-I{path.parent}" for path in files]
+    sources = tuple(dict.fromkeys(files))
+    icarus = Icarus(top, folder, sources, tuple(dict.fromkeys(options)), _digests(sources))
+    icarus.check()
+    return icarus
+
+
+def _digests(files: Sequence[Path]) -> tuple[tuple[str, str], ...]:
+    return tuple((str(path), digest_of_source(path)) for path in (*files, *_included(files)))
+
+
+def _included(files: Sequence[Path]) -> list[Path]:
+    """What these files include, and what that includes, from one of their folders."""
+    folders = dict.fromkeys(path.parent for path in files)
+    found: dict[Path, None] = {}
+    left = [*files]
+    while left:
+        text = left.pop().read_text(encoding="latin-1")
+        named = (folder / name for name in _INCLUDE.findall(text) for folder in folders)
+        new = [path for path in named if path.is_file() and path not in found]
+        found |= dict.fromkeys(new)
+        left += new
+    return sorted(found)
+
+
+def _is_no_input(path: str) -> bool:
+    """Whether a file is not read by a simulation: sources, which are inputs as such, and what was compiled."""
+    return path.endswith((".vhd", ".v", ".sv", ".vvp"))
 
 
 def netlist(

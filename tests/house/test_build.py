@@ -420,7 +420,7 @@ UPSTREAM = REPOSITORY / "docs" / "upstream" / "fusesoc-generators.patch"
 SEAM = """\
 from fusesoc import edalizer, utils
 from fusesoc.capi2 import coreparser
-from fusesoc_firm.building.process import save_time
+from fusesoc_firm.builds.setup.process import save_time
 save_time(lambda line, start: print("asked", *line) or start())
 assert edalizer.Launcher is utils.Launcher and edalizer.Core2Parser is coreparser.Core2Parser
 edalizer.Ttptttg.launcher("echo", ["started"], cwd=".").run()

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.building.build import Build
-from fusesoc_firm.building.plan import make_plan
-from fusesoc_firm.building.pool import Pool
+from fusesoc_firm.builds.setup.outcome import Build
+from fusesoc_firm.builds.setup.plan import make_plan
+from fusesoc_firm.builds.setup.pool import Pool
 from tests.hdl.ghdl import CORES, core_description, core_files
 
 

@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.simulation.simulator import BuiltSimulator, build_simulator
+from fusesoc_firm.node.transport.built_simulator import BuiltSimulator, build_simulator
 from tests.house.test_live_simulators import SPECS, answers
 from tests.node.drivers import Driver, cpp_driver
 from tests.node.test_cpp_node import puts, run
+from tests.seeds import seeded
 
 pytestmark = pytest.mark.check
-SEED = 20261126
+SEED = seeded(20261126)
 # Each simulator is built in one process.
 TOOLS = [
     pytest.param(
@@ -59,7 +60,7 @@ def test_a_node_gets_the_simulator_s_answers(driver: Driver, built: BuiltSimulat
         drain=60000,
     )
     assert outcome.said["status"] == "0", outcome.said
-    expected, _ = answers(built, [pack_frame(0, payload) for payload in payloads], (1, 8))
+    expected, _ = answers(built, [pack_frame(0, payload) for payload in payloads], (1, 8), 20)
     assert [pack_frame(0, payload) for payload in outcome.published[0]] == expected
     assert len(expected) == 20 and outcome.count("errors") == 0
 

@@ -23,9 +23,9 @@ def make_environment(folder: Path, *, has_package: bool) -> Path:
     venv.create(folder, symlinks=True)
     site_packages = folder / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
     if has_package:
-        (site_packages / "fusesoc_firm" / "plugin").mkdir(parents=True)
-        (site_packages / "fusesoc_firm" / "plugin" / "answer.py").write_text(ANSWER)
-        packages = ("fusesoc_firm/__init__.py", "fusesoc_firm/plugin/__init__.py")
+        (site_packages / "fusesoc_firm" / "builds" / "call").mkdir(parents=True)
+        (site_packages / "fusesoc_firm" / "builds" / "call" / "answer.py").write_text(ANSWER)
+        packages = (f"fusesoc_firm/{name}__init__.py" for name in ("", "builds/", "builds/call/"))
         for name in (*packages, "chevron.py", "rosbags.py", "yaml.py"):
             (site_packages / name).write_text("")
     return folder / "bin" / "python3"
@@ -139,8 +139,14 @@ def test_where_there_is_none_the_message_says_what_to_do(tmp_path: Path, bare: P
 def test_the_folder_it_is_called_in_does_not_count(tmp_path: Path, bare: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = make_environment(tmp_path / "other", has_package=False)
     here = tmp_path / "here"
-    (here / "fusesoc_firm" / "plugin").mkdir(parents=True)
-    for name in ("fusesoc_firm/__init__.py", "fusesoc_firm/plugin/answer.py", "chevron.py", "rosbags.py", "yaml.py"):
+    (here / "fusesoc_firm" / "builds" / "call").mkdir(parents=True)
+    for name in (
+        "fusesoc_firm/__init__.py",
+        "fusesoc_firm/builds/call/answer.py",
+        "chevron.py",
+        "rosbags.py",
+        "yaml.py",
+    ):
         (here / name).write_text("")
     monkeypatch.chdir(here)
     done = call(bare, put_generators(other.parents[1] / "lib" / "generators"), "input.yml")

@@ -18,18 +18,18 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from fusesoc_firm.action.contents import Contents
-from fusesoc_firm.action.sandbox import can_sandbox
-from fusesoc_firm.action.trace import can_trace, traced
-from fusesoc_firm.action.tree import tree_of
-from fusesoc_firm.store.server import Server
-from fusesoc_firm.store.store import Store
+from fusesoc_firm.builds.step.contents import Contents
+from fusesoc_firm.builds.step.sandbox import can_sandbox
+from fusesoc_firm.builds.step.trace import can_trace, traced
+from fusesoc_firm.builds.step.tree import tree_of
+from fusesoc_firm.builds.store.server import Server
+from fusesoc_firm.builds.store.store import Store
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import find
+from tests.builds.store.test_remote import SECRET, served
 from tests.certificates import needs_openssl, tls_files, write_certificates
 from tests.hdl.ghdl import REPOSITORY
 from tests.house.test_build import wait_until
-from tests.store.test_remote import SECRET, served
 
 pytestmark = pytest.mark.skipif(not can_trace(), reason="strace is not installed or not permitted")
 
@@ -268,6 +268,7 @@ def test_netlists_and_bitstreams_are_cached(library: Path, flow: str, program: s
     assert {path.name: path.read_bytes() for path in place.glob("acme_m_gate_1.0.*")} == made
 
 
+@pytest.mark.check
 @pytest.mark.skipif(not can_sandbox(), reason="bwrap is not installed or not permitted")
 def test_a_sandbox_changes_no_output(library: Path) -> None:
     """The same bytes of a program, a library and logs, apart from GHDL's times; and what an action did not declare."""
@@ -315,6 +316,7 @@ def test_an_edit_runs_its_dependents_and_a_failure_is_not_cached(library: Path) 
     assert set(results(run(library, *cores, "--rerun")[1]).values()) == {"passed"}
 
 
+@pytest.mark.check
 def test_a_second_machine_runs_nothing(library: Path) -> None:
     """With an empty store of its own, and the remote store to which the first one wrote."""
     token = {"FUSESOC_FIRM_REMOTE_TOKEN": SECRET}
@@ -339,6 +341,7 @@ def test_a_second_machine_runs_nothing(library: Path) -> None:
     assert f"warning: remote store {url}: Connection refused" in text
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("arguments", "tests"),
     [
@@ -353,6 +356,7 @@ def test_tests_are_selected_like_builds(library: Path, arguments: tuple[str, ...
     assert (status, results(text)) == (0, dict.fromkeys(tests, "passed")), text
 
 
+@pytest.mark.check
 def test_reports_tell_what_was_cached(library: Path) -> None:
     """The same counts in the summary, in the events and in JUnit's file, for both commands."""
     (library / "counter" / "limit.txt").write_text("5\n")
@@ -384,6 +388,7 @@ def test_reports_tell_what_was_cached(library: Path) -> None:
     assert "--rerun needs --cached or --sandbox" in run(library, "gate@sim_icarus", "--rerun", name="build")[1]
 
 
+@pytest.mark.check
 def test_why_a_step_ran(library: Path) -> None:
     selected = ("acme:m:counter", "--target", "sim")
 
@@ -551,8 +556,8 @@ def test_a_cluster_without_a_shared_folder(library: Path, machines: str) -> None
         gate = library / "gate" / "gate.v"
         gate.write_text("module gate;\n  initial forever #1;\nendmodule\n")
         endless = ("acme:m:gate", "--target", "sim_icarus", "--cluster", machines)
-        status, text = run(library, *endless, "--timeout", "20", name="build", **remote)
-        assert (status, "ended at the time limit of 20 s" in text) == (1, True), text
+        status, text = run(library, *endless, "--timeout", "10", name="build", **remote)
+        assert (status, "ended at the time limit of 10 s" in text) == (1, True), text
         wait_until(lambda: not simulations(library))
         running = subprocess.Popen(
             command(*endless, name="build"),
@@ -618,6 +623,7 @@ targets:
 """
 
 
+@pytest.mark.check
 @pytest.mark.skipif(not can_sandbox(), reason="bwrap is not installed or not permitted")
 def test_two_machines_with_one_lock_give_the_same_bytes(library: Path, tmp_path: Path) -> None:
     """The second machine has a copy of the project, lock file included, an empty store and its own temporary files."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.pages.console import blocks, check
-from tests.pages.page import DOCS, Page
+from tools.pages.console import blocks, check
+from tools.pages.page import DOCS, Page
 
 PAGE = Page(DOCS / "tutorials" / "first-accelerator.md")
 

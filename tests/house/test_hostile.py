@@ -22,10 +22,10 @@ from typing import Any
 import pytest
 import yaml
 
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request, as_files
-from fusesoc_firm.simulation.simulator import _build_folder
+from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, Request, as_files
+from fusesoc_firm.node.transport.built_simulator import _build_folder
 from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.text.diagnostics import InputError
 
@@ -396,8 +396,8 @@ def test_pictures(project: Project) -> None:
 
 def test_a_picture_of_a_trace(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    from fusesoc_firm.node.trace import COLUMNS
-    from fusesoc_firm.node.trace_picture import draw_trace
+    from fusesoc_firm.node.engine.trace import COLUMNS
+    from fusesoc_firm.node.engine.trace_picture import draw_trace
 
     rows = [",".join(COLUMNS)]
     for name in ("$\\bad{$", "$x$ \\alpha"):

@@ -19,6 +19,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from fusesoc_firm.builds.call.lock_file import read_lock
 from fusesoc_firm.cli import main
 from fusesoc_firm.converter.config_file import read_config
 from fusesoc_firm.message import ROS1, ROS2
@@ -27,8 +28,7 @@ from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_message, parse_name
-from fusesoc_firm.plugin.lock_file import read_lock
-from fusesoc_firm.simulation.stimuli import read_stimuli
+from fusesoc_firm.runs.simulation.stimuli import read_stimuli
 from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
@@ -73,7 +73,7 @@ from fusesoc_firm.converter.stages import STAGES
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.complexity import statistics
+from fusesoc_firm.runs.verify.complexity import statistics
 
 for ros in (ROS1, ROS2):
     library = MessageLibrary(ros, [Path(sys.argv[1])])

@@ -14,11 +14,11 @@ import pytest
 from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.bursts import BurstJoiner
+from fusesoc_firm.node.engine.bursts import BurstJoiner
+from fusesoc_firm.node.transport.built_simulator import BuiltSimulator, CoreSources, build_simulator
 from fusesoc_firm.node.transport.simulator import Simulator, Waits
 from fusesoc_firm.node.transport.transport import Burst
-from fusesoc_firm.simulation.simulator import BuiltSimulator, CoreSources, build_simulator
-from fusesoc_firm.studio.run import stimuli_of
+from fusesoc_firm.studio.page_run import stimuli_of
 from fusesoc_firm.system.hardware.waits import waits_configuration
 from fusesoc_firm.system.message_sources import core_of, load_beside
 from fusesoc_firm.text.diagnostics import InputError
@@ -34,6 +34,15 @@ STALL_PERCENT = 25  # the default of the bench that reads files
 @pytest.fixture(scope="module")
 def build_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("live") / "build"
+
+
+@pytest.fixture(scope="module")
+def specs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folders of the systems, whose models run for less time than a compilation with optimisation takes."""
+    folder = tmp_path_factory.mktemp("specs")
+    for system in SYSTEMS:
+        copy_of(system, folder, has_core=True)
+    return folder / "some place"
 
 
 @pytest.fixture(scope="module", params=SYSTEMS)
@@ -62,15 +71,16 @@ def by_id(frames: Iterable[bytes]) -> dict[int, list[bytes]]:
     return found
 
 
-def answers(built: BuiltSimulator, frames: list[bytes], shape: tuple[int, int]) -> tuple[list[bytes], int]:
-    """The frames of a system's responses, in order, and the cycle of the last beat."""
-    joiner, joined, last = BurstJoiner(*shape), [], 0
+def answers(built: BuiltSimulator, frames: list[bytes], shape: tuple[int, int], count: int) -> tuple[list[bytes], int]:
+    """The frames of a system's responses, in order, and the cycle of the last beat; so many are expected."""
+    joiner, last = BurstJoiner(*shape), 0
+    joined: list[bytes] = []
     with Simulator(built.command(seed=1, stall_percent=STALL_PERCENT), built.folder) as simulator:
         for frame in frames:
             simulator.request(frame)
         simulator.run(1)
-        while simulator.quiet < 100_000:
-            for event in simulator.run(20_000):
+        while simulator.quiet < (2_000 if len(joined) >= count else 100_000):
+            for event in simulator.run(1_000):
                 if isinstance(event, Burst):
                     last = event.last_cycle or 0
                     if frame_ := joiner.push(event.data, event.tid):
@@ -81,15 +91,15 @@ def answers(built: BuiltSimulator, frames: list[bytes], shape: tuple[int, int]) 
 
 
 @pytest.mark.check
-def test_the_same_frames_give_the_same_bytes(recorded: tuple[str, Path], build_root: Path) -> None:
+def test_the_same_frames_give_the_same_bytes(recorded: tuple[str, Path], specs: Path, build_root: Path) -> None:
     system, folder = recorded
     stimuli, received = frames_of(folder / "stimulus.txt"), frames_of(folder / "received.txt")
     ends = []
     for tool in fitting(is_live=True):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not installed")
-        built = build_simulator(SPECS / system / f"{system}.yaml", tool, build_root=build_root.parent / "simulators")
-        found, last = answers(built, stimuli, SYSTEMS[system])
+        built = build_simulator(specs / system / f"{system}.yaml", tool, build_root=build_root.parent / "simulators")
+        found, last = answers(built, stimuli, SYSTEMS[system], len(received))
         assert by_id(found) == by_id(received)
         ends.append(last)
     assert len(received) >= 7
@@ -99,8 +109,8 @@ def test_the_same_frames_give_the_same_bytes(recorded: tuple[str, Path], build_r
 
 @pytest.mark.check
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
-def test_a_second_build_builds_nothing(build_root: Path) -> None:
-    spec, root = SPECS / "quat2euler" / "quat2euler.yaml", build_root.parent / "simulators"
+def test_a_second_build_builds_nothing(specs: Path, build_root: Path) -> None:
+    spec, root = specs / "quat2euler" / "quat2euler.yaml", build_root.parent / "simulators"
     first = build_simulator(spec, "verilator", build_root=root)
     time = Path(*first.words).stat().st_mtime_ns
     assert build_simulator(spec, "verilator", build_root=root) == first
@@ -108,11 +118,13 @@ def test_a_second_build_builds_nothing(build_root: Path) -> None:
 
 
 def copy_of(application: str, folder: Path, *, has_core: bool) -> Path:
-    """A copy of a specification in a new folder."""
+    """A copy of a specification in a new folder; GCC optimises nothing."""
     copy = folder / "some place" / application
     shutil.copytree(SPECS / application, copy)
-    if not has_core:
-        for core in copy.glob("*.core"):
+    for core in copy.glob("*.core"):
+        if has_core:
+            core.write_text(core.read_text().replace("OPT_FAST=-O2", "OPT_FAST=-O0"))
+        else:
             core.unlink()
     return copy / f"{application}.yaml"
 
@@ -123,7 +135,7 @@ def test_a_specification_without_a_core(tmp_path: Path) -> None:
     sources = CoreSources(depend=["robot:acc:firm_cordic", "robot:acc:firm_float64"])
     built = build_simulator(spec, build_root=tmp_path / "build", sources=sources)
     frame = quaternion()
-    assert len(answers(built, [frame], (1, 8))[0]) == 1
+    assert len(answers(built, [frame], (1, 8), 1)[0]) == 1
     # It leaves nothing next to the specification.
     assert not [*spec.parent.glob("*.core")]
 
@@ -159,7 +171,7 @@ def test_links_and_further_clocks(tmp_path: Path, tool: str, changes: dict[str, 
         text = text.replace(old, new, 1)
     spec.write_text(text)
     built = build_simulator(spec, tool, build_root=tmp_path / "build")
-    found, _ = answers(built, [quaternion()] * 3, (1, 8))
+    found, _ = answers(built, [quaternion()] * 3, (1, 8), 3)
     # Roll, pitch and yaw of the identity rotation.
     assert found == [b"\x00\x18\x00\x00\x00" + bytes(24)] * 3
 
@@ -252,9 +264,9 @@ def levels_of(waves: Path, unit: str) -> Iterator[dict[str, str]]:
 
 @pytest.mark.check
 @pytest.mark.parametrize("system", ["quat2euler", "multi_type"])
-def test_waits_are_those_of_the_waves(system: str, tmp_path: Path, build_root: Path) -> None:
+def test_waits_are_those_of_the_waves(system: str, specs: Path, tmp_path: Path, build_root: Path) -> None:
     """They are counted here in GHDL's waves of a run; all simulators count the same."""
-    spec, counted = SPECS / system / f"{system}.yaml", []
+    spec, counted = specs / system / f"{system}.yaml", []
     loaded = load_beside(spec)
     ids = {item.block: item.id for item in loaded.system.subscribers}
     frames = [pack_frame(ids[item.subscriber.block], item.payload) for item in stimuli_of(spec, loaded)[:12]]

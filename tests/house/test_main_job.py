@@ -65,7 +65,6 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
 @pytest.mark.parametrize(
     ("name", "messages"),
     [
-        ("image_pipeline", 7),
         ("image_pipeline_software", 14),
         ("sobel", 7),
         ("resize", 13),
@@ -96,7 +95,7 @@ def project(tmp_path: Path) -> Path:
 
 
 def copy_project(destination: Path) -> Path:
-    ignored = shutil.ignore_patterns("__pycache__", "demos", "library")
+    ignored = shutil.ignore_patterns("__pycache__", "demos", "library", "node_modules")
     for folder in ("fusesoc_firm", "cores", "generators", "specs"):
         shutil.copytree(ROOT / folder, destination / folder, ignore=ignored)
     shutil.copy(ROOT / "fusesoc.conf", destination)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests import matrix
+from tools import matrix
 
 # Builds the wheel, and then finds no packages to install.
 UV = """

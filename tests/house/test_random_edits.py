@@ -19,9 +19,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.action.contents import Contents
-from fusesoc_firm.action.trace import can_trace
-from fusesoc_firm.action.tree import tree_of
+from fusesoc_firm.builds.step.contents import Contents
+from fusesoc_firm.builds.step.trace import can_trace
+from fusesoc_firm.builds.step.tree import tree_of
 from tests.hdl.ghdl import REPOSITORY
 from tests.processes import program
 

@@ -140,6 +140,7 @@ def test_make_without_a_target_lists_them() -> None:
         "sim",
         "test",
         "check",
+        "ci",
         "docs",
         "studio",
         "corpus",
@@ -148,7 +149,10 @@ def test_make_without_a_target_lists_them() -> None:
         "matrix",
         "proofs",
         "policies",
+        "constants",
+        "fuzz",
         "fuzz-netlist",
+        "mutants",
         "debian",
         "lint",
         "licences",
@@ -175,6 +179,14 @@ def test_make_sim_passes_its_variables_on(variables: list[str], arguments: str) 
     command = ["make", "--dry-run", "sim", *variables]
     done = subprocess.run(command, cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
     assert f" .venv/bin/firm sim {arguments} ." in f"{' '.join(done.stdout.split())} ."
+
+
+@pytest.mark.parametrize("target", ["test", "check", "ci"])
+def test_make_test_passes_its_variables_on(target: str) -> None:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    command = ["make", "--dry-run", target, "SINCE=HEAD~1", "FRESH=1", "PYTEST_OPTIONS=-x"]
+    done = subprocess.run(command, cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
+    assert '.venv/bin/python -m pytest --since "HEAD~1" --fresh -x' in done.stdout
 
 
 def make_corpus(corpus: Path) -> list[str]:
@@ -266,6 +278,26 @@ def test_a_missing_network_is_said(checkout: Checkout) -> None:
     done = checkout.make("bitstream", "BOARD=icebreaker")
     assert done.returncode
     assert "The package index cannot be reached. Run make again with a network," in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("prefix", "configured", "offered"),
+    [
+        ("echo", "exit 1", 1),
+        ("echo", "echo .git/hooks", 1),
+        ("echo", "echo .ci/hooks", 0),
+        ("exit 128", "exit 1", 0),  # not a repository
+        ("echo vendor/", "exit 1", 0),  # a folder of another repository
+    ],
+)
+def test_setup_offers_the_hook_and_changes_no_configuration(
+    checkout: Checkout, prefix: str, configured: str, offered: int
+) -> None:
+    checkout.add("git", f'echo "$*" >> {checkout.folder}/git.log; [ $1 = config ] && {configured} || {prefix}')
+    done = checkout.make("setup")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("enable the hook: git config core.hooksPath .ci/hooks\n") == offered
+    assert set(checkout.calls("git.log")) <= {"rev-parse --show-prefix", "config core.hooksPath"}
 
 
 class Pythons:

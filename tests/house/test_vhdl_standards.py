@@ -29,15 +29,16 @@ from fusesoc_firm.netlist import ghdl2
 from fusesoc_firm.text.diagnostics import InputError
 from tests import corpus
 from tests.hdl.ghdl import CORES, REPOSITORY, GhdlError, Library
+from tests.seeds import seeded
 from tests.system.simulated.systems import call, generate_system, write
 
 SPECS = REPOSITORY / "specs"
 STANDARDS = ("93", "08")
-SEED = 20241130
+SEED = seeded(20241130)
 # Of fixed and of variable size; with arrays of messages and of strings.
 MESSAGES = ("geometry_msgs/Pose", "sensor_msgs/Image", "sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray")
 # Of the corpus' messages, of each ROS.
-SAMPLE = 25
+SAMPLE = 15
 STRICT = ("--warn-error",)
 
 # Debian's ghdl starts one of the others. The variable FIRM_GHDLS adds programs.
@@ -97,8 +98,7 @@ def firm(ghdl: str, standard: str, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def user_of(firm: Library, folder: Path) -> Library:
     """A library `work` in `folder`, which finds `firm`."""
-    for file in firm.directory.glob("firm-obj*.cf"):
-        shutil.copy(file, folder)
+    firm.copy_to(folder)
     return replace(firm, name="work", directory=folder)
 
 
@@ -136,6 +136,7 @@ def test_a_warning_is_a_fault(ghdl: str, standard: str, tmp_path: Path) -> None:
         Library("work", tmp_path, standard, ghdl).analyse([path], *STRICT)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("core", sorted(SPECS.glob("*/*.core")), ids=lambda path: path.stem)
 def test_systems(firm: Library, core: Path, tmp_path: Path) -> None:
     """The accelerators and benches of the demo systems, and their generated systems with test benches."""
@@ -176,6 +177,7 @@ def analyse_converters(work: Library, library: MessageLibrary, names: list[Messa
         count -= 1
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("ros", [ROS1, ROS2], ids=["ros1", "ros2"])
 def test_converters(firm: Library, ros: Middleware, tmp_path: Path) -> None:
     names = [parse_name(name) for name in MESSAGES]

@@ -14,19 +14,19 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
+from fusesoc_firm.builds.call.answer import Basis, load, obtain
+from fusesoc_firm.builds.call.calls import make_request
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
+from fusesoc_firm.core.request import GeneratedCore, GeneratorCall, Request
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.plugin.answer import Basis, load, obtain
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.calls import make_request
-from fusesoc_firm.request.request import GeneratedCore, GeneratorCall, Request
-from fusesoc_firm.store.facts import state
-from fusesoc_firm.store.reads import Part, Reads, noted
 from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools.facts import state
+from fusesoc_firm.tools.reads import Part, Reads, noted
 
 KINDS = ("ros1", "sqlite3", "mcap")
 ODD = parse_name("odd_msgs/Odd")

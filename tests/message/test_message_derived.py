@@ -18,7 +18,8 @@ import pytest
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.folders import ros2_folders
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName
+from fusesoc_firm.message.middleware import MessageDefinition
+from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.services import Interface
 from fusesoc_firm.message.signature import md5, signature

@@ -104,8 +104,9 @@ def test_a_workspace(tmp_path: Path) -> None:
     write(tmp_path / "src" / "repo" / "folder" / "msg" / "deeper" / "B.msg")
     write(tmp_path / "src" / "by_layout" / "msg" / "C.msg")
     write(tmp_path / "flat" / "D.msg")
-    write(tmp_path / "install" / "COLCON_IGNORE", "")
-    write(tmp_path / "install" / "declared" / "share" / "declared" / "msg" / "A.msg")
+    for folder, marker in {"install": "COLCON_IGNORE", "devel": "CATKIN_IGNORE", "old": "AMENT_IGNORE"}.items():
+        write(tmp_path / folder / marker, "")
+        write(tmp_path / folder / "share" / "copied" / "msg" / "A.msg")
     write(tmp_path / ".git" / "hidden" / "msg" / "E.msg")
     assert own_names(MessageLibrary(ROS2, [tmp_path])) == ["by_layout/C", "declared/A", "declared/B", "flat/D"]
 

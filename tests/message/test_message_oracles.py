@@ -21,13 +21,12 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     DefaultValue,
     ElementType,
     FieldType,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,

@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from fusesoc_firm.message import ROS1, ROS2
-from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
     InterfaceKind,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,

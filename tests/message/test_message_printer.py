@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.dialect import Dialect
-from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     Constant,
@@ -18,7 +18,6 @@ from fusesoc_firm.message.model import (
     ElementType,
     Field,
     FieldType,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,

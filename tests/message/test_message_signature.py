@@ -20,16 +20,8 @@ from rosbags.typesys.store import Typestore
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import (
-    ArrayType,
-    FieldType,
-    MessageDefinition,
-    MessageName,
-    MessageType,
-    SequenceType,
-    StringType,
-)
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
+from fusesoc_firm.message.model import ArrayType, FieldType, MessageName, MessageType, SequenceType, StringType
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.message.signature import md5, rihs01, signature
 from fusesoc_firm.message.stores import DistributionStore

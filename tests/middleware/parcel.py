@@ -17,14 +17,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     ElementType,
     Field,
     FieldType,
     InterfaceKind,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,

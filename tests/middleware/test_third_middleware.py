@@ -25,13 +25,14 @@ from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
+from fusesoc_firm.runs.verify.loop import PUBLISHER_ID, SUBSCRIBER_ID, loop_text
+from fusesoc_firm.runs.verify.simulation import firm_library, simulate, write_frames
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.render import render
-from fusesoc_firm.verify.loop import PUBLISHER_ID, SUBSCRIBER_ID, loop_text
-from fusesoc_firm.verify.simulation import firm_library, simulate, write_frames
 from tests.frame.oracle import is_same
+from tests.seeds import seeded
 
-SEED = 20241123
+SEED = seeded(20241123)
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "add-a-middleware.md"
 MODULE = Path(__file__).parent / "parcel.py"
 POSE, SCAN = MessageName("lab", "Pose"), MessageName("lab", "Scan")

@@ -17,7 +17,9 @@ from pathlib import Path
 from random import Random
 
 from fusesoc_firm.netlist.translation import Translation, translate
+from tests.hdl.ghdl import GhdlError, Library
 from tests.netlist.designs import INPUT, OUTPUT, Design
+from tests.recall import RunResult, identity, recalled
 
 TOP = "batch"
 # The reset holds for the first of them.
@@ -48,17 +50,31 @@ def stimuli(seed: str, number: int) -> list[int]:
     return found[:number]
 
 
-def run(command: Sequence[str | Path], folder: Path) -> str:
-    """What a program prints. Raises `ToolError`."""
-    try:
-        done = subprocess.run(
-            list(map(str, command)), cwd=folder, capture_output=True, encoding="latin-1", timeout=TIMEOUT, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        raise ToolError(f"{command[0]} did not end in {TIMEOUT} s") from error
-    if done.returncode:
-        raise ToolError(f"{command[0]}:\n{(done.stdout + done.stderr)[-4000:]}")
-    return done.stdout
+def run(command: Sequence[str | Path], folder: Path, *paths: Path) -> str:
+    """What a program prints that reads and writes files of a folder, or what is known of that. Raises `ToolError`.
+
+    The folders `paths` have only what the tool's version decides.
+    """
+    words = list(map(str, command))
+
+    def run() -> RunResult:
+        try:
+            done = subprocess.run(
+                words, cwd=folder, capture_output=True, encoding="latin-1", timeout=TIMEOUT, check=False
+            )
+        except subprocess.TimeoutExpired as error:
+            raise ToolError(f"{command[0]} did not end in {TIMEOUT} s") from error
+        if done.returncode:
+            raise ToolError(f"{command[0]}:\n{(done.stdout + done.stderr)[-4000:]}")
+        return RunResult(0, done.stdout)
+
+    # Other programs are in the folder.
+    tool = identity(words[0]) if "/" not in words[0] else []
+    return recalled({"tool": tool, "command": words}, [folder], run, paths, _is_of_ghdl).output
+
+
+def _is_of_ghdl(path: str) -> bool:
+    return path.endswith(".cf")
 
 
 def write(designs: Sequence[Design], inputs: Sequence[int], folder: Path) -> None:
@@ -75,9 +91,15 @@ def ghdl(folder: Path) -> str:
     """The simulation of the VHDL."""
     work = folder / "ghdl"
     work.mkdir(exist_ok=True)
-    options = ["--std=93", f"--workdir={work}"]
-    run(["ghdl", "-a", *options, f"{TOP}.vhd", "bench.vhd"], folder)
-    return run(["ghdl", "-r", *options, "bench", "--ieee-asserts=disable"], folder)
+    library = Library("work", work)
+    try:
+        library.analyse([folder / f"{TOP}.vhd", folder / "bench.vhd"])
+    except GhdlError as error:
+        raise ToolError(f"ghdl:\n{str(error)[-4000:]}") from error
+    done = library.run("bench", directory=folder, options=["--ieee-asserts=disable"], seconds=TIMEOUT)
+    if done.exit_code:
+        raise ToolError(f"ghdl:\n{done.output[-4000:]}")
+    return done.output
 
 
 def netlist(folder: Path) -> Path:
@@ -115,7 +137,7 @@ def verilator(folder: Path) -> str:
     run(["verilator", *options, "--top-module", "bench", "bench.v", "netlist.v"], folder)
     sources = sorted(file.name for file in made.glob("*.cpp"))
     (made / "all.cpp").write_text("".join(f'#include "{name}"\n' for name in sources))
-    run([*_COMPILER, *_includes(), "all.cpp", *_runtime(), "-pthread", "-o", "bench"], made)
+    run([*_COMPILER, *_includes(), "all.cpp", *_runtime(), "-pthread", "-o", "bench"], made, _runtime()[0].parent)
     return run([made / "bench"], folder)
 
 
@@ -125,7 +147,8 @@ _RUNTIME = ("verilated", "verilated_timing", "verilated_threads")
 
 @cache
 def _includes() -> list[str]:
-    root = Path(run(["verilator", "--getenv", "VERILATOR_ROOT"], Path()).strip()) / "include"
+    command = ["verilator", "--getenv", "VERILATOR_ROOT"]
+    root = Path(subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()) / "include"
     return [f"-I{root}", f"-I{root / 'vltstd'}"]
 
 

@@ -13,8 +13,9 @@ from fusesoc_firm.netlist.model import NetlistError
 from tests.hdl.loop_tools import found_by_others
 from tests.hdl.verilog import loops, netlist
 from tests.netlist.test_ghdlsynth import Build
+from tests.seeds import seeded
 
-SEED = 20260611
+SEED = seeded(20260611)
 BITS = 24
 
 DESIGN = """

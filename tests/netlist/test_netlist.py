@@ -14,6 +14,7 @@ from fusesoc_firm.netlist import ghdl2
 from fusesoc_firm.netlist.model import NetlistError
 from tests.hdl.ghdl import Library
 from tests.hdl.verilog import compile_verilog, netlist
+from tests.seeds import seeded
 
 ARITHMETIC = Path(__file__).parent / "data" / "arithmetic.vhd"
 PORTS = {
@@ -29,7 +30,7 @@ PORTS = {
     "turn": 16,
     "driven": 4,
 }
-SEED = 20260131
+SEED = seeded(20260131)
 OFFSET = -5
 
 

@@ -14,8 +14,9 @@ from tests.netlist import comparison, simulators
 from tests.netlist.comparison import differences
 from tests.netlist.designs import Design
 from tests.netlist.faults import COMPUTED, CRASH, FAULTS, KEPT, LOST, MIXED, RESTORED, WITHOUT_MEMORIES, growing
+from tests.seeds import seeded
 
-SEED = 20260214
+SEED = seeded(20260214)
 DESIGNS, BATCH = 200, 25
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.carrier import Answer, Answered, Call, Called, CarrierError, Event, Lost, Published, Taken
-from fusesoc_firm.node.description import NodeDescription
-from fusesoc_firm.node.diagnostics import Report
+from fusesoc_firm.node.engine.carrier import Answer, Answered, Call, Called, CarrierError, Event, Lost, Published, Taken
+from fusesoc_firm.node.engine.software import NodeSoftware
+from fusesoc_firm.node.engine.trace import Trace
+from fusesoc_firm.node.interface.description import NodeDescription
+from fusesoc_firm.node.interface.diagnostics import Report
 from fusesoc_firm.node.node import HardwareListener, Node, NodeSettings, OpenTransport
-from fusesoc_firm.node.software import NodeSoftware
-from fusesoc_firm.node.trace import Trace
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from tests.system.systems import LIBRARIES, accelerator, converter, instance, specification

@@ -18,7 +18,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusesoc_firm.node.bursts import split_frame
+from fusesoc_firm.node.engine.bursts import split_frame
 from fusesoc_firm.system.status_frames import answered, status_answer
 
 FAULTS = ("exit", "kill", "cut", "garbage", "hang", "unsent", "backwards", "long", "deaf", "error", "later")

@@ -18,13 +18,22 @@ from fusesoc_firm.frame.codec import decode, encode, pack_frame
 from fusesoc_firm.frame.defaults import completed
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.node.action_types import CANCEL, CANCEL_GOAL, FEEDBACK, GET_RESULT, GOAL, RESULT, SEND_GOAL, STATES
-from fusesoc_firm.node.calls import MOST_WAITING, CallLine
-from fusesoc_firm.node.carrier import Answer, Call
-from fusesoc_firm.node.description import describe
+from fusesoc_firm.node.engine.calls import MOST_WAITING, CallLine
+from fusesoc_firm.node.engine.carrier import Answer, Call
+from fusesoc_firm.node.engine.queues import Overflow
+from fusesoc_firm.node.interface.action_types import (
+    CANCEL,
+    CANCEL_GOAL,
+    FEEDBACK,
+    GET_RESULT,
+    GOAL,
+    RESULT,
+    SEND_GOAL,
+    STATES,
+)
+from fusesoc_firm.node.interface.description import describe
 from fusesoc_firm.node.node import HardwareListener, NodeSettings
-from fusesoc_firm.node.python_node import python_node
-from fusesoc_firm.node.queues import Overflow
+from fusesoc_firm.node.package.python_node import python_node
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from tests.node.fake_node import FakeHardware, Run, until

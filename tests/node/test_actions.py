@@ -20,13 +20,22 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.node.action_server import MOST_KEPT
-from fusesoc_firm.node.action_types import CANCEL, CANCEL_GOAL, FEEDBACK, GET_RESULT, GOAL, RESULT, SEND_GOAL, STATES
-from fusesoc_firm.node.calls import CallLine
-from fusesoc_firm.node.carrier import Call
-from fusesoc_firm.node.description import NodeDescription, describe
+from fusesoc_firm.node.actions.action_server import MOST_KEPT
+from fusesoc_firm.node.engine.calls import CallLine
+from fusesoc_firm.node.engine.carrier import Call
+from fusesoc_firm.node.interface.action_types import (
+    CANCEL,
+    CANCEL_GOAL,
+    FEEDBACK,
+    GET_RESULT,
+    GOAL,
+    RESULT,
+    SEND_GOAL,
+    STATES,
+)
+from fusesoc_firm.node.interface.description import NodeDescription, describe
 from fusesoc_firm.node.node import HardwareListener, NodeSettings
-from fusesoc_firm.node.python_node import python_node
+from fusesoc_firm.node.package.python_node import python_node
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from tests.node.fake_node import FakeHardware, Run, until

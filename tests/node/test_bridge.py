@@ -12,8 +12,8 @@ import pytest
 
 from fusesoc_firm.node.bridge.channel import MESSAGE, Channel
 from fusesoc_firm.node.bridge.ros import Ends
-from fusesoc_firm.node.carrier import CarrierError, RosCarrier, RosOptions
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.engine.carrier import CarrierError, RosCarrier, RosOptions
+from fusesoc_firm.node.interface.description import NodeDescription
 
 
 def test_an_end_is_reported_once_with_the_name_of_its_node() -> None:

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.bursts import WIDTHS, BurstError, BurstJoiner, JoinedFrame, split_frame
+from fusesoc_firm.node.engine.bursts import WIDTHS, BurstError, BurstJoiner, JoinedFrame, split_frame
 from tests.node.drivers import Driver, cpp_driver
+from tests.seeds import seeded
 
-SEED = 20240612
+SEED = seeded(20240612)
 LONGEST = 1000
 
 

@@ -12,15 +12,16 @@ import pytest
 
 from fusesoc_firm.frame import faults
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.bursts import BurstError, BurstJoiner
-from fusesoc_firm.node.queues import ClosedError, EmptyError, SubscriberQueues
+from fusesoc_firm.node.engine.bursts import BurstError, BurstJoiner
+from fusesoc_firm.node.engine.queues import ClosedError, EmptyError, SubscriberQueues
 from fusesoc_firm.node.transport.abort_record import burst_of
 from tests.links import coded
 from tests.node.dma_engine import ERRORS, HALTED, MM2S, S2MM, Built, Engine, Fault, Loop, board
 from tests.node.drivers import C_FOLDER, HERE, Driver, compile_c_driver
 from tests.node.test_bursts import _interleaved
+from tests.seeds import seeded
 
-SEED = 20261124
+SEED = seeded(20261124)
 LONGEST = 60
 IDS = 3
 DEPTH = 2

@@ -34,6 +34,7 @@ def _counts(driver: Driver, frames: int, *modes: str) -> dict[str, dict[str, int
     }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("modes", [(), ("interrupt",), ("flow",), ("flow", "interrupt"), ("slow", "interrupt")])
 def test_no_byte_is_lost_in_either_direction(uart: Driver, modes: tuple[str, ...]) -> None:
     """32 to 1,024 bytes in each frame, back to back, both ways at once."""

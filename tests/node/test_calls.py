@@ -15,11 +15,11 @@ import pytest
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.node.calls import MOST_WAITING, CallLine
-from fusesoc_firm.node.carrier import Answer, Call
-from fusesoc_firm.node.description import NodeDescription, describe
+from fusesoc_firm.node.engine.calls import MOST_WAITING, CallLine
+from fusesoc_firm.node.engine.carrier import Answer, Call
+from fusesoc_firm.node.interface.description import NodeDescription, describe
 from fusesoc_firm.node.node import HardwareListener, NodeSettings
-from fusesoc_firm.node.python_node import python_node
+from fusesoc_firm.node.package.python_node import python_node
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.system.system_core import load_system
 from tests.node.fake_node import FakeHardware, Run, until

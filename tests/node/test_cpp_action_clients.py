@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from fusesoc_firm.node.calls import MOST_WAITING
+from fusesoc_firm.node.engine.calls import MOST_WAITING
 from tests.node.drivers import Driver, cpp_driver
 
 # The messages of ROS 2: a goal that is accepted, one that is rejected, and a result with the state 4.

@@ -19,8 +19,9 @@ from tests.node.dma_engine import (
     board_files,
 )
 from tests.node.drivers import Driver, cpp_driver
+from tests.seeds import seeded
 
-SEED = 20261123
+SEED = seeded(20261123)
 # Some frames are the record of an aborted frame.
 RECORD_BYTES = 7
 MEMORY_BYTES = 1 << 22

@@ -16,13 +16,14 @@ from uuid import uuid4
 
 import pytest
 
-from fusesoc_firm.node.status import access
-from fusesoc_firm.node.status_socket import open_status
+from fusesoc_firm.node.status.status import access
+from fusesoc_firm.node.status.status_socket import open_status
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.status_frames import write_request
 from tests.node.drivers import HERE, Driver, cpp_driver
+from tests.seeds import seeded
 
-SEED = 20261121
+SEED = seeded(20261121)
 SIMULATOR = f"exec {shlex.quote(sys.executable)} {shlex.quote(str(HERE / 'model_simulator.py'))}"
 
 

@@ -17,8 +17,9 @@ from fusesoc_firm.frame.codec import pack_frame
 from tests.links import coded, decoded
 from tests.node.drivers import Driver
 from tests.node.test_cpp_node import by_converter, payloads_of, puts, run
+from tests.seeds import seeded
 
-SEED = 20261122
+SEED = seeded(20261122)
 
 # What a board does with a frame: bytes for the line.
 Answer = Callable[[int, bytes], bytes]

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.bursts import AbortedFrameError, BurstJoiner, JoinedFrame
+from fusesoc_firm.node.engine.bursts import AbortedFrameError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.transport.dma import FROM_SYSTEM, LAST_DESCRIPTOR, TO_SYSTEM, DmaBuffers, DmaTransport
 from fusesoc_firm.node.transport.dma_device import LinuxDmaDevice
 from fusesoc_firm.node.transport.open_transport import open_transport
@@ -31,8 +31,9 @@ from tests.node.dma_engine import (
     board,
     board_files,
 )
+from tests.seeds import seeded
 
-SEED = 20241103
+SEED = seeded(20241103)
 
 
 @pytest.fixture

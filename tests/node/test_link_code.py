@@ -11,8 +11,9 @@ from fusesoc_firm.node.transport.link_code import LinkDecoder, encode
 from tests.hdl.frames import Frame
 from tests.links import coded, decoded, faulty_row
 from tests.node.drivers import Driver, compile_c_driver, cpp_driver
+from tests.seeds import seeded
 
-SEED = 20261123
+SEED = seeded(20261123)
 _PIECE_BYTES = 20_000
 
 Encode = Callable[[Sequence[bytes]], list[bytes]]

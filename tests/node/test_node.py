@@ -16,21 +16,21 @@ import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.message import ROS1, ROS2
-from fusesoc_firm.node.bursts import split_frame
-from fusesoc_firm.node.carrier import CarrierError, ros_arguments
-from fusesoc_firm.node.cpp_trace import are_steps, write_ways
-from fusesoc_firm.node.description import describe
+from fusesoc_firm.node.engine.bursts import split_frame
+from fusesoc_firm.node.engine.carrier import CarrierError, ros_arguments
+from fusesoc_firm.node.engine.cpp_trace import are_steps, write_ways
+from fusesoc_firm.node.engine.player import Player
+from fusesoc_firm.node.engine.queues import Overflow
+from fusesoc_firm.node.engine.software import node_software
+from fusesoc_firm.node.engine.trace import COLUMNS, CYCLES, WALL_TIMES, Trace
+from fusesoc_firm.node.engine.trace_picture import draw_trace
+from fusesoc_firm.node.engine.watch import Control, Latency, Load, Watch
+from fusesoc_firm.node.interface.description import describe
+from fusesoc_firm.node.interface.options import add_node_options, remappings
+from fusesoc_firm.node.live_run import run_options
 from fusesoc_firm.node.node import HardwareListener, Node, NodeSettings
-from fusesoc_firm.node.options import add_node_options, remappings
-from fusesoc_firm.node.player import Player
-from fusesoc_firm.node.python_node import python_node
-from fusesoc_firm.node.queues import Overflow
-from fusesoc_firm.node.run import run_options
-from fusesoc_firm.node.software import node_software
-from fusesoc_firm.node.trace import COLUMNS, CYCLES, WALL_TIMES, Trace
-from fusesoc_firm.node.trace_picture import draw_trace
+from fusesoc_firm.node.package.python_node import python_node
 from fusesoc_firm.node.transport.transport import Burst, TransportError
-from fusesoc_firm.node.watch import Control, Latency, Load, Watch
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
 from tests.node.fake_node import Answers, FakeHardware, Run, echo, loaded, pairs, until

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.builds.call.generators import GENERATORS
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.node.cpp_package import HEADERS, cpp_package, generated_files, headers
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.request import Request
+from fusesoc_firm.node.package.cpp_package import HEADERS, cpp_package, generated_files, headers
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.text.diagnostics import InputError
 from tests.system.systems import accelerator, converter, instance, messages, specification

@@ -11,7 +11,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
-from fusesoc_firm.node.parameters import option_words, parameters_of
+from fusesoc_firm.node.interface.parameters import option_words, parameters_of
 from fusesoc_firm.text.diagnostics import InputError
 
 

@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.node import carrier, ros_wheels
 from fusesoc_firm.node.bridge.ros import BridgeError
 from fusesoc_firm.node.bridge.ros1 import _warn_without_master
 from fusesoc_firm.node.bridge.ros2_types import message_class
-from fusesoc_firm.node.carrier import CarrierError
+from fusesoc_firm.node.engine import carrier, ros_wheels
+from fusesoc_firm.node.engine.carrier import CarrierError
 from fusesoc_firm.text.diagnostics import InputError
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -406,6 +406,7 @@ def test_waits_are_counted_while_they_are_wanted(monkeypatch: pytest.MonkeyPatch
     transport.close()
 
 
+@pytest.mark.check
 def test_a_long_frame_takes_few_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """A frame of 100 ms needed a hundred runs of 1 ms; no run takes much longer than an eighth of the time before."""
     simulator = _TimedSimulator(1e-6, 100_000)

@@ -17,10 +17,11 @@ from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.text.diagnostics import InputError
 from tests.node.drivers import Driver
 from tests.node.test_cpp_node import puts, run
-from tests.simulation.test_software import elsewhere, point, soft
+from tests.runs.simulation.test_software import elsewhere, point, soft
+from tests.seeds import seeded
 from tests.system.systems import accelerator, converter, derived, instance, specification
 
-SEED = 20261125
+SEED = seeded(20261125)
 CODE = """\
 def soft(m):
     print('what a function prints is no frame')

@@ -12,13 +12,13 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.interface.description import NodeDescription
 from fusesoc_firm.node.reopening import checked
-from fusesoc_firm.node.status import access, read_status, read_word, status_text, write_word
+from fusesoc_firm.node.status.status import access, read_status, read_word, status_text, write_word
+from fusesoc_firm.node.transport.built_simulator import CoreSources, build_simulator
 from fusesoc_firm.node.transport.simulator import Simulator, SimulatorTransport
 from fusesoc_firm.node.transport.status_registers import open_registers
 from fusesoc_firm.node.transport.transport import Burst, TransportError
-from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.status_frames import answered, read_request, status_answer
 from fusesoc_firm.system.system_core import identity
@@ -72,7 +72,7 @@ def test_the_status_of_a_simulated_system_is_what_was_sent(tmp_path: Path, capsy
 
 
 class Hardware:
-    """A transport whose hardware answers each request with a word of a table, after frames of its own."""
+    """A transport whose hardware answers each request with a word of a table, after a message and another answer."""
 
     def __init__(self, words: dict[int, int]) -> None:
         self.words = words
@@ -82,7 +82,7 @@ class Hardware:
     def send(self, frame: bytes) -> None:
         request = answered(frame)
         assert request
-        self.bursts.append(Burst(pack_frame(0, b"another")))
+        self.bursts += [Burst(pack_frame(0, b"another")), Burst(status_answer(request[0] ^ 4, 0xBAD))]
         if request[0] in self.words:
             self.bursts.append(Burst(status_answer(request[0], self.words[request[0]])))
 
@@ -142,6 +142,14 @@ def test_hardware_without_a_status_is_reported() -> None:
         access(Hardware({}), read_request(0))
     with pytest.raises(TransportError, match="another kind of status"):
         read_status(Hardware({0: 7, 4: 0}))
+
+
+def test_hardware_that_sends_without_end_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fusesoc_firm.node.status.status._ANSWER_SECONDS", 0.05)
+    hardware = Hardware({})
+    monkeypatch.setattr(hardware, "receive", lambda _: Burst(pack_frame(0, b"another")))
+    with pytest.raises(TransportError, match="did not answer"):
+        access(hardware, read_request(0))
 
 
 def test_a_status_with_faults_is_text() -> None:

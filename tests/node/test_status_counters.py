@@ -26,19 +26,20 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.faults import Fault
-from fusesoc_firm.node.status import Status, read_status, read_word, write_word
-from fusesoc_firm.node.status_socket import StatusServer
+from fusesoc_firm.node.status.status import Status, read_status, read_word, write_word
+from fusesoc_firm.node.status.status_socket import StatusServer
+from fusesoc_firm.node.transport.built_simulator import BuiltSimulator, build_simulator
 from fusesoc_firm.node.transport.link_code import LinkDecoder, encode
 from fusesoc_firm.node.transport.simulator import Simulator, SimulatorTransport, Taken
 from fusesoc_firm.node.transport.transport import Transport
-from fusesoc_firm.simulation.simulator import BuiltSimulator, build_simulator
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity
 from tests.node.drivers import compile_c_driver, cpp_driver
+from tests.seeds import seeded
 from tests.system.simulated.systems import DATA
 
 pytestmark = pytest.mark.check
-SEED = 20261123
+SEED = seeded(20261123)
 FRAMES = 200
 MOST_BYTES = 40
 QUEUED = 2

@@ -10,16 +10,17 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node.status import read_status, status_text
+from fusesoc_firm.node.status.status import read_status, status_text
+from fusesoc_firm.node.transport.built_simulator import build_simulator
 from fusesoc_firm.node.transport.link_code import LinkDecoder, encode
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.transport.transport import Burst
-from fusesoc_firm.simulation.simulator import build_simulator
 from tests.node.drivers import compile_c_driver, cpp_driver
 from tests.node.test_status_counters import LINK_FAULT, counted, told
+from tests.seeds import seeded
 
 pytestmark = [pytest.mark.check, pytest.mark.skipif(not shutil.which("verilator"), reason="no verilator")]
-SEED = 20261126
+SEED = seeded(20261126)
 FRAMES = 60
 SPECIFICATION = """\
 project: {name: linked, status: frames, timeStamps: added}

@@ -16,11 +16,11 @@ from uuid import uuid4
 
 import pytest
 
-from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.interface.description import NodeDescription
 from fusesoc_firm.node.node import HardwareListener
 from fusesoc_firm.node.reopening import checked, status_registers
-from fusesoc_firm.node.status import read_status, read_word, write_word
-from fusesoc_firm.node.status_socket import open_status
+from fusesoc_firm.node.status.status import read_status, read_word, write_word
+from fusesoc_firm.node.status.status_socket import open_status
 from fusesoc_firm.node.transport.status_registers import open_registers_at
 from fusesoc_firm.node.transport.transport import Transport, TransportError
 from tests.hdl.ghdl import REPOSITORY
@@ -106,7 +106,7 @@ def node(request: pytest.FixtureRequest, tmp_path: Path) -> list[str | Path]:
     path = tmp_path / "robot_node.py"
     path.write_text(
         "import sys\n"
-        "from fusesoc_firm.node.description import Crossing, NodeDescription\n"
+        "from fusesoc_firm.node.interface.description import Crossing, NodeDescription\n"
         "from fusesoc_firm.node.script import main\n"
         f"description = NodeDescription(sys.argv.pop(1), 8, (), (), ((),), (Crossing('in', 0),), digest='{DIGEST}',\n"
         "    has_status_registers=True)\n"

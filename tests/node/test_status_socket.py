@@ -15,13 +15,13 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.node import status_socket
-from fusesoc_firm.node.description import NodeDescription, describe
+from fusesoc_firm.node.engine.queues import Overflow
+from fusesoc_firm.node.engine.trace import Trace
+from fusesoc_firm.node.interface.description import NodeDescription, describe
 from fusesoc_firm.node.node import NodeSettings
-from fusesoc_firm.node.queues import Overflow
-from fusesoc_firm.node.status import read_status, read_word, write_word
-from fusesoc_firm.node.status_socket import StatusServer, open_status, served_names
-from fusesoc_firm.node.trace import Trace
+from fusesoc_firm.node.status import status_socket
+from fusesoc_firm.node.status.status import read_status, read_word, write_word
+from fusesoc_firm.node.status.status_socket import StatusServer, open_status, served_names
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from fusesoc_firm.system.derived.status import STATUS_ID
 from fusesoc_firm.system.hardware.status import status_map

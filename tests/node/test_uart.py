@@ -18,8 +18,9 @@ from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.transport import Burst, LostFrameError, Transport, TransportError
 from fusesoc_firm.node.transport.uart import UartTransport
 from tests.links import coded
+from tests.seeds import seeded
 
-SEED = 20240722
+SEED = seeded(20240722)
 
 
 class Board:

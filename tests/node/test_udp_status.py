@@ -10,14 +10,15 @@ from collections.abc import Iterator
 
 import pytest
 
-from fusesoc_firm.node.status import read_status, read_word, status_text, write_word
-from fusesoc_firm.node.status_socket import open_status
+from fusesoc_firm.node.status.status import read_status, read_word, status_text, write_word
+from fusesoc_firm.node.status.status_socket import open_status
 from fusesoc_firm.node.transport import udp
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.hardware.status import Part, network_words, status_map
 from fusesoc_firm.system.status_frames import answered, read_request
+from tests.seeds import seeded
 
-SEED = 20261127
+SEED = seeded(20261127)
 WRITE = 1 << 31
 MAP = {register.address: register for register in status_map("board", 1, 1, parts=Part.NETWORK).registers}
 COUNTED = {"network_broken_frames": 7, "subscriber[0].frames": 3}
@@ -91,7 +92,7 @@ def test_a_word_is_written(board: Board) -> None:
 def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
     """A port that does not answer by itself; accesses to it last for a short time."""
     monkeypatch.setattr(udp, "_REPEAT_SECONDS", 0.02)
-    monkeypatch.setattr("fusesoc_firm.node.status._ANSWER_SECONDS", 0.2)
+    monkeypatch.setattr("fusesoc_firm.node.status.status._ANSWER_SECONDS", 0.2)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
         port.bind(("127.0.0.1", 0))
         monkeypatch.setattr(udp, "PORT", port.getsockname()[1])

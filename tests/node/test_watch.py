@@ -10,9 +10,9 @@ import tracemalloc
 
 import pytest
 
-from fusesoc_firm.node.carrier import Taken
-from fusesoc_firm.node.player import Player
-from fusesoc_firm.node.watch import Control, Latency, Percentiles, Waits, Watch
+from fusesoc_firm.node.engine.carrier import Taken
+from fusesoc_firm.node.engine.player import Player
+from fusesoc_firm.node.engine.watch import Control, Latency, Percentiles, Waits, Watch
 
 
 def test_the_record_is_bounded_and_tells_what_is_missing() -> None:

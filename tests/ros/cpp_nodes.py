@@ -22,6 +22,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from random import Random
 from types import TracebackType
@@ -29,6 +30,7 @@ from typing import Any, Self
 
 import pytest
 
+from tests.compilers import compile_program
 from tests.node.drivers import HEADERS
 from tests.processes import IGNORING_INTERRUPTS
 from tests.shared import made_once
@@ -38,8 +40,11 @@ DEBIAN_PYTHON = "/usr/bin/python3"
 # A venv with ROS 2 from wheels.
 ROS2 = Path(os.environ.get("FIRM_ROS2") or Path(sys.prefix) / "ros2")
 _OPTIONS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-pthread"]
-# What all nodes include.
+# What all nodes include, and the code in it that is the same for all.
 _HEADER = "nodes.hpp"
+_INSTANCE = "template int firm::run<firm::Ros{}>(const firm::System&, int, char**);\n"
+_OBJECT = "nodes.o"
+_PROGRAM = "compiled"
 _ROS1_MODULES = ("rospy", "geometry_msgs", "sensor_msgs", "std_msgs")
 _ROS2_LIBRARIES = (
     "rcl",
@@ -64,24 +69,35 @@ class Ros:
 
     def compile(self, package: Path, program: Path | None) -> None:
         """Compile a node's package to `program`, or look only whether it would."""
-        output = ["-fsyntax-only"] if program is None else ["-o", str(program)]
+        output = ["-fsyntax-only"] if program is None else ["-o", _PROGRAM, *self.libraries]
         sources = [str(path) for path in sorted((package / "src").glob("*.cpp"))]
-        libraries = [] if program is None else self.libraries
-        header = made_once(f"ros{self.version}_nodes", self._precompile) / _HEADER
-        self._compile(package / "include", ["-include", str(header), *sources, *output, *libraries])
+
+        def made() -> list[str]:
+            folder = made_once(f"ros{self.version}_nodes", self._precompile)
+            return ["-include", str(folder / _HEADER), *([str(folder / _OBJECT)] if program else [])]
+
+        compile_program([*self._command(package / "include"), *sources, *output], package, made)
+        if program:
+            shutil.move(package / _PROGRAM, program)
 
     def _precompile(self, folder: Path) -> None:
-        """Compile what all nodes include, the longest part of each."""
-        header = folder / _HEADER
-        header.write_text(f"#include <firm/ros{self.version}.hpp>\n#include <firm/ros_node.hpp>\n", encoding="utf-8")
-        self._compile(HEADERS, ["-x", "c++-header", str(header), "-o", f"{header}.gch"])
+        """Compile what all nodes include, the longest part of each: a node itself is a table."""
+        header, source, instance = folder / _HEADER, folder / "nodes.cpp", _INSTANCE.format(self.version)
+        includes = f"#include <firm/ros{self.version}.hpp>\n#include <firm/ros_node.hpp>\n"
+        header.write_text(f"{includes}extern {instance}", encoding="utf-8")
+        source.write_text(instance, encoding="utf-8")
+        for words in (
+            ["-x", "c++-header", str(header), "-o", f"{header}.gch"],
+            ["-include", str(header), "-c", str(source), "-o", str(folder / _OBJECT)],
+        ):
+            done = subprocess.run([*self._command(HEADERS), *words], capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr[-4000:]
 
-    def _compile(self, headers: Path, arguments: Sequence[str]) -> None:
-        command = ["g++", *_OPTIONS, "-I", str(headers), *self.includes, *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr[-4000:]
+    def _command(self, headers: Path) -> list[str]:
+        return ["g++", *_OPTIONS, "-I", str(headers), *self.includes]
 
 
+@cache
 def missing_ros1() -> str:
     """Why there is no ROS 1 here, or nothing."""
     for program in ("g++", "pkg-config", "rosmaster"):
@@ -336,9 +352,7 @@ def roscpp_peer(name: str, *packages: str) -> Path:
         words = ["pkg-config", "--cflags", "--libs", *packages, "roscpp"]
         libraries = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
         source = str(HERE / f"{name}.cpp")
-        subprocess.run(
-            ["g++", "-std=c++17", "-pthread", source, "-o", name, *libraries, "-lboost_thread"], cwd=folder, check=True
-        )
+        compile_program(["g++", "-std=c++17", "-pthread", source, "-o", name, *libraries, "-lboost_thread"], folder)
 
     return made_once(f"roscpp/{name}", make) / name
 

@@ -14,7 +14,7 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.simulation.simulator import build_simulator
+from fusesoc_firm.node.transport.built_simulator import build_simulator
 from tests.node.model_simulator import Gate
 from tests.ros.cpp_nodes import Node, NodeProcess, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import LiveNode

@@ -16,11 +16,12 @@ _PROCESS_OF_FABRIC = 1
 def are_known(name: str, subscribers: Iterable[Any]) -> bool:
     """Whether all publishers of ROS 1 have the node `name` among their connections: they answer before they add it.
 
-    A node in fabric lists no connections.
+    rospy counts a connection before it is made, and again while it repeats an attempt that a node in fabric, which
+    lists no connections, has refused. Only the other side's header tells that it stands.
     """
-    links = [(end.resolved_name, link.endpoint_id) for end in subscribers for link in [*end.impl.connections]]
+    links = [(end.resolved_name, link) for end in subscribers for link in [*end.impl.connections]]
     try:
-        return all(_is_known(name, topic, uri) for topic, uri in links)
+        return all(link.header and _is_known(name, topic, link.endpoint_id) for topic, link in links)
     except OSError:
         return False
 

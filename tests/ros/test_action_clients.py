@@ -19,12 +19,12 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.cli import main
-from tests.replay.goals import what_is_told
 from tests.ros.action_server_peer import HELD, Kind
 from tests.ros.action_simulator import in_ros2
 from tests.ros.cpp_nodes import Client, NodeProcess, Peer, roscpp_peer
 from tests.ros.places import Place, diagnoses, running, versions
 from tests.ros.test_actions import skip_without_actions
+from tests.runs.replay.goals import what_is_told
 
 pytestmark = pytest.mark.check
 

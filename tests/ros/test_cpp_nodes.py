@@ -22,19 +22,20 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.node.cpp_trace import write_ways
-from fusesoc_firm.node.description import describe
-from fusesoc_firm.simulation.simulator import build_simulator
+from fusesoc_firm.node.engine.cpp_trace import write_ways
+from fusesoc_firm.node.interface.description import describe
+from fusesoc_firm.node.transport.built_simulator import build_simulator
 from fusesoc_firm.system.system_core import load_system
 from tests.applications.images import filtered, image, load_model
 from tests.ros.cpp_nodes import Node, Peer, Ros, check_angles, missing_ros, running_ros
+from tests.seeds import seeded
 
 REPOSITORY = Path(__file__).parents[2]
 SPECS = REPOSITORY / "specs"
 ECHO_SIMULATOR = f"pipe:exec {sys.executable} {Path(__file__).with_name('echo_simulator.py')}"
 MODEL_SIMULATOR = REPOSITORY / "tests/node/model_simulator.py"
 APPLICATIONS = ["quat2euler", "image_pipeline", "multi_type", "mobile_robot", "robotic_arm", "sobel"]
-SEED = 20240721
+SEED = seeded(20240721)
 pytestmark = pytest.mark.check
 # A simulator on a machine that does other things, too, comes to rest late.
 PATIENT = ("--drain", "100")

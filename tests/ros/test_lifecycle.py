@@ -19,9 +19,11 @@ from tests.ros.cpp_nodes import Client, Node, NodeProcess, Peer, missing_ros, ru
 from tests.ros.live_nodes import REPOSITORY, LiveNode, model_address
 from tests.ros.places import Place
 from tests.ros.test_services import Camera
+from tests.seeds import seeded
 
 # Nodes of these tests have the same names.
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("lifecycle")]
+_RANDOM = random.Random(seeded(20261128))
 
 SPECIFICATION = """\
 project: {name: robot, width: 64}
@@ -80,7 +82,7 @@ def node_of(place: Place, spec: Path, transport: str, kind: str) -> NodeProcess:
 
 
 def point() -> bytes:
-    return b"\0\1\0\0" + struct.pack("<3d", *(random.random() for _ in range(3)))
+    return b"\0\1\0\0" + struct.pack("<3d", *(_RANDOM.random() for _ in range(3)))
 
 
 @pytest.mark.parametrize("kind", ["live", "python", "cpp"])

@@ -252,7 +252,7 @@ def test_frames_of_all_types_through_a_preemptive_system(place: Place) -> None:
     seed = random.randrange(2**32)
     print(f"seed {seed}")
     source = random.Random(seed)
-    count, window = {1: 1000, 2: 300}[version], 20
+    count, window = 300, 20
     types = {"twist": "geometry_msgs/TwistStamped", "scan": "sensor_msgs/LaserScan", "image": "sensor_msgs/Image"}
     makers = {
         "twist": twist,

@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.simulation.simulator import build_simulator
+from fusesoc_firm.node.transport.built_simulator import build_simulator
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity
 from tests.ros.cpp_nodes import Node, NodeProcess, Peer, Ros

@@ -9,8 +9,9 @@ import pytest
 from tests.ros.cpp_nodes import NodeProcess, missing_ros, running_ros
 from tests.ros.live_nodes import LiveNode, specification
 from tests.ros.resizing import CPU_NODE, resized
+from tests.seeds import seeded
 
-SEED = 20261126
+SEED = seeded(20261126)
 
 pytestmark = [
     pytest.mark.check,

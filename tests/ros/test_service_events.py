@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.replay.test_calls import HASH, TOPIC, replay_calls, write_events
 from tests.ros.cpp_nodes import missing_ros, ros2
+from tests.runs.replay.test_calls import HASH, TOPIC, replay_calls, write_events
 
 CALLS = 20
 

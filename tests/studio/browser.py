@@ -7,11 +7,14 @@ import base64
 import json
 import shutil
 import subprocess
+import tempfile
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import aiohttp
 
@@ -24,9 +27,13 @@ _CONTROL, _SHIFT = 2, 8
 
 
 class Page:
-    """A page of the browser; `trouble` collects its errors and what its policy has refused."""
+    """A page of the browser; `trouble` collects its errors and what its policy has refused.
 
-    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+    `context` is the browser's name of its cookies and storage.
+    """
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse, context: str = "") -> None:
+        self.context = context
         self._socket = socket
         self._count = 0
         self._answers: dict[int, asyncio.Future[Any]] = {}
@@ -140,28 +147,59 @@ class Page:
                 self.trouble.append(json.dumps(parameters))
 
 
+class Browser:
+    """A running browser, whose profile is in a folder; within a `with`, after which both are gone."""
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        assert PROGRAM
+        command = [PROGRAM, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+        command += ["--remote-debugging-port=0", f"--user-data-dir={folder}", *options, "about:blank"]
+        self._folder = folder
+        self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self._port = folder / "DevToolsActivePort"
+
+    @asynccontextmanager
+    async def opened(self, address: str) -> AsyncIterator[Page]:
+        """A page that has cookies and storage of its own."""
+        end = time.monotonic() + _SECONDS
+        while not (self._port.exists() and self._port.read_text().count("\n")):
+            assert self._process.poll() is None, "the browser ended"
+            assert time.monotonic() < end, "the browser did not start"
+            await asyncio.sleep(0.1)
+        port, path = self._port.read_text().split()
+        base = f"ws://127.0.0.1:{port}"
+        async with aiohttp.ClientSession() as session, session.ws_connect(base + path) as own:
+            browser = Page(own)
+            context = (await browser.call("Target.createBrowserContext"))["browserContextId"]
+            try:
+                target = await browser.call("Target.createTarget", url="about:blank", browserContextId=context)
+                async with session.ws_connect(f"{base}/devtools/page/{target['targetId']}", max_msg_size=0) as socket:
+                    page = Page(socket, context)
+                    await page.open(address)
+                    yield page
+            finally:
+                await browser.call("Target.disposeBrowserContext", browserContextId=context)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.wait()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+@cache
+def shared_browser() -> Browser:
+    """The browser of the tests of a process, at whose end tests/studio/conftest.py ends it."""
+    return Browser(Path(tempfile.mkdtemp(prefix="firm_browser_")))
+
+
 @asynccontextmanager
 async def opened(address: str, folder: Path, *options: str) -> AsyncIterator[Page]:
     """A page in a browser of its own, whose profile is in a folder."""
-    assert PROGRAM
-    command = [PROGRAM, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-    command += ["--remote-debugging-port=0", f"--user-data-dir={folder}", *options, "about:blank"]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        port = folder / "DevToolsActivePort"
-        end = time.monotonic() + _SECONDS
-        while not (port.exists() and port.read_text().count("\n")):
-            assert process.poll() is None, "the browser ended"
-            assert time.monotonic() < end, "the browser did not start"
-            await asyncio.sleep(0.1)
-        base = f"http://127.0.0.1:{port.read_text().split()[0]}"
-        async with aiohttp.ClientSession() as session:
-            async with session.get(f"{base}/json") as answer:
-                target = next(item for item in await answer.json() if item["type"] == "page")
-            async with session.ws_connect(target["webSocketDebuggerUrl"], max_msg_size=0) as socket:
-                page = Page(socket)
-                await page.open(address)
-                yield page
-    finally:
-        process.kill()
-        process.wait()
+    with Browser(folder, *options) as browser:
+        async with browser.opened(address) as page:
+            yield page

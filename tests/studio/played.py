@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.simulation.simulator import BuiltSimulator
+from fusesoc_firm.node.transport.built_simulator import BuiltSimulator
 from fusesoc_firm.text.diagnostics import fail
 from tests.node import model_simulator
 

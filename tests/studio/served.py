@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from fusesoc_firm.request.request import no_core_folders
-from fusesoc_firm.simulation.simulator import build_simulator
-from fusesoc_firm.studio.run import Build
+from fusesoc_firm.core.request import no_core_folders
+from fusesoc_firm.node.transport.built_simulator import build_simulator
+from fusesoc_firm.studio.page_run import Build
 from fusesoc_firm.studio.server import Studio
 from fusesoc_firm.studio.workspace import Tools
 from fusesoc_firm.system.message_sources import MessageSources, known_names, load_beside

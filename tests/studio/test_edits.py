@@ -15,12 +15,13 @@ import yaml
 from fusesoc_firm.studio.edits import edited
 from fusesoc_firm.text.yaml_edit import EditError
 from tests.random_systems import random_system
+from tests.seeds import seeded
 
-SEED = 20261124
+SEED = seeded(20261124)
 SPECS = sorted(
     path
     for path in (Path(__file__).parents[2] / "specs").glob("*/*.yaml")
-    if "blocks" in (yaml.safe_load(path.read_text(encoding="utf-8")) or ())
+    if "\nblocks:" in path.read_text(encoding="utf-8")
 )
 
 
@@ -92,6 +93,7 @@ def check_all_edits(text: str, source: random.Random) -> set[str]:
     return seen
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
 def test_edits_of_the_shipped_specifications(path: Path) -> None:
     print(f"seed {SEED}")

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.simulation.simulator import build_simulator
-from tests.studio.browser import PROGRAM, Page, opened
+from fusesoc_firm.node.transport.built_simulator import build_simulator
+from tests.studio.browser import PROGRAM, Page, shared_browser
 from tests.studio.served import served
 from tests.studio.test_page import ROOM, block
 from tests.studio.test_watching import STATE, press
@@ -114,7 +114,7 @@ def test_a_system_is_begun_extended_run_and_measured(tmp_path: Path) -> None:
         assert after == before + 1
 
     async def all_steps(address: str) -> None:
-        async with opened(address, tmp_path / "profile") as page:
+        async with shared_browser().opened(address) as page:
             try:
                 await steps(page)
             finally:

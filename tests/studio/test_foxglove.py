@@ -15,10 +15,10 @@ from typing import Any
 import aiohttp
 import pytest
 
-from fusesoc_firm.node.watch import Control
-from fusesoc_firm.studio.run import Run
-from tests.replay.replays import load as load_replayed
-from tests.replay.replays import passing, payload, specification
+from fusesoc_firm.node.engine.watch import Control
+from fusesoc_firm.studio.page_run import Run
+from tests.runs.replay.replays import load as load_replayed
+from tests.runs.replay.replays import passing, payload, specification
 from tests.studio.played import HOSTILE, IMAGE, modelled, write_system
 from tests.studio.served import load, served
 from tests.studio.test_live import begin, until

@@ -20,11 +20,11 @@ import pytest
 from matplotlib import image as pictures
 
 from fusesoc_firm.frame.codec import encode
-from fusesoc_firm.node.watch import Control, Latency, Load, Seen, Waits, Watch
-from fusesoc_firm.studio import run
+from fusesoc_firm.node.engine.watch import Control, Latency, Load, Seen, Waits, Watch
+from fusesoc_firm.studio import page_run
 from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
+from fusesoc_firm.studio.page_run import Run
 from fusesoc_firm.studio.reports import Reports
-from fusesoc_firm.studio.run import Run
 from fusesoc_firm.studio.server import Studio
 from tests.studio.played import HOSTILE, TYPES, WAITS, modelled, write_service, write_system
 from tests.studio.served import load, served
@@ -300,12 +300,12 @@ def test_a_run_that_cannot_begin_says_why(studio: Studio, spec: Path) -> None:
 
 
 def test_a_run_waits_for_slow_hardware_until_it_is_stopped(spec: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "_STOP_SECONDS", 0.1)
+    monkeypatch.setattr(page_run, "_STOP_SECONDS", 0.1)
     with served(spec, modelled("--fault=hang", "--at=2")) as studio:
         begin(studio)
         until(studio, lambda now: now["last"] >= 3)
         # A run of hardware that reports rest would end in this silence; hung hardware never does.
-        time.sleep(5 * run._SETTLE_SECONDS)
+        time.sleep(5 * page_run._SETTLE_SECONDS)
         assert until(studio, lambda _: True)["run"]["state"] == "running"
         control(studio, "stop")
         until(studio, lambda now: now["run"]["state"] == "ended")
@@ -313,7 +313,7 @@ def test_a_run_waits_for_slow_hardware_until_it_is_stopped(spec: Path, monkeypat
 
 def test_a_run_whose_queue_is_full_can_be_stopped(spec: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The player waits for room in a queue, and hung hardware takes no more messages."""
-    monkeypatch.setattr(run, "_STOP_SECONDS", 0.1)
+    monkeypatch.setattr(page_run, "_STOP_SECONDS", 0.1)
     with served(spec, modelled("--fault=hang", "--at=2")) as studio:
         begin(studio, isEndless=True)
         until(studio, lambda now: any(load["waiting"] == load["capacity"] for load in now.get("loads", {}).values()))
@@ -326,7 +326,7 @@ def timers() -> list[threading.Timer]:
 
 
 def test_the_limit_of_a_stop_ends_with_the_run(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "_STOP_SECONDS", 600)
+    monkeypatch.setattr(page_run, "_STOP_SECONDS", 600)
     others = timers()
     begin(studio, isEndless=True)
     until(studio, lambda now: now["run"] and now["last"] > 5)

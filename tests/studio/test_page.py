@@ -19,7 +19,7 @@ from matplotlib import image as pictures
 import fusesoc_firm.studio
 from fusesoc_firm.studio import evaluation
 from fusesoc_firm.studio.resources import Tell
-from tests.studio.browser import PROGRAM, Page, opened
+from tests.studio.browser import PROGRAM, Page, shared_browser
 from tests.studio.played import write_service
 from tests.studio.served import served
 
@@ -83,11 +83,11 @@ def view(name: str) -> str:
     return f"[...document.querySelectorAll('.text > [role=group] button')].find(item => item.textContent === '{name}')"
 
 
-def run(place: Path, folder: Path, steps: Callable[[Page], Awaitable[None]], *options: str) -> None:
+def run(place: Path, folder: Path, steps: Callable[[Page], Awaitable[None]]) -> None:
     """Open the page of a place, and do the steps there; nothing may have gone wrong in the page."""
 
     async def all_steps(address: str) -> None:
-        async with opened(address, folder / "profile", *options) as page:
+        async with shared_browser().opened(address) as page:
             await page.until("document.querySelectorAll('.svelte-flow__node').length > 2")
             try:
                 await steps(page)
@@ -475,7 +475,8 @@ def test_resources_are_shown_as_they_come(
 
 async def saved(page: Page, place: Path, name: str) -> tuple[ET.Element, Path]:
     """Save the picture in both forms: the root of the SVG, and the PNG."""
-    await page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(place))
+    allowed = {"behavior": "allow", "downloadPath": str(place), "browserContextId": page.context}
+    await page.call("Browser.setDownloadBehavior", **allowed)
     for form in "SVG", "PNG":
         found = f"[...document.querySelectorAll('header button')].find(button => button.textContent === '{form}')"
         await page.evaluate(f"{found}.click()")

@@ -15,7 +15,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.simulation.simulator import build_simulator
+from fusesoc_firm.node.transport.built_simulator import build_simulator
 from fusesoc_firm.studio.byte_map import byte_map
 from fusesoc_firm.studio.server import Studio
 from fusesoc_firm.system.system_core import artifacts

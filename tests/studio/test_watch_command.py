@@ -14,7 +14,7 @@ from urllib.request import Request, urlopen
 import aiohttp
 import pytest
 
-from tests.replay.replays import passing, points, read, specification, write
+from tests.runs.replay.replays import passing, points, read, specification, write
 
 
 @pytest.mark.check

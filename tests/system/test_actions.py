@@ -10,7 +10,7 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.node.description import describe
+from fusesoc_firm.node.interface.description import describe
 from fusesoc_firm.system.derived.model import Action, ServiceEnd
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.system.views.show import derived_description

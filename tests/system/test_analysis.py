@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.message import ROS1, ROS2
-from fusesoc_firm.request.request import Request
 from fusesoc_firm.system.system_core import load_requested, load_system
 from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import InputError

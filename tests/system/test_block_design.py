@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.request.request import GeneratedFile, Request
+from fusesoc_firm.core.request import GeneratedFile, Request
 from fusesoc_firm.system.system_core import load_requested, system_core
 from fusesoc_firm.text.diagnostics import InputError
 

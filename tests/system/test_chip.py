@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.fabric.ros1 import node_of
 from fusesoc_firm.message.library import libraries
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.request import Request
 from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.text.diagnostics import InputError
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.request.request import Request
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.system import system_core
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.text.diagnostics import InputError

@@ -17,6 +17,7 @@ def test_every_demo_system_is_an_example() -> None:
     assert examples(demos_root()) == sorted(path.name for path in demos_root().iterdir() if path.is_dir())
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("example", examples(demos_root()))
 def test_a_copy_is_a_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured, example: str) -> None:
     monkeypatch.chdir(tmp_path)

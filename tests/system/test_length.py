@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.request.request import GeneratedCore, Request
+from fusesoc_firm.core.request import GeneratedCore, Request
 from fusesoc_firm.system import system_core
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.configuration import system_configuration

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.request import Request
+from fusesoc_firm.core.request import Request
 from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.system.hardware.status import Part, network_words, status_map
 from fusesoc_firm.text.diagnostics import InputError

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.builds.call.calls import make_request
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.calls import make_request
-from fusesoc_firm.request.request import GeneratorCall
-from fusesoc_firm.simulation.simulator import CoreSources, _write_core
+from fusesoc_firm.core.request import GeneratorCall
+from fusesoc_firm.node.transport.built_simulator import CoreSources, _write_core
 from tests.message.test_bag_definitions import record
 
 SPEC = """\

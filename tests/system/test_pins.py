@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.simulation.environment import environment_files
+from fusesoc_firm.runs.simulation.environment import environment_files
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.configuration import system_configuration
 from fusesoc_firm.system.hardware.configuration import test_bench_configuration as bench_configuration

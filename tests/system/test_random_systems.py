@@ -11,9 +11,10 @@ import yaml
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.system.system_core import load_system
 from tests.random_systems import random_system
+from tests.seeds import seeded
 from tests.system.systems import LIBRARIES
 
-SEED = 20241122
+SEED = seeded(20241122)
 LARGEST = 60
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.node.description import NodeDescription, describe
-from fusesoc_firm.simulation.stimuli import read_stimuli
+from fusesoc_firm.node.interface.description import NodeDescription, describe
+from fusesoc_firm.runs.simulation.stimuli import read_stimuli
 from fusesoc_firm.system.derived.model import DerivedSystem, Service, ServiceEnd
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.system.views.show import derived_description

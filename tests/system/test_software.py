@@ -18,6 +18,7 @@ from fusesoc_firm.system.views.diagram import diagram
 from fusesoc_firm.system.views.report import report
 from fusesoc_firm.system.views.show import derived_description
 from fusesoc_firm.text.diagnostics import InputError
+from tests.seeds import seeded
 from tests.system.systems import (
     LIBRARIES,
     accelerator,
@@ -30,7 +31,7 @@ from tests.system.systems import (
     specification,
 )
 
-SEED = 20240801
+SEED = seeded(20240801)
 IMAGE = "sensor_msgs/Image"
 
 

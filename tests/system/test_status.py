@@ -8,11 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from systemrdl.node import FieldNode
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.system.derived.model import StatusAccess
 from fusesoc_firm.system.derived.status import status_of
-from fusesoc_firm.system.hardware.registers import register_map
+from fusesoc_firm.system.hardware.registers import compiled, register_map
 from fusesoc_firm.system.hardware.status import identity_of, status_map
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity, status_text
@@ -73,6 +74,13 @@ def test_the_files_of_the_registers(tmp_path: Path, capsys: pytest.CaptureFixtur
     text = (tmp_path / "made" / "quat2euler_status.rdl").read_text()
     assert text == status_text(load_beside(spec, [], None, needs_sources=False))
     assert register_map(text).by_name["publisher[0].longest_wait"].address == 0x8078
+    writes = {
+        node.get_path(): onwrite.name
+        for node in compiled(tmp_path / "made" / "quat2euler_status.rdl").descendants()
+        if isinstance(node, FieldNode) and (onwrite := node.get_property("onwrite"))
+    }
+    cleared = ("frame_error", "id_error", "link_error", "lost")
+    assert writes == {f"quat2euler_status.interrupt.{name}": "woclr" for name in cleared}
     program = '#include "quat2euler_status.h"\n#include <stddef.h>\n'
     program += '_Static_assert(offsetof(quat2euler_status_t, publisher[0].longest_wait) == 0x8078, "place");\n'
     (tmp_path / "made" / "use.c").write_text(program)

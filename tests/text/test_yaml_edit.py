@@ -11,8 +11,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from fusesoc_firm.text.yaml_edit import EditError, insert, put, remove, word
+from tests.seeds import seeded
 
-SEED = 20261124
+SEED = seeded(20261124)
 DOCUMENT = """\
 # A system.
 project: {name: arm, width: 64}   # one line

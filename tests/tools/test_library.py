@@ -9,13 +9,12 @@ import sys
 import tomllib
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import pytest
-import yaml
 
 from fusesoc_firm import __version__
 from fusesoc_firm.tools.library_path import library_root
+from tests.hdl.ghdl import core_description
 
 ROOT = Path(__file__).resolve().parents[2]
 GENERATORS = "robot:firm:generators"
@@ -24,16 +23,11 @@ LICENSE = "Apache-2.0"
 _OURS = re.compile(r"[^\s('\"]*robot:\w+:\w+[^\s)'\"]*")
 
 
-def read_core(path: Path) -> dict[str, Any]:
-    core: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
-    return core
-
-
 CORES = {
     core["name"].rpartition(":")[0]: core
     for room in ("cores", "generators", "specs")
     for path in sorted((ROOT / room).rglob("*.core"))
-    for core in [read_core(path)]
+    for core in [core_description(path)]
 }
 
 

@@ -24,8 +24,8 @@ from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.system.derived.model import Host, Network
-from tests.bench.model import compiled
 from tests.hdl.ghdl import core_files
+from tests.hdl.verilator import compiled
 from tests.hdl.verilog import netlist
 from tests.shared import made_once
 from tests.wiznet.sequencer import ABORTED, ACCESSES, LAST, Sequencer
@@ -34,6 +34,7 @@ HERE = Path(__file__).parent
 *_HARDWARE, _LINK = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
 _IDLE_BYTES = 5  # of a turn without news
+_IDLE_SECONDS = 0.002
 _LONGEST_SECONDS = 60
 # More at once is not the board's time, but the machine's. The bench plays them during the header of an SPI frame.
 _MOST_MS = 5
@@ -181,7 +182,7 @@ def interpreted(board: Node, chip_number: int, manager: Manager, model: W5200 | 
             sequencer.turn()
             running.turns.append(access.bytes - before)
             if running.turns[-1] <= _IDLE_BYTES:
-                chip.poll(0.002)
+                chip.poll(_IDLE_SECONDS)
             while sequencer.given:
                 sequencer.offered.extend(manager.take(*sequencer.given.popleft()))
             sequencer.offered.extend(running.offered())
@@ -219,6 +220,11 @@ class Frame:
     offered: list[int]
     sent: bytearray = field(default_factory=bytearray)
     answered: bytearray = field(default_factory=bytearray)
+
+
+def _is_idle(before: Frame, frame: Frame) -> bool:
+    """Whether a turn was as the one before it, and nothing came in between: the next one may come later."""
+    return not frame.offered and (before.sent, before.answered) == (frame.sent, frame.answered)
 
 
 def hardware(chip_number: int) -> Path:
@@ -283,6 +289,8 @@ def clocked(
                         chip.take(log[-1].sent[-1])
                     case b"d":
                         chip.deselect()
+                        if len(log) > 1 and not answers and _is_idle(*log[-2:]):
+                            chip.poll(_IDLE_SECONDS)
                     case b"g" | b"l" as mark:
                         answers += manager.take(process.stdout.read(1)[0], mark == b"l")
                     case other:

@@ -16,10 +16,11 @@ from typing import Any
 from fusesoc_firm.fabric.ros1 import Node, Server
 from fusesoc_firm.system.derived.model import Host
 from tests.ros.cpp_nodes import DEBIAN_PYTHON
+from tests.seeds import seeded
 from tests.wiznet.peers import free_port
 from tests.wiznet.ros1 import Board, Manager, Stalls, clocked, endpoint, interpreted, node
 
-_SEED = 20261126  # of the stalls
+_SEED = seeded(20261126)  # of the stalls
 # Services of the running node: one that has time, and one of which the hardware must answer soon.
 ASK = Server("/ask", "std_srvs/Ask", 32 * "a", 2, 2, 100)
 SOON = Server("/ask/soon", "std_srvs/Ask", 32 * "a", 3, 3, 1)

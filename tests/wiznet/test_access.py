@@ -16,11 +16,12 @@ from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.fabric.wiznet.spi import Slave
 from fusesoc_firm.fabric.wiznet.w5200 import W5200
 from fusesoc_firm.fabric.wiznet.w5500 import W5500
-from tests.bench.model import compiled
 from tests.hdl.ghdl import Generic, Library, core_files
+from tests.hdl.verilator import compiled
 from tests.hdl.verilog import loops, netlist
+from tests.seeds import seeded
 
-SEED = 20261126
+SEED = seeded(20261126)
 HERE = Path(__file__).parent
 HARDWARE = core_files("cdc/sync", "net/wiznet")
 BUFFER = 2048  # bytes of each buffer

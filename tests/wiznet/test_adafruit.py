@@ -14,10 +14,11 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.fabric.wiznet.w5500 import W5500
+from tests.seeds import seeded
 from tests.wiznet.adafruit import driver
 from tests.wiznet.peers import echo, free_port
 
-SEED = 20261126
+SEED = seeded(20261126)
 LOOPBACK = (bytes([127, 0, 0, 1]), bytes([255, 0, 0, 0]), bytes(4), bytes(4))
 ESTABLISHED, CLOSE_WAIT, CLOSED = 0x17, 0x1C, 0x00
 DISCON, TIMEOUT = 0x02, 0x08

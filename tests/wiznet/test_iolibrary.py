@@ -20,9 +20,10 @@ import pytest
 from fusesoc_firm.fabric.wiznet.chip import Chip, Status
 from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.fabric.wiznet.spi import exchange
+from tests.seeds import seeded
 from tests.wiznet.peers import echo, free_port
 
-SEED = 20261126
+SEED = seeded(20261126)
 FOLDER = os.environ.get("IOLIBRARY", "")
 TCP, NO_FLAG = 1, 0
 SOCKERR_SOCKCLOSED, SOCKERR_TIMEOUT = -4, -13

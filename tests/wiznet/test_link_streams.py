@@ -9,8 +9,9 @@ import pytest
 
 from fusesoc_firm.fabric.sequencer import Assembler, Rom
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
-SEED = 20261126
+SEED = seeded(20261126)
 END, DAMAGED = 0xFF, 0xEE
 # Gives what it takes. A frame ends with END; the last byte of an aborted one becomes DAMAGED.
 PROGRAM = f"""\

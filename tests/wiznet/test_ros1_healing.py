@@ -15,10 +15,11 @@ from fusesoc_firm.fabric.wiznet.chip import TX_FREE, ChipSocket, Status
 from fusesoc_firm.fabric.wiznet.chips import MODELS
 from fusesoc_firm.fabric.wiznet.w5200 import W5200
 from fusesoc_firm.fabric.wiznet.w5500 import W5500
+from tests.seeds import seeded
 from tests.wiznet.ros1 import Board, Manager, endpoint, framed, interpreted, node
 from tests.wiznet.ros1_peers import LONGEST_SECONDS, header, header_of, read
 
-SEED = 20261127
+SEED = seeded(20261127)
 PLACE = endpoint("/place", "geometry_msgs", "Point")
 MS = 64  # of the sequencer's unit of time
 # Of times that the board counts while it does something else.

@@ -25,13 +25,14 @@ from fusesoc_firm.fabric.wiznet.chip import Status
 from fusesoc_firm.fabric.wiznet.chips import MODELS
 from tests.ros.cpp_nodes import Ros, missing_ros1, ros1
 from tests.ros.live_nodes import paced
+from tests.seeds import seeded
 from tests.wiznet.peers import free_port
 from tests.wiznet.ros1 import Board, Frame, Manager, Stalls, clocked, endpoint, framed, hardware, interpreted, node
 from tests.wiznet.ros1_peers import LONGEST_SECONDS, Running, header, header_of, read
 from tests.wiznet.sequencer import ACCESSES, Sequencer
 from tests.wiznet.test_ros1_frames import Publisher
 
-SEED = 20261126
+SEED = seeded(20261126)
 HERE = Path(__file__).parent
 ROS = HERE.parent / "ros"
 TURN, PLACE = endpoint("/turn", "geometry_msgs", "Quaternion"), endpoint("/place", "geometry_msgs", "Point")

@@ -13,10 +13,11 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.fabric.wiznet.chips import MODELS
+from tests.seeds import seeded
 from tests.wiznet.ros1 import framed, hardware
 from tests.wiznet.ros1_peers import Running, header, header_of, pause, read, running_node
 
-SEED = 20261126
+SEED = seeded(20261126)
 HARDWARE = 5500
 QUATERNION = "a779879fadf0160734f906b8c19c7004"
 POINT = "4a842b65f413084dc2b10fb484ea7f17"

@@ -22,6 +22,7 @@ from fusesoc_firm.frame.codec import decode, encode
 from tests.ros.camera.model import respond
 from tests.ros.cpp_nodes import Client, Ros, missing_ros1, ros1, roscpp_peer
 from tests.ros.service_simulator import frames
+from tests.seeds import seeded
 from tests.wiznet.ros1 import Board, Manager, Stalls, clocked, framed, hardware, interpreted, node
 from tests.wiznet.ros1_peers import (
     ASK,
@@ -35,7 +36,7 @@ from tests.wiznet.ros1_peers import (
     service_sum,
 )
 
-SEED = 20261127
+SEED = seeded(20261127)
 HARDWARE = 5500
 BUFFER = 2048
 FAILURE = b"the hardware did not answer"

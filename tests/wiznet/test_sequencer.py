@@ -7,9 +7,10 @@ import random
 import pytest
 
 from fusesoc_firm.fabric.sequencer import MEMORY_BYTES, Assembler, AssemblyError, Operation, Rom
+from tests.seeds import seeded
 from tests.wiznet.sequencer import Sequencer
 
-SEED = 20261126
+SEED = seeded(20261126)
 
 
 class _NoChip:

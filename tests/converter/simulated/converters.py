@@ -32,7 +32,8 @@ from fusesoc_firm.text.render import render
 from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD
 from tests.hdl.frames import write_expected, write_stimulus
-from tests.hdl.ghdl import Generic, Library, RunResult, core_files
+from tests.hdl.ghdl import Generic, Library, core_files
+from tests.recall import RunResult
 
 SUBSCRIBER = 1
 PUBLISHER = 2

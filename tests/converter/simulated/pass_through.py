@@ -16,9 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import Stimuli, kinds
+from fusesoc_firm.runs.verify.stimuli import Stimuli, kinds
 from tests.frame.oracle import Oracle
-from tests.replay.replays import Item, read, write
+from tests.runs.replay.replays import Item, read, write
 
 _STORES = {"noetic": Stores.ROS1_NOETIC, "humble": Stores.ROS2_HUMBLE}
 # A subscriber and a publisher do without a pause.

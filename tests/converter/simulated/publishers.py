@@ -30,11 +30,12 @@ from fusesoc_firm.frame.values import leaf_of, part_of, units_of
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.runs.verify.stimuli import EMPTY, EXTREME, TYPICAL, Stimuli
 from fusesoc_firm.text.render import render
-from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL, Stimuli
 from tests.frame.oracle import Oracle
 from tests.frame.variable_samples import PACKAGE, VARIABLE
-from tests.hdl.ghdl import Generic, Library, RunResult, core_files
+from tests.hdl.ghdl import Generic, Library, core_files
+from tests.recall import RunResult
 
 HERE = Path(__file__).parent
 ID = 0xA5

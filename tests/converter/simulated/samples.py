@@ -12,7 +12,7 @@ from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import KINDS, TYPICAL, Stimuli
+from fusesoc_firm.runs.verify.stimuli import KINDS, TYPICAL, Stimuli
 from tests.converter.simulated.subscribers import LENGTH_BYTES, Subscriber
 from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD_VARIABLE

@@ -14,8 +14,9 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from tests.converter.simulated.samples import ORACLES, case, framed, typical
 from tests.converter.simulated.subscribers import LENGTH_BYTES, Beat, SubscriberBench
+from tests.seeds import seeded
 
-SEED = 20261123
+SEED = seeded(20261123)
 # At 8 bits, every beat holds its byte.
 WIDTHS = (16, 32, 64, 128, 256, 512)
 TYPES = [

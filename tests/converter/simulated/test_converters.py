@@ -15,8 +15,9 @@ from tests.converter.simulated.converters import PUBLISHER, ConverterBench, Sent
 from tests.converter.simulated.samples import case
 from tests.frame.samples import AWKWARD
 from tests.hdl.frames import traffic
+from tests.seeds import seeded
 
-SEED = 20240602
+SEED = seeded(20240602)
 
 _FROM_DISTRIBUTIONS = {
     ROS1: """
@@ -204,7 +205,7 @@ def test_they_are_latch_free(bench: ConverterBench, ros: Middleware, name: str, 
         assert pair.library.latches(entity) == []
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize(("ros", "name", "width"), NETLISTS)
 def test_the_netlist_does_the_same(tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     """The bench with what `ghdl --synth` made of both converters in their place."""

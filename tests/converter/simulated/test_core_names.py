@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.plugin.generators import GENERATORS
-from fusesoc_firm.request.calls import make_request
-from fusesoc_firm.request.request import GeneratorCall
+from fusesoc_firm.builds.call.calls import make_request
+from fusesoc_firm.builds.call.generators import GENERATORS
+from fusesoc_firm.core.request import GeneratorCall
 from tests.hdl.ghdl import REPOSITORY, core_files
 
 MESSAGE = "geometry_msgs/Point"

@@ -12,10 +12,11 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from tests.bench.payloads import Payloads
 from tests.converter.simulated.subscribers import LENGTH_BYTES, SubscriberBench
+from tests.payloads import Payloads
+from tests.seeds import seeded
 
-SEED = 20261123
+SEED = seeded(20261123)
 # 32 steps at 8 and 16 bits: of the 128 entries of a table, those of the last steps are the highest 32.
 MESSAGE = "sensor_msgs/JointState"
 

@@ -12,8 +12,9 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from tests.converter.simulated.samples import ORACLES, case, framed, typical
 from tests.converter.simulated.subscribers import SubscriberBench
+from tests.seeds import seeded
 
-SEED = 20261124
+SEED = seeded(20261124)
 LIE = 2**32 - 1
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
 TYPES = [

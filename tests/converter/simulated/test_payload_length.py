@@ -23,12 +23,13 @@ from fusesoc_firm.frame.values import part_of, units_of
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.runs.verify.stimuli import KINDS, Stimuli
 from fusesoc_firm.text.render import render
-from fusesoc_firm.verify.stimuli import KINDS, Stimuli
 from tests.frame.oracle import Oracle
 from tests.hdl.ghdl import Library
+from tests.seeds import seeded
 
-SEED = 20240611
+SEED = seeded(20240611)
 VALUES_OF_A_KIND = 8
 
 PACKAGE = "length_msgs"

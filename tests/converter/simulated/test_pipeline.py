@@ -16,12 +16,13 @@ from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import TYPICAL
+from fusesoc_firm.runs.verify.stimuli import TYPICAL
 from tests.converter.simulated.samples import ORACLES, case, exchanged, framed, serialise, stimuli
 from tests.converter.simulated.subscribers import SubscriberBench
 from tests.converter.simulated.test_variable_converters import codes, outcomes, troubled, verdict
+from tests.seeds import seeded
 
-SEED = 20261123
+SEED = seeded(20261123)
 CASES = [
     case(ROS2, "awkward_msgs/Deep", 64),
     case(ROS1, "diagnostic_msgs/DiagnosticArray", 8),

@@ -17,8 +17,9 @@ from tests.converter.simulated.converters import EVERYTHING, ConverterBench, Sel
 from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD
 from tests.hdl.frames import traffic
+from tests.seeds import seeded
 
-SEED = 20240603
+SEED = seeded(20240603)
 
 _DEFAULTS = {
     "x": 1.5,

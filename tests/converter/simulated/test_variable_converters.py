@@ -16,12 +16,13 @@ from fusesoc_firm.frame.select import select
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import KINDS, TYPICAL
+from fusesoc_firm.runs.verify.stimuli import KINDS, TYPICAL
 from tests.converter.simulated.samples import ORACLES, case, exchanged, framed, serialise, stimuli
 from tests.converter.simulated.subscribers import LENGTH_BYTES, Subscriber, SubscriberBench
 from tests.frame.samples import AWKWARD_VARIABLE
+from tests.seeds import seeded
 
-SEED = 20240711
+SEED = seeded(20240711)
 
 _FROM_DISTRIBUTIONS = {
     ROS1: """

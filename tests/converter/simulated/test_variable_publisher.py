@@ -20,14 +20,15 @@ from fusesoc_firm.converter.variable_publisher import (
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.runs.verify.stimuli import EMPTY, EXTREME, TYPICAL
 from fusesoc_firm.text.render import render
-from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL
 from tests.converter.simulated.publishers import ID, SHORT, Publisher, PublisherBench
 from tests.converter.simulated.samples import case
 from tests.frame.variable_samples import PACKAGE, VARIABLE
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 
-SEED = 20240607
+SEED = seeded(20240607)
 
 _FROM_DISTRIBUTIONS = {
     ROS1: """

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.request.request import GeneratedCore, Plain, Request
-from fusesoc_firm.simulation import simulation_core
+from fusesoc_firm.core.request import GeneratedCore, Plain, Request
+from fusesoc_firm.runs.simulation import simulation_core
 from fusesoc_firm.system import system_core
 from tests.cores.schedulers import POLICY_CORES
-from tests.hdl.ghdl import Generic, Library, RunResult, core_files
+from tests.hdl.ghdl import Generic, Library, core_files
+from tests.recall import RunResult
 
 DATA = Path(__file__).parent / "data"
 RUNTIME = (

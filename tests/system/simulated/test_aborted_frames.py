@@ -10,9 +10,10 @@ import yaml
 
 from fusesoc_firm.frame.codec import pack_frame
 from tests.hdl.frames import write_stimulus
+from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
-SEED = 20261126
+SEED = seeded(20261126)
 POINT, VECTOR, TEXT = 0, 1, 2
 COUNT = 150
 # Half a payload is enough for the publisher of the text to begin its frame.

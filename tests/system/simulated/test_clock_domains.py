@@ -18,6 +18,7 @@ from fusesoc_firm.system.system_core import load_system
 from tests.applications.images import Message, copied, fed, image, odd_images, random_images
 from tests.cores.crossing_paths import Domains, unsynchronised
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 from tests.system.simulated.systems import DATA, GeneratedSystem, build, call
 from tests.system.simulated.test_variable_system import (
     ALL,
@@ -31,7 +32,7 @@ from tests.system.simulated.test_variable_system import (
 )
 from tests.system.systems import LIBRARIES
 
-SEED = 20240921
+SEED = seeded(20240921)
 # Of clk and of another clock; no edge of one has a fixed place in the other's period (firm_sim_clock).
 CLOCKS = [("100 MHz", "11 MHz"), ("100 MHz", "97 MHz"), ("50 MHz", "333.3 MHz")]
 SAME = "the system's"

@@ -9,11 +9,12 @@ import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.message import ROS2
-from tests.bench.payloads import Payloads
 from tests.hdl.frames import traffic, write_stimulus
+from tests.payloads import Payloads
+from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
-SEED = 20261123
+SEED = seeded(20261123)
 LIE = (2**32 - 1).to_bytes(4, "little")
 ID_BYTES, LENGTH_BYTES = 1, 4
 # Cycles that a lie may cost beside its beats.

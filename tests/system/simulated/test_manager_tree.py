@@ -13,9 +13,10 @@ from fusesoc_firm.system.derived.tree import groups_by_period
 from fusesoc_firm.system.hardware.status import status_map
 from fusesoc_firm.system.status_frames import read_request, status_answer
 from tests.hdl.frames import traffic, write_expected, write_stimulus
+from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
-SEED = 20261123
+SEED = seeded(20261123)
 # Ids that no subscriber has, with a byte of the status id.
 UNKNOWN = (0x00FF, 0xFF00, 0x01FF, 0xFFFE)
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.converter.pipeline import PIPELINES
-from tests.bench.loops import loops_of_messages, loops_of_random_system
 from tests.converter.simulated.pass_through import PassThrough
+from tests.seeds import seeded
+from tools.bench.loops import loops_of_messages, loops_of_random_system
 
-SEED = 20260611
+SEED = seeded(20260611)
 RANDOM_SYSTEMS = 30
 # An array of messages with strings, an array of strings, and both without.
 SAMPLE = ("diagnostic_msgs/DiagnosticArray", "sensor_msgs/JointState", "sensor_msgs/Image")
@@ -29,7 +30,7 @@ def test_messages_that_are_passed_through(tmp_path: Path, distribution: str, wid
 @pytest.mark.parametrize(
     "number",
     [
-        pytest.param(number, marks=pytest.mark.thorough if number % 3 else pytest.mark.check)
+        pytest.param(number, marks=pytest.mark.thorough if number % 5 else pytest.mark.check)
         for number in range(RANDOM_SYSTEMS)
     ],
 )

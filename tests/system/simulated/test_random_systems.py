@@ -13,9 +13,10 @@ from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import load_system
 from tests.hdl.ghdl import Library, core_files
 from tests.random_systems import random_system
+from tests.seeds import seeded
 from tests.system.simulated.systems import RUNTIME, generate_system
 
-SEED = 20241121
+SEED = seeded(20241121)
 
 
 @pytest.fixture(scope="module")

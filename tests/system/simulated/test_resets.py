@@ -10,9 +10,10 @@ import pytest
 
 from tests.cores.crossing_paths import Domains, unsynchronised
 from tests.hdl.ghdl import Library, core_files
+from tests.seeds import seeded
 from tests.system.simulated.systems import DATA, HARDWARE, generate_system
 
-SEED = 20261122
+SEED = seeded(20261122)
 SPECIFICATION = f"""
 project:
   name: resets

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.scheduling.policies import POLICIES
+from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
-SEED = 20241008
+SEED = seeded(20241008)
 MESSAGES = {
     "scan": ("sensor_msgs/LaserScan", 20_000),
     "pose": ("geometry_msgs/Pose", 3000),

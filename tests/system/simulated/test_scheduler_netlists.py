@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.scheduling.policies import POLICIES
-from tests.bench.loops import found_by_us
 from tests.hdl.ghdl import core_files
 from tests.hdl.verilog import netlist
 from tests.system.simulated.systems import HARDWARE, generate_system
+from tools.bench.loops import found_by_us
 
 MESSAGE = "middleware: ROS1, message: std_msgs/UInt8"
 # With 17 requesters, least recently used has no matrix any more, and no policy compares all requesters in one cycle.

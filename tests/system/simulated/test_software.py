@@ -13,9 +13,10 @@ import yaml
 
 from fusesoc_firm.text.diagnostics import InputError
 from tests.applications.images import SPECS, broken_images, built, copied, fed, image, load_model, odd_images
+from tests.seeds import seeded
 from tests.system.simulated.systems import DATA, GeneratedSystem, build, call
 
-SEED = 20240803
+SEED = seeded(20240803)
 
 # --- messages of fixed size ------------------------------------------------------------------------------------------
 

@@ -16,11 +16,12 @@ from rosbags.typesys import Stores, get_typestore
 
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify.stimuli import EMPTY, TYPICAL, Stimuli
+from fusesoc_firm.runs.verify.stimuli import EMPTY, TYPICAL, Stimuli
 from tests.frame.oracle import Oracle
+from tests.seeds import seeded
 from tests.system.simulated.systems import DATA, GeneratedSystem, build, call
 
-SEED = 20240615
+SEED = seeded(20240615)
 IMAGE, CLOUD, STRING = "sensor_msgs/Image", "sensor_msgs/PointCloud2", "std_msgs/String"
 ORACLE = Oracle(ROS2)
 
