@@ -38,6 +38,9 @@ SUITE ?= trixie
 COMMANDS ?= make sim; make test
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
+# SINCE=REV runs only tests that the changes since a commit can reach; FRESH=1 recalls no result of a tool.
+SINCE ?=
+FRESH ?=
 # Programs other than Python that tests run.
 EMULATION_TOOLS := qemu-system-arm arm-none-eabi-gcc:gcc-arm-none-eabi \
   /usr/lib/arm-none-eabi/include/string.h:libnewlib-arm-none-eabi \
@@ -57,9 +60,16 @@ ROS1 := pkg-config rosmaster:python3-rosmaster roslaunch:python3-roslaunch \
   /usr/include/actionlib/client/simple_action_client.h:libactionlib-dev \
   $(foreach name,rospy std_msgs geometry_msgs sensor_msgs actionlib,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
 
+PYTEST = $(BIN)/python -m pytest $(if $(SINCE),--since "$(SINCE)") $(if $(FRESH),--fresh) $(PYTEST_OPTIONS)
+
+# The campaigns and options of make fuzz
+FUZZ ?=
 # The number of designs for make fuzz-netlist, and further options, such as FUZZ_OPTIONS='--judges icarus'.
 DESIGNS ?= 10000
 FUZZ_OPTIONS ?=
+# The number of mutants for make mutants, chosen at random (all if empty), and further options, such as parts of paths.
+SAMPLE ?=
+MUTANTS ?=
 
 # Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip would hide error messages.
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
@@ -67,7 +77,12 @@ pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.lo
     ! grep -q "Retrying (" $(1)/pip.log || echo "The package index cannot be reached. Run make again with a network, and with a proxy if one is needed." >&2; \
     exit 1; }
 
-.PHONY: help sim test check docs studio ros bitstream bench matrix proofs policies corpus fuzz-netlist debian lint licences setup tools clean distclean
+# The user's configuration of git is not changed. The top level of a repository has an empty prefix.
+offer_hook = prefix=$$(git rev-parse --show-prefix 2>/dev/null) && [ -z "$$prefix" ] && \
+  [ "$$(git config core.hooksPath)" != .ci/hooks ] && \
+  echo "To check the messages of your commits, enable the hook: git config core.hooksPath .ci/hooks" || true
+
+.PHONY: help sim test check ci docs studio ros bitstream bench matrix proofs policies constants mutants corpus fuzz fuzz-netlist debian lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -79,17 +94,21 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 	@$(BIN)/firm sim $(SYSTEM) $(SIM_FLAGS)
 
 test: TOOLS = $(TEST_TOOLS)
-check: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS) $(NETWORK_TOOLS)
-test: setup ros ## Run the tests, every rule once; PYTEST_OPTIONS='...'
-	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+check ci: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS) $(NETWORK_TOOLS)
+test: setup ros ## Run the tests, every rule once; SINCE=REV, FRESH=1, PYTEST_OPTIONS='...'
+	@$(PYTEST)
 
-check: setup ros lint studio ## Run the longer tests: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'
-	@$(BIN)/python -m pytest -m "check and not thorough" $(PYTEST_OPTIONS)
+check: setup ros studio $(VENV)/.extra-lint ## Run the longer tests: live ROS, proofs, boards, more sizes and seeds; variables as for test
+	@$(PYTEST) -m "check and not thorough"
+
+ci: setup ros studio $(VENV)/.extra-lint ## Run the tests of test and check together, as continuous integration does; variables as for test
+	@$(PYTEST) -m "not thorough"
 
 docs: TOOLS = dot:graphviz
 docs: tools $(VENV)/.extra-docs ## Run the commands in the documentation, build the site in build/docs; DOCS=--update updates their output in the pages
-	@$(BIN)/python -m tests.pages $(DOCS)
-	@$(BIN)/zensical build --clean --strict
+	@$(BIN)/python -m tools.pages $(DOCS)
+	@cp docs/zensical.toml build
+	@$(BIN)/zensical build --clean --strict --config-file build/zensical.toml
 	@echo "The site: build/docs/index.html"
 
 studio: $(VENV)/.extra-page ## Build the page of firm studio
@@ -115,7 +134,7 @@ endif
 
 bench: TOOLS = iverilog verilator yosys $(STUDIO_TOOLS)
 bench: setup ros studio $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures; BENCH='area cycles' for parts, BENCH=--help lists them
-	@$(BIN)/python -m tests.bench $(BENCH)
+	@$(BIN)/python -m tools.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
 bitstream: $(VENV)/.installed ## Build SYSTEM for BOARD (icebreaker, tangnano9k, ulx3s) to a bitstream
@@ -127,17 +146,29 @@ bitstream: $(VENV)/.installed ## Build SYSTEM for BOARD (icebreaker, tangnano9k,
 
 matrix: TOOLS = verilator
 matrix: tools $(VENV)/.extra-matrix ## Test each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' adds more
-	@$(BIN)/python -m tests.matrix $(PYTHONS)
+	@$(BIN)/python -m tools.matrix $(PYTHONS)
 
+proofs: TOOLS = yosys
 proofs: setup ## Prove the Manager, the schedulers, and readers, packets and frames of nodes in fabric; write docs/figures/proofs.md
-	@$(BIN)/python -m tests.proofs
+	@$(BIN)/python -m tools.proofs
 
 policies: $(VENV)/.installed ## Write the lists of schedulers in cores/sched from fusesoc_firm/scheduling/policies.py
-	@$(BIN)/python -m tests.cores.policies
+	@$(BIN)/python -m tools.policies
+
+constants: $(VENV)/.installed ## Write the constants of C, C++ and VHDL that derive from Python: codes of faults, numbers of RTPS
+	@$(BIN)/python -m tools.constants
+
+fuzz: TOOLS = $(TEST_TOOLS) $(NETWORK_TOOLS)
+fuzz: setup ros ## Run the random tests with new seeds, for an hour; FUZZ='bags packets --minutes 20', FUZZ=--help lists the campaigns
+	@$(BIN)/python -m tools.fuzz $(FUZZ)
 
 fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
-	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
+	@$(BIN)/python -m tools.fuzz_netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
+
+mutants: TOOLS = $(TEST_TOOLS) $(EMULATION_TOOLS) $(STUDIO_TOOLS) $(NETWORK_TOOLS)
+mutants: setup ros ## Put faults of one line into the sources, each of which the tests must find; SAMPLE=N, SEED=N, MUTANTS='fusesoc_firm/node'
+	@$(BIN)/python -m tools.mutants $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(SEED),--seed $(SEED)) $(MUTANTS)
 
 debian: ## Run the README's commands in a minimal system of a suite, as root; SUITE=trixie, bookworm, forky; COMMANDS='make sim; .ci/run'
 	@python=$$(./.ci/install-tools debootstrap unshare:util-linux git) && "$$python" .ci/debian.py "$(SUITE)" "$(COMMANDS)"
@@ -154,6 +185,7 @@ licences: tools ros ## List the project's dependencies and their licences in doc
 	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 
 setup: tools $(VENV)/.extra-test ## Install the programs (with apt) and Python packages (into .venv) that other targets need
+	@$(if $(filter $@,$(MAKECMDGOALS)),$(offer_hook))
 
 tools:
 	@./.ci/install-tools $(TOOLS) >/dev/null

@@ -2,7 +2,7 @@
 
     python check_target.py CORE TARGET FLOW...
 
-An unknown core, an unknown target, or one that none of these flows builds ends in a list of what there is.
+For an unknown core or target, or a target that none of these flows builds, it ends with a list of the known ones.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import sys
 from collections.abc import Collection
 from typing import Any
 
-from fusesoc_firm.building.plan import make_plan
+from fusesoc_firm.builds.setup.plan import make_plan
 from fusesoc_firm.text.diagnostics import InputError, fail
 
 

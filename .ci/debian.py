@@ -28,10 +28,10 @@ LATEST = "sid"
 CHECKOUT = Path("/root/fusesoc_firm")
 # Programs and files of `make` itself; all others must come from the commands.
 PACKAGES = ("ca-certificates", "git", "make")
-# What the table's caption names, if the commands have installed it.
+# The tools in the table's caption, if the commands have installed them.
 TOOLS = ("ghdl-mcode", "iverilog", "verilator", "yosys", "g++", "python3", "qemu-system-arm", "python3-rospy")
 LOGIN = {"HOME": "/root", "TERM": "dumb", "PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"}
-# A machine behind a proxy, or with certificates of its own, reaches the network with these only.
+# A machine behind a proxy, or with its own certificates, needs these for the network.
 PROXIES = ("http_proxy", "https_proxy", "ftp_proxy", "no_proxy", "HTTP_PROXY", "HTTPS_PROXY", "NO_PROXY")
 CERTIFICATES = (
     "SSL_CERT_FILE",
@@ -42,7 +42,7 @@ CERTIFICATES = (
     "NODE_EXTRA_CA_CERTS",
 )
 HOST_CERTIFICATES = "/etc/ssl/host-certificates.crt"
-# In a mount namespace of its own, the copy becomes the root, as on a machine: with chroot, bubblewrap would fail.
+# In a separate mount namespace, the copy becomes the root, as on a machine: with chroot, bubblewrap would fail.
 ENTER = """
 set -eu
 mount --bind "$1" "$1"
@@ -78,7 +78,7 @@ class Result:
 
     @property
     def summary(self) -> str:
-        """The last lines in which tests or a simulation are counted."""
+        """The last lines with the counts of tests or of a simulation."""
         text = self.log.read_text(encoding="utf-8", errors="replace")
         counts = re.findall(r"^=+ (.*(?:passed|failed).*?) in [\d.]+s.*=+$|^(PASS \d+/\d+)$", text, re.MULTILINE)
         return "; ".join(tests or simulation for tests, simulation in counts)
@@ -146,13 +146,13 @@ def new_machine(suite: str) -> Path:
 
 
 def remove(system: Path) -> None:
-    """Remove a system in which nothing is mounted any more, since mounts end with the namespace that has them."""
+    """Remove a system. Its mounts have ended with their namespace."""
     if system.exists():
         shutil.rmtree(system)
 
 
 def mirror() -> list[str]:
-    """Return the mirror of this machine's own packages, if it is a Debian; else, debootstrap has its own."""
+    """Return the mirror of this machine's packages, if it is a Debian; otherwise, debootstrap chooses."""
     form = "$(ORIGIN) $(CODENAME) $(REPO_URI)"
     if not shutil.which("apt-get"):
         return []
@@ -162,7 +162,7 @@ def mirror() -> list[str]:
 
 
 def give_network(machine: Path) -> None:
-    """Copy the settings with which this machine reaches its packages."""
+    """Copy this machine's settings for the access to packages."""
     for name in ("resolv.conf", "hosts"):
         shutil.copy(f"/etc/{name}", machine / "etc" / name)
     for settings in Path("/etc/apt/apt.conf.d").glob("*"):
@@ -173,7 +173,7 @@ def give_network(machine: Path) -> None:
 
 
 def environment() -> Mapping[str, str]:
-    """Return the variables of a bare login, and those without which the network cannot be reached."""
+    """Return the variables of a bare login, and those for the access to the network."""
     proxies = {name: os.environ[name] for name in PROXIES if name in os.environ}
     return LOGIN | proxies | {name: HOST_CERTIFICATES for name in CERTIFICATES if os.environ.get(name)}
 

