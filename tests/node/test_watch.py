@@ -55,10 +55,25 @@ def test_waits_are_kept_and_summed_over_the_counted_cycles() -> None:
     assert watch.waits(10, 1100) == watch.waits(1) == parts[1:]
     # Nobody watched before cycle 2000.
     watch.waited(2000, 2000, [0, 0])
-    for cycle in range(2000, 10_000):
+    for cycle in range(2000, 40_000):
         watch.waited(cycle, cycle + 1, [0, 1])
+    assert watch.waits_of_all == Waits(1000, 40_000, 400 + 38_000, (10, 240 + 38_000))
+    # A long run keeps the counts of all its cycles, the older ones in sums; none spans the time without watchers.
+    kept = watch.waits(10_000)
+    assert len(kept) <= 5000
+    assert Waits.of(kept) == watch.waits_of_all
+    assert kept[0].end == 1400
+    assert kept[-1] == Waits(39_999, 40_000, 1, (0, 1))
+    assert [part for part in watch.waits(10_000, 2000, 2000) if not part.first <= 2000 < part.end] == []
+    assert watch.waits(10_000, 2000, 2000)
+
+
+def test_times_without_watchers_do_not_add_to_the_memory() -> None:
+    watch = Watch()
+    for cycle in range(0, 20_000, 2):
+        watch.waited(cycle, cycle + 1, [1])
     assert len(watch.waits(10_000)) == 5000
-    assert watch.waits_of_all == Waits(1000, 10_000, 400 + 8000, (10, 240 + 8000))
+    assert watch.waits(1) == [Waits(19_998, 19_999, 1, (1,))]
 
 
 def test_what_belongs_to_cycles_of_an_earlier_simulator_is_forgotten() -> None:

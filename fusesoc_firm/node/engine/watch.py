@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 _MOST_BYTES, _MOST_MESSAGES = 64 * 2**20, 20_000
-# The number of the latest bursts, and of the latest counts of waits.
+# The number of the latest bursts, and of counts of waits.
 _MOST_GRANTS, _MOST_WAITS = 5000, 5000
 # The number of latencies of a block from which percentiles are computed.
 _MOST_LATENCIES = 1000
@@ -80,6 +80,20 @@ class Waits:
             return None
         counts = tuple(map(sum, zip(*(part.counts for part in parts), strict=True)))
         return cls(parts[0].first, parts[-1].end, sum(part.cycles for part in parts), counts)
+
+
+def _coarser(parts: Sequence[Waits]) -> list[Waits]:
+    """Return the parts with neighbours of the older half summed, so that a long run keeps the waits of all its cycles.
+
+    Between parts that are not neighbours, nobody watched; they stay apart.
+    """
+    half = len(parts) // 2
+    found: list[Waits] = []
+    for first, second in zip(parts[0:half:2], parts[1:half:2], strict=False):
+        pair = [first, second]
+        total = Waits.of(pair) if first.end == second.first else None
+        found += [total] if total else pair
+    return [*found, *parts[half // 2 * 2 :]]
 
 
 @dataclass(frozen=True)
@@ -219,6 +233,8 @@ class Watch:
             if first == end:
                 return
             found = Waits(first, end, end - first, tuple(counts))
+            if len(self._waits) == _MOST_WAITS:
+                self._waits = deque(_coarser([*self._waits]), _MOST_WAITS)
             self._waits.append(found)
             self._waits_of_all = Waits.of([self._waits_of_all, found] if self._waits_of_all else [found])
 
@@ -228,7 +244,7 @@ class Watch:
         return self._waits_of_all
 
     def waits(self, most: int, first: int = 0, last: int | None = None) -> list[Waits]:
-        """Return the latest counts of waits, at most `most`, the oldest first.
+        """Return the latest counts of waits, at most `most`, the oldest first; older ones are coarser in a long run.
 
         Counts that end before the cycle `first` or begin after the cycle `last` are omitted.
         """
