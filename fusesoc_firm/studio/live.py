@@ -204,10 +204,12 @@ class Live:
         body, workspace = await body_of(request), self._workspace
         document, wishes = workspace.document(body.get("file")), _wishes(body)
 
-        def begun() -> SimulatedRun:
+        def prepared() -> SimulatedRun:
             return SimulatedRun(workspace.loaded(document), document.path, wishes, workspace.tools.build)
 
-        self.take(await workspace.in_turn(begun))
+        run = await workspace.in_turn(prepared)
+        self.take(run)
+        run.begin()
         return in_json({})
 
     async def _control(self, request: web.Request) -> web.Response:

@@ -93,7 +93,7 @@ class SimulatedRun(Run):
     """A simulation in a thread of this process, with the system's software, without a middleware."""
 
     def __init__(self, loaded: LoadedSystem, spec: Path, wishes: Wishes, build: Build) -> None:
-        """Read the stimuli, and begin to build the simulator. May raise `InputError`."""
+        """Read the stimuli. May raise `InputError`."""
         super().__init__(loaded, spec, f"simulation in {wishes.tool}", Control())
         self.state = BUILDING
         if wishes.is_paused and self.control:
@@ -105,6 +105,9 @@ class SimulatedRun(Run):
         # The node, and the timer that closes it after `stop`.
         self._running: tuple[Node, threading.Timer] | None = None
         self._thread = threading.Thread(target=self._work, name="watched run", daemon=True)
+
+    def begin(self) -> None:
+        """Build the simulator, and run it. What watches the run is there before its first cycle."""
         self._thread.start()
 
     def stop(self) -> None:

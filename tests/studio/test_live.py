@@ -22,6 +22,7 @@ from matplotlib import image as pictures
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.node.engine.watch import Control, Latency, Load, Seen, Waits, Watch
 from fusesoc_firm.studio import page_run
+from fusesoc_firm.studio.live import Live
 from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
 from fusesoc_firm.studio.page_run import Run
 from fusesoc_firm.studio.reports import Reports
@@ -244,6 +245,26 @@ def test_waits_are_counted_only_while_a_page_watches(studio: Studio) -> None:
     row = ask(studio, "GET", "api/record?before=999999999")[2]["messages"][-1]
     found = ask(studio, "GET", f"api/message?number={row[0]}")[2]
     assert (found["waits"] is None) == (row[5] is None)
+
+
+def test_a_run_is_watched_from_its_first_cycle(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However late the server hears that the run is ready."""
+    take, begun = Live.take, threading.Event()
+
+    def late(live: Live, run: Run) -> None:
+        time.sleep(1)
+        take(live, run)
+
+    monkeypatch.setattr(Live, "take", late)
+
+    def has_ended(now: News) -> bool:
+        if not begun.is_set():
+            begun.set()
+            begin(studio)
+        return bool(now.get("run") and now["run"]["state"] == "ended")
+
+    first = next(row for row in until(studio, has_ended)["messages"] if row[5] is not None)
+    assert ask(studio, "GET", f"api/message?number={first[0]}")[2]["waits"]["cycles"] > 0
 
 
 def test_waits_of_a_message_are_those_of_its_cycles() -> None:
