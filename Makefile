@@ -162,7 +162,7 @@ fuzz: TOOLS = $(TEST_TOOLS) $(NETWORK_TOOLS)
 fuzz: setup ros ## Run the random tests with new seeds, for an hour; FUZZ='bags packets --minutes 20', FUZZ=--help lists the campaigns
 	@$(BIN)/python -m tools.fuzz $(FUZZ)
 
-fuzz-netlist: TOOLS = iverilog verilator
+fuzz-netlist: TOOLS = iverilog verilator yosys
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
 	@$(BIN)/python -m tools.fuzz_netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
