@@ -27,7 +27,7 @@ TOOLS :=
 OPEN_FLOWS := apicula icestorm trellis
 BITSTREAM_FLOWS := $(OPEN_FLOWS) quartus vivado
 # The folder of message definitions for `make corpus`, with folders ros1 and ros2, and further options of its command.
-CORPUS ?= ../shared/corpus
+CORPUS ?=
 VERIFY_OPTIONS ?=
 # Parts of the bench, such as BENCH='area cycles'; if empty, all run. BENCH=--help lists them.
 BENCH ?=
@@ -119,7 +119,7 @@ studio: $(VENV)/.extra-page ## Build the page of firm studio
 ros: $(VENV)/.ros2
 	@./.ci/install-tools $(ROS1) >/dev/null || echo "ROS 1 is missing: tests that need it are skipped" >&2
 
-HAS_CORPUS := $(and $(wildcard $(CORPUS)/ros1),$(wildcard $(CORPUS)/ros2))
+HAS_CORPUS := $(and $(CORPUS),$(wildcard $(CORPUS)/ros1),$(wildcard $(CORPUS)/ros2))
 
 corpus: $(if $(HAS_CORPUS),setup) ## Verify the converters of all messages below CORPUS; VERIFY_OPTIONS='--width 64 ...'
 ifeq ($(HAS_CORPUS),)

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-# As in the Makefile.
-_USUAL = Path(__file__).resolve().parents[1] / ".." / "shared" / "corpus"
-
 
 def definitions(ros: str, package: str) -> Path:
     """The folder of `ros1` or `ros2`; the test is skipped where it does not have this package."""
-    folder = Path(os.environ.get("CORPUS") or _USUAL).resolve() / ros
+    if not (place := os.environ.get("CORPUS")):
+        pytest.skip("CORPUS does not name a folder of message definitions")
+    folder = Path(place).resolve() / ros
     if not (folder / package).is_dir():
-        pytest.skip(f"no {package} in {folder}; CORPUS names another place")
+        pytest.skip(f"no {package} in {folder}, which CORPUS names")
     return folder
