@@ -27,7 +27,7 @@ ALLOWED: dict[str, str] = {
     "scheduling": "text tools",
     "system": "converter core frame message scheduling text tools",
     "fabric": "message system text tools",
-    "accelerator": "converter frame system text tools",
+    "accelerator": "converter frame netlist system text tools",
     "node": "accelerator core frame message system text tools",
     "runs": "accelerator converter core frame message node system text tools",
     "builds": "converter core fabric message node runs system text tools",

@@ -52,6 +52,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
             options=self.tool_options.get("ghdlsynth_options", []),
             programs=_programs(edam),
             refuses_loops=bool(self.tool_options.get("ghdlsynth_refuse_loops")),
+            defines={name: self._param_value_str(value) for name, value in self.vlogdefine.items()},
         )
         output = self.translation.output
         self.commands = EdaCommands()
@@ -61,6 +62,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
             [
                 self._request,
                 *(file["name"] for file in sources),
+                *self.translation.verilog,
                 *(make_prerequisite(str(path)) for path in translator()),
             ],
         )

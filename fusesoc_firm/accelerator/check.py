@@ -9,6 +9,7 @@ from pathlib import Path
 
 from fusesoc_firm.accelerator.cpp import read_function
 from fusesoc_firm.accelerator.cpp_interface import compare_function
+from fusesoc_firm.accelerator.instances import Instances
 from fusesoc_firm.accelerator.interface import compare
 from fusesoc_firm.accelerator.unit import Libraries, Reader
 from fusesoc_firm.accelerator.verilog import VerilogReader
@@ -19,6 +20,7 @@ from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.system_core import LoadedSystem, artifacts
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics
 from fusesoc_firm.tools.programs import find, ways
+from fusesoc_firm.tools.yosys import Yosys
 
 _PROGRAMS = {"VHDL": "ghdl", "Verilog": "yosys"}
 
@@ -62,16 +64,18 @@ def _reader(
     libraries: Callable[[], Libraries],
 ) -> Reader:
     """Return the reader of accelerators in one language."""
-    if types[0].accelerator.type == "Verilog":
-        return VerilogReader(program, folder).read
 
     def complete() -> Libraries:
         generated = artifacts(loaded)
         packages = [item.text for item in generated if item.template == CONSTANTS_TEMPLATE]
         return replace(libraries(), packages=packages, generated={Path(item.path).stem for item in generated})
 
-    sources = dict.fromkeys(path for type_ in types for path in _sources(type_, loaded.folder))
-    return VhdlReader(program, folder, complete, list(sources)).read
+    sources = list(dict.fromkeys(path for type_ in types for path in _sources(type_, loaded.folder)))
+    if types[0].accelerator.type == "VHDL":
+        return VhdlReader(program, folder, complete, sources).read
+    ghdl = find("ghdl")
+    entity = VhdlReader(ghdl, folder, complete, []).entity if ghdl else lambda *_: None
+    return VerilogReader(Yosys(program, folder), Instances(complete, entity)).read
 
 
 def _sources(type_: AcceleratorType, folder: Path) -> list[Path]:

@@ -18,9 +18,13 @@ from itertools import groupby
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
+from fusesoc_firm.accelerator.instances import core_with
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
+from fusesoc_firm.netlist import dump
+from fusesoc_firm.netlist.corrections import lost_latches
+from fusesoc_firm.netlist.instantiated import entities
+from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
-from fusesoc_firm.tools.library_path import library_root
 
 # A process that never waits is only a warning, but its simulation would never end.
 _MESSAGE = re.compile(
@@ -30,9 +34,14 @@ _OPTION = re.compile(r" \[-W[\w-]+\]$")
 # Of GHDL's synthesis; the place is the signal's declaration.
 _TWO_SOURCES = re.compile(r'(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*multiple assignments for "(?P<name>.+?)"')
 _NO_SOURCE = re.compile(r'(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*no assignment for port "(?P<name>.+?)"')
+_LENGTH = re.compile(
+    r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*mismatching vector length;"
+    r" got (?P<found>\d+), expect (?P<needed>\d+)"
+)
+_LATCH = re.compile(r"^.*latch infered for net .*(?= \(use --latches\))", re.MULTILINE)
+_PLACED = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):(?: ?error:)? ?(?P<text>.+)")
+_INSTANCE = re.compile(r"(\w+)\s*:\s*(?:entity\s+)?(?:\w+\s*\.\s*)?(\w+)\s+(?:generic|port)\s+map", re.IGNORECASE)
 _MISSING_UNIT = re.compile(r'unit "(\w+)" not found in library|cannot find resource library')
-# The name of a core of this package, without its version.
-_CORE = re.compile(r"^name: (\w+:\w+:\w+)", re.MULTILINE)
 _ARCHITECTURE = re.compile(
     r"^[ \t]*architecture\s+\w+\s+of\s+\w+\s+is\b.*?"
     r"(?=^[ \t]*(?:architecture\s+\w+\s+of|library\s|entity\s+\w+\s+is|package\s|configuration\s+\w+\s+of)|\Z)",
@@ -82,6 +91,11 @@ class VhdlReader:
         tree = self._all_entities or self._tree(paths) or self._tree(paths[-1:])
         return [unit for path in paths for unit in tree.units(path, generics)] if tree else []
 
+    def entity(self, path: Path, name: str, generics: Mapping[str, int]) -> Unit | None:
+        """Return an entity in a file of another core, with the values of generics, or None if it cannot be read."""
+        tree = self._tree([path])
+        return next((unit for unit in tree.units(path, generics) if unit.name == name.lower()), None) if tree else None
+
     @cached_property
     def _is_faultless(self) -> bool:
         """Whether GHDL reports no message about all sources together."""
@@ -109,15 +123,22 @@ class VhdlReader:
     def _report_sources(
         self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics
     ) -> None:
-        """Add the signals with more than one source, and warnings about outputs without a source.
+        """Add lengths that differ, signals with more than one source, and warnings about outputs without a source.
 
         Other messages of GHDL's synthesis are ignored. A file with the value 'Z' may have such signals.
         """
         if any("'Z'" in path.read_text(encoding="utf-8", errors="replace").upper() for path in paths):
             return
         # All names of a generic differ only in case.
-        options = ["--out=none", *(f"-g{name}={value}" for name, value in list(generics.items())[:1])]
-        lines = dict.fromkeys(self._run("--synth", [*options, top]).stderr.splitlines())
+        options = ["--out=dump", *(f"-g{name}={value}" for name, value in list(generics.items())[:1])]
+        done = self._run("--synth", [*options, top])
+        lines = dict.fromkeys(done.stderr.splitlines())
+        self._report_latches(done, paths, faults)
+        for match in filter(None, map(_LENGTH.match, lines)):
+            if (path := Path(match["file"])) in paths:
+                source = place(path, int(match["line"]), int(match["column"]))
+                message = f"{match['found']} bits, but {match['needed']} are needed here"
+                faults.error(message, source, self._generics_hint(path, int(match["line"])))
         several = "keep one source: an assignment, a process or an output of an instance; remove the others"
         for pattern, report, message, hint in (
             (_TWO_SOURCES, faults.error, "'{}' has more than one source", several),
@@ -127,6 +148,30 @@ class VhdlReader:
                 if Path(match["file"]) in paths:
                     source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
                     report(message.format(match["name"]), source, hint)
+
+    def _report_latches(
+        self, done: subprocess.CompletedProcess[str], paths: Sequence[Path], faults: Diagnostics
+    ) -> None:
+        """Add warnings about latches and combinational loops: they can be simulated, but they are not synchronous."""
+        sentences = [f"{match[0]}" for match in _LATCH.finditer(done.stderr)]
+        if not done.returncode:
+            modules = dump.read(done.stdout)
+            sentences += [*lost_latches(modules), *loops(modules)]
+        hint = "assign it in every branch of its process, or only at a clock edge"
+        for match in filter(None, map(_PLACED.match, sentences)):
+            if (path := Path(match["file"])) in paths:
+                faults.warn(match["text"], place(path, int(match["line"]), int(match["column"])), hint)
+
+    def _generics_hint(self, path: Path, line: int) -> str:
+        """Return a hint if the last instance above a line is of an entity with generics in another core."""
+        instances = _INSTANCE.findall("\n".join(lines_of(path)[:line]))
+        if not instances:
+            return ""
+        label, name = instances[-1]
+        files = {str(file) for file, _ in self._known.files}
+        entity = {key.lower(): item for key, item in entities({"": sorted(files)}).items()}.get(name.lower())
+        generics = ", ".join(entity.generics) if entity else ""
+        return f"the generics of '{label}' select the size: {generics} of {name}" if generics else ""
 
     def _packages(self) -> list[Path]:
         return [self._written(f"package_{number}.vhd", text) for number, text in enumerate(self._known.packages)]
@@ -287,6 +332,5 @@ def _hint(text: str) -> str:
     found = _MISSING_UNIT.match(text)
     if not found or not found[1]:
         return ""
-    texts = (path.read_text(encoding="utf-8") for path in (library_root() / "cores").resolve().rglob("*.core"))
-    name = next((match[1] for text in texts if f"/{found[1]}.vhd\n" in text and (match := _CORE.search(text))), "")
+    name = core_with(found[1])
     return f"it is in {name}, on which the accelerator's core must depend" if name else ""

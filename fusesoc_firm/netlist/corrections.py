@@ -46,6 +46,22 @@ def correct(modules: Modules) -> None:
         module.instances += made
 
 
+def lost_latches(modules: Modules) -> list[str]:
+    """Return a sentence for each signal that is X because a branch does not assign it; GHDL 2.0 reports only ports.
+
+    An X that the VHDL assigns is another gate.
+    """
+    found = []
+    for module in modules.values():
+        unknown = {net.number for gate in module.instances if gate.kind == "$const_X" for net in gate.outputs}
+        for gate in module.instances:
+            if gate.kind == "$signal" and (net := gate.inputs[0]) and net.number in unknown:
+                found.append(
+                    f"{gate.location}: error: latch inferred for '{gate.name}': some branch does not assign it"
+                )
+    return found
+
+
 def doubts(modules: Modules) -> list[str]:
     """Return warnings about constants whose bits GHDL may have read in the wrong order.
 

@@ -279,7 +279,8 @@ def _sentence(bits: _Bits, loop: Sequence[_Step]) -> str:
     if not steps:
         signals = dict.fromkeys(step.gate.name for step in loop if step.gate.kind in {"$signal", "$isignal"})
         names = ", ".join(f"'{name}'" for name in signals) or "unnamed signals"
-        return f"{loop[0].gate.location}: error: combinational loop in '{entity}': {names}"
+        location = next((step.gate.location for step in loop if step.gate.location), "")
+        return f"{location}: error: combinational loop in '{entity}': {names}"
     first, *others = steps
     source, result = bits.ports(first)
     ways = ", ".join(

@@ -14,15 +14,16 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
 from fusesoc_firm.netlist import dump, ghdl2, lost_constants, probe_functions, verilog
-from fusesoc_firm.netlist.corrections import correct, doubts
+from fusesoc_firm.netlist.corrections import correct, doubts, lost_latches
+from fusesoc_firm.netlist.instantiated import Instantiated, Use, entities, module_of
 from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.netlist.model import GrownTableError, LostMemoryError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.padding import Padding
@@ -89,7 +90,8 @@ class Translation:
     """A translation: VHDL files by library, in any order, the top unit, `[library.]unit`, and the top unit's generics.
 
     `verilog` lists the sources that may define the modules for components without an entity; a later step links these
-    sources. `programs` lists the known programs that read the netlist; if a program is missing, nothing is translated.
+    sources. They may instantiate entities in turn, and one of their modules may be the top unit; `defines` are their
+    macros. `programs` lists the known programs that read the netlist; if a program is missing, nothing is translated.
     If `refuses_loops` is set, a combinational loop is an error. All paths are relative to the current folder.
     """
 
@@ -102,6 +104,7 @@ class Translation:
     options: Sequence[str] = ()
     programs: Sequence[str] = ()
     refuses_loops: bool = False
+    defines: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """Return the translation as a text that `from_json` reads."""
@@ -112,6 +115,16 @@ class Translation:
         """Return the translation in a text from `to_json`."""
         content: dict[str, Any] = json.loads(text)
         return cls(**content)
+
+    def of(self, use: Use) -> Translation:
+        """Return the translation of an entity that Verilog instantiates."""
+        return replace(self, top=f"{use.entity.library}.{use.entity.name}", generics=dict(use.generics))
+
+    @property
+    def is_verilog(self) -> bool:
+        """Whether the top unit is a module in Verilog, and no unit in VHDL."""
+        names = {name.lower() for name in entities(self.libraries)} if _module(self.top, self.verilog) else ()
+        return bool(names) and self.unit.lower() not in names
 
     @property
     def unit(self) -> str:
@@ -138,18 +151,60 @@ def translate(translation: Translation, folder: Path) -> str:
         raise NetlistError(explanation(absent))
     output = Path(translation.output)
     output.unlink(missing_ok=True)
+    netlist, warnings = _whole(translation, folder)
+    part = output.with_name(f"{output.name}.part")
+    part.write_text(f"{_HEADER}{netlist}{_FOOTER}", encoding="utf-8")
+    part.replace(output)
+    return warnings
+
+
+def _whole(translation: Translation, folder: Path) -> tuple[str, str]:
+    """Return the Verilog of the top unit and of all entities that Verilog below it instantiates, and the warnings.
+
+    If the top unit is a module in Verilog, only the entities are translated.
+    """
+    found = Instantiated.of(translation.libraries, translation.verilog, translation.defines, folder / "verilog")
+    texts: dict[str, str] = {}
+    warnings: list[str] = []
+    roots: list[tuple[str, Mapping[str, str]]] = []
+    if translation.is_verilog:
+        roots.append((translation.top, {}))
+    else:
+        first = _translated(translation, folder)
+        texts, roots, warnings = first.text(), first.components, [first.warnings]
+    translated: dict[Use, Module] = {}
+    while roots:
+        uses = dict.fromkeys(use for root in roots for use in found.below(*root))
+        roots = []
+        for use in uses:
+            # A module of the netlist has the name of its entity if that has no generics.
+            if use in translated or (not use.generics and use.entity.name in texts):
+                continue
+            part = _translated(translation.of(use), folder)
+            part.rename(f"{use.entity.name}__{len(translated)}", texts)
+            translated[use] = part.top
+            texts |= part.text()
+            roots += part.components
+            warnings.append(part.warnings)
+    for entity in dict.fromkeys(use.entity for use in translated):
+        if entity.name in texts:
+            raise NetlistError(f"error: '{entity.name}' is below itself")
+        own = {use: top for use, top in translated.items() if use.entity is entity}
+        texts[entity.name] = module_of(entity, own)
+    return "\n".join(texts.values()), "\n".join(dict.fromkeys(filter(None, warnings)))
+
+
+def _translated(translation: Translation, folder: Path) -> _Part:
+    """Return the netlist of the top unit; if GHDL cannot infer its memories, all of them are registers."""
     try:
-        netlist, warnings = _padded(_netlist, translation, folder)
+        return _padded(_netlist, translation, folder)
     except LostMemoryError as error:
         if _NO_MEMORIES in translation.options:
             raise
         registers = replace(translation, options=[*translation.options, _NO_MEMORIES])
-        netlist, warnings = _padded(_netlist, registers, folder)
-        warnings = f"{error.args[0].replace('error', 'warning', 1)}{_WITHOUT_MEMORIES}\n{warnings}"
-    part = output.with_name(f"{output.name}.part")
-    part.write_text(netlist, encoding="utf-8")
-    part.replace(output)
-    return warnings
+        part = _padded(_netlist, registers, folder)
+        warning = f"{error.args[0].replace('error', 'warning', 1)}{_WITHOUT_MEMORIES}"
+        return replace(part, warnings=f"{warning}\n{part.warnings}")
 
 
 def find_loops(translation: Translation, folder: Path) -> list[str]:
@@ -187,13 +242,50 @@ def _analysed(translation: Translation, folder: Path, padding: Padding) -> _Ghdl
     return ghdl
 
 
-def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
-    """Return the Verilog netlist and GHDL's relevant warnings."""
+@dataclass(frozen=True)
+class _Part:
+    """The netlist of a unit, with the generics of its components and GHDL's relevant warnings."""
+
+    modules: Modules
+    generics: Mapping[tuple[str, str], Mapping[str, str]]
+    warnings: str
+
+    @property
+    def top(self) -> Module:
+        return next(module for module in self.modules.values() if module.is_defined)
+
+    @property
+    def components(self) -> list[tuple[str, Mapping[str, str]]]:
+        """The modules in Verilog, with each set of parameters of their instances."""
+        found: list[tuple[str, Mapping[str, str]]] = []
+        for module in self.modules.values():
+            for instance in module.instances:
+                kind = self.modules.get(instance.kind)
+                if kind and not kind.is_defined:
+                    root = (kind.name, self.generics.get((module.name, instance.name), {}))
+                    found += [root] if root not in found else []
+        return found
+
+    def rename(self, top: str, taken: Container[str]) -> None:
+        """Give the top unit another name, and one that begins with it to each module whose name is taken."""
+        for module in self.modules.values():
+            if module.is_defined and (module is self.top or module.name in taken):
+                module.name = top if module is self.top else f"{top}__{module.name}"
+
+    def text(self) -> dict[str, str]:
+        """Return the Verilog of each module, by its name."""
+        return verilog.write(self.modules, self.generics)
+
+
+def _netlist(ghdl: _Ghdl) -> _Part:
+    """Return the netlist of the top unit."""
     text, warnings = ghdl.synthesise("dump")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
         raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not match the VHDL"]))
     modules = dump.read(text)
+    if latches := lost_latches(modules):
+        raise NetlistError("\n".join(latches))
     if ghdl.translation.refuses_loops and (sentences := loops(modules)):
         raise NetlistError("\n".join(sentences))
     components = _components(modules, ghdl.translation.verilog)
@@ -203,7 +295,7 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     if ghdl2.is_at_hand():
         found += [ghdl.check_constants(modules), *doubts(modules)]
     correct(modules)
-    return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(filter(None, found))
+    return _Part(modules, generics, "\n".join(filter(None, found)))
 
 
 @dataclass(frozen=True)

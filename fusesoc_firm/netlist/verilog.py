@@ -71,10 +71,13 @@ _IGNORED = frozenset({"$assume", "$cover"})
 Generics = Mapping[tuple[str, str], Mapping[str, str]]
 
 
-def write(modules: Modules, generics: Generics) -> str:
-    """Return the Verilog of all defined modules; raise `NetlistError` for gates without a hardware equivalent."""
+def write(modules: Modules, generics: Generics) -> dict[str, str]:
+    """Return the Verilog of each defined module, by its name, instances before what contains them.
+
+    Raise `NetlistError` for gates without a hardware equivalent.
+    """
     defined = [module for module in modules.values() if module.is_defined]
-    return "\n".join(_Writer(module, modules, generics).text() for module in reversed(defined))
+    return {module.name: _Writer(module, modules, generics).text() for module in reversed(defined)}
 
 
 def identifier(name: str) -> str:

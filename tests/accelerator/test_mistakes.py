@@ -12,9 +12,10 @@ from fusesoc_firm.accelerator.unit import Libraries
 from fusesoc_firm.cli import main
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
-from tests.hdl.ghdl import CORES
+from tests.hdl.ghdl import CORES, core_files
 
 _GENERIC = "generic (WIDTH : positive; LEVEL : natural);\n  port ("
+_LATCH = "  p : process (clk)\n  begin\n    if clk = '1' then\n      {}\n    end if;\n  end process;\n"
 # A text of the source, its replacement, a text in the line that is reported, and a part of the message.
 VHDL = [
     # names
@@ -116,6 +117,19 @@ VHDL = [
         "infinite loop",
     ),
     ("architecture rtl of img", "architecture rtl of image", "of image", "entity 'image' was not analysed"),
+    # latches and loops, of which GHDL 2.0 says nothing
+    (
+        "  is_there <= in_msg_valid;",
+        _LATCH.format("is_there <= in_msg_valid;"),
+        "",
+        "latch inferred for 'is_there'",
+    ),
+    (
+        "  out_data <= (others => '0');\n",
+        _LATCH.format("out_data(0) <= '1';") + "  out_data(31 downto 1) <= (others => '0');\n",
+        "",
+        "combinational loop in 'img'",
+    ),
     # two sources of a signal
     ("  out_data <= (others => '0');\n", "", "out_data   ", "output 'out_data' has no source"),
     ("begin\n\n", "begin\n  out_data <= in_step;\n", "out_data   ", "'out_data' has more than one source"),
@@ -139,6 +153,9 @@ VERILOG = [
     ("is_there && out_msg_ready;", "is_there && out_msg_ready", "assign out_segment_valid", "syntax error"),
     ("in_msg_ready = is_there", "in_msg_ready = is_their", "is_their", "'is_their' is not declared"),
     ("endmodule", "", "", "syntax error"),
+    # latches
+    (_ZERO, "reg [31:0] r; always @* if (clk) r = in_step; assign out_data = r;", "always", "latch inferred for 'r'"),
+    (_ZERO, "unknown u (.i(in_step), .o(out_data));", "unknown", "there is no module 'unknown' in the sources and"),
     # sources of signals
     (f"  {_ZERO}", "", "out_data", "output 'out_data' has no source"),
     ("out_data = 32'b0;", "out_data[7:0] = 8'b0;", "out_data", "a part of output 'out_data' has no source"),
@@ -152,7 +169,6 @@ VERILOG = [
 _COPY = "module copy (input [31:0] i, output [31:0] o); assign o = i; endmodule\n"
 LEGAL_VERILOG = [
     "assign out_data = in_msg_valid ? 32'bz : 0; assign out_data[0] = 1'bz;",
-    "unknown u (.i(in_step), .o(out_data));",
     _INSTANCE,
     "copy u (.i(in_step), .o({out_data[3:0], out_data[31:4]}));",
     "integer i; reg [31:0] a, b; assign out_data = a ^ b;"
@@ -246,6 +262,84 @@ def test_the_core_of_a_missing_unit_is_named() -> None:
     others = Libraries([(CORES / "axis/rtl/firm_axis_pkg.vhd", "firm")], is_complete=True)
     (fault, *_) = diagnostics("vhdl", old, use + old, others)
     assert fault.hint == "it is in robot:acc:firm_float, on which the accelerator's core must depend"
+
+
+_PARAMETERS = "#(.EXPONENT_BITS(8), .MANTISSA_BITS(23))"
+_PORTS = (
+    ".clk(clk), .rst_n(rst_n), .in_valid(1'b1), .in_ready(), .in_a(in_step), .in_b(in_width), .out_valid(), "
+    ".out_ready(1'b1), .out_number(out_data)"
+)
+
+
+@pytest.mark.parametrize(
+    ("instance", "message", "hint"),
+    [
+        (f"firm_float_multiply {_PARAMETERS} u ({_PORTS});", "", ""),
+        (
+            f"firm_float_multiply u ({_PORTS});",
+            "'in_a' of 'firm_float_multiply' has 64 bits here, and is",
+            "MANTISSA_BITS",
+        ),
+        (
+            f"firm_float_multiply {_PARAMETERS.replace('BITS', 'BIT', 1)} u ({_PORTS});",
+            "no parameter 'EXPONENT_BIT'",
+            "did you mean 'EXPONENT_BITS'?",
+        ),
+        (
+            f"firm_float_multiply {_PARAMETERS} u ({_PORTS.replace('in_b', 'b')});",
+            "no port 'b'",
+            "legal here: clk, rst_n",
+        ),
+        (
+            f"firm_float_multiply {_PARAMETERS} u ({_PORTS.replace('.in_b(in_width), ', '')});",
+            "input 'in_b' of 'firm_float_multiply' is not connected",
+            "connect it",
+        ),
+        (
+            f"firm_float_add {_PARAMETERS} u ({_PORTS});",
+            "input 'in_subtract' of 'firm_float_add' is not connected",
+            "connect",
+        ),
+        (f"firm_float_multiply {_PARAMETERS} u (clk, rst_n);", "its ports are connected by name", ".port(net)"),
+        (
+            f"firm_float_multipli {_PARAMETERS} u ({_PORTS});",
+            "no module 'firm_float_multipli'",
+            "'firm_float_multiply'?",
+        ),
+        ("firm_axis_fifo u ();", "no module 'firm_axis_fifo' in the sources", "it is in robot:axis:firm_axis"),
+    ],
+)
+def test_entities_of_other_cores_in_verilog(instance: str, message: str, hint: str) -> None:
+    others = Libraries([(path, "firm") for path in core_files("acc/float/float")], is_complete=True)
+    found = diagnostics("verilog", _ZERO, instance, others)
+    if not message:
+        assert found == []
+        return
+    told = next(item for item in found if message in item.message)
+    assert told.source
+    assert hint in told.hint
+    assert instance.split(maxsplit=1)[0] in told.source.text
+
+
+def test_a_float_of_the_wrong_size_in_vhdl() -> None:
+    """GHDL reports it at elaboration, seven lines of which name neither the file nor the generics."""
+    instance = (
+        "begin\n  u_gain : entity firm.firm_float_multiply\n    port map (\n"
+        "      clk => clk, rst_n => rst_n, in_valid => '1', in_ready => open,\n"
+        "      in_a => in_step, in_b => in_step, out_valid => open, out_ready => '1', out_number => out_data\n    );\n"
+    )
+    assert main(["init", "img", "--in", "sensor_msgs/Image", "--out", "std_msgs/UInt32"]) == 0
+    source = Path("img/rtl/img.vhd")
+    text = source.read_text(encoding="utf-8").replace("  out_data <= (others => '0');\n", "")
+    source.write_text("library firm;\n" + text.replace("begin\n", instance, 1), encoding="utf-8")
+    files = [(path, "firm") for path in core_files("acc/cordic/cordic", "acc/float/float")]
+    with pytest.raises(InputError) as refused:
+        check_accelerators(load_beside(Path("img/img.yaml")), lambda: Libraries(files, is_complete=True))
+    fault = refused.value.diagnostics[0]
+    assert "32 bits, but 64 are needed here" in fault.message
+    assert fault.source
+    assert "in_a => in_step" in fault.source.text
+    assert fault.hint.endswith("EXPONENT_BITS, MANTISSA_BITS of firm_float_multiply")
 
 
 def test_the_library_of_the_arithmetic_is_named() -> None:

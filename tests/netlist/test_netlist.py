@@ -156,6 +156,7 @@ COMPONENT = """
     port (d : in std_logic_vector(7 downto 0); Q : out std_logic_vector(7 downto 0));
   end component;
 """
+_R = "signal r : std_logic_vector(7 downto 0);"
 INSTANCE = "u : Inner port map (d => a, Q => q);"
 
 
@@ -163,6 +164,7 @@ INSTANCE = "u : Inner port map (d => a, Q => q);"
     ("text", "message"),
     [
         (entity("process (a, enable) begin if enable = '1' then q <= a; end if; end process;"), "latch"),
+        (entity("process (a, enable) begin if enable = '1' then r <= a; end if; end process;\n  q <= r;", _R), "latch"),
         (entity("q <= a and b;"), 'no declaration for "b"'),
         (entity("q <= a;").replace("entity top", "entity other").replace("of top", "of other"), "top"),
         (entity(INSTANCE, COMPONENT), "'Inner', which is neither an entity in this build's VHDL nor a module"),

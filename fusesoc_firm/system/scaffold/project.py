@@ -213,7 +213,7 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
     spec = folder / f"{project.name}.yaml"
     write(spec, render("project/specification.yaml", _specification(project, ros, taken, given)))
     loaded = load_system(spec, known, needs_sources=False)
-    has_arithmetic = project.language == "vhdl"
+    has_arithmetic = project.language in ("vhdl", "verilog")
     for path, text in missing_sources(loaded.system, folder, has_arithmetic=has_arithmetic).items():
         write(path, text)
     if stimuli:

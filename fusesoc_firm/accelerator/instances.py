@@ -1,0 +1,105 @@
+"""The instances in an accelerator's Verilog whose modules are in none of its sources.
+
+Each is an entity in the VHDL of a core, which the netlist provides as a module, or a module that does not exist.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.accelerator.unit import Libraries, Unit, place
+from fusesoc_firm.netlist.instantiated import Entity, entities, integer
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest
+from fusesoc_firm.tools.library_path import library_root
+from fusesoc_firm.tools.yosys import source_place
+
+# The name of a core of this package, without its version.
+_CORE = re.compile(r"^name: (\w+:\w+:\w+)", re.MULTILINE)
+# Returns an entity in a file with the values of its generics, in lower case, or None if its ports are unknown.
+EntityReader = Callable[[Path, str, Mapping[str, int]], Unit | None]
+
+
+def core_with(unit: str) -> str:
+    """Return the name of this package's core that has the unit in a file of its name, or an empty text."""
+    texts = (path.read_text(encoding="utf-8") for path in (library_root() / "cores").resolve().rglob("*.core"))
+    return next((match[1] for text in texts if f"/{unit}.vhd\n" in text and (match := _CORE.search(text))), "")
+
+
+@dataclass
+class Instances:
+    """The comparison of instances with the entities in `libraries`, which is called only if a module is missing."""
+
+    libraries: Callable[[], Libraries]
+    entity: EntityReader
+
+    @cached_property
+    def _libraries(self) -> Libraries:
+        return self.libraries()
+
+    @cached_property
+    def _entities(self) -> dict[str, Entity]:
+        files: dict[str, list[str]] = {}
+        for path, library in self._libraries.files:
+            files.setdefault(library, []).append(str(path))
+        return entities(files)
+
+    def compare(self, modules: Mapping[str, Mapping[str, Any]], paths: Sequence[Path], faults: Diagnostics) -> None:
+        """Add the faults of all instances in elaborated modules, as Yosys' JSON has them."""
+        for cell in (cell for module in modules.values() for cell in module["cells"].values()):
+            kind = str(cell["type"])
+            if kind not in modules and not kind.startswith("$"):
+                self._compare(kind, cell, place(*source_place(cell["attributes"]) or (paths[0], 1, 1)), faults)
+
+    def _compare(self, kind: str, cell: Mapping[str, Any], source: SourceRef, faults: Diagnostics) -> None:
+        if not (entity := self._entities.get(kind)):
+            self._report_missing(kind, source, faults)
+            return
+        if any(name.startswith("$") for name in cell["connections"]):
+            faults.error(
+                f"'{kind}' is an entity in VHDL, so its ports are connected by name", source, "write .port(net)"
+            )
+            return
+        values: dict[str, int] = {}
+        for name, value in cell["parameters"].items():
+            if name not in entity.generics:
+                faults.error(f"'{kind}' has no parameter '{name}'", source, _legal(name, entity.generics))
+            elif (number := integer(str(value))) is not None:
+                values[name.lower()] = number
+        if unit := self.entity(entity.path, kind, values):
+            self._compare_ports(unit, entity, cell, source, faults)
+
+    def _compare_ports(
+        self, unit: Unit, entity: Entity, cell: Mapping[str, Any], source: SourceRef, faults: Diagnostics
+    ) -> None:
+        ports = {entity.spelt(port.name): port for port in unit.ports}
+        for name, bits in cell["connections"].items():
+            if not (port := ports.get(name)):
+                faults.error(f"'{unit.name}' has no port '{name}'", source, _legal(name, ports))
+            elif bits and port.bits is not None and len(bits) != port.bits:
+                parameters = ", ".join(entity.generics)
+                hint = f"the parameters {parameters} select the size" if parameters else ""
+                message = f"port '{name}' of '{unit.name}' has {port.bits} bits here, and is connected to {len(bits)}"
+                faults.error(message, source, hint)
+        for name, port in ports.items():
+            # In the netlist, an input has no default value.
+            if port.direction == "in" and not cell["connections"].get(name):
+                faults.error(f"input '{name}' of '{unit.name}' is not connected", source, "connect it")
+
+    def _report_missing(self, kind: str, source: SourceRef, faults: Diagnostics) -> None:
+        if core := core_with(kind):
+            hint = f"it is in {core}, on which the accelerator's core must depend"
+            faults.error(f"there is no module '{kind}' in the sources", source, hint)
+        elif self._libraries.is_complete and kind not in self._libraries.generated:
+            message = f"there is no module '{kind}' in the sources and in the VHDL of other cores"
+            near = closest(kind, self._entities)
+            faults.error(message, source, f"did you mean '{near}'?" if near else "add its file to 'sources'")
+
+
+def _legal(name: str, names: Iterable[str]) -> str:
+    near = closest(name, names)
+    return f"did you mean '{near}'?" if near else f"legal here: {', '.join(names) or 'none'}"
