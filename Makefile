@@ -82,7 +82,7 @@ offer_hook = prefix=$$(git rev-parse --show-prefix 2>/dev/null) && [ -z "$$prefi
   [ "$$(git config core.hooksPath)" != .ci/hooks ] && \
   echo "To check the messages of your commits, enable the hook: git config core.hooksPath .ci/hooks" || true
 
-.PHONY: help sim test check ci docs studio ros bitstream bench matrix proofs policies constants mutants corpus fuzz fuzz-netlist debian lint licences setup tools clean distclean
+.PHONY: help sim test check ci docs studio ros bitstream bench matrix proofs dissertation policies constants mutants corpus fuzz fuzz-netlist debian lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -151,6 +151,9 @@ matrix: tools $(VENV)/.extra-matrix ## Test each supported Python with the oldes
 proofs: TOOLS = yosys
 proofs: setup ## Prove the Manager, the schedulers, and readers, packets and frames of nodes in fabric; write docs/figures/proofs.md
 	@$(BIN)/python -m tools.proofs
+
+dissertation: $(VENV)/.extra-test ## Reproduce tables and figures of the dissertation in build/dissertation; pictures need matplotlib
+	@$(BIN)/python -m tools.dissertation --dataset all --output build/dissertation
 
 policies: $(VENV)/.installed ## Write the lists of schedulers in cores/sched from fusesoc_firm/scheduling/policies.py
 	@$(BIN)/python -m tools.policies

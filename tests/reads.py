@@ -18,11 +18,11 @@ import pytest
 
 from fusesoc_firm.core.core_reader import read_core_once
 from fusesoc_firm.scheduling.area import measured
-from fusesoc_firm.scheduling.dissertation import dissertation
 from fusesoc_firm.text import render
 from fusesoc_firm.text.reserved import declared_names
 from tests.hdl.ghdl import core_description
 from tests.recall import STORE
+from tools.dissertation.published import dissertation
 
 ROOT = Path(__file__).resolve().parents[1]
 EVERYTHING = "*"

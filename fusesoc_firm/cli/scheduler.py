@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import add_sources, command, load, natural, positive
+
+if TYPE_CHECKING:
+    from fusesoc_firm.scheduling.evaluation.bench import Selection
 
 
 def add_scheduler(commands: Any) -> None:
@@ -18,54 +21,10 @@ def add_scheduler(commands: Any) -> None:
         actions,
         "bench",
         "evaluate the schedulers with cycle-exact models, as in the dissertation's section 4.3",
-        "firm scheduler bench --dataset all --output evaluation",
+        "firm scheduler bench --policies lru,lst --requesters 8,32 --csv values.csv",
         _bench_schedulers,
     )
-    lists = "names separated by commas (default: %(default)s)"
-    bench.add_argument(
-        "--dataset", default="large", metavar="NAMES", help=f"data sets: large, cc1 to cc4, or all; {lists}"
-    )
-    bench.add_argument("--policies", default="all", metavar="NAMES", help=f"schedulers; {lists}")
-    bench.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
-    bench.add_argument(
-        "--sets", type=positive, metavar="N", help="number of sets in each data set (default: set by the data set)"
-    )
-    bench.add_argument(
-        "--cycles",
-        type=positive,
-        metavar="N",
-        help="number of cycles in each simulation (default: set by the data set)",
-    )
-    bench.add_argument("--seed", type=natural, default=1, metavar="N", help="seed of all random values (default: 1)")
-    bench.add_argument(
-        "--distribution",
-        choices=("normal", "uniform"),
-        default="normal",
-        help="distribution of the times (default: normal)",
-    )
-    bench.add_argument(
-        "--shortest-run",
-        type=positive,
-        default=1,
-        metavar="BEATS",
-        help="number of beats in a run before a preemptive scheduler may interrupt the run (default: 1)",
-    )
-    bench.add_argument(
-        "--resume-beats",
-        type=natural,
-        default=0,
-        metavar="BEATS",
-        help="number of additional beats in a resumed run; 1 for the Manager's bursts (default: 0, as in section 4.3)",
-    )
-    bench.add_argument(
-        "--jobs", type=positive, metavar="N", help="number of parallel simulations (default: one per processor core)"
-    )
-    bench.add_argument(
-        "--cluster", metavar="ADDRESS", help="run on the Dask cluster of the scheduler at ADDRESS, not on this machine"
-    )
-    bench.add_argument(
-        "--output", type=Path, metavar="DIR", help="write a report with all tables and figures into this folder"
-    )
+    add_evaluations(bench)
     bench.add_argument("--csv", type=Path, metavar="F.csv", help="write all metrics of all simulations to this table")
     choose = command(
         actions,
@@ -86,8 +45,55 @@ def add_scheduler(commands: Any) -> None:
     add_sources(choose)
 
 
-def _bench_schedulers(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.scheduling.evaluation.bench import Places, Selection, bench, names_of, numbers_of
+def add_evaluations(parser: argparse.ArgumentParser) -> None:
+    """Add the options that select evaluations, and the processors that run them."""
+    lists = "names separated by commas (default: %(default)s)"
+    parser.add_argument(
+        "--dataset", default="large", metavar="NAMES", help=f"data sets: large, cc1 to cc4, or all; {lists}"
+    )
+    parser.add_argument("--policies", default="all", metavar="NAMES", help=f"schedulers; {lists}")
+    parser.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
+    parser.add_argument(
+        "--sets", type=positive, metavar="N", help="number of sets in each data set (default: set by the data set)"
+    )
+    parser.add_argument(
+        "--cycles",
+        type=positive,
+        metavar="N",
+        help="number of cycles in each simulation (default: set by the data set)",
+    )
+    parser.add_argument("--seed", type=natural, default=1, metavar="N", help="seed of all random values (default: 1)")
+    parser.add_argument(
+        "--distribution",
+        choices=("normal", "uniform"),
+        default="normal",
+        help="distribution of the times (default: normal)",
+    )
+    parser.add_argument(
+        "--shortest-run",
+        type=positive,
+        default=1,
+        metavar="BEATS",
+        help="number of beats in a run before a preemptive scheduler may interrupt the run (default: 1)",
+    )
+    parser.add_argument(
+        "--resume-beats",
+        type=natural,
+        default=0,
+        metavar="BEATS",
+        help="number of additional beats in a resumed run; 1 for the Manager's bursts (default: 0, as in section 4.3)",
+    )
+    parser.add_argument(
+        "--jobs", type=positive, metavar="N", help="number of parallel simulations (default: one per processor core)"
+    )
+    parser.add_argument(
+        "--cluster", metavar="ADDRESS", help="run on the Dask cluster of the scheduler at ADDRESS, not on this machine"
+    )
+
+
+def selection_of(arguments: argparse.Namespace) -> Selection:
+    """Return the selected evaluations; raise `InputError` for an unknown name or an illegal number."""
+    from fusesoc_firm.scheduling.evaluation.bench import Selection, names_of, numbers_of
     from fusesoc_firm.scheduling.evaluation.jobs import Settings
     from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, REQUESTERS, Distribution
     from fusesoc_firm.scheduling.policies import POLICIES
@@ -95,7 +101,7 @@ def _bench_schedulers(arguments: argparse.Namespace) -> None:
     def names(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
         return tuple(legal) if text == "all" else names_of(text, legal, what)
 
-    selection = Selection(
+    return Selection(
         names(arguments.dataset, list(DATA_SETS), "data set"),
         names(arguments.policies, list(POLICIES), "policy"),
         REQUESTERS if arguments.requesters is None else numbers_of(arguments.requesters),
@@ -108,7 +114,12 @@ def _bench_schedulers(arguments: argparse.Namespace) -> None:
             arguments.resume_beats,
         ),
     )
-    bench(selection, Places(arguments.jobs, arguments.cluster, arguments.output, arguments.csv))
+
+
+def _bench_schedulers(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.scheduling.evaluation.bench import Places, bench
+
+    bench(selection_of(arguments), Places(arguments.jobs, arguments.cluster), arguments.csv)
 
 
 def _choose_scheduler(arguments: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ from math import floor, inf
 
 from fusesoc_firm.scheduling import area, response
 from fusesoc_firm.scheduling.area import Areas
-from fusesoc_firm.scheduling.policies import POLICIES, TABLE_ORDER, Order
+from fusesoc_firm.scheduling.policies import POLICIES, Order
 from fusesoc_firm.scheduling.response import Overheads
 from fusesoc_firm.scheduling.tasks import Task
 
@@ -267,7 +267,7 @@ def choose(
     if len({task.name for task in tasks}) < len(tasks):
         raise ValueError("task names must be unique")
     analyses = sorted(
-        (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in TABLE_ORDER), key=_RANKS[criterion]
+        (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in POLICIES), key=_RANKS[criterion]
     )
     load = utilisation(tasks)
     names = tuple(task.name for task in tasks)

@@ -26,8 +26,6 @@ class Policy:
     """A policy; `name` is its name in specifications, and the name of the model's function and file."""
 
     name: str
-    short: str
-    """The abbreviation in the dissertation, or a similar one."""
     title: str
     """The name in the dissertation's tables, or a similar one."""
     order: Order = Order.OTHER
@@ -75,21 +73,19 @@ class Policy:
 
 
 _ROWS = (
-    Policy("fixed_priority", "NPFP", "Non-Preemptive FP", Order.PRIORITY),
+    Policy("fixed_priority", "Non-Preemptive FP", Order.PRIORITY),
     Policy(
         "fixed_priority_preemptive",
-        "PFP",
         "Preemptive FP",
         Order.PRIORITY,
         is_preemptive=True,
         model="fixed_priority",
         core="fixed_priority",
     ),
-    Policy("round_robin", "RR", "Round robin", Order.TURNS),
-    Policy("lru", "LRU", "LRU", Order.TURNS, most_at_once=16),
+    Policy("round_robin", "Round robin", Order.TURNS),
+    Policy("lru", "LRU", Order.TURNS, most_at_once=16),
     Policy(
         "edf_resources",
-        "ROEDF",
         "Resources-Optimized EDF",
         Order.DEADLINE,
         is_preemptive=True,
@@ -99,7 +95,6 @@ _ROWS = (
     ),
     Policy(
         "edf_latency",
-        "LOEDF",
         "Latency-Optimized EDF",
         Order.DEADLINE,
         is_preemptive=True,
@@ -110,7 +105,6 @@ _ROWS = (
     ),
     Policy(
         "lst",
-        "LST",
         "LST",
         Order.SLACK,
         is_preemptive=True,
@@ -124,9 +118,3 @@ POLICIES: Mapping[str, Policy] = MappingProxyType({policy.name: policy for polic
 """All policies, in the order in which specifications, VHDL and pages list them."""
 
 DEFAULT = "fixed_priority"
-
-EVALUATED = ("lru", "fixed_priority", "fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
-"""The dissertation's six policies, in the order of its tables."""
-
-TABLE_ORDER = (*EVALUATED, *(name for name in POLICIES if name not in EVALUATED))
-"""All policies; those in the dissertation's tables are first."""

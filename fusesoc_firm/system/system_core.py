@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from enum import Enum
 from fractions import Fraction
 from functools import cached_property, partial
 from pathlib import Path, PurePosixPath
@@ -228,20 +227,11 @@ def _board(request: Request) -> Board | None:
     return read_board(str(name), request.files_root) if name else None
 
 
-class Part(Enum):
-    """The purpose of a generated file, classified as in the dissertation's table 6.2."""
-
-    CONVERTERS = "converters"
-    WRAPPERS = "wrappers"
-    COMPONENTS = "components"
-
-
 @dataclass(frozen=True)
 class Artifact:
-    """A generated file: name, purpose, template and data."""
+    """A generated file: name, template and data."""
 
     path: str
-    part: Part
     template: str
     configuration: Context
 
@@ -269,28 +259,28 @@ def _least_pipeline(system: DerivedSystem) -> str:
 def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     system = loaded.system
     for path, configuration in constants_configurations(loaded.messages()):
-        yield Artifact(path, Part.CONVERTERS, CONSTANTS_TEMPLATE, configuration)
+        yield Artifact(path, CONSTANTS_TEMPLATE, configuration)
     for item in system.subscribers:
         entity = subscriber_entity(item.frame, item.suffix)
         pipeline = pipeline_of(item.frame, system.pipeline, _least_pipeline(system))
-        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity, pipeline))
+        yield Artifact(f"{entity}.vhd", *subscriber_source(item.frame, system.width, entity, pipeline))
     for item in system.publishers:
         entity = publisher_entity(item.frame, item.suffix)
-        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *publisher_source(item.frame, system.width, entity))
+        yield Artifact(f"{entity}.vhd", *publisher_source(item.frame, system.width, entity))
     for frame, suffix in system.computed_lengths.items():
         configuration = payload_length_configuration(frame, suffix)
-        yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
+        yield Artifact(f"{length_entity(frame, suffix)}.vhd", LENGTH_TEMPLATE, configuration)
     for type_ in system.kernels:
         made = wrapper(type_)
-        yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, made.template, dict(made.context))
+        yield Artifact(f"{type_.entity}.vhd", made.template, dict(made.context))
     for type_ in system.accelerator_types:
         if type_.inner:
-            yield Artifact(f"{type_.entity}.vhd", Part.WRAPPERS, BYPASS_TEMPLATE, bypass_configuration(type_))
+            yield Artifact(f"{type_.entity}.vhd", BYPASS_TEMPLATE, bypass_configuration(type_))
     if system.status:
         signatures = identity(loaded).signatures
         configuration = registers_configuration(status_registers(loaded), signatures, address_bits(system))
-        yield Artifact(f"{status_entity(system)}.vhd", Part.COMPONENTS, REGISTERS_TEMPLATE, configuration)
-    yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
+        yield Artifact(f"{status_entity(system)}.vhd", REGISTERS_TEMPLATE, configuration)
+    yield Artifact(f"{system.entity}.vhd", SYSTEM_TEMPLATE, system_configuration(system))
 
 
 def identity(loaded: LoadedSystem) -> Identity:

@@ -11,7 +11,7 @@ from pathlib import Path
 from tests.hdl.ghdl import CORES, REPOSITORY
 from tools.policies.lists import files
 
-ROW = '    Policy("last_first", "LF", "Last first"),\n'
+ROW = '    Policy("last_first", "Last first"),\n'
 MODEL = '''"""The highest index first."""
 
 from fusesoc_firm.scheduling.models.base import Bools, Generics, Ints
@@ -76,7 +76,15 @@ TESTS = (
 
 
 def test_a_row_a_model_and_an_entity_are_a_policy(tmp_path: Path) -> None:
-    for name in ("fusesoc_firm", "cores", "tests/cores", "tests/hdl", "tests/system", "tools/policies"):
+    for name in (
+        "fusesoc_firm",
+        "cores",
+        "tests/cores",
+        "tests/hdl",
+        "tests/system",
+        "tools/dissertation",
+        "tools/policies",
+    ):
         shutil.copytree(REPOSITORY / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     for path in (REPOSITORY / "pyproject.toml", *REPOSITORY.glob("tests/*.py")):
         shutil.copy(path, tmp_path / path.relative_to(REPOSITORY))

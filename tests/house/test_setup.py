@@ -148,6 +148,7 @@ def test_make_without_a_target_lists_them() -> None:
         "bitstream",
         "matrix",
         "proofs",
+        "dissertation",
         "policies",
         "constants",
         "fuzz",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusesoc_firm.scheduling.dissertation import dissertation
 from fusesoc_firm.scheduling.evaluation.combinations import COMBINATIONS, combined
 from fusesoc_firm.scheduling.evaluation.jobs import Job, Key, Settings, evaluate, jobs
 from fusesoc_firm.scheduling.evaluation.simulation import simulate
@@ -35,7 +34,6 @@ def test_the_longest_jobs_come_first() -> None:
 def test_combinations_join_in_with_their_parts() -> None:
     everything = {job.key.policy for job in jobs(["large"], ["edf_latency", "lst", "lru"], [2, 256], Settings())}
     assert set(COMBINATIONS) <= everything
-    assert set(COMBINATIONS) | {"LOEDF256", "LST256"} == set(dissertation().combined_area)
     without = {job.key.policy for job in jobs(["large"], ["edf_latency", "lru"], [2, 256], Settings())}
     assert without & set(COMBINATIONS) == {"(LOEDF128+LOEDF128)+LRU2"}
     assert not {job.key.policy for job in jobs(["large"], ["edf_latency", "lst"], [2], Settings())} & set(COMBINATIONS)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fusesoc_firm.scheduling.evaluation.simulation import Trace, simulate
-from fusesoc_firm.scheduling.evaluation.timeline import Recorder
 from fusesoc_firm.scheduling.evaluation.workloads import Times, Workload
 from fusesoc_firm.scheduling.models import Generics, make_model
 from tests.scheduling.numbers import times
+from tools.dissertation.timeline import Recorder
 
 
 def run(

@@ -1,4 +1,4 @@
-"""Areas of the Manager and of schedulers as a file: `firm scheduler bench` shows them, the choice compares them."""
+"""Areas of the Manager and of schedulers as a file: the choice of a scheduler compares them."""
 
 from __future__ import annotations
 

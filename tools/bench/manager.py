@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from fusesoc_firm.scheduling.area import MANAGER, MANAGER_PREEMPTIVE
-from fusesoc_firm.scheduling.dissertation import dissertation
 from fusesoc_firm.scheduling.evaluation.combinations import COMBINATIONS, COMBINED_REQUESTERS
 from fusesoc_firm.scheduling.evaluation.workloads import REQUESTERS
 from fusesoc_firm.scheduling.policies import POLICIES
@@ -16,6 +15,7 @@ from tools.bench.area import WIDTHS, Bar, Row, Subject, of_core, tables_of
 from tools.bench.designs import CORES
 from tools.bench.tables import Table, Tell
 from tools.bench.yosys import Yosys
+from tools.dissertation.published import dissertation
 
 # The sum of table 3.3, LUT/FF.
 DISSERTATION = {

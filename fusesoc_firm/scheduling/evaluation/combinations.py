@@ -10,10 +10,7 @@ import numpy as np
 from fusesoc_firm.scheduling.models import Combined, Generics, make_model
 
 COMBINED_REQUESTERS = 256
-"""The accelerators of figure 4.18 and of table 4.5."""
-
-BASELINES: Mapping[str, str] = MappingProxyType({"LOEDF256": "edf_latency", "LST256": "lst"})
-"""The schedulers for comparison: the name in table 4.5, and the policy."""
+"""The number of accelerators with which combined schedulers are evaluated."""
 
 COMBINATIONS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {

@@ -1,14 +1,13 @@
-"""The amounts of hand-written and generated code: the dissertation's table 6.2, for any system."""
+"""The amounts of hand-written and generated code of a system."""
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.system.system_core import LoadedSystem, Part, artifacts
+from fusesoc_firm.system.system_core import Artifact, LoadedSystem, artifacts
 
 
 @dataclass(frozen=True)
@@ -22,15 +21,13 @@ class Report:
     name: str
     written: int
     configuration: int
-    wrappers: int
-    converters: int
-    components: int
+    files: int
     software: int = 0
 
     @property
     def generated(self) -> int:
         """The total number of generated lines."""
-        return self.configuration + self.wrappers + self.converters + self.components
+        return self.configuration + self.files
 
     @property
     def ratio(self) -> float:
@@ -43,9 +40,7 @@ class Report:
             "lines written: specification": self.written,
             **({"lines written: software": self.software} if self.software else {}),
             "template configuration": self.configuration,
-            "accelerators' wrappers": self.wrappers,
-            "converters": self.converters,
-            "system components": self.components,
+            "generated files": self.files,
             "lines generated": self.generated,
             "generated for each line written": f"{self.ratio:.2f}",
         }
@@ -55,21 +50,19 @@ class Report:
 
 def report(specification: Path, loaded: LoadedSystem) -> Report:
     """Count the lines of a system and of its specification; may raise `InputError`."""
-    lines: Counter[Part] = Counter()
-    configuration = 0
-    for item in artifacts(loaded):
-        lines[item.part] += _lines_of_code(item.text, "--")
-        data = yaml.safe_dump(item.configuration, sort_keys=False, width=10**6)
-        configuration += _lines_of_code(data, "#")
+    made = artifacts(loaded)
     return Report(
         loaded.system.name,
-        _lines_of_code(specification.read_text(encoding="utf-8"), "#"),
-        configuration,
-        lines[Part.WRAPPERS],
-        lines[Part.CONVERTERS],
-        lines[Part.COMPONENTS],
-        sum(_lines_of_code(path.read_text(encoding="utf-8"), "#") for path in _software(loaded)),
+        lines_of_code(specification.read_text(encoding="utf-8"), "#"),
+        sum(_configuration_lines(item) for item in made),
+        sum(lines_of_code(item.text, "--") for item in made),
+        sum(lines_of_code(path.read_text(encoding="utf-8"), "#") for path in _software(loaded)),
     )
+
+
+def _configuration_lines(item: Artifact) -> int:
+    """Return the number of lines of a template's data in YAML."""
+    return lines_of_code(yaml.safe_dump(item.configuration, sort_keys=False, width=10**6), "#")
 
 
 def _software(loaded: LoadedSystem) -> list[Path]:
@@ -78,5 +71,6 @@ def _software(loaded: LoadedSystem) -> list[Path]:
     return [*dict.fromkeys((loaded.folder / source).resolve() for source in sources)]
 
 
-def _lines_of_code(text: str, comment: str) -> int:
+def lines_of_code(text: str, comment: str) -> int:
+    """Return the number of lines that are neither empty nor comments."""
     return sum(bool(line.strip()) and not line.lstrip().startswith(comment) for line in text.split("\n"))

@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fusesoc_firm.scheduling.dissertation import dissertation
 from fusesoc_firm.scheduling.evaluation.jobs import model_of
 from fusesoc_firm.scheduling.evaluation.metrics import measure
 from fusesoc_firm.scheduling.evaluation.simulation import Flags, SchedulerModel, simulate
 from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, Times, Workload, draw
 from fusesoc_firm.scheduling.models import Generics, Scheduler
+from tools.dissertation.published import dissertation
 
 pytestmark = pytest.mark.thorough
 

@@ -9,8 +9,8 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.scheduling.evaluation.timeline import Timeline
-from fusesoc_firm.scheduling.tables import Figure, Panel
+from tools.dissertation.tables import Figure, Panel
+from tools.dissertation.timeline import Timeline
 
 SUFFIXES = ("png", "svg")
 

@@ -5,14 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from fusesoc_firm.scheduling.area import Areas
-from fusesoc_firm.scheduling.dissertation import dissertation
-from fusesoc_firm.scheduling.evaluation.combinations import BASELINES, COMBINATIONS, COMBINED_REQUESTERS
+from fusesoc_firm.scheduling.evaluation.combinations import COMBINATIONS, COMBINED_REQUESTERS
 from fusesoc_firm.scheduling.evaluation.jobs import Key
 from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, REQUESTERS
-from fusesoc_firm.scheduling.policies import EVALUATED, POLICIES, TABLE_ORDER
-from fusesoc_firm.scheduling.tables import UNKNOWN, Figure, Panel, Table, decimal
+from fusesoc_firm.scheduling.policies import POLICIES
+from fusesoc_firm.scheduling.tables import UNKNOWN, decimal
+from tools.dissertation.published import EVALUATED, dissertation
+from tools.dissertation.tables import Figure, Panel, Table
+
+BASELINES: Mapping[str, str] = MappingProxyType({"LOEDF256": "edf_latency", "LST256": "lst"})
+"""The schedulers for comparison with combined ones: the name in table 4.5, and the policy."""
 
 LARGE = "large"
 CORNER_CASES = tuple(name for name in DATA_SETS if name != LARGE)
@@ -21,6 +26,15 @@ _NOT_MEASURED = "Our LUTs and FFs are not measured here; `make bench` measures t
 _MEASURED = "Ours are Yosys', the dissertation's Vivado's; a dash is not measured."
 # Values whose text is equal are ranked as equal.
 _EQUAL = 0.005
+_ABBREVIATIONS = {
+    "lru": "LRU",
+    "fixed_priority": "NPFP",
+    "fixed_priority_preemptive": "PFP",
+    "round_robin": "RR",
+    "edf_resources": "ROEDF",
+    "edf_latency": "LOEDF",
+    "lst": "LST",
+}
 
 
 @dataclass(frozen=True)
@@ -39,9 +53,9 @@ class Evaluation:
         return tuple(sorted({key.requesters for key in self.means if key.data_set == data_set}))
 
     def policies(self, data_set: str) -> tuple[str, ...]:
-        """Return the evaluated policies, in the order of the tables."""
+        """Return the evaluated policies, in the order of the tables; policies of others are last."""
         found = {key.policy for key in self.means if key.data_set == data_set}
-        return tuple(name for name in TABLE_ORDER if name in found)
+        return tuple(name for name in dict.fromkeys((*EVALUATED, *POLICIES)) if name in found)
 
 
 def tables(evaluation: Evaluation) -> Iterator[Table]:
@@ -77,7 +91,7 @@ def _area_table(areas: Areas) -> Table:
     rows = []
     for policy in EVALUATED:
         for number, (lut, ff) in dissertation().area[policy].items():
-            rows.append((POLICIES[policy].short, str(number), *_area(areas, policy, number), str(lut), str(ff)))
+            rows.append((_short(policy), str(number), *_area(areas, policy, number), str(lut), str(ff)))
     columns = ("scheduler", "accelerators", "LUT", "FF", "dissertation LUT", "dissertation FF")
     return Table("4.1", "resource utilisation", columns, tuple(rows), _area_note(areas))
 
@@ -114,7 +128,7 @@ def _spread_table(
             ours = [evaluation.value(LARGE, policy, requesters, f"{metric}_{part}") for part in parts]
             known = theirs.get(policy, {}).get(requesters, (math.nan,) * 3)
             cells = map(decimal, (*ours, *known))
-            rows.append((POLICIES[policy].short, str(requesters), *cells, _verdict(ours[1], known[1])))
+            rows.append((_short(policy), str(requesters), *cells, _verdict(ours[1], known[1])))
     columns = ("scheduler", "accelerators", *parts, *(f"dissertation {part}" for part in parts), "our average is")
     return Table(number, title, columns, tuple(rows))
 
@@ -181,8 +195,12 @@ def _best(scores: Mapping[str, float]) -> list[str]:
     return [name for name, score in scores.items() if score <= least + _EQUAL]
 
 
+def _short(policy: str) -> str:
+    return _ABBREVIATIONS.get(policy, policy)
+
+
 def _names(policies: Sequence[str]) -> str:
-    return ", ".join(POLICIES[name].short for name in policies) or UNKNOWN
+    return ", ".join(_short(name) for name in policies) or UNKNOWN
 
 
 # --- Figures -----------------------------------------------------------------------------------------------------
@@ -194,8 +212,8 @@ def _area_figure(areas: Areas, numbers: tuple[int, ...]) -> Figure:
         ours, theirs = {}, {}
         for policy in EVALUATED:
             found = [areas.get((policy, number)) for number in numbers]
-            ours[POLICIES[policy].short] = [float(getattr(each, part)) if each else math.nan for each in found]
-            theirs[POLICIES[policy].short] = [dissertation().area[policy][number][index] for number in numbers]
+            ours[_short(policy)] = [float(getattr(each, part)) if each else math.nan for each in found]
+            theirs[_short(policy)] = [dissertation().area[policy][number][index] for number in numbers]
         panels.append(Panel(title, ours, theirs))
     return Figure("4.5", "resource utilisation", "cells", numbers, tuple(panels))
 
@@ -205,7 +223,7 @@ def _large_figures(evaluation: Evaluation, numbers: tuple[int, ...]) -> Iterator
 
     def panel(title: str, metric: str, table: Mapping[str, Mapping[int, Sequence[float]]], column: int) -> Panel:
         known = {
-            POLICIES[policy].short: [rows[number][column] if number in rows else math.nan for number in numbers]
+            _short(policy): [rows[number][column] if number in rows else math.nan for number in numbers]
             for policy, rows in table.items()
         }
         return Panel(title, _series(evaluation, LARGE, numbers, metric), known)
@@ -260,6 +278,6 @@ def _case_title(case: str) -> str:
 
 def _series(evaluation: Evaluation, data_set: str, numbers: Sequence[int], metric: str) -> dict[str, list[float]]:
     return {
-        POLICIES[policy].short: [evaluation.value(data_set, policy, number, metric) for number in numbers]
+        _short(policy): [evaluation.value(data_set, policy, number, metric) for number in numbers]
         for policy in evaluation.policies(data_set)
     }

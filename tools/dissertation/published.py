@@ -1,14 +1,17 @@
-"""The values of the dissertation's tables 4.1 to 4.6, from the data file next to this module."""
+"""The values of the dissertation's tables 4.1 to 4.6, from the data file beside this module."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 
 import yaml
 
 Row = list[float]
+
+EVALUATED = ("lru", "fixed_priority", "fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
+"""The dissertation's six policies, in the order of its tables."""
 
 
 @dataclass(frozen=True)
@@ -26,5 +29,4 @@ class Dissertation:
 @cache
 def dissertation() -> Dissertation:
     """Return all tables of the data file."""
-    file = resources.files(__package__) / "dissertation.yaml"
-    return Dissertation(**yaml.safe_load(file.read_text(encoding="utf-8")))
+    return Dissertation(**yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")))

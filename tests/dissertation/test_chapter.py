@@ -11,16 +11,17 @@ import pytest
 
 from fusesoc_firm.scheduling import area
 from fusesoc_firm.scheduling.area import Area
-from fusesoc_firm.scheduling.dissertation import dissertation
-from fusesoc_firm.scheduling.evaluation import pictures
-from fusesoc_firm.scheduling.evaluation.chapter import Evaluation, figures, tables
+from fusesoc_firm.scheduling.evaluation.combinations import COMBINATIONS
 from fusesoc_firm.scheduling.evaluation.jobs import Key
 from fusesoc_firm.scheduling.evaluation.metrics import METRICS
 from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, REQUESTERS
-from fusesoc_firm.scheduling.policies import EVALUATED, POLICIES
-from fusesoc_firm.scheduling.tables import Table, figure_csv, figure_markdown, markdown, table_csv
+from fusesoc_firm.scheduling.policies import POLICIES
 from tools.bench import tables as bench_tables
 from tools.bench.areas import write_areas
+from tools.dissertation import pictures
+from tools.dissertation.chapter import BASELINES, Evaluation, figures, tables
+from tools.dissertation.published import EVALUATED, dissertation
+from tools.dissertation.tables import Table, figure_csv, figure_markdown, markdown, table_csv
 
 
 def evaluation(areas: area.Areas | None = None) -> Evaluation:
@@ -67,6 +68,7 @@ def test_facts_of_the_dissertation() -> None:
     assert facts.lateness["lru"][2] == [-129.11, -65.9, -1.81]
     assert facts.lateness["lst"][256] == [-96.74, 4078.41, 9526.57]
     assert facts.combined_area["(LST128+LST128)+LRU2"] == [86673, 33515]
+    assert set(facts.combined_area) == {*BASELINES, *COMBINATIONS}
     assert facts.comparison[2]["finished"] == ["edf_resources"]
     assert facts.comparison[256]["utilisation"] == ["lst"]
     # Table 4.2 is what table 4.1 gives.
@@ -130,7 +132,7 @@ def test_text_and_csv_hold_the_same_cells() -> None:
 
 def test_a_figure_holds_a_line_a_scheduler() -> None:
     (found,) = [each for each in figures(evaluation()) if each.number == "4.10"]
-    assert list(found.panels[0].series) == [POLICIES[policy].short for policy in EVALUATED]
+    assert list(found.panels[0].series) == ["LRU", "NPFP", "PFP", "ROEDF", "LOEDF", "LST"]
     assert found.panels[0].dissertation["LST"][-1] == 3808.68
     rows = list(csv.DictReader(io.StringIO(figure_csv(found))))
     assert len(rows) == len(EVALUATED) * len(REQUESTERS)
