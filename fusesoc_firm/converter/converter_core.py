@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.constants import (
-    CONSTANTS_TEMPLATE,
-    constants_configuration,
-    constants_package,
-)
 from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_configuration
 from fusesoc_firm.converter.order import ENTITIES, Order, Selection, order_of_config, order_of_message
 from fusesoc_firm.converter.pipeline import pipeline_of
-from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
+from fusesoc_firm.converter.sources import Artifact, constants_sources, publisher_source, subscriber_source
 from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.middleware import Definitions, middleware_of
-from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.text.render import Context, render
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.text.render import render
 
 VHDL = "vhdlSource-93"
 
@@ -50,7 +43,9 @@ def load(request: Request) -> LoadedRequest:
 
 def converters_core(order: Order) -> GeneratedCore:
     """Return the core of an order, with its files in compilation order; may raise `InputError`."""
-    files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
+    files = files_of(
+        constants_sources([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
+    )
     interfaces: dict[str, GeneratedFile] = {}
     for wanted in order.messages:
         frames = [wanted.frame]
@@ -66,43 +61,24 @@ def converters_core(order: Order) -> GeneratedCore:
     return GeneratedCore(f"Converters of {order.title}", files | interfaces)
 
 
-def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix: str = "") -> dict[str, GeneratedFile]:
-    """Return the package files of the messages, each once, by name; the definitions include nested messages."""
-    return {
-        path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
-        for path, configuration in constants_configurations(messages, prefix)
-    }
-
-
-def constants_configurations(
-    messages: Sequence[tuple[MessageName, Definitions]], prefix: str = ""
-) -> Iterator[tuple[str, Context]]:
-    """Yield the file name of each message's package, with the configuration to render it."""
-    counts = Counter(name for name, _ in messages)
-    for name, definitions in messages:
-        package = constants_package(name, definitions[name].ros if counts[name] > 1 else None, prefix)
-        yield f"{package}.vhd", constants_configuration(name, definitions, package)
+def files_of(artifacts: Iterable[Artifact]) -> dict[str, GeneratedFile]:
+    """Return VHDL files, each once, by name."""
+    return {item.path: GeneratedFile(item.text, VHDL) for item in artifacts}
 
 
 def subscriber_files(
     frames: Iterable[Frame], width: int, prefix: str = "", pipeline: str | None = None
 ) -> dict[str, GeneratedFile]:
     """Return `<prefix>_axis_to_<pkg>_<type>.vhd` for each frame; for `pipeline`, see `pipeline_of`."""
-    entities = {subscriber_entity(frame, prefix=prefix): frame for frame in frames}
-    return {
-        f"{entity}.vhd": _file(subscriber_source(frame, width, entity, pipeline_of(frame, pipeline)))
-        for entity, frame in entities.items()
-    }
+    return files_of(
+        subscriber_source(frame, width, subscriber_entity(frame, prefix=prefix), pipeline_of(frame, pipeline))
+        for frame in frames
+    )
 
 
 def publisher_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
     """Return `<prefix>_<pkg>_<type>_to_axis.vhd` for each frame."""
-    entities = {publisher_entity(frame, prefix=prefix): frame for frame in frames}
-    return {f"{entity}.vhd": _file(publisher_source(frame, width, entity)) for entity, frame in entities.items()}
-
-
-def _file(source: ConverterSource) -> GeneratedFile:
-    return GeneratedFile(render(source.template, source.configuration), VHDL)
+    return files_of(publisher_source(frame, width, publisher_entity(frame, prefix=prefix)) for frame in frames)
 
 
 def order_of_request(request: Request) -> Order:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from fusesoc_firm.text.yaml_text import yaml_dump
 
 if TYPE_CHECKING:
-    from fusesoc_firm.converter.sources import ConverterSource
+    from fusesoc_firm.converter.sources import Artifact
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.message.middleware import Definitions
     from fusesoc_firm.message.model import MessageName
@@ -72,21 +72,16 @@ def _configuration(name: MessageName, definitions: Definitions, width: int) -> s
 
 
 def _vhdl(name: MessageName, definitions: Definitions, width: int) -> str:
-    from fusesoc_firm.text.render import render
-
-    return "\n".join(render(source.template, source.configuration) for source in _sources(name, definitions, width))
+    return "\n".join(source.text for source in _sources(name, definitions, width))
 
 
-def _sources(name: MessageName, definitions: Definitions, width: int) -> Iterator[ConverterSource]:
+def _sources(name: MessageName, definitions: Definitions, width: int) -> Iterator[Artifact]:
     """Yield the message's package of constants, and both converters."""
-    from fusesoc_firm.converter import constants
-    from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
+    from fusesoc_firm.converter.sources import constants_sources, publisher_source, subscriber_source
     from fusesoc_firm.frame.layout import frame_of
 
     frame = frame_of(name, definitions)
-    package = constants.constants_package(frame.message)
-    configuration = constants.constants_configuration(frame.message, definitions, package)
-    yield ConverterSource(constants.CONSTANTS_TEMPLATE, configuration)
+    yield from constants_sources([(name, definitions)])
     yield subscriber_source(frame, width)
     yield publisher_source(frame, width)
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
-from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
+from fusesoc_firm.converter.converter_core import VHDL, files_of, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.pipeline import BORDERS, FULL, NONE, pipeline_of
-from fusesoc_firm.converter.sources import publisher_source, subscriber_source
+from fusesoc_firm.converter.sources import Artifact, constants_sources, publisher_source, subscriber_source
 from fusesoc_firm.core.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES, Definitions, Middleware
@@ -71,7 +70,7 @@ from fusesoc_firm.system.written.specification import (
 )
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
-from fusesoc_firm.text.render import Context, render
+from fusesoc_firm.text.render import render
 from fusesoc_firm.text.yaml_text import Text
 from fusesoc_firm.tools.reads import Input
 
@@ -227,20 +226,6 @@ def _board(request: Request) -> Board | None:
     return read_board(str(name), request.files_root) if name else None
 
 
-@dataclass(frozen=True)
-class Artifact:
-    """A generated file: name, template and data."""
-
-    path: str
-    template: str
-    configuration: Context
-
-    @cached_property
-    def text(self) -> str:
-        """The text of the file."""
-        return render(self.template, self.configuration)
-
-
 def artifacts(loaded: LoadedSystem) -> list[Artifact]:
     """Return all generated files of a system, each once, in compilation order with the top level last."""
     return list({item.path: item for item in _artifacts(loaded)}.values())
@@ -258,15 +243,12 @@ def _least_pipeline(system: DerivedSystem) -> str:
 
 def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     system = loaded.system
-    for path, configuration in constants_configurations(loaded.messages()):
-        yield Artifact(path, CONSTANTS_TEMPLATE, configuration)
+    yield from constants_sources(loaded.messages())
     for item in system.subscribers:
-        entity = subscriber_entity(item.frame, item.suffix)
         pipeline = pipeline_of(item.frame, system.pipeline, _least_pipeline(system))
-        yield Artifact(f"{entity}.vhd", *subscriber_source(item.frame, system.width, entity, pipeline))
+        yield subscriber_source(item.frame, system.width, subscriber_entity(item.frame, item.suffix), pipeline)
     for item in system.publishers:
-        entity = publisher_entity(item.frame, item.suffix)
-        yield Artifact(f"{entity}.vhd", *publisher_source(item.frame, system.width, entity))
+        yield publisher_source(item.frame, system.width, publisher_entity(item.frame, item.suffix))
     for frame, suffix in system.computed_lengths.items():
         configuration = payload_length_configuration(frame, suffix)
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", LENGTH_TEMPLATE, configuration)
@@ -306,7 +288,7 @@ def status_text(loaded: LoadedSystem) -> str:
 def system_core(loaded: LoadedSystem) -> GeneratedCore:
     """Return the core of a loaded system, with its files in compilation order; may raise `InputError`."""
     system = loaded.system
-    made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
+    made = files_of(artifacts(loaded))
     # Units that instantiate the user's units follow them.
     after = [*(f"{type_.entity}.vhd" for type_ in system.accelerator_types if type_.inner), f"{system.entity}.vhd"]
     files = {path: file for path, file in made.items() if path not in after}

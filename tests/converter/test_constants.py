@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.converter.converter_core import constants_files, load
+from fusesoc_firm.converter.converter_core import load
+from fusesoc_firm.converter.sources import constants_sources
 from fusesoc_firm.core.request import Plain, Request
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
@@ -37,10 +38,9 @@ TEXTS = {"awkward_msgs/Kinds": KINDS, "awkward_msgs/Inner": "int8 LOW=-1\nint8 v
 def text_of(ros: Middleware, name: str) -> str:
     message = parse_name(name)
     definitions = parsed(TEXTS, ros) if name in TEXTS else LIBRARIES[ros].closure(message)
-    ((path, file),) = constants_files([(message, definitions)]).items()
-    assert path == f"{name.replace('/', '_').lower()}_pkg.vhd"
-    assert file.file_type == "vhdlSource-93"
-    return str(file.content)
+    (file,) = constants_sources([(message, definitions)])
+    assert file.path == f"{name.replace('/', '_').lower()}_pkg.vhd"
+    return file.text
 
 
 @pytest.mark.parametrize(
@@ -83,8 +83,8 @@ def test_long_names_put_their_comments_above() -> None:
     long = "A" * 50
     name = parse_name("my_msgs/Long")
     definitions = parsed({"my_msgs/Long": f"uint64 {long}=1\nuint8 B=2\n"}, ROS1)
-    (file,) = constants_files([(name, definitions)]).values()
-    lines = str(file.content).splitlines()
+    (file,) = constants_sources([(name, definitions)])
+    lines = file.text.splitlines()
     assert f"  -- uint64 {long}=1" in lines
     assert f'  constant B{" " * 49} : std_logic_vector(7 downto 0)  := x"02";' in lines
     assert max(map(len, lines)) <= LONGEST_LINE
@@ -92,9 +92,9 @@ def test_long_names_put_their_comments_above() -> None:
 
 def test_the_versions_of_one_message_have_packages_of_two_names() -> None:
     name = parse_name("std_msgs/Header")
-    files = constants_files([(name, LIBRARIES[ros].closure(name)) for ros in (ROS1, ROS2)])
-    assert list(files) == ["std_msgs_header_ros1_pkg.vhd", "std_msgs_header_ros2_pkg.vhd"]
-    assert all(f"package {path.removesuffix('.vhd')} is\n" in str(file.content) for path, file in files.items())
+    files = list(constants_sources([(name, LIBRARIES[ros].closure(name)) for ros in (ROS1, ROS2)]))
+    assert [file.path for file in files] == ["std_msgs_header_ros1_pkg.vhd", "std_msgs_header_ros2_pkg.vhd"]
+    assert all(f"package {file.path.removesuffix('.vhd')} is\n" in file.text for file in files)
 
 
 def test_the_package_is_the_first_file_of_a_core(tmp_path: Path) -> None:

@@ -137,8 +137,8 @@ def test_its_converters_in_simulation(
 
 def write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
     texts = {
-        subscriber_entity(frame): render(*subscriber_source(frame, width)),
-        publisher_entity(frame): render(*publisher_source(frame, width)),
+        subscriber_entity(frame): subscriber_source(frame, width).text,
+        publisher_entity(frame): publisher_source(frame, width).text,
         "loop": loop_text(frame, width),
     }
     assert all("(Parcel)" in text for text in texts.values())

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.system.system_core import Artifact, LoadedSystem, artifacts
+from fusesoc_firm.converter.sources import Artifact
+from fusesoc_firm.system.system_core import LoadedSystem, artifacts
 
 
 @dataclass(frozen=True)

@@ -83,9 +83,8 @@ class Subscriber:
         folder = self.library.directory / self.library.name
         folder.mkdir(exist_ok=True)
         file = folder / f"{self.entity}.vhd"
-        file.write_text(
-            render(*subscriber_source(self.frame, self.width, self.entity, self.pipeline)), encoding="ascii"
-        )
+        source = subscriber_source(self.frame, self.width, self.entity, self.pipeline)
+        file.write_text(source.text, encoding="ascii")
         self.library.analyse([file])
         self.analyse_bench()
 

@@ -15,7 +15,7 @@ import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores
 
-from fusesoc_firm.converter.converter_core import constants_files
+from fusesoc_firm.converter.sources import constants_sources
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
@@ -164,10 +164,10 @@ end architecture;
 
 
 def written(folder: Path, library: MessageLibrary, names: list[MessageName]) -> list[Path]:
-    files = constants_files([(name, library.closure(name)) for name in names])
-    for name, file in files.items():
-        (folder / name).write_bytes(str(file.content).encode("ascii"))
-    return [folder / name for name in files]
+    files = list(constants_sources([(name, library.closure(name)) for name in names]))
+    for file in files:
+        (folder / file.path).write_text(file.text, encoding="ascii")
+    return [folder / file.path for file in files]
 
 
 def analysed(folder: Path, files: list[Path]) -> Library:
